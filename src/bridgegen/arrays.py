@@ -1,0 +1,36 @@
+"""Checks on arrays at the border to compiled code, which does not check them itself."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
+Bool = npt.NDArray[np.bool_]
+
+
+def as_float(
+    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...], *, finite: bool = True
+) -> Float:
+    """Return ``value`` as a C-contiguous float64 array of the given shape.
+
+    Args:
+        name: what the array is, with its unit, for the message.
+        value: anything that NumPy takes.
+        shape: expected length per axis; ``None`` leaves one open.
+        finite: refuse NaN and infinities.
+
+    Raises:
+        ValueError: the shape differs, or a value is not finite.
+    """
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.ndim != len(shape) or any(
+        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+    ):
+        want_text = "(" + ", ".join("·" if n is None else str(n) for n in shape) + ")"
+        raise ValueError(f"{name} must have shape {want_text}, got {array.shape}")
+    if finite and not np.isfinite(array).all():
+        bad: Any = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise ValueError(f"{name} must be finite, got {array[tuple(bad)]} at {bad}")
+    return array

@@ -1,0 +1,66 @@
+"""Reading XML from strangers: no entities, no DTD, no network, bounded size and depth."""
+
+from pathlib import Path
+
+from lxml import etree
+
+from bridgegen.errors import FileFormatError
+
+MAX_BYTES = 64 * 2**20
+MAX_DEPTH = 64
+
+
+def parse_xml(source: Path | bytes, place: str | None = None) -> etree._Element:
+    """Return the root element of an XML file or text.
+
+    Args:
+        source: a path, or the document itself.
+        place: what to call it in messages; the path by default.
+
+    Raises:
+        FileFormatError: missing, unreadable, malformed, larger than 64 MiB, deeper than 64
+            levels, or with a DOCTYPE (entities and external references are never resolved).
+    """
+    place = place or (str(source) if isinstance(source, Path) else "document")
+    data = read_bytes(source, place) if isinstance(source, Path) else source
+    if len(data) > MAX_BYTES:
+        raise FileFormatError(f"{place}: an XML file may have {MAX_BYTES} bytes, got {len(data)}")
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False,
+        remove_comments=True, remove_pis=True,
+    )  # fmt: skip
+    try:
+        root = etree.fromstring(data, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise FileFormatError(f"{place}: not well-formed XML: {error}") from None
+    if root.getroottree().docinfo.doctype:
+        raise FileFormatError(f"{place}: a DOCTYPE is refused (entities are never expanded)")
+    _check_depth(root, place)
+    return root
+
+
+def read_bytes(path: Path, place: str | None = None, limit: int = MAX_BYTES) -> bytes:
+    """Return a file's bytes, or one clear error.
+
+    Raises:
+        FileFormatError: missing, a folder, not readable, or larger than ``limit`` bytes.
+    """
+    place = place or str(path)
+    try:
+        size = path.stat().st_size
+        if size > limit:
+            raise FileFormatError(f"{place}: may have at most {limit} bytes, got {size}")
+        return path.read_bytes()
+    except OSError as error:
+        raise FileFormatError(f"{place}: cannot be read: {error.strerror}") from None
+
+
+def _check_depth(root: etree._Element, place: str) -> None:
+    level = [root]
+    for _ in range(MAX_DEPTH):
+        level = [child for element in level for child in element]
+        if not level:
+            return
+    raise FileFormatError(
+        f"{place}: elements may nest {MAX_DEPTH} deep, line {level[0].sourceline} is deeper"
+    )

@@ -1,0 +1,69 @@
+"""What a simulator hands on: the recorded motion of every entity of every scenario of a batch."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Float, Int
+
+STATUS_MESSAGES = {
+    0: "ok",
+    1: "a state became NaN or infinite",
+    2: "a parameter value puts an entity off its route",
+}
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """N simulated scenarios of E entities over T recorded instants; the ego is entity 0.
+
+    A position is the OpenSCENARIO reference point: the rear axle's centre on the ground.
+    After a scenario has stopped, its arrays repeat the last recorded state; ``n_steps`` tells
+    how many instants are real.
+
+    Attributes:
+        time_step: seconds between two recorded instants; instant k is at k · time_step.
+        names: E entity names, ``names[0]`` is the ego's.
+        box: ``(E, 3)`` float64 [m]: length, width, and the distance of the box's centre ahead
+            of the reference point.
+        x: ``(N, E, T)`` float64 [m].
+        y: ``(N, E, T)`` float64 [m].
+        h: ``(N, E, T)`` float64 [rad], heading, counter-clockwise from +x, continuous.
+        v: ``(N, E, T)`` float64 [m/s], forward speed, ≥ 0.
+        a: ``(N, E, T)`` float64 [m/s²], forward acceleration applied from this instant on.
+        offset: ``(N, E, T)`` float64 [m], signed lateral distance of the reference point from the
+            entity's route (the lane's centre), left positive.
+        n_steps: ``(N,)`` int64, in 1..T, the recorded instants before the stop trigger fired.
+        status: ``(N,)`` int8, a key of ``STATUS_MESSAGES``; 0 is success. Arrays of a failed
+            scenario are finite but meaningless.
+    """
+
+    time_step: float
+    names: tuple[str, ...]
+    box: Float
+    x: Float
+    y: Float
+    h: Float
+    v: Float
+    a: Float
+    offset: Float
+    n_steps: Int
+    status: npt.NDArray[np.int8]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(N, E, T)."""
+        n, e, t = self.x.shape
+        return n, e, t
+
+    @cached_property
+    def distance(self) -> Float:
+        """``(N, E, T)`` float64 [m]: from the ego's oriented box to each other's, 0 at contact.
+
+        Row 0 of axis E, the ego's distance to itself, is +inf. Padded instants repeat the last.
+        """
+        from bridgegen.simulation.boxes import box_distance
+
+        return box_distance(self.box, self.x, self.y, self.h, self.n_steps)
