@@ -1,0 +1,135 @@
+"""The intersection that a scenario takes place at: what the storyboard needs to know of a road network.
+
+The same description comes from the static parameters (`Site.generated`) or from a map that was
+made elsewhere (`bridgegen.openx.opendrive.site.find_site`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+SPEED_LIMIT = 13.9
+"""Speed limit of generated legs [m/s]: 50 km/h, the usual limit in towns."""
+
+HEADINGS = {"A": 270.0, "B": 180.0, "C": 90.0, "D": 0.0}
+"""Outward heading [deg] of the legs of the paper's crossroads, counter-clockwise from +x (east)."""
+
+JUNCTION_ID = "100"
+
+
+@dataclass(frozen=True, slots=True)
+class SiteLane:
+    """A driving lane of an arm.
+
+    Attributes:
+        lane_id: OpenDRIVE's id, never 0.
+        direction: ``"in"`` leads to the junction, ``"out"`` away from it.
+        width: [m].
+    """
+
+    lane_id: int
+    direction: Literal["in", "out"]
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class ArmRoad:
+    """A road of a leg.
+
+    Attributes:
+        road_id: OpenDRIVE's id.
+        length: [m].
+        junction_end: the end of the reference line that is nearer to the junction.
+        lanes: its driving lanes.
+        speed_limit: [m/s], where known.
+    """
+
+    road_id: str
+    length: float
+    junction_end: Literal["start", "end"]
+    lanes: tuple[SiteLane, ...]
+    speed_limit: float | None = None
+
+    def along(self, direction: Literal["in", "out"]) -> tuple[SiteLane, ...]:
+        """Return the lanes of one direction, the innermost (nearest to the centre line) first."""
+        lanes = [lane for lane in self.lanes if lane.direction == direction]
+        return tuple(sorted(lanes, key=lambda lane: abs(lane.lane_id)))
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One leg of the intersection.
+
+    Attributes:
+        name: ``"A"`` (south), ``"B"`` (west), ``"C"`` (north), ``"D"`` (east).
+        heading_deg: direction in which it leaves the junction [deg], counter-clockwise from +x.
+        roads: the road that touches the junction, then its continuations, outwards.
+    """
+
+    name: str
+    heading_deg: float
+    roads: tuple[ArmRoad, ...]
+
+    @property
+    def length(self) -> float:
+        """Length of the whole leg [m]."""
+        return sum(road.length for road in self.roads)
+
+    def road_at(self, distance: float) -> int:
+        """Return the index of the road that lies ``distance`` [m] from the junction.
+
+        A distance beyond the leg's end gives its last road.
+        """
+        end = 0.0
+        for index, road in enumerate(self.roads):
+            end += road.length
+            if distance <= end:
+                return index
+        return len(self.roads) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """An intersection with its legs.
+
+    Attributes:
+        name: of the road network.
+        map_file: the OpenDRIVE file it is part of; None where it is generated.
+        junction_id: OpenDRIVE's id.
+        size: stop line to the opposite stop line [m], where it is one number.
+        legs: in the order of their names.
+    """
+
+    name: str
+    map_file: str | None
+    junction_id: str
+    size: float | None
+    legs: tuple[Leg, ...]
+
+    @classmethod
+    def generated(cls, values: Mapping[str, float], name: str = "crossroads") -> "Site":
+        """Return the crossroads of four equal legs at right angles.
+
+        Each leg's reference line runs outwards, so inbound lanes have positive ids.
+
+        Args:
+            values: ``lane_width`` [m], ``lanes_per_direction``, ``arm_length`` [m],
+                ``intersection_size`` [m]; others are ignored.
+            name: of the road network.
+        """
+        width = float(values["lane_width"])
+        count = int(values["lanes_per_direction"])
+        lanes = tuple(SiteLane(k, "in", width) for k in range(1, count + 1)) + tuple(
+            SiteLane(-k, "out", width) for k in range(1, count + 1)
+        )
+        length = float(values["arm_length"])
+        return cls(
+            name=name,
+            map_file=None,
+            junction_id=JUNCTION_ID,
+            size=float(values["intersection_size"]),
+            legs=tuple(
+                Leg(leg, heading, (ArmRoad(str(number), length, "start", lanes, SPEED_LIMIT),))
+                for number, (leg, heading) in enumerate(HEADINGS.items(), start=1)
+            ),
+        )

@@ -1,0 +1,111 @@
+"""The evaluations condensed for the charts: statistics per batch, and the telling axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.report.data import Column, Evaluations
+
+MAX_BATCHES = 250
+"""More batches than this are merged, neighbours first: a screen shows no more."""
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A quantity over B batches; NaN where a batch has no finite value.
+
+    Attributes:
+        median: ``(B,)`` float64 in the quantity's unit.
+        lower: ``(B,)`` float64, first quartile.
+        upper: ``(B,)`` float64, third quartile.
+        best: ``(B,)`` float64, the most critical value of the batch.
+    """
+
+    median: Float
+    lower: Float
+    upper: Float
+    best: Float
+
+
+@dataclass(frozen=True)
+class Batches:
+    """Where each of B batches ends, and what it found.
+
+    Attributes:
+        first: ``(B,)`` int64, the first iteration in the batch, counted from 1.
+        last: ``(B,)`` int64, the last; equal to ``first`` unless batches were merged.
+        evaluations: ``(B,)`` int64, evaluations done when the batch was, failed ones included.
+        share: ``(B,)`` float64 in [0, 1], critical share of the batch.
+        cumulative: ``(B,)`` float64 in [0, 1], critical share of all evaluations so far.
+        group: ``(N,)`` int64, the batch of each evaluation, in 0..B-1.
+    """
+
+    first: Int
+    last: Int
+    evaluations: Int
+    share: Float
+    cumulative: Float
+    group: Int
+
+
+def batches(evaluations: Evaluations, limit: int = MAX_BATCHES) -> Batches:
+    """Group the evaluations by iteration, at most ``limit`` groups."""
+    iteration, index, counts = np.unique(
+        evaluations.iteration, return_inverse=True, return_counts=True
+    )
+    merge = -(-iteration.size // limit) or 1
+    starts = np.arange(0, iteration.size, merge)
+    group = index // merge
+    size = np.add.reduceat(counts, starts) if iteration.size else np.zeros(0, dtype=np.int64)
+    critical = np.bincount(group, weights=evaluations.critical, minlength=starts.size)
+    done = np.cumsum(size)
+    return Batches(
+        first=iteration[starts] + 1,
+        last=iteration[np.minimum(starts + merge, iteration.size) - 1] + 1,
+        evaluations=done,
+        share=critical / size,
+        cumulative=np.cumsum(critical) / done,
+        group=group,
+    )
+
+
+def trend(values: Float, group: Int, n_groups: int, *, larger_is_worse: bool) -> Trend:
+    """Return the quartiles and the most critical value per group.
+
+    Args:
+        values: ``(N,)`` float64; only finite ones count.
+        group: ``(N,)`` int64 in 0..n_groups-1, ascending.
+        n_groups: how many groups there are.
+        larger_is_worse: whether the largest (v_d) or the smallest (d_min) is the most critical.
+    """
+    table = np.full((4, n_groups), np.nan)
+    edges = np.searchsorted(group, np.arange(n_groups + 1))
+    for k in range(n_groups):
+        part = values[edges[k] : edges[k + 1]]
+        part = part[np.isfinite(part)]
+        if part.size:
+            lower, median, upper = np.quantile(part, (0.25, 0.5, 0.75))
+            table[:, k] = median, lower, upper, part.max() if larger_is_worse else part.min()
+    return Trend(*table)
+
+
+def telling_parameters(columns: tuple[Column, ...], critical: Bool) -> list[str]:
+    """Return the names of the searched parameters that vary, the most telling first.
+
+    Telling is the distance between the distributions of the critical and of the other
+    evaluations (Kolmogorov and Smirnov's statistic); where one of the two is empty, the order
+    stays as declared.
+    """
+    varied = [c for c in columns if c.searched and np.unique(c.values[np.isfinite(c.values)]).size > 1]
+    if critical.all() or not critical.any():
+        return [column.name for column in varied]
+    score = {c.name: _smirnov(c.values[critical], c.values[~critical]) for c in varied}
+    return sorted(score, key=lambda name: -score[name])
+
+
+def _smirnov(a: Float, b: Float) -> float:
+    both = np.concatenate([a, b])
+    rank_a = np.searchsorted(np.sort(a), both, side="right") / a.size
+    rank_b = np.searchsorted(np.sort(b), both, side="right") / b.size
+    return float(np.abs(rank_a - rank_b).max())

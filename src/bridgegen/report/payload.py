@@ -1,0 +1,176 @@
+"""The report's data as the JSON that the page reads.
+
+Numbers in bulk are rounded to what a screen can show; the handed-over files keep every bit. A
+number that is NaN or infinite becomes null.
+"""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.report import convergence, sentences
+from bridgegen.report.data import Column, Evaluations, Playback, ReportData
+
+DIGITS = 5
+"""Significant digits of the largest value of a column in bulk."""
+MILLIMETRE = 3
+ANGLE = 5
+"""Decimals of headings: 1e-5 rad moves a car's front by 0.05 mm."""
+
+TRENDS = {"d_min": False, "v_d": True}
+"""The metrics shown over iterations, and whether a larger one is worse."""
+
+
+def to_json(data: ReportData) -> str:
+    """Return the page's data as JSON that is safe inside a ``<script>`` element.
+
+    Every ``<`` is written as ``\\u003c``, so that no text in it can close the element or open a
+    comment; everything that is not ASCII is escaped, so that lone surrogates (from file names)
+    do not break the encoding.
+    """
+    text = json.dumps(payload(data), allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def payload(data: ReportData) -> dict[str, Any]:
+    """Return the page's data as plain dicts, lists, numbers and strings."""
+    s = data.summary
+    roads: list[list[dict[str, Any]]] = []
+    index: dict[tuple[tuple[str, bytes], ...], int] = {}
+    kept = []
+    for playback in data.kept:
+        key = tuple((lane.kind, lane.points.tobytes()) for lane in playback.lanes)
+        if key not in index:
+            index[key] = len(roads)
+            roads.append(_road(playback))
+        kept.append(_playback(playback, index[key]))
+    return {
+        "summary": {
+            "title": s.title,
+            "description": s.description,
+            "facts": [s.scenario, s.road, f"ego {s.ego}", s.algorithm, f"seed {s.seed}"],
+            "finished": s.finished,
+            "sentences": sentences.sentences(data),
+            "table": sentences.summary_table(s),
+            "provenance": sentences.provenance(s),
+            "command": s.command,
+            "critical_distance": _number(s.critical_distance),
+        },
+        "rows": _rows(data.evaluations),
+        "batches": _batches(data.evaluations),
+        "roads": roads,
+        "kept": kept,
+    }
+
+
+def _rows(e: Evaluations) -> dict[str, Any]:
+    ok = e.status == 0
+    groups = [("parameter", e.parameters), ("metric", e.metrics), ("objective", e.objectives)]
+    return {
+        "n": int(e.status.size),
+        "n_failed": int(np.count_nonzero(~ok)),
+        "evaluation": np.flatnonzero(ok).tolist(),
+        "iteration": (e.iteration[ok] + 1).tolist(),
+        "critical": e.critical[ok].astype(np.int64).tolist(),
+        "columns": [_column(c, group, ok) for group, columns in groups for c in columns],
+        "telling": convergence.telling_parameters(e.parameters, e.critical, ok),
+    }
+
+
+def _column(column: Column, group: str, ok: Any) -> dict[str, Any]:
+    return {
+        "name": column.name,
+        "unit": column.unit,
+        "group": group,
+        "description": column.description,
+        "low": _number(column.low),
+        "high": _number(column.high),
+        "searched": column.searched,
+        "values": significant(column.values[ok]),
+    }
+
+
+def _batches(e: Evaluations) -> dict[str, Any]:
+    found = convergence.batches(e)
+    n = found.first.size
+    trends = {}
+    for column in e.metrics:
+        if column.name in TRENDS:
+            values = np.where(e.status == 0, column.values, np.nan)
+            t = convergence.trend(values, found.group, n, larger_is_worse=TRENDS[column.name])
+            trends[column.name] = {
+                "unit": column.unit,
+                "median": significant(t.median),
+                "lower": significant(t.lower),
+                "upper": significant(t.upper),
+                "best": significant(t.best),
+            }
+    return {
+        "first": found.first.tolist(),
+        "last": found.last.tolist(),
+        "evaluations": found.evaluations.tolist(),
+        "share": significant(found.share),
+        "cumulative": significant(found.cumulative),
+        "trends": trends,
+    }
+
+
+def _road(playback: Playback) -> list[dict[str, Any]]:
+    return [
+        {"kind": lane.kind, "points": decimals(lane.points.ravel(), MILLIMETRE)}
+        for lane in playback.lanes
+    ]
+
+
+def _playback(p: Playback, road: int) -> dict[str, Any]:
+    real = slice(0, p.n_steps)
+    return {
+        "name": p.name,
+        "rank": p.rank,
+        "evaluation": p.evaluation,
+        "critical": p.critical,
+        "parameters": {name: _number(value) for name, value in p.parameters.items()},
+        "metrics": {name: _number(value) for name, value in p.metrics.items()},
+        "files": list(p.files),
+        "time_step": p.time_step,
+        "road": road,
+        "entities": [
+            {"name": e.name, "length": e.length, "width": e.width, "center_ahead": e.center_ahead}
+            for e in p.entities
+        ],
+        "x": [decimals(row[real], MILLIMETRE) for row in p.x],
+        "y": [decimals(row[real], MILLIMETRE) for row in p.y],
+        "h": [decimals(row[real], ANGLE) for row in p.h],
+        "v": [decimals(row[real], MILLIMETRE) for row in p.v],
+        "distance": decimals(p.distance[real], MILLIMETRE),
+    }
+
+
+def significant(values: Float, digits: int = DIGITS) -> list[float | None]:
+    """Round to ``digits`` significant digits of the largest finite magnitude."""
+    finite = np.abs(values[np.isfinite(values)])
+    top = float(finite.max()) if finite.size else 0.0
+    if top == 0.0:
+        return decimals(values, 0)
+    return decimals(values, digits - 1 - math.floor(math.log10(top)))
+
+
+def decimals(values: Float, places: int) -> list[float | None]:
+    """Round to decimal places; null for what is not finite, and no negative zero."""
+    if not -300 < places < 300:  # beyond what powers of ten in float64 carry
+        places = 0 if places < 0 else 300
+    with np.errstate(over="ignore", invalid="ignore"):
+        rounded = np.round(values, places) + 0.0
+    kept = np.where(np.isfinite(rounded), rounded, values)
+    if np.isfinite(kept).all():
+        return kept.tolist()  # type: ignore[no-any-return]
+    return [value if math.isfinite(value) else None for value in kept.tolist()]
+
+
+def _number(value: float | None) -> float | None:
+    if value is None or not math.isfinite(value):
+        return None
+    return float(value)

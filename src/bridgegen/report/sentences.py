@@ -1,0 +1,119 @@
+"""The result in words: what a manager would copy, and the small table beside it."""
+
+import math
+
+import numpy as np
+
+from bridgegen.report.data import ReportData, RunSummary
+
+NARROW = "\N{NARROW NO-BREAK SPACE}"
+
+
+def sentences(data: ReportData) -> list[str]:
+    """Return two or three sentences: what was searched, what was found, how bad the worst is."""
+    s = data.summary
+    words = [
+        f"{_count(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
+        f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego} "
+        f"on the {s.road}, chosen by {s.algorithm} in {duration(s.wall_seconds)}."
+    ]
+    if not s.finished:
+        words[0] = words[0][:-1] + f"; the run stopped before its budget of {s.budget:,}."
+    if s.n_critical == 0:
+        if s.n_evaluations:
+            words.append(f"None of them is critical (critical means {s.critical_rule}).")
+        return words
+    found = f"{s.n_critical:,} of them ({share(s.r_critic)}) "
+    found += f"{'is' if s.n_critical == 1 else 'are'} critical: {s.critical_rule}"
+    if s.first_critical is not None:
+        found += f"; the first was found at evaluation {s.first_critical:,}"
+        if s.fiftieth_critical is not None:
+            found += f", the 50th at {s.fiftieth_critical:,}"
+    words.append(found + ".")
+    worst = _worst(data)
+    return [*words, worst] if worst else words
+
+
+def summary_table(s: RunSummary) -> list[tuple[str, str]]:
+    """Return the rows of the small table: what, and how much of it with its unit."""
+    return [
+        ("Critical share R_critic", f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})"),
+        ("First critical", _at(s.first_critical)),
+        ("50th critical", _at(s.fiftieth_critical)),
+        ("Smallest gap d_min", f"best {metres(s.d_min_best)}, median {metres(s.d_min_median)}"),
+        ("Speed at that moment v_d", f"highest {speed(s.v_d_best)}, median {speed(s.v_d_median)}"),
+        ("Wall time", duration(s.wall_seconds)),
+    ]
+
+
+def provenance(s: RunSummary) -> list[tuple[str, str]]:
+    """Return what somebody needs to make the run again, name and text."""
+    rows = [
+        ("Scenario", s.scenario),
+        ("Road", s.road),
+        ("Ego", s.ego),
+        ("Algorithm", s.algorithm),
+        ("Seed", str(s.seed)),
+        ("Budget", f"{s.budget:,} evaluations"),
+        ("Done", f"{s.n_evaluations:,} evaluations" + ("" if s.finished else ", interrupted")),
+        ("Critical means", s.critical_rule),
+        ("Started", s.started),
+        ("BridgeGen", s.version),
+    ]
+    return [row for row in rows if row[1]] + list((s.settings or {}).items())
+
+
+def share(value: float) -> str:
+    """Return a share of 1 in per cent."""
+    return f"{100.0 * value:.1f}{NARROW}%" if math.isfinite(value) else "–"
+
+
+def metres(value: float) -> str:
+    """Return a distance [m]."""
+    return f"{value:.2f}{NARROW}m" if math.isfinite(value) else "–"
+
+
+def speed(value: float) -> str:
+    """Return a speed [m/s], with km/h beside it."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.1f}{NARROW}m/s ({3.6 * value:.0f}{NARROW}km/h)"
+
+
+def duration(seconds: float) -> str:
+    """Return a time span in the unit that suits it."""
+    if not math.isfinite(seconds):
+        return "–"
+    if seconds < 120.0:
+        return f"{seconds:.1f}{NARROW}s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 120:
+        return f"{minutes}{NARROW}min {rest}{NARROW}s"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours:,}{NARROW}h {minutes}{NARROW}min"
+
+
+def _worst(data: ReportData) -> str:
+    e = data.evaluations
+    columns = {column.name: column.values for column in e.metrics}
+    ok = e.status == 0
+    hits = columns.get("n_collision")
+    n_hits = 0 if hits is None else int(np.count_nonzero(hits[ok] > 0))
+    v_d = columns.get("v_d")
+    if n_hits:
+        text = f"{_count(n_hits, 'scenario')} {'ends' if n_hits == 1 else 'end'} in a collision"
+        if hits is not None and v_d is not None:
+            top = v_d[ok & (hits > 0) & np.isfinite(v_d)]
+            text += f", the fastest at {speed(float(top.max()))}" if top.size else ""
+        return text + "."
+    if math.isfinite(data.summary.d_min_best):
+        return f"There is no collision; the closest pass leaves {metres(data.summary.d_min_best)}."
+    return ""
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n:,} {noun}{'' if n == 1 else 's'}"
+
+
+def _at(evaluation: int | None) -> str:
+    return "not reached" if evaluation is None else f"evaluation {evaluation:,}"
