@@ -1,4 +1,4 @@
-"""The intersection that a scenario takes place at: what the storyboard needs to know of a road network.
+"""The intersection that a scenario takes place at: what a storyboard needs to know of the roads.
 
 The same description comes from the static parameters (`Site.generated`) or from a map that was
 made elsewhere (`bridgegen.openx.opendrive.site.find_site`).

@@ -25,9 +25,12 @@ PREFIXES = {"bg": BG, "dcterms": DCTERMS, "owl": OWL, "rdfs": RDFS, "xsd": XSD}
 Subject = ox.NamedNode | ox.BlankNode
 
 TYPE = ox.NamedNode(RDF + "type")
-LABEL = ox.NamedNode(RDFS + "label")
+COMMENT = ox.NamedNode(RDFS + "comment")
 SUBCLASS = ox.NamedNode(RDFS + "subClassOf")
+DOMAIN = ox.NamedNode(RDFS + "domain")
 RANGE = ox.NamedNode(RDFS + "range")
+DOUBLE = ox.NamedNode(XSD + "double")
+INTEGER = ox.NamedNode(XSD + "integer")
 NAMED_INDIVIDUAL = ox.NamedNode(OWL + "NamedIndividual")
 OWL_ONTOLOGY = ox.NamedNode(OWL + "Ontology")
 EQUIVALENT_CLASS = ox.NamedNode(OWL + "equivalentClass")
@@ -54,11 +57,15 @@ class TBox:
         quads: all of it but its own header, in the order of the file.
         version: its ``owl:versionInfo``.
         subclasses: per class, the class itself and all below it.
-        equivalents: per property that has any, all that mean the same, the paper's name first.
-        requires: per class, the properties that its individuals must have, inherited ones included.
+        equivalents: per property that has any, all that mean the same.
+        requires: per class, the properties that its individuals must have, besides inherited ones.
         ranges: per property, its range: a class or a datatype.
+        domains: per property, the class that it belongs to.
         units: per data property with a unit, the unit.
+        comments: per term, what it means.
         functional: the properties that have at most one value.
+        above: per data property whose values must exceed something, that.
+        allowed: per data property with an enumeration, its values.
     """
 
     quads: tuple[ox.Quad, ...]
@@ -67,8 +74,12 @@ class TBox:
     equivalents: Mapping[str, tuple[ox.NamedNode, ...]]
     requires: Mapping[str, tuple[str, ...]]
     ranges: Mapping[str, ox.NamedNode]
+    domains: Mapping[str, str]
     units: Mapping[str, str]
+    comments: Mapping[str, str]
     functional: frozenset[str]
+    above: Mapping[str, float]
+    allowed: Mapping[str, tuple[str, ...]]
 
 
 @cache
@@ -78,59 +89,60 @@ def tbox() -> TBox:
     everything = list(ox.parse(data, format=ox.RdfFormat.RDF_XML))
     header = ox.NamedNode(ONTOLOGY)
     quads = tuple(quad for quad in everything if quad.subject != header)
-    version = ox.NamedNode(OWL + "versionInfo")
-    parents = [(q.subject, q.object) for q in quads if q.predicate == SUBCLASS]
-    classes = [
-        q.subject for q in quads if q.predicate == TYPE and q.object == ox.NamedNode(OWL + "Class")
-    ]
-    subclasses = {node: closure(node, parents) for node in classes if _named(node)}
-    own = [(q.subject, q.object) for q in quads if q.predicate == bg("requires")]
-    equal = [(q.subject, q.object) for q in quads if q.predicate == EQUIVALENT_PROPERTY]
+    said: dict[ox.NamedNode, list[tuple[Subject, ox.NamedNode | ox.Literal]]] = {}
+    for quad in everything:
+        if isinstance(quad.subject, Subject) and isinstance(quad.object, ox.NamedNode | ox.Literal):
+            said.setdefault(quad.predicate, []).append((quad.subject, quad.object))
+
+    def links(predicate: ox.NamedNode) -> list[tuple[ox.NamedNode, ox.NamedNode]]:
+        return [
+            (a, b)
+            for a, b in said.get(predicate, ())
+            if isinstance(a, ox.NamedNode) and isinstance(b, ox.NamedNode)
+        ]
+
+    def texts(predicate: ox.NamedNode) -> dict[str, tuple[str, ...]]:
+        found: dict[str, tuple[str, ...]] = {}
+        for node, value in said.get(predicate, ()):
+            if isinstance(value, ox.Literal):
+                found[local_name(node)] = (*found.get(local_name(node), ()), value.value)
+        return found
+
+    def first(predicate: ox.NamedNode) -> dict[str, str]:
+        return {name: values[0] for name, values in texts(predicate).items()}
+
+    parents = links(SUBCLASS)
+    types = links(TYPE)
+    classes = [node for node, cls in types if cls == ox.NamedNode(OWL + "Class")]
+    subclasses = {node: closure(node, parents) for node in classes}
+    needed = links(bg("requires"))
+    equal = links(EQUIVALENT_PROPERTY)
     return TBox(
         quads=quads,
-        version=next(
-            str(q.object.value)
-            for q in everything
-            if q.predicate == version and isinstance(q.object, ox.Literal)
-        ),
+        version=first(ox.NamedNode(OWL + "versionInfo"))[local_name(header)],
         subclasses=subclasses,
-        equivalents={
-            local_name(one): (other, one)
-            for pair in equal
-            for one in pair
-            for other in pair
-            if one != other and _named(one) and _named(other)
-        },
+        equivalents={local_name(term): pair for pair in equal for term in pair},
         requires={
-            local_name(node): tuple(
-                dict.fromkeys(
-                    local_name(needed)
-                    for owner, needed in own
-                    if node in subclasses.get(owner, frozenset())
-                )
-            )
-            for node in subclasses
+            local_name(cls): names
+            for cls in classes
+            if (names := tuple(local_name(term) for owner, term in needed if owner == cls))
         },
-        ranges={
-            local_name(q.subject): q.object
-            for q in quads
-            if q.predicate == RANGE and isinstance(q.object, ox.NamedNode)
-        },
-        units={
-            local_name(q.subject): q.object.value
-            for q in quads
-            if q.predicate == bg("unit") and isinstance(q.object, ox.Literal)
-        },
+        ranges={local_name(term): target for term, target in links(RANGE)},
+        domains={local_name(term): local_name(cls) for term, cls in links(DOMAIN)},
+        units=first(bg("unit")),
+        comments=first(COMMENT),
         functional=frozenset(
-            local_name(q.subject)
-            for q in quads
-            if q.predicate == TYPE and q.object == ox.NamedNode(OWL + "FunctionalProperty")
+            local_name(term)
+            for term, cls in types
+            if cls == ox.NamedNode(OWL + "FunctionalProperty")
         ),
+        above={name: float(text) for name, text in first(bg("above")).items()},
+        allowed=texts(bg("allows")),
     )
 
 
 def closure(
-    top: ox.NamedNode, parents: Iterable[tuple[object, object]]
+    top: ox.NamedNode, parents: Iterable[tuple[ox.NamedNode, ox.NamedNode]]
 ) -> frozenset[ox.NamedNode]:
     """Return ``top`` and every class below it.
 
@@ -138,18 +150,14 @@ def closure(
         top: a class.
         parents: pairs (class, its superclass); circles are no trouble.
     """
-    below: dict[object, list[object]] = {}
+    below: dict[ox.NamedNode, list[ox.NamedNode]] = {}
     for child, parent in parents:
         below.setdefault(parent, []).append(child)
     found = {top}
-    todo: list[object] = [top]
+    todo = [top]
     while todo:
         for child in below.get(todo.pop(), ()):
-            if isinstance(child, ox.NamedNode) and child not in found:
+            if child not in found:
                 found.add(child)
                 todo.append(child)
     return frozenset(found)
-
-
-def _named(node: object) -> bool:
-    return isinstance(node, ox.NamedNode)

@@ -90,18 +90,29 @@ def trend(values: Float, group: Int, n_groups: int, *, larger_is_worse: bool) ->
     return Trend(*table)
 
 
-def telling_parameters(columns: tuple[Column, ...], critical: Bool) -> list[str]:
+def telling_parameters(columns: tuple[Column, ...], critical: Bool, ok: Bool) -> list[str]:
     """Return the names of the searched parameters that vary, the most telling first.
 
     Telling is the distance between the distributions of the critical and of the other
     evaluations (Kolmogorov and Smirnov's statistic); where one of the two is empty, the order
     stays as declared.
+
+    Args:
+        columns: the parameters.
+        critical: ``(N,)`` bool.
+        ok: ``(N,)`` bool, the rows that count.
     """
-    varied = [c for c in columns if c.searched and np.unique(c.values[np.isfinite(c.values)]).size > 1]
-    if critical.all() or not critical.any():
+    varied = [c for c in columns if c.searched and _varies(c.values[ok])]
+    hit, other = ok & critical, ok & ~critical
+    if not hit.any() or not other.any():
         return [column.name for column in varied]
-    score = {c.name: _smirnov(c.values[critical], c.values[~critical]) for c in varied}
+    score = {c.name: _smirnov(c.values[hit], c.values[other]) for c in varied}
     return sorted(score, key=lambda name: -score[name])
+
+
+def _varies(values: Float) -> bool:
+    finite = values[np.isfinite(values)]
+    return finite.size > 0 and bool(finite.min() < finite.max())
 
 
 def _smirnov(a: Float, b: Float) -> float:

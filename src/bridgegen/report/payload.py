@@ -127,6 +127,9 @@ def _road(playback: Playback) -> list[dict[str, Any]]:
 
 def _playback(p: Playback, road: int) -> dict[str, Any]:
     real = slice(0, p.n_steps)
+    contact = p.distance[real] <= 0.0  # before rounding: a miss by 0.1 mm is a miss
+    begins = np.flatnonzero(contact & ~np.concatenate([[False], contact[:-1]]))
+    finite = np.where(np.isfinite(p.distance[real]), p.distance[real], np.inf)
     return {
         "name": p.name,
         "rank": p.rank,
@@ -146,6 +149,8 @@ def _playback(p: Playback, road: int) -> dict[str, Any]:
         "h": [decimals(row[real], ANGLE) for row in p.h],
         "v": [decimals(row[real], MILLIMETRE) for row in p.v],
         "distance": decimals(p.distance[real], MILLIMETRE),
+        "closest": int(finite.argmin()) if np.isfinite(finite).any() else None,
+        "contacts": begins.tolist(),
     }
 
 
@@ -160,10 +165,8 @@ def significant(values: Float, digits: int = DIGITS) -> list[float | None]:
 
 def decimals(values: Float, places: int) -> list[float | None]:
     """Round to decimal places; null for what is not finite, and no negative zero."""
-    if not -300 < places < 300:  # beyond what powers of ten in float64 carry
-        places = 0 if places < 0 else 300
     with np.errstate(over="ignore", invalid="ignore"):
-        rounded = np.round(values, places) + 0.0
+        rounded = np.round(values, min(places, 300)) + 0.0  # 10**300: the last that float64 holds
     kept = np.where(np.isfinite(rounded), rounded, values)
     if np.isfinite(kept).all():
         return kept.tolist()  # type: ignore[no-any-return]

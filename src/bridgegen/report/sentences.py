@@ -12,6 +12,8 @@ NARROW = "\N{NARROW NO-BREAK SPACE}"
 def sentences(data: ReportData) -> list[str]:
     """Return two or three sentences: what was searched, what was found, how bad the worst is."""
     s = data.summary
+    if s.n_evaluations == 0:
+        return [f"No scenario of “{s.title}” has been simulated yet."]
     words = [
         f"{_count(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
         f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego} "
@@ -20,11 +22,10 @@ def sentences(data: ReportData) -> list[str]:
     if not s.finished:
         words[0] = words[0][:-1] + f"; the run stopped before its budget of {s.budget:,}."
     if s.n_critical == 0:
-        if s.n_evaluations:
-            words.append(f"None of them is critical (critical means {s.critical_rule}).")
-        return words
+        none = "It is not" if s.n_evaluations == 1 else "None of them is"
+        return [*words, f"{none} critical (critical means {s.critical_rule})."]
     found = f"{s.n_critical:,} of them ({share(s.r_critic)}) "
-    found += f"{'is' if s.n_critical == 1 else 'are'} critical: {s.critical_rule}"
+    found += f"{'is' if s.n_critical == 1 else 'are'} critical ({s.critical_rule})"
     if s.first_critical is not None:
         found += f"; the first was found at evaluation {s.first_critical:,}"
         if s.fiftieth_critical is not None:
@@ -37,11 +38,13 @@ def sentences(data: ReportData) -> list[str]:
 def summary_table(s: RunSummary) -> list[tuple[str, str]]:
     """Return the rows of the small table: what, and how much of it with its unit."""
     return [
-        ("Critical share R_critic", f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})"),
+        ("Critical share, R_critic", f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})"),
         ("First critical", _at(s.first_critical)),
         ("50th critical", _at(s.fiftieth_critical)),
-        ("Smallest gap d_min", f"best {metres(s.d_min_best)}, median {metres(s.d_min_median)}"),
-        ("Speed at that moment v_d", f"highest {speed(s.v_d_best)}, median {speed(s.v_d_median)}"),
+        ("Distance d_min, smallest", metres(s.d_min_best)),
+        ("Distance d_min, median", metres(s.d_min_median)),
+        ("Speed v_d at d_min, highest", speed(s.v_d_best)),
+        ("Speed v_d at d_min, median", speed(s.v_d_median)),
         ("Wall time", duration(s.wall_seconds)),
     ]
 
@@ -54,8 +57,8 @@ def provenance(s: RunSummary) -> list[tuple[str, str]]:
         ("Ego", s.ego),
         ("Algorithm", s.algorithm),
         ("Seed", str(s.seed)),
-        ("Budget", f"{s.budget:,} evaluations"),
-        ("Done", f"{s.n_evaluations:,} evaluations" + ("" if s.finished else ", interrupted")),
+        ("Budget", _count(s.budget, "evaluation")),
+        ("Done", _count(s.n_evaluations, "evaluation") + ("" if s.finished else ", interrupted")),
         ("Critical means", s.critical_rule),
         ("Started", s.started),
         ("BridgeGen", s.version),

@@ -1,0 +1,10 @@
+"""The search algorithms, one file each, behind one ask/tell protocol over the unit cube.
+
+``get(name)`` returns an algorithm's class, ``names()`` lists them; an installed package adds its
+own through the entry-point group ``bridgegen.algorithms``.
+"""
+
+from bridgegen.search.algorithm import Algorithm, Setting
+from bridgegen.search.registry import ALGORITHMS, get, names
+
+__all__ = ["ALGORITHMS", "Algorithm", "Setting", "get", "names"]

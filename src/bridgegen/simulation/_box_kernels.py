@@ -1,19 +1,20 @@
 """Compiled distance between oriented boxes; public wrapper: ``boxes.box_distance``.
 
-Row by row, without fastmath, so a row's result depends on that row alone.
+One scenario after the other, each from its own numbers alone. Trigonometry comes first, so that
+the loop over instants is plain arithmetic without branches, which the compiler vectorises.
 """
 
 import math
 
 import numpy as np
-from numba import njit
 
 from bridgegen.arrays import Float, Int
+from bridgegen.compiled import kernel
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@kernel
 def directions(heading: Float, n: int, cosine: Float, sine: Float) -> None:
-    """Write the cosine and sine of the first n headings; a heading that stays costs nothing."""
+    """Write the cosine and sine of the first n headings; one that stays the same is reused."""
     cosine[0] = math.cos(heading[0])
     sine[0] = math.sin(heading[0])
     for k in range(1, n):
@@ -25,92 +26,85 @@ def directions(heading: Float, n: int, cosine: Float, sine: Float) -> None:
             sine[k] = math.sin(heading[k])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-def corner_to_box(px: float, py: float, half_length: float, half_width: float) -> float:
+@kernel
+def outside(px: float, py: float, half_length: float, half_width: float) -> float:
     """Squared distance from a point, in the box's own frame, to the box."""
     gx = max(abs(px) - half_length, 0.0)
     gy = max(abs(py) - half_width, 0.0)
     return gx * gx + gy * gy
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-def corners_to_box(
+@kernel
+def corners_outside(
     px: float, py: float, c: float, s: float, la: float, wa: float, lb: float, wb: float
 ) -> float:
     """Least squared distance from the four corners of box B to box A, in A's frame.
 
     B's centre is at (px, py), its direction (c, s); la, wa, lb, wb are half lengths and widths.
     """
-    ux = lb * c
-    uy = lb * s
-    vx = wb * s
-    vy = wb * c
+    ux, uy, vx, vy = lb * c, lb * s, wb * s, wb * c
     front = min(
-        corner_to_box(px + (ux + vx), py + (uy - vy), la, wa),
-        corner_to_box(px + (ux - vx), py + (uy + vy), la, wa),
+        outside(px + (ux + vx), py + (uy - vy), la, wa),
+        outside(px + (ux - vx), py + (uy + vy), la, wa),
     )
     rear = min(
-        corner_to_box(px - (ux - vx), py - (uy + vy), la, wa),
-        corner_to_box(px - (ux + vx), py - (uy - vy), la, wa),
+        outside(px - (ux - vx), py - (uy + vy), la, wa),
+        outside(px - (ux + vx), py - (uy - vy), la, wa),
     )
     return min(front, rear)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-def gap(
-    dx: float, dy: float, ca: float, sa: float, cb: float, sb: float,
-    la: float, wa: float, lb: float, wb: float,
-) -> float:  # fmt: skip
-    """Distance between boxes A and B, 0 where they touch or overlap.
+@kernel
+def gaps(
+    box_a: Float, box_b: Float, dx: Float, dy: Float,
+    cos_a: Float, sin_a: Float, cos_b: Float, sin_b: Float, n: int, out: Float,
+) -> None:  # fmt: skip
+    """Write the first n distances between boxes A and B, 0 where they touch or overlap.
 
     (dx, dy) leads from A's centre to B's. Overlap is decided by the separating-axis theorem; the
     distance of disjoint boxes is attained at a corner of one of them. Swapping A and B negates
     or permutes the operands of every sum only, so the result is symmetric to the last bit.
     """
-    c = ca * cb + sa * sb
-    s = ca * sb - sa * cb
-    ax = dx * ca + dy * sa
-    ay = dy * ca - dx * sa
-    bx = -(dx * cb + dy * sb)
-    by = -(dy * cb - dx * sb)
-    ac = abs(c)
-    as_ = abs(s)
-    apart_a = max(abs(ax) - (la + (ac * lb + as_ * wb)), abs(ay) - (wa + (as_ * lb + ac * wb)))
-    apart_b = max(abs(bx) - (lb + (ac * la + as_ * wa)), abs(by) - (wb + (as_ * la + ac * wa)))
-    squared = min(
-        corners_to_box(ax, ay, c, s, la, wa, lb, wb),
-        corners_to_box(bx, by, c, -s, lb, wb, la, wa),
-    )
-    return math.sqrt(squared) if max(apart_a, apart_b) > 0.0 else 0.0
+    la, wa = 0.5 * box_a[0], 0.5 * box_a[1]
+    lb, wb = 0.5 * box_b[0], 0.5 * box_b[1]
+    for k in range(n):
+        ca, sa, cb, sb = cos_a[k], sin_a[k], cos_b[k], sin_b[k]
+        # Each centre in the other box's frame, and B's direction in A's frame.
+        ax = dx[k] * ca + dy[k] * sa
+        ay = dy[k] * ca - dx[k] * sa
+        bx = -(dx[k] * cb + dy[k] * sb)
+        by = -(dy[k] * cb - dx[k] * sb)
+        c = ca * cb + sa * sb
+        s = ca * sb - sa * cb
+        ac, az = abs(c), abs(s)
+        apart_a = max(abs(ax) - (la + (ac * lb + az * wb)), abs(ay) - (wa + (az * lb + ac * wb)))
+        apart_b = max(abs(bx) - (lb + (ac * la + az * wa)), abs(by) - (wb + (az * la + ac * wa)))
+        squared = min(
+            corners_outside(ax, ay, c, s, la, wa, lb, wb),
+            corners_outside(bx, by, c, -s, lb, wb, la, wa),
+        )
+        out[k] = math.sqrt(squared) if max(apart_a, apart_b) > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@kernel
 def box_distance(box: Float, x: Float, y: Float, h: Float, n_steps: Int, out: Float) -> None:
     """Fill ``out`` (N, E, T) with the distances from entity 0's box to each other's."""
     n_rows, n_entities, n_instants = x.shape
-    ca = np.empty(n_instants)
-    sa = np.empty(n_instants)
-    cb = np.empty(n_instants)
-    sb = np.empty(n_instants)
-    dx = np.empty(n_instants)
-    dy = np.empty(n_instants)
-    la = 0.5 * box[0, 0]
-    wa = 0.5 * box[0, 1]
+    cos_a, sin_a = np.empty(n_instants), np.empty(n_instants)
+    cos_b, sin_b = np.empty(n_instants), np.empty(n_instants)
+    dx, dy = np.empty(n_instants), np.empty(n_instants)
     ahead_a = box[0, 2]
     for i in range(n_rows):
         n = n_steps[i]
         out[i, 0, :] = np.inf
         if n_entities > 1:
-            directions(h[i, 0], n, ca, sa)
+            directions(h[i, 0], n, cos_a, sin_a)
         for e in range(1, n_entities):
-            directions(h[i, e], n, cb, sb)
-            lb = 0.5 * box[e, 0]
-            wb = 0.5 * box[e, 1]
+            directions(h[i, e], n, cos_b, sin_b)
             ahead_b = box[e, 2]
             for k in range(n):
                 # Differences first: far from the origin they lose no digits.
-                dx[k] = (x[i, e, k] - x[i, 0, k]) + (ahead_b * cb[k] - ahead_a * ca[k])
-                dy[k] = (y[i, e, k] - y[i, 0, k]) + (ahead_b * sb[k] - ahead_a * sa[k])
-            for k in range(n):
-                out[i, e, k] = gap(dx[k], dy[k], ca[k], sa[k], cb[k], sb[k], la, wa, lb, wb)
+                dx[k] = (x[i, e, k] - x[i, 0, k]) + (ahead_b * cos_b[k] - ahead_a * cos_a[k])
+                dy[k] = (y[i, e, k] - y[i, 0, k]) + (ahead_b * sin_b[k] - ahead_a * sin_a[k])
+            gaps(box[0], box[e], dx, dy, cos_a, sin_a, cos_b, sin_b, n, out[i, e])
             out[i, e, n:] = out[i, e, n - 1]

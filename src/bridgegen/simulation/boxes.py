@@ -54,6 +54,6 @@ def as_steps(n_steps: npt.ArrayLike, n: int, t: int) -> Int:
     if given.shape != (n,) or given.dtype.kind not in "iu":
         raise ValueError(f"n_steps must be ({n},) whole numbers, got {given.dtype} {given.shape}")
     steps = np.ascontiguousarray(given, dtype=np.int64)
-    if n and not (1 <= steps.min() and steps.max() <= t):
+    if n and (steps.min() < 1 or steps.max() > t):
         raise ValueError(f"n_steps must be in 1..{t}, got {steps.min()} to {steps.max()}")
     return steps

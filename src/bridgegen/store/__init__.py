@@ -1,0 +1,9 @@
+"""A run's results, append-only, in one SQLite file that anybody can query.
+
+``Store.create`` starts a run's folder, ``Store.open`` reads it or goes on with it.
+"""
+
+from bridgegen.store.rows import Evaluated, Rows
+from bridgegen.store.store import Store
+
+__all__ = ["Evaluated", "Rows", "Store"]

@@ -1,0 +1,229 @@
+"""A campaign from start to finish: search, hand over, report; and going on with one."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bridgegen import search as toolkit
+from bridgegen.campaign.handover import hand_over, most_critical
+from bridgegen.campaign.loop import Progress, Reason, run_loop
+from bridgegen.campaign.run import REPORT, Run
+from bridgegen.campaign.settings import Settings, fingerprint
+from bridgegen.errors import InputError, StorageError
+from bridgegen.objective import Objective
+from bridgegen.odd.scenario import ObjectiveSpec, Term, load
+from bridgegen.openx.opendrive.road_map import RoadMap, load_map
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.build import build_report
+from bridgegen.report.page import write_report
+from bridgegen.store import Store
+from bridgegen.store.summary import summarise
+
+MAX_BUDGET = 10_000_000
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C ended the search; ``folder`` holds what was done, and can be gone on with."""
+
+    def __init__(self, folder: Path, evaluations: int, budget: int) -> None:
+        super().__init__(f"stopped after {evaluations} of {budget} evaluations")
+        self.folder, self.evaluations, self.budget = folder, evaluations, budget
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who wants to know how a campaign is getting on; each is called from the same thread.
+
+    Attributes:
+        stage: told what begins: "compile", "search", "hand over", "report".
+        batch: told after each batch.
+        written: told how many scenarios are handed over.
+    """
+
+    stage: Callable[[str], None] = lambda stage: None
+    batch: Callable[[Progress], None] = lambda progress: None
+    written: Callable[[int], None] = lambda count: None
+
+
+def search(
+    scenario: str | Path,
+    *,
+    algorithm: str = "pso",
+    budget: int = 1000,
+    seed: int = 0,
+    ego: str = "route-follower",
+    axes: Iterable[str] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    road_map: Path | str | None = None,
+    junction: str | None = None,
+    keep: int = 10,
+    out: Path | str | None = None,
+    objective: Mapping[str, float | None] | None = None,
+    weights: str | None = None,
+    scale: str | None = None,
+    watch: Watch | None = None,
+) -> Run:
+    """Search a logical scenario for its critical concrete ones, and hand them over.
+
+    Args:
+        scenario: a name of the catalogue, or the path of a YAML file.
+        algorithm: a name of ``bridgegen list algorithms``.
+        budget: evaluations, exactly.
+        seed: the same seed gives the same result.
+        ego: a name of the ego's drivers.
+        axes: the axes of the search space; the scenario's own by default.
+        fixed: parameters to hold at a value, by name.
+        road_map: an OpenDRIVE map; by default a crossroads is generated.
+        junction: the id of the map's junction, where it has several with four legs.
+        keep: how many critical scenarios to hand over.
+        out: the run's folder, new; ``runs/SCENARIO-ALGORITHM-SEED`` by default.
+        objective: metrics and their weights (None with entropy weights), instead of the
+            scenario's.
+        weights: "fixed", or "entropy" of a random sample, instead of the scenario's way.
+        scale: "raw", or "standardised" by a random sample, instead of the scenario's.
+        watch: told how it is getting on.
+
+    Returns:
+        The finished run.
+
+    Raises:
+        InputError: anything that the arguments or files say wrongly.
+        StorageError: the folder exists or cannot be written.
+        Interrupted: Ctrl-C; ``resume`` goes on.
+    """
+    watch = watch or Watch()
+    _check_numbers(budget, seed, keep)
+    catalogue = load(scenario)
+    logical = replace(catalogue, objective=_choose(catalogue.objective, objective, weights, scale))
+    method = toolkit.get(algorithm)
+    space = logical.space(axes, fixed)
+    if space.n_var == 0:
+        raise InputError(f"{logical.name}: nothing to search, every parameter is fixed")
+    roads = load_map(Path(road_map), junction) if road_map is not None else None
+    folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
+    pipeline = Pipeline(logical, space, ego=ego, road_map=roads)
+    watch.stage("compile")
+    chosen = pipeline.choose_objective(seed=seed)
+    is_file = Path(scenario).suffix in (".yaml", ".yml")
+    settings = Settings(
+        scenario=str(Path(scenario).resolve()) if is_file else str(scenario),
+        fingerprint=fingerprint(catalogue),
+        algorithm=method.name,
+        budget=budget,
+        seed=seed,
+        ego=ego,
+        axes=tuple(str(axis) for axis in space.axes),
+        fixed=dict(fixed or {}),
+        map=str(roads.path.resolve()) if roads else None,
+        map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
+        junction=roads.site.junction_id if roads else None,
+        keep=keep,
+        objective=chosen.to_dict(),
+    )
+    with Store.create(
+        folder, settings.to_dict(), space.names, pipeline.metrics,
+        n_var=space.n_var, n_obj=chosen.n_obj,
+    ) as store:  # fmt: skip
+        return _go(pipeline, store, settings, watch)
+
+
+def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
+    """Go on with a run that was interrupted or killed; a finished one gets its files again.
+
+    The result is that of an undisturbed run, to the last bit.
+
+    Raises:
+        StorageError: not a run, in use, made by another version, or not writable.
+        InputError: the scenario or the map is missing, or not what it was.
+        Interrupted: Ctrl-C.
+    """
+    watch = watch or Watch()
+    with Store.open(folder, write=True) as store:
+        settings = Settings.from_dict(store.settings, store.folder)
+        logical = load(settings.scenario)
+        if fingerprint(logical) != settings.fingerprint:
+            raise StorageError(
+                f"{folder}: scenario {settings.scenario} is not what it was when the run began; "
+                "its results can still be read"
+            )
+        roads: RoadMap | None = None
+        if settings.map:
+            roads = load_map(Path(settings.map), settings.junction)
+            if hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
+                raise StorageError(
+                    f"{folder}: map {settings.map} is not what it was when the run began"
+                )
+        space = logical.space(settings.axes, settings.fixed)
+        pipeline = Pipeline(logical, space, ego=settings.ego, road_map=roads)
+        watch.stage("compile")
+        pipeline.choose_objective(Objective.from_dict(settings.objective))
+        return _go(pipeline, store, settings, watch)
+
+
+def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> Run:
+    """Search up to the budget, then hand over and report."""
+    space, chosen = pipeline.space, pipeline.objective
+    algorithm = toolkit.get(settings.algorithm)(space.n_var, chosen.n_obj, settings.seed)
+    watch.stage("search")
+    result = run_loop(
+        algorithm, space.decode, pipeline.evaluate, store, settings.budget, watch.batch
+    )
+    if result.reason is Reason.INTERRUPTED:
+        raise Interrupted(store.folder, result.evaluations, settings.budget)
+    try:
+        _finish(pipeline, store, settings, watch)
+    except KeyboardInterrupt:
+        raise Interrupted(store.folder, result.evaluations, settings.budget) from None
+    return Run(store.folder)
+
+
+def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> None:
+    watch.stage("hand over")
+    rows = store.read()
+    best = most_critical(rows.U, rows.F, rows.critical, settings.keep)
+    kept = hand_over(pipeline, rows.take(best), store.folder, watch.written)
+    watch.stage("report")
+    metric = store.metrics.index
+    summary = summarise(
+        rows.critical, rows.status == 0,
+        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], store.seconds,
+    )  # fmt: skip
+    data = build_report(
+        pipeline, rows, summary,
+        kept=[(one.name, one.evaluation, one.files) for one in kept],
+        algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
+        command=settings.command(store.folder), finished=store.finished is not None,
+        version=store.version,
+    )  # fmt: skip
+    write_report(store.folder / REPORT, data)
+
+
+def _choose(
+    spec: ObjectiveSpec,
+    metrics: Mapping[str, float | None] | None,
+    weights: str | None,
+    scale: str | None,
+) -> ObjectiveSpec:
+    """Return the scenario's objective with what the user wants instead."""
+    way = weights or ("fixed" if metrics and None not in metrics.values() else spec.weights)
+    terms = spec.terms
+    if metrics is not None:
+        terms = tuple(Term(name, weight) for name, weight in metrics.items())
+    elif way == "entropy":
+        terms = tuple(Term(term.metric) for term in terms)
+    return replace(spec, terms=terms, weights=way, scale=scale or spec.scale)  # type: ignore[arg-type]
+
+
+def _check_numbers(budget: int, seed: int, keep: int) -> None:
+    problems = [
+        f"{low} <= {name} <= {high} must hold, got {value}"
+        for name, value, low, high in (
+            ("budget", budget, 1, MAX_BUDGET),
+            ("seed", seed, 0, 2**32 - 1),
+            ("keep", keep, 0, 1000),
+        )
+        if not low <= value <= high
+    ]
+    if problems:
+        raise InputError(*problems)

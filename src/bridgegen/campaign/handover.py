@@ -1,0 +1,153 @@
+"""The most critical distinct scenarios of a run, each as files that other tools run."""
+
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.errors import OntologyError, StorageError
+from bridgegen.metrics import METRICS
+from bridgegen.ontology.check import check
+from bridgegen.ontology.files import save
+from bridgegen.openx.opendrive.write import to_xml as road_xml
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.write import to_xml as scenario_xml
+from bridgegen.pipeline import Pipeline
+from bridgegen.store import Rows
+
+DISTINCT = 0.1
+"""Two kept scenarios differ by at least this much: root mean square over the searched parameters,
+each scaled to 0..1."""
+
+FOLDER = "critical"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A scenario that was handed over.
+
+    Attributes:
+        name: of its files, "0001" the most critical.
+        evaluation: its row in the store.
+        files: their paths relative to the run's folder.
+    """
+
+    name: str
+    evaluation: int
+    files: tuple[str, ...]
+
+
+def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
+    """Return the rows of the most critical scenarios that differ from each other, best first.
+
+    Args:
+        U: ``(N, n_var)`` unit-cube rows.
+        F: ``(N, n_obj)``, minimised; several objectives are compared by their sum.
+        critical: ``(N,)``, only these are kept.
+        keep: how many at most.
+    """
+    order = np.flatnonzero(critical)
+    order = order[np.argsort(F[order].sum(axis=1), kind="stable")]
+    kept: list[int] = []
+    while len(order) and len(kept) < keep:
+        best = int(order[0])
+        kept.append(best)
+        apart = np.sqrt(((U[order] - U[best]) ** 2).mean(axis=1))
+        order = order[apart >= DISTINCT]
+    return np.array(kept, dtype=np.int64)
+
+
+def hand_over(
+    pipeline: Pipeline,
+    rows: Rows,
+    folder: Path,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[Kept, ...]:
+    """Write each row's ``.owl``, ``.xodr``, ``.xosc`` and ``.json`` into ``folder/critical``.
+
+    The folder is replaced as a whole, once all of it is written.
+
+    Args:
+        pipeline: what evaluated the rows.
+        rows: the scenarios, most critical first.
+        folder: the run's.
+        progress: told after each, how many are written.
+
+    Raises:
+        OntologyError: a scenario's individuals break a constraint.
+        StorageError: the folder cannot be written.
+    """
+    target, fresh = folder / FOLDER, folder / f"{FOLDER}.part"
+    names = [f"{rank:04d}" for rank in range(1, len(rows) + 1)]
+    kept = []
+    try:
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir()
+        for i, name in enumerate(names):
+            files = write_scenario(pipeline, rows.X[i], fresh, name)
+            files.append(fresh / f"{name}.json")
+            files[-1].write_text(_facts(pipeline, rows, i, name), encoding="utf-8")
+            paths = tuple(f"{FOLDER}/{file.name}" for file in files)
+            kept.append(Kept(name, int(rows.id[i]), paths))
+            if progress:
+                progress(i + 1)
+        shutil.rmtree(target, ignore_errors=True)
+        fresh.rename(target)
+    except OSError as error:
+        raise StorageError(
+            f"{target}: cannot be written: {error.strerror}; the evaluations are kept, "
+            f"'bridgegen resume {folder}' writes the files"
+        ) from None
+    return tuple(kept)
+
+
+def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> list[Path]:
+    """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
+
+    Raises:
+        OntologyError: its individuals break a constraint (SHACL).
+        OSError: the folder cannot be written.
+    """
+    individuals = pipeline.individuals(pipeline.space.values(x))
+    violations = check(individuals, pipeline.scenario)
+    if violations:
+        raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
+    owl, xodr, xosc = (folder / f"{name}.{kind}" for kind in ("owl", "xodr", "xosc"))
+    save(individuals, owl)
+    if pipeline.road_map:
+        xodr.write_bytes(pipeline.road_map.data)
+    else:
+        xodr.write_bytes(road_xml(pipeline.roads(individuals)))
+    xosc.write_bytes(scenario_xml(openscenario_from_owl(individuals, xodr.name)))
+    return [owl, xodr, xosc]
+
+
+def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:
+    """Return one scenario's parameters and metrics as JSON; what is infinite or NaN is null."""
+    space = pipeline.space
+    facts = {
+        "name": name,
+        "evaluation": int(rows.id[i]),
+        "scenario": pipeline.scenario.name,
+        "ego": pipeline.driver.name,
+        "critical": bool(rows.critical[i]),
+        "parameters": _named(space.names, space.units, rows.X[i].tolist()),
+        "metrics": _named(
+            pipeline.metrics, [METRICS[m].unit for m in pipeline.metrics], rows.metrics[i].tolist()
+        ),
+        "F": rows.F[i].tolist(),
+    }
+    return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _named(
+    names: Sequence[str], units: Sequence[str], values: Sequence[float]
+) -> dict[str, dict[str, float | str | None]]:
+    return {
+        name: {"value": value if np.isfinite(value) else None, "unit": unit}
+        for name, unit, value in zip(names, units, values, strict=True)
+    }

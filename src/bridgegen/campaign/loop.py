@@ -1,0 +1,260 @@
+"""The loop of a campaign: ask → decode → evaluate → record → tell. Resume is its replay."""
+
+import time
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from hashlib import blake2b
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.errors import InputError, StorageError
+from bridgegen.search import Algorithm
+from bridgegen.store import Evaluated, Rows, Store
+
+PATIENCE = 100
+"""Batches in a row without a new row, after which a search has nothing left to say."""
+
+
+class Reason(StrEnum):
+    """Why a loop ended. The first three finish the run; after the others it can go on."""
+
+    BUDGET = "budget"
+    CONVERGED = "converged"
+    EXHAUSTED = "exhausted"
+    STOPPED = "stopped"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def final(self) -> bool:
+        """Whether the run is finished, its budget unchanged."""
+        return self in (Reason.BUDGET, Reason.CONVERGED, Reason.EXHAUSTED)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What ``on_batch`` is told.
+
+    Attributes:
+        evaluations: recorded and told so far, in the order of the store.
+        budget: what the loop goes up to.
+        seconds: [s] since the start of the run.
+        result: the evaluations that came with this batch, at least one.
+        replayed: whether they were read from the store instead of simulated.
+    """
+
+    evaluations: int
+    budget: int
+    seconds: float
+    result: Evaluated
+    replayed: bool
+
+
+@dataclass(frozen=True)
+class LoopResult:
+    """How a loop ended.
+
+    Attributes:
+        reason: why.
+        evaluations: rows in the store.
+        simulated: of these, rows that this call evaluated.
+        batches: batches that this call asked for, replayed ones included.
+        repeated: asked rows that were known already and cost nothing.
+        seconds: [s] the run has taken, earlier sessions included.
+    """
+
+    reason: Reason
+    evaluations: int
+    simulated: int
+    batches: int
+    repeated: int
+    seconds: float
+
+
+def run_loop(
+    algorithm: Algorithm,
+    decode: Callable[[Float], Float],
+    evaluate: Callable[[Float], Evaluated],
+    store: Store,
+    budget: int,
+    on_batch: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> LoopResult:
+    """Search until the budget is spent: exactly ``budget`` evaluations, never one more.
+
+    A row whose decoded X is known, to the last bit, is not evaluated again: the algorithm is
+    told the recorded result, and the budget is not charged. A batch that the budget cuts short is
+    recorded as far as it goes; the algorithm, which is not needed any more, is not told.
+
+    A store that holds evaluations is gone on with: a fresh algorithm asks again, is told what is
+    recorded, and must ask for exactly those rows. So a run that was killed, or ended with a
+    smaller budget, becomes the run that it would have been undisturbed.
+
+    Args:
+        algorithm: new, made with the run's seed and settings.
+        decode: ``(n, n_var)`` unit-cube rows → X ``(n, len(store.parameters))``; each row's
+            result depends on that row alone.
+        evaluate: X → metrics, F, critical and status of its rows; NaN and ±inf are recorded.
+        store: open for writing.
+        budget: evaluations in the store at the end.
+        on_batch: called after each batch that brought evaluations, recorded or replayed.
+        stop: asked before each batch; True ends the loop.
+
+    Returns:
+        How it ended. Ctrl-C ends it too; finished batches are in the store by then.
+
+    Raises:
+        StorageError: the store cannot be written, or was made by another version or other inputs.
+    """
+    n_before = len(store)
+    session = _Session(algorithm, decode, evaluate, store, budget, on_batch)
+    reason: Reason | None = Reason.BUDGET if n_before >= budget else None
+    try:
+        while reason is None:
+            reason = Reason.STOPPED if stop is not None and stop() else session.batch()
+        if reason.final and store.finished != reason:
+            store.finish(reason)
+    except KeyboardInterrupt:
+        reason = Reason.INTERRUPTED
+    return LoopResult(
+        reason,
+        evaluations=len(store),
+        simulated=len(store) - n_before,
+        batches=session.batches,
+        repeated=session.repeated,
+        seconds=session.seconds,
+    )
+
+
+class _Session:
+    """One call of the loop: which rows are known, and how far it is."""
+
+    def __init__(
+        self,
+        algorithm: Algorithm,
+        decode: Callable[[Float], Float],
+        evaluate: Callable[[Float], Evaluated],
+        store: Store,
+        budget: int,
+        on_batch: Callable[[Progress], None] | None,
+    ) -> None:
+        self.batches = self.repeated = 0
+        self._algorithm, self._decode, self._evaluate = algorithm, decode, evaluate
+        self._store, self._budget, self._on_batch = store, budget, on_batch
+        self._recorded, self._seconds_before = len(store), store.seconds
+        self._began: float | None = None
+        # id of every row of X met so far, by a 16-byte digest: some 200 MB for a million rows.
+        self._known: dict[bytes, int] = {}
+        self._F, self._ok = array("d"), array("b")  # of every row, by id
+        self._idle = 0
+
+    @property
+    def seconds(self) -> float:
+        """[s] of the run; the replay takes none."""
+        running = 0.0 if self._began is None else time.perf_counter() - self._began
+        return self._seconds_before + running
+
+    def batch(self) -> Reason | None:
+        """Go through one batch; return why it was the last one, if it was."""
+        done = len(self._known)
+        if done >= self._recorded:
+            self._start_clock()
+        U = self._ask()
+        if len(U) == 0:
+            return self._nothing_new(Reason.EXHAUSTED)
+        # No −0.0: SQLite would not keep its sign, and what is simulated is what is recorded.
+        X = as_float("X", self._decode(U), (len(U), len(self._store.parameters))) + 0.0
+        ids, fresh = self._identify(X)
+        old = fresh[: max(0, self._recorded - done)]
+        for rows, take in ((old, self._replay), (fresh[len(old) :], self._simulate)):
+            if rows:
+                self._remember(take(U[rows], X[rows], int(ids[rows[0]])))
+        self.batches += 1
+        self.repeated += int(np.count_nonzero(ids >= 0)) - len(fresh)
+        if len(self._known) >= self._budget:
+            # The budget may have cut this batch short, and nobody will ask again.
+            return Reason.BUDGET
+
+        self._algorithm.tell(U, *self._results(ids))
+        self._idle = 0 if fresh else self._idle + 1
+        return self._nothing_new(Reason.CONVERGED) if self._idle >= PATIENCE else None
+
+    def _ask(self) -> Float:
+        name, n_var = self._algorithm.name, self._store.columns.n_var
+        try:
+            # A copy: the rows stay ours whatever the algorithm does with its array.
+            U = as_float("its rows", self._algorithm.ask(), (None, n_var)).copy()
+        except ValueError as error:
+            raise InputError(f"algorithm '{name}': {error}") from error
+        if len(U) and not (U.min() >= 0.0 and U.max() <= 1.0):
+            got = f"{U.min():g} .. {U.max():g}"
+            raise InputError(f"algorithm '{name}': its rows must be in [0, 1], got {got}")
+        return U
+
+    def _identify(self, X: Float) -> tuple[Int, list[int]]:
+        """Return each row's id, −1 where the budget has no room for it, and the new rows."""
+        ids, fresh = np.full(len(X), -1), []
+        for k, row in enumerate(X):
+            key = blake2b(row.tobytes(), digest_size=16).digest()
+            if key not in self._known:
+                if len(self._known) >= self._budget:
+                    continue
+                self._known[key] = len(self._known)
+                fresh.append(k)
+            ids[k] = self._known[key]
+        return ids, fresh
+
+    def _replay(self, U: Float, X: Float, start: int) -> Rows:
+        """Return what is recorded for rows that must be those asked at the time."""
+        rows = self._store.read(start, start + len(U))
+        for name, now, then in (("U", U, rows.U), ("X", X, rows.X)):
+            differ = np.argwhere(now != then)
+            if len(differ):
+                k, j = (int(i) for i in differ[0])
+                detail = f"{name}[{j}] is {float(now[k, j])}, recorded {float(then[k, j])}"
+                raise self._other(f"evaluation {start + k}: {detail}")
+        self._report(start + len(U), rows, replayed=True)
+        return rows
+
+    def _simulate(self, U: Float, X: Float, start: int) -> Evaluated:
+        """Evaluate new rows and record them."""
+        self._start_clock()
+        result = self._evaluate(X)
+        self._store.append(U, X, result, self.seconds)
+        self._report(start + len(U), result, replayed=False)
+        return result
+
+    def _remember(self, result: Evaluated) -> None:
+        # No −0.0 here either: what is told live and what is told in a replay are the same bits.
+        F = np.asarray(result.F, np.float64) + 0.0
+        ok = (np.asarray(result.status) == 0) & np.isfinite(F).all(axis=1)
+        self._F.frombytes(F.tobytes())
+        self._ok.frombytes(ok.tobytes())
+
+    def _results(self, ids: Int) -> tuple[Float, Bool]:
+        F = np.frombuffer(self._F).reshape(-1, self._store.n_obj)[ids]
+        return F, np.frombuffer(self._ok, np.bool_)[ids]
+
+    def _report(self, evaluations: int, result: Evaluated, *, replayed: bool) -> None:
+        if self._on_batch:
+            self._on_batch(Progress(evaluations, self._budget, self.seconds, result, replayed))
+
+    def _nothing_new(self, reason: Reason) -> Reason:
+        if len(self._known) < self._recorded:
+            raise self._other(f"the search ends after {len(self._known)} evaluations ({reason})")
+        return reason
+
+    def _other(self, detail: str) -> StorageError:
+        store = self._store
+        return StorageError(
+            f"{store.folder}: cannot go on with this run: asked again from its seed, the search "
+            f"must repeat the {self._recorded} recorded evaluations bit for bit; {detail}. It was "
+            f"made by another version of BridgeGen ({store.version}) or of what it runs on, "
+            "or from another scenario; its results can still be read"
+        )
+
+    def _start_clock(self) -> None:
+        if self._began is None:
+            self._began = time.perf_counter()

@@ -1,0 +1,56 @@
+"""A run on disk, as people and notebooks look at it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bridgegen.campaign.handover import FOLDER
+from bridgegen.campaign.settings import Settings
+from bridgegen.store import Store
+from bridgegen.store.summary import summarise
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+REPORT = "report.html"
+
+
+class Run:
+    """A finished or interrupted run: its folder, its results, its files."""
+
+    def __init__(self, folder: Path | str) -> None:
+        """Open a run's folder.
+
+        Raises:
+            StorageError: not a run, or damaged.
+        """
+        self.folder = Path(folder)
+        with Store.open(self.folder) as store:
+            self.settings = Settings.from_dict(store.settings, self.folder)
+            self.finished = store.finished is not None
+            rows = store.read()
+            self.summary = summarise(
+                rows.critical,
+                rows.status == 0,
+                rows.metrics[:, store.metrics.index("d_min")],
+                rows.metrics[:, store.metrics.index("v_d")],
+                store.seconds,
+            )
+
+    def frame(self) -> "pd.DataFrame":
+        """Return every evaluation as a row: parameters, metrics, objectives, status, critical."""
+        with Store.open(self.folder) as store:
+            return store.frame()
+
+    @property
+    def scenarios(self) -> tuple[Path, ...]:
+        """The handed-over OpenSCENARIO files, the most critical first."""
+        return tuple(sorted((self.folder / FOLDER).glob("*.xosc")))
+
+    @property
+    def report(self) -> Path:
+        """The report page; written when the run finishes."""
+        return self.folder / REPORT
+
+    def __repr__(self) -> str:
+        s = self.summary
+        return f"Run({str(self.folder)!r}: {s.critical} critical of {s.evaluations} evaluations)"

@@ -1,0 +1,98 @@
+"""What a run was made with: all that it takes to make it again, as JSON in its store."""
+
+import hashlib
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, Self
+
+from bridgegen.errors import StorageError
+from bridgegen.odd.expression import Expression
+from bridgegen.odd.scenario import LogicalScenario
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The settings of a run.
+
+    Attributes:
+        scenario: a name of the catalogue, or the absolute path of a YAML file.
+        fingerprint: digest of what the scenario said when the run began.
+        algorithm: the search algorithm.
+        budget: evaluations.
+        seed: of the whole run.
+        ego: the ego's driver.
+        axes: what is searched.
+        fixed: parameters held at a value.
+        map: the absolute path of an OpenDRIVE map, or None for the generated crossroads.
+        map_digest: SHA-256 of that file.
+        junction: the junction of the map that was chosen.
+        keep: how many scenarios are handed over.
+        objective: the objective with its weights, as ``Objective.to_dict`` gives it.
+    """
+
+    scenario: str
+    fingerprint: str
+    algorithm: str
+    budget: int
+    seed: int
+    ego: str
+    axes: tuple[str, ...]
+    fixed: Mapping[str, float]
+    map: str | None
+    map_digest: str | None
+    junction: str | None
+    keep: int
+    objective: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as JSON's types."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], place: Path) -> Self:
+        """Return the settings of a store.
+
+        Raises:
+            StorageError: a key is unknown or missing: the run is another version's.
+        """
+        if odd := set(data) ^ {one.name for one in fields(cls)}:
+            raise StorageError(
+                f"{place}: a run's settings must be those of this version; unknown or missing: "
+                f"{', '.join(sorted(odd))}"
+            )
+        return cls(**{**data, "axes": tuple(data["axes"])})
+
+    def command(self, folder: Path) -> str:
+        """Return the command line that makes the same run."""
+        words = ["bridgegen", "search", self.scenario, "--algorithm", self.algorithm]
+        words += ["--budget", str(self.budget), "--seed", str(self.seed), "--ego", self.ego]
+        words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
+        for name, value in self.fixed.items():
+            words += ["--fix", f"{name}={value!r}"]
+        if self.map:
+            words += ["--map", self.map, "--junction", str(self.junction)]
+        return shlex.join([*words, "--out", str(folder)])
+
+
+def fingerprint(scenario: LogicalScenario) -> str:
+    """Return a digest of all that a scenario says, wherever its file lies."""
+    text = json.dumps(_plain(scenario), sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Expression):
+        return value.source
+    if isinstance(value, Enum):
+        return value.value
+    if is_dataclass(value):
+        return {one.name: _plain(getattr(value, one.name)) for one in fields(value) if one.compare}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [_plain(one) for one in value]
+    return value

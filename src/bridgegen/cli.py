@@ -1,0 +1,237 @@
+"""The command line: parse, call, print; no logic."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.errors import BridgeGenError, InputError
+
+app = typer.Typer(
+    name="bridgegen",
+    help="Search an operational design domain for the scenarios in which a vehicle comes to harm.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+listing = typer.Typer(help="List what there is.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(listing, name="list")
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one message on stderr and exit status 2."""
+    from bridgegen.screen import fail
+
+    try:
+        app(standalone_mode=True)
+    except BridgeGenError as error:
+        fail(error)
+    except KeyboardInterrupt as stop:
+        folder = getattr(stop, "folder", None)
+        print(f"\nbridgegen: {stop or 'stopped'}", file=sys.stderr)
+        if folder is not None:
+            print(f"bridgegen: go on with 'bridgegen resume {folder}'", file=sys.stderr)
+        sys.exit(130)
+
+
+@app.command()
+def search(
+    scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
+    algorithm: Annotated[str, typer.Option(help="See 'bridgegen list algorithms'.")] = "pso",
+    budget: Annotated[int, typer.Option(help="Evaluations, exactly.")] = 1000,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
+    ego: Annotated[str, typer.Option(help="Who drives: route-follower or reference.")] = (
+        "route-follower"
+    ),
+    axes: Annotated[
+        str | None,
+        typer.Option(help="What to search, e.g. static,participants,weather."),
+    ] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(help="Hold a parameter, e.g. --fix fog_density=80; may be repeated."),
+    ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            help="Metrics and weights, e.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy."
+        ),
+    ] = None,
+    weights: Annotated[
+        str | None, typer.Option(help="fixed, or entropy (from a random sample).")
+    ] = None,
+    scale: Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")] = None,
+    road_map: Annotated[
+        Path | None, typer.Option("--map", help="An OpenDRIVE map instead of a generated one.")
+    ] = None,
+    junction: Annotated[str | None, typer.Option(help="Which junction of the map.")] = None,
+    keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
+    out: Annotated[Path | None, typer.Option(help="The run's folder, new.")] = None,
+) -> None:
+    """Search a logical scenario for its critical concrete ones."""
+    from bridgegen import campaign
+    from bridgegen.screen import Screen, print_summary
+
+    fixed = _numbers(fix or [])
+    terms = _terms(objective) if objective else None
+    with Screen(budget) as screen:
+        run = campaign.search(
+            scenario,
+            algorithm=algorithm,
+            budget=budget,
+            seed=seed,
+            ego=ego,
+            axes=axes.split(",") if axes else None,
+            fixed=fixed,
+            road_map=road_map,
+            junction=junction,
+            keep=keep,
+            out=out,
+            objective=terms,
+            weights=weights,
+            scale=scale,
+            watch=screen.watch,
+        )
+    print_summary(run)
+
+
+@app.command()
+def resume(folder: Annotated[Path, typer.Argument(help="The folder of a run.")]) -> None:
+    """Go on with a run that was interrupted; the result is as if it had not been."""
+    from bridgegen import campaign
+    from bridgegen.screen import Screen, print_summary
+
+    with Screen() as screen:
+        run = campaign.resume(folder, watch=screen.watch)
+    print_summary(run)
+
+
+@app.command()
+def simulate(
+    file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
+    ego: Annotated[
+        str | None, typer.Option(help="Who drives; what the file says by default.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run one scenario file and print its metrics."""
+    from bridgegen.pipeline import simulate_file
+    from bridgegen.screen import print_file_result
+
+    result = simulate_file(file, ego=ego)
+    if as_json:
+        facts = {"file": str(file), "ego": result.driver, "status": result.status}
+        metrics = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
+        print(json.dumps({**facts, "parameters": result.parameters, "metrics": metrics}, indent=2))
+    else:
+        print_file_result(file, result)
+
+
+@app.command()
+def convert(
+    file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files; beside the .owl by default.")
+    ] = None,
+) -> None:
+    """Turn a scenario's individuals into OpenDRIVE and OpenSCENARIO files."""
+    from bridgegen.openx.convert import convert_file
+
+    written, violations = convert_file(file, out)
+    for path in written:
+        print(path)
+    for violation in violations:
+        print(f"bridgegen: warning: {violation}", file=sys.stderr)
+
+
+@app.command()
+def validate(
+    files: Annotated[list[Path], typer.Argument(help="Files: .owl, .xodr, .xosc or .yaml.")],
+) -> None:
+    """Check files against their rules; exit status 2 if one breaks any."""
+    from bridgegen.openx.convert import validate_file
+
+    broken: list[str] = []
+    for file in files:
+        problems = validate_file(file)
+        broken += problems
+        if not problems:
+            print(f"{file}: valid")
+    if broken:
+        raise InputError(*broken)
+
+
+@listing.command("scenarios")
+def list_scenarios(as_json: Json = False) -> None:
+    """The logical scenarios that ship."""
+    from bridgegen.odd.scenario import load, names
+    from bridgegen.screen import print_table
+
+    rows = [(name, load(name).title) for name in names()]
+    print_table(("scenario", "title"), rows, as_json=as_json)
+
+
+@listing.command("algorithms")
+def list_algorithms(as_json: Json = False) -> None:
+    """The search algorithms."""
+    from bridgegen import search as toolkit
+    from bridgegen.screen import print_table
+
+    found = [toolkit.get(name) for name in toolkit.names()]
+    rows = [(one.name, one.description, one.source) for one in found]
+    print_table(("algorithm", "description", "source"), rows, as_json=as_json)
+
+
+@listing.command("metrics")
+def list_metrics(as_json: Json = False) -> None:
+    """The criticality metrics."""
+    from bridgegen.metrics import METRICS
+    from bridgegen.screen import print_table
+
+    rows = [(m.name, m.unit, m.sense, m.description) for m in METRICS.values()]
+    print_table(("metric", "unit", "more critical if", "description"), rows, as_json=as_json)
+
+
+@listing.command("parameters")
+def list_parameters(
+    scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
+    as_json: Json = False,
+) -> None:
+    """The parameters of a scenario, with ranges and constraints."""
+    from bridgegen.odd.scenario import load
+    from bridgegen.screen import print_table
+
+    rows = [
+        (p.name, str(p.axis), p.unit, p.low, p.high, p.default, p.bounds, p.description)
+        for p in load(scenario).table()
+    ]
+    head = ("parameter", "axis", "unit", "low", "high", "default", "constraints", "description")
+    print_table(head, rows, as_json=as_json)
+
+
+def _terms(text: str) -> dict[str, float | None]:
+    """Read ``metric=weight,…`` or ``metric,…``."""
+    pairs = [pair.strip() for pair in text.split(",")]
+    weighted = _numbers([pair for pair in pairs if "=" in pair], "--objective")
+    return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
+
+
+def _numbers(pairs: list[str], option: str = "--fix") -> dict[str, float]:
+    """Read ``name=value`` pairs."""
+    values, problems = {}, []
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        try:
+            values[name] = float(text)
+        except ValueError:
+            equals = ""
+        if not equals:
+            problems.append(f"{option} must read NAME=NUMBER, got '{pair}'")
+    if problems:
+        raise InputError(*problems)
+    return values

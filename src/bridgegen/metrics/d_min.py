@@ -1,0 +1,39 @@
+"""d_min: how close the ego came to anybody."""
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.metrics.metric import Metric, distance, steps, without_failed
+from bridgegen.simulation.rollout import Rollout
+
+
+def d_min(rollout: Rollout) -> Float:
+    """Return the smallest distance between the ego's oriented box and any other's.
+
+    Returns:
+        ``(N,)`` float64 [m], 0 at contact, +inf where there is no other entity, NaN where the
+        scenario failed.
+
+    Source: paper, Table I.
+    """
+    return without_failed(rollout, closest(rollout)[0])
+
+
+def closest(rollout: Rollout) -> tuple[Float, Int]:
+    """Return the smallest distance ``(N,)`` [m] and its first instant ``(N,)``, −1 if none."""
+    from bridgegen.metrics import _kernels
+
+    n = rollout.shape[0]
+    least, instant = np.empty(n), np.empty(n, dtype=np.int64)
+    _kernels.closest(distance(rollout), steps(rollout), least, instant)
+    return least, instant
+
+
+METRIC = Metric(
+    name="d_min",
+    unit="m",
+    description="smallest distance between the ego's oriented box and any other's",
+    sense="smaller",
+    cap=200.0,  # farther than a lidar sees: nobody is there
+    compute=d_min,
+)

@@ -1,0 +1,84 @@
+"""What a metric is, and the checks that every metric makes on a rollout."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int, as_float
+from bridgegen.simulation.boxes import as_steps
+from bridgegen.simulation.rollout import Rollout
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number per scenario that says how critical it was.
+
+    Attributes:
+        name: as in Table I of the paper.
+        unit: "m", "m/s" …; "count" for whole numbers.
+        description: one line for people.
+        sense: which values are more critical, "smaller" or "larger" ones.
+        cap: the value, finite, that counts as "not critical at all"; in an objective every value
+            that is less critical still, +inf for one, counts as this. The metric is not capped.
+        compute: rollout → ``(N,)`` float64, NaN exactly where the scenario failed.
+    """
+
+    name: str
+    unit: str
+    description: str
+    sense: Literal["smaller", "larger"]
+    cap: float
+    compute: Callable[[Rollout], Float]
+
+    def __post_init__(self) -> None:
+        if self.sense not in ("smaller", "larger"):
+            raise ValueError(f"sense must be 'smaller' or 'larger', got {self.sense!r}")
+        if not isfinite(self.cap):
+            raise ValueError(f"cap [{self.unit}] of {self.name} must be finite, got {self.cap}")
+
+    @property
+    def sign(self) -> float:
+        """+1 if larger values are more critical, −1 if smaller ones are."""
+        return 1.0 if self.sense == "larger" else -1.0
+
+
+def recorded(rollout: Rollout, field: str) -> Float:
+    """Return a state of the rollout, ``(N, E, T)``, fit for compiled code.
+
+    Raises:
+        ValueError: another shape, or not finite.
+    """
+    return as_float(f"rollout.{field}", getattr(rollout, field), rollout.shape)
+
+
+def distance(rollout: Rollout) -> Float:
+    """Return the distances ego to others, ``(N, E, T)`` [m]; +inf for the ego itself."""
+    return as_float("rollout.distance [m]", rollout.distance, rollout.shape, finite=False)
+
+
+def steps(rollout: Rollout) -> Int:
+    """Return the number of real instants of every scenario, ``(N,)`` int64 in 1..T."""
+    n, _, t = rollout.shape
+    return as_steps(rollout.n_steps, n, t)
+
+
+def in_steps(name: str, seconds: float, time_step: float) -> int:
+    """Return how many whole time steps fit into a duration.
+
+    Raises:
+        ValueError: the duration or the time step is not a positive number of seconds.
+    """
+    for what, value in ((name, seconds), ("time_step", time_step)):
+        if not (isfinite(value) and value > 0.0):
+            raise ValueError(f"{what} [s] must be finite and > 0, got {value}")
+    # 0.5 s are ten steps of 0.05 s, whatever the rounding of the quotient.
+    return int(np.floor(seconds / time_step + 1e-9))
+
+
+def without_failed(rollout: Rollout, values: Float) -> Float:
+    """Set the values of failed scenarios to NaN, in place, and return the array."""
+    values[np.asarray(rollout.status) != 0] = np.nan
+    return values

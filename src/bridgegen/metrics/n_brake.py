@@ -1,0 +1,44 @@
+"""n_brake: how often the ego braked hard."""
+
+from math import isfinite
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.metric import Metric, recorded, steps, without_failed
+from bridgegen.simulation.rollout import Rollout
+
+
+def n_brake(rollout: Rollout, threshold: float = 4.9) -> Float:
+    """Return how often the ego's deceleration rose to the threshold.
+
+    Args:
+        rollout: N scenarios.
+        threshold: [m/s²]; 3.0 is also in use. Reaching it counts. Before the first instant the
+            deceleration is taken as 0.
+
+    Returns:
+        ``(N,)`` float64, whole numbers; NaN where the scenario failed.
+
+    Raises:
+        ValueError: ``threshold`` is not a finite number > 0.
+
+    Source: paper, Table I.
+    """
+    from bridgegen.metrics import _kernels
+
+    if not (isfinite(threshold) and threshold > 0.0):
+        raise ValueError(f"threshold [m/s²] must be finite and > 0, got {threshold}")
+    out = np.empty(rollout.shape[0])
+    _kernels.braking_edges(recorded(rollout, "a"), steps(rollout), float(threshold), out)
+    return without_failed(rollout, out)
+
+
+METRIC = Metric(
+    name="n_brake",
+    unit="count",
+    description="rising edges of the ego's deceleration through 4.9 m/s²",
+    sense="larger",
+    cap=0.0,
+    compute=n_brake,
+)

@@ -1,0 +1,48 @@
+"""All metrics by name. A new one: its own file with a ``METRIC``, and one entry here."""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.errors import UnknownNameError
+from bridgegen.metrics import a_change, d_min, l_offset, n_brake, n_collision, ttc, v_d
+from bridgegen.metrics.metric import Metric
+from bridgegen.simulation.rollout import Rollout
+
+# In the order of Table I.
+METRICS: Mapping[str, Metric] = MappingProxyType(
+    {
+        module.METRIC.name: module.METRIC
+        for module in (n_collision, ttc, d_min, v_d, l_offset, a_change, n_brake)
+    }
+)
+
+
+def get(name: str) -> Metric:
+    """Return the metric of that name.
+
+    Raises:
+        UnknownNameError: there is none; the message suggests the nearest.
+    """
+    if name not in METRICS:
+        raise UnknownNameError("metric", name, METRICS)
+    return METRICS[name]
+
+
+def evaluate(rollout: Rollout, names: Sequence[str]) -> Float:
+    """Return the named metrics of every scenario.
+
+    Returns:
+        ``(N, M)`` float64, a column per name, in the metric's unit; NaN throughout a row exactly
+        where the scenario failed (``rollout.status`` says why).
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+    """
+    metrics = [get(name) for name in names]
+    out = np.empty((rollout.shape[0], len(metrics)))
+    for j, metric in enumerate(metrics):
+        out[:, j] = metric.compute(rollout)
+    return out

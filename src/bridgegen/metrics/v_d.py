@@ -1,0 +1,32 @@
+"""v_d: how fast the ego was when it came closest."""
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.d_min import closest
+from bridgegen.metrics.metric import Metric, recorded, without_failed
+from bridgegen.simulation.rollout import Rollout
+
+
+def v_d(rollout: Rollout) -> Float:
+    """Return the ego's speed at the moment of d_min, the first if there are several.
+
+    Returns:
+        ``(N,)`` float64 [m/s], ≥ 0: on a collision the speed at first contact; 0 where there is
+        no other entity; NaN where the scenario failed.
+
+    Source: paper, Table I.
+    """
+    _, instant = closest(rollout)
+    speed = recorded(rollout, "v")[np.arange(len(instant)), 0, instant]
+    return without_failed(rollout, np.where(instant < 0, 0.0, speed))
+
+
+METRIC = Metric(
+    name="v_d",
+    unit="m/s",
+    description="ego speed at the moment of d_min",
+    sense="larger",
+    cap=0.0,
+    compute=v_d,
+)

@@ -1,0 +1,245 @@
+"""What may vary (``Parameter``), what limits it (``Bound``), what follows (``Derived``)."""
+
+import keyword
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.errors import ScenarioError, UnknownNameError
+from bridgegen.odd.expression import RESERVED, Expression
+
+# Every check of a bound or a derived value allows TOLERANCE·(1 + |limit|): values that passed
+# through a file rounded to four decimals still keep their bounds, and no physical quantity here
+# is known better. One constant, so that the decoder and the SHACL shapes cannot disagree.
+TOLERANCE = 1e-4
+
+UNITS = {
+    "m": "length",
+    "m/s": "speed",
+    "m/s²": "acceleration",
+    "s": "time",
+    "deg": "angle",
+    "deg/s": "angular speed",
+    "%": "share of the range of CARLA's weather parameters",
+    "mm/h": "rain rate",
+    "kg": "mass",
+    "lx": "illuminance",
+    "°C": "temperature",
+    "count": "number of things",
+    "1": "dimensionless",
+}
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+
+
+class Axis(StrEnum):
+    """The five axes of the search space (paper, Section III-A)."""
+
+    STATIC = "static"
+    TEMPORARY = "temporary"
+    PARTICIPANTS = "participants"
+    WEATHER = "weather"
+    EXTENSION = "extension"
+
+
+def read_axes(axes: Iterable[str]) -> tuple[Axis, ...]:
+    """Return axes by name, each once, in the order of ``Axis``.
+
+    Raises:
+        UnknownNameError: no such axis.
+    """
+    names = {axes} if isinstance(axes, str) else set(axes)
+    for name in sorted(names - set(Axis)):
+        raise UnknownNameError("axis", name, list(Axis))
+    return tuple(axis for axis in Axis if axis in names)
+
+
+def slack(limit: Float | float) -> Float:
+    """Return by how much a value may miss ``limit`` and still keep it."""
+    return np.asarray(TOLERANCE * (1.0 + np.abs(limit)))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One quantity that may vary.
+
+    Attributes:
+        name: lower case, digits and underscores.
+        axis: where it belongs.
+        unit: one of ``UNITS``.
+        low: smallest value.
+        high: largest value.
+        default: value while its axis is not searched.
+        kind: whether it takes whole numbers only.
+        description: what it is, for people.
+        source: where its range comes from.
+        place: file and line that declare it, for messages.
+
+    Raises:
+        ScenarioError: a rule is broken; all that are.
+    """
+
+    name: str
+    axis: Axis
+    unit: str
+    low: float
+    high: float
+    default: float
+    kind: Literal["float", "integer"] = "float"
+    description: str = ""
+    source: str = ""
+    place: str = field(default="", compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        label = f"{self.name} [{self.unit}]"
+        values = {"low": self.low, "high": self.high, "default": self.default}
+        problems = [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
+        unusable = [key for key, value in values.items() if not math.isfinite(value)]
+        problems += [f"{key} of {label} must be finite, got {values[key]}" for key in unusable]
+        if not unusable:
+            if self.low > self.high:
+                problems.append(
+                    f"low <= high must hold for {label}, got low={self.low}, high={self.high}"
+                )
+            elif not self.low <= self.default <= self.high:
+                problems.append(
+                    f"low <= default <= high must hold for {label}, "
+                    f"got low={self.low}, default={self.default}, high={self.high}"
+                )
+            if self.kind == "integer":
+                problems += [
+                    f"{key} of {label} must be a whole number, got {value}"
+                    for key, value in values.items()
+                    if value != math.floor(value)
+                ]
+        _refuse(problems, self.place)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """An interval that earlier parameters leave to one parameter.
+
+    Attributes:
+        target: the parameter that is limited.
+        lo: smallest value, or ``None``.
+        hi: largest value, or ``None``.
+        why: the reason in the world, one sentence.
+        source: where the reason, or its numbers, come from.
+        place: file and line that declare it, for messages.
+
+    Raises:
+        ScenarioError: neither ``lo`` nor ``hi``, or no reason or source.
+    """
+
+    target: str
+    lo: Expression | None
+    hi: Expression | None
+    why: str
+    source: str
+    place: str = field(default="", compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        problems = _reason_problems(f"the bound on {self.target}", self.why, self.source)
+        if self.lo is None and self.hi is None:
+            problems.append(f"the bound on {self.target} needs lo or hi")
+        _refuse(problems, self.place)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The parameters that limit the target."""
+        return frozenset().union(*(side.names for side in (self.lo, self.hi) if side))
+
+    def __str__(self) -> str:
+        """Return the rule as read: ``cloudiness >= 0.5*precipitation``."""
+        low = f"{self.target} >= {self.lo}" if self.lo else ""
+        high = f"{self.target} <= {self.hi}" if self.hi else ""
+        return " and ".join(side for side in (low, high) if side)
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A quantity that follows from others.
+
+    Attributes:
+        name: as a parameter's.
+        axis: where it belongs.
+        unit: one of ``UNITS``.
+        value: its formula.
+        why: the reason in the world, one sentence.
+        source: where the formula comes from.
+        description: what it is, for people.
+        place: file and line that declare it, for messages.
+
+    Raises:
+        ScenarioError: a rule is broken; all that are.
+    """
+
+    name: str
+    axis: Axis
+    unit: str
+    value: Expression
+    why: str
+    source: str
+    description: str = ""
+    place: str = field(default="", compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        _refuse(
+            [
+                *_name_problems(self.name),
+                *_unit_problems(self.name, self.unit),
+                *_reason_problems(f"the derived {self.name}", self.why, self.source),
+            ],
+            self.place,
+        )
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The quantities that it follows from."""
+        return self.value.names
+
+    def __str__(self) -> str:
+        """Return the rule as read: ``fog_distance = 100 - fog_density``."""
+        return f"{self.name} = {self.value}"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean '…'?"`` for the known name next to ``name``, or nothing."""
+    near = get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def at(place: str) -> str:
+    """Return a place as the end of a message, or nothing."""
+    return f" ({place})" if place else ""
+
+
+def _name_problems(name: str) -> list[str]:
+    if not _NAME.fullmatch(name):
+        return [f"a name is lower case letters, digits and '_', 64 at most, got '{name}'"]
+    if keyword.iskeyword(name) or name in RESERVED:
+        return [f"'{name}' has a meaning in formulas and cannot name a parameter"]
+    return []
+
+
+def _unit_problems(name: str, unit: str) -> list[str]:
+    if unit in UNITS:
+        return []
+    return [f"unknown unit '{unit}' of {name}; known: {', '.join(UNITS)}"]
+
+
+def _reason_problems(label: str, why: str, source: str) -> list[str]:
+    given = {"why": why, "source": source}
+    return [f"{label} must say its {key}" for key, text in given.items() if not text.strip()]
+
+
+def _refuse(problems: list[str], place: str) -> None:
+    if problems:
+        raise ScenarioError(*(problem + at(place) for problem in problems))

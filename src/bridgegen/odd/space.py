@@ -1,0 +1,325 @@
+"""The search space: points of the unit cube to rows of parameters that keep every constraint."""
+
+from collections.abc import Iterable, Mapping
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float, as_float
+from bridgegen.errors import ScenarioError, UnknownNameError
+from bridgegen.odd.constraints import order, problems_of
+from bridgegen.odd.parameters import (
+    TOLERANCE,
+    Bound,
+    Derived,
+    Parameter,
+    at,
+    nearest,
+    read_axes,
+    slack,
+)
+from bridgegen.odd.violations import Violation, violations
+
+if TYPE_CHECKING:
+    from bridgegen.odd.scenario import LogicalScenario
+
+# Points at which a new space is tried: all corners of the cube up to _CORNERS, and as many others.
+_CORNERS = 2048
+
+
+class SearchSpace:
+    """What is searched of a logical scenario, and how a point of the unit cube becomes a row.
+
+    Decoding takes the parameters in an order in which each comes after all that limit it, and
+    spreads each over the interval that the earlier ones leave to it: ``x = lo + u·(hi − lo)``,
+    or evenly over its whole numbers. So every point of the cube is feasible, and no algorithm
+    needs a penalty. A parameter that is not searched stands at its default, or where ``fixed``
+    puts it, moved into its interval where a bound asks for it. Derived quantities follow.
+
+    Attributes:
+        scenario: the logical scenario.
+        axes: the axes that are searched.
+        variables: the searched parameters, in declared order: the columns of U. One whose low is
+            its high is not searched.
+        names: every parameter, then every derived quantity, in declared order: the columns of X.
+        units: the unit of each of ``names``.
+
+    Args:
+        scenario: where the parameters and constraints come from.
+        axes: what to search; the scenario's own choice if ``None``.
+        fixed: parameters to hold at a value instead of searching them.
+
+    Raises:
+        UnknownNameError: no such axis or parameter.
+        ScenarioError: constraints that cannot be computed, a fixed value outside its range, or
+            constraints that leave a parameter no value somewhere in the cube.
+    """
+
+    def __init__(
+        self,
+        scenario: "LogicalScenario",
+        axes: Iterable[str] | None = None,
+        fixed: Mapping[str, float] | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.axes = read_axes(scenario.axes if axes is None else axes)
+        parameters, fixed = scenario.parameters, dict(fixed or {})
+        problems = problems_of(parameters.values(), scenario.bounds, scenario.derived)
+        problems += _fixed_problems(fixed, scenario)
+        if problems:
+            raise ScenarioError(*problems)
+        columns: list[Parameter | Derived] = [*parameters.values(), *scenario.derived]
+        self.names = tuple(column.name for column in columns)
+        self.units = tuple(column.unit for column in columns)
+        self.variables = tuple(
+            p.name
+            for p in parameters.values()
+            if p.axis in self.axes and p.name not in fixed and p.low < p.high
+        )
+        self._defaults = {p.name: p.default for p in parameters.values()} | fixed
+        self._columns = {name: number for number, name in enumerate(self.names)}
+        self._derived = {one.name: one for one in scenario.derived}
+        self._bounds: dict[str, tuple[Bound, ...]] = {
+            name: tuple(b for b in scenario.bounds if b.target == name) for name in parameters
+        }
+        self._order = order(self.names, scenario.bounds, scenario.derived)
+        self._decode(probes(self.n_var))
+
+    @property
+    def n_var(self) -> int:
+        """Number of searched parameters: columns of U."""
+        return len(self.variables)
+
+    def index(self, name: str) -> int:
+        """Return the column of X that holds ``name``.
+
+        Raises:
+            UnknownNameError: no such parameter.
+        """
+        if name not in self._columns:
+            raise UnknownNameError("parameter", name, self.names)
+        return self._columns[name]
+
+    def values(self, row: npt.ArrayLike) -> dict[str, float]:
+        """Return one row of X by name.
+
+        Raises:
+            ValueError: wrong length.
+        """
+        array = as_float("a row of X", row, (len(self.names),))
+        return dict(zip(self.names, array.tolist(), strict=True))
+
+    def decode(self, U: npt.ArrayLike) -> Float:
+        """Turn points of the unit cube into feasible rows.
+
+        Args:
+            U: ``(N, n_var)`` in [0, 1].
+
+        Returns:
+            X ``(N, len(names))``. A row has the same bits whatever the rows around it.
+
+        Raises:
+            ValueError: wrong shape, or a value outside [0, 1].
+            ScenarioError: the constraints leave a parameter no value at some row.
+        """
+        cube = as_float("U", U, (None, self.n_var))
+        if cube.size and not (cube.min() >= 0.0 and cube.max() <= 1.0):
+            row, column = np.argwhere((cube < 0.0) | (cube > 1.0))[0].tolist()
+            raise ValueError(
+                f"0 <= U <= 1 must hold for {self.variables[column]}, "
+                f"got {float(cube[row, column])!r} in row {row}"
+            )
+        return self._decode(cube)
+
+    def encode(self, X: npt.ArrayLike) -> Float:
+        """Return the points of the unit cube that decode to these rows.
+
+        Where an interval has no width any point would do: 0.5 is returned.
+
+        Args:
+            X: ``(N, len(names))``, rows of this space.
+
+        Returns:
+            U ``(N, n_var)``; ``decode`` gives X back, up to rounding.
+
+        Raises:
+            ValueError: wrong shape, or NaN or inf.
+            ScenarioError: a row that no point decodes to: infeasible, or with a value other
+                than this space's in a column that it does not search.
+        """
+        rows = as_float("X", X, (None, len(self.names)))
+        table = self._table(rows)
+        cube = np.empty((len(rows), self.n_var))
+        for number, name in enumerate(self.variables):
+            lo, hi = self._interval(name, table)
+            below, width = table[name] - lo, np.broadcast_to(hi - lo, len(rows))
+            if self.scenario.parameters[name].kind == "integer":
+                below, width = below + 0.5, width + 1.0
+            share = np.divide(below, width, out=np.full(len(rows), 0.5), where=width > 0.0)
+            cube[:, number] = np.clip(share, 0.0, 1.0)
+        back = self._decode(cube)
+        wrong = np.argwhere(np.abs(rows - back) > slack(back)).tolist()
+        if wrong:
+            raise ScenarioError(
+                *(
+                    f"no point of the unit cube decodes to row {row}: "
+                    f"{self.names[column]} [{self.units[column]}] would be "
+                    f"{float(back[row, column]):.6g}, got {float(rows[row, column]):.6g}"
+                    for row, column in wrong[:10]
+                )
+            )
+        return cube
+
+    def row(self, values: Mapping[str, float]) -> Float:
+        """Return the row of X with the given values, and the others at their defaults.
+
+        Defaults are moved into the interval that the given values leave them. A given value is
+        kept to the last bit, whether this space searches it or not.
+
+        Args:
+            values: by name; a derived quantity may be given if it is what its formula says.
+
+        Returns:
+            ``(len(names),)``.
+
+        Raises:
+            UnknownNameError: no such parameter.
+            ScenarioError: a given value breaks a constraint; all that do.
+        """
+        for name in values:
+            self.index(name)
+        table: dict[str, Float | float] = {}
+        for name in self._order:
+            if name in values:
+                table[name] = float(values[name])
+            elif name in self._derived:
+                table[name] = float(self._derived[name].value.evaluate(table))
+            else:
+                lo, hi = self._interval(name, table)
+                table[name] = float(np.clip(self._defaults[name], lo, hi))
+        row = np.array([table[name] for name in self.names], dtype=np.float64)
+        broken = self.violations(row[None, :])
+        if broken:
+            raise ScenarioError(*(one.reason for one in broken))
+        return row
+
+    def violations(self, X: npt.ArrayLike) -> list[Violation]:
+        """Check rows against every range, bound and formula, independently of the decoder.
+
+        Args:
+            X: ``(N, len(names))``; NaN and inf are violations.
+
+        Returns:
+            All that is wrong, by row; nothing if the rows are feasible to ``TOLERANCE``.
+
+        Raises:
+            ValueError: wrong shape.
+        """
+        rows = as_float("X", X, (None, len(self.names)), finite=False)
+        return violations(self.scenario, self._table(rows))
+
+    def _table(self, rows: Float) -> dict[str, Float]:
+        return dict(zip(self.names, np.ascontiguousarray(rows.T), strict=True))
+
+    def _decode(self, cube: Float) -> Float:
+        shares = dict(zip(self.variables, np.ascontiguousarray(cube.T), strict=True))
+        # What formulas read; a parameter that never moves stays one number in it.
+        table: dict[str, Float | float] = {}
+        result = np.empty((len(self.names), len(cube)))
+        for name in self._order:
+            out = result[self._columns[name]]
+            if name in self._derived:
+                out[:] = self._derived[name].value.evaluate(table)
+                one = self._derived[name]
+                problem = f"'{one}'{at(one.place)} has no value"
+                self._refuse(problem, one.names, table, ~np.isfinite(out))
+                table[name] = out
+                continue
+            if name not in shares and not self._bounds[name]:
+                out[:] = table[name] = self._defaults[name]
+                continue
+            lo, hi = self._interval(name, table)
+            if name not in shares:
+                out[:] = self._defaults[name]
+            elif self.scenario.parameters[name].kind == "integer":
+                np.floor(lo + shares[name] * (hi - lo + 1.0), out=out)
+            else:
+                np.add(lo, shares[name] * (hi - lo), out=out)
+            np.maximum(out, lo, out=out)  # rounding may leave the interval by a bit
+            np.minimum(out, hi, out=out)
+            table[name] = out
+        return np.ascontiguousarray(result.T)
+
+    def _interval(
+        self, name: str, table: Mapping[str, Float | float]
+    ) -> tuple[Float | float, Float | float]:
+        """Return the lowest and the highest value that the columns before it leave ``name``."""
+        parameter = self.scenario.parameters[name]
+        if not self._bounds[name]:
+            return parameter.low, parameter.high
+        lo: Float | float = parameter.low
+        hi: Float | float = parameter.high
+        for bound in self._bounds[name]:
+            if bound.lo is not None:
+                lo = np.maximum(lo, bound.lo.evaluate(table))
+            if bound.hi is not None:
+                hi = np.minimum(hi, bound.hi.evaluate(table))
+        if parameter.kind == "integer":
+            lo, hi = np.ceil(lo - TOLERANCE), np.floor(hi + TOLERANCE)
+            empty = ~np.atleast_1d(lo <= hi)
+        else:
+            empty = ~np.atleast_1d(lo <= hi + slack(hi))  # true for NaN, too
+        rules = " and ".join(f"'{bound}'{at(bound.place)}" for bound in self._bounds[name])
+        label = f"{name} [{parameter.unit}], {parameter.low:g} to {parameter.high:g}"
+        names = frozenset().union(*(bound.names for bound in self._bounds[name]))
+        self._refuse(f"{rules} leaves no value to {label},", names, table, empty)
+        # Limits that cross by less than the tolerance meet, inside the box.
+        hi = np.clip(hi, parameter.low, parameter.high)
+        return np.minimum(lo, hi), hi
+
+    def _refuse(
+        self,
+        problem: str,
+        names: Iterable[str],
+        table: Mapping[str, Float | float],
+        bad: Bool,
+    ) -> None:
+        """Raise, if any row is bad, the error of a constraint that cannot be kept at the first."""
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            columns = {name: np.atleast_1d(table[name]) for name in sorted(names)}
+            values = [f"{n}={float(c[row % len(c)]):.6g}" for n, c in columns.items()]
+            raise ScenarioError(f"{problem} at {', '.join(values) or 'any row'}")
+
+
+def _fixed_problems(fixed: Mapping[str, float], scenario: "LogicalScenario") -> list[str]:
+    problems = []
+    parameters = scenario.parameters
+    derived = {one.name: one for one in scenario.derived}
+    for name, value in fixed.items():
+        if name in derived:
+            problems.append(f"cannot fix '{name}', which follows from '{derived[name]}'")
+            continue
+        if name not in parameters:
+            problems.append(f"cannot fix the unknown parameter '{name}'{nearest(name, parameters)}")
+            continue
+        one = parameters[name]
+        if not one.low <= value <= one.high:
+            problems.append(
+                f"{one.low:g} <= {name} <= {one.high:g} [{one.unit}] must hold, got {value!r}"
+            )
+        elif one.kind == "integer" and value != int(value):
+            problems.append(f"{name} [{one.unit}] must be a whole number, got {value!r}")
+    return problems
+
+
+def probes(n_var: int) -> Float:
+    """Return points that show what a space can hold: corners (all, if few) and others."""
+    random = np.random.default_rng(0)
+    if 2**n_var <= _CORNERS:
+        corners = np.array(list(product((0.0, 1.0), repeat=n_var)))
+    else:
+        corners = random.integers(0, 2, (_CORNERS, n_var)).astype(np.float64)
+    return np.concatenate([corners, random.random((_CORNERS, n_var))])

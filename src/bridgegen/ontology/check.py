@@ -1,0 +1,125 @@
+"""Does a scenario keep its rules? Answers in sentences that a person understands.
+
+SHACL decides (`shapes`, run by pyshacl over a ``pyoxigraph.Store``) and `words` says it in words.
+pyshacl is imported at the first check, as that takes half a second.
+"""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import pyoxigraph as ox
+
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.shapes import Rule, rules, turtle
+from bridgegen.ontology.vocabulary import SUBCLASS, tbox
+from bridgegen.ontology.words import Finding, Violation, violations_of
+
+if TYPE_CHECKING:
+    from bridgegen.odd.scenario import LogicalScenario
+
+__all__ = ["Violation", "check"]
+
+_SH = "http://www.w3.org/ns/shacl#"
+_KEPT = 8
+"""Compiled scenarios that are remembered."""
+
+
+def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -> list[Violation]:
+    """Return every rule that the individuals break; nothing if they are as they should be.
+
+    Args:
+        individuals: of one scenario.
+        scenario: the logical scenario whose ranges, bounds and formulas they must keep; without
+            it, the ranges that the individuals declare themselves.
+    """
+    compiled = _compiled(scenario)
+    store = ox.Store()
+    store.extend(individuals.quads)
+    store.extend(_hierarchy())
+    found = {
+        (one.nodes, one.message): one
+        for finding in compiled.validate(store)
+        for one in violations_of(individuals, scenario, compiled.rules, finding)
+    }
+    return sorted(found.values(), key=lambda one: (one.individual, one.message))
+
+
+@cache
+def _hierarchy() -> tuple[ox.Quad, ...]:
+    """Return the subclass relations: shapes apply to subclasses through them."""
+    return tuple(quad for quad in tbox().quads if quad.predicate == SUBCLASS)
+
+
+class _Compiled:
+    """The shapes of one scenario, as pyshacl has read them."""
+
+    def __init__(self, scenario: "LogicalScenario | None") -> None:
+        import rdflib
+        from pyshacl.graph_abstraction import to_rdf
+        from pyshacl.shapes_graph import ShapesGraph
+
+        self.rules: dict[str, Rule] = {rule.key: rule for rule in rules(scenario)}
+        graph = rdflib.Graph()
+        for quad in ox.parse(turtle(scenario), format=ox.RdfFormat.TURTLE):
+            graph.add((to_rdf(quad.subject), to_rdf(quad.predicate), to_rdf(quad.object)))
+        self.shapes: Any = ShapesGraph(graph)
+        _ = self.shapes.shapes  # builds them, once
+
+    def validate(self, store: ox.Store) -> Iterator[Finding]:
+        from pyshacl.graph_abstraction import DataGraph
+        from pyshacl.validator import Validator
+        from rdflib import Literal, URIRef
+
+        # pyshacl.validate() would read the shapes anew at each call
+        validator = Validator(
+            DataGraph.from_oxigraph_store(store), shacl_graph=self.shapes.graph, options={}
+        )
+        validator.shacl_graph = self.shapes
+        with _quiet():
+            conforms, report, _ = validator.run()
+        if conforms:
+            return
+
+        def said(result: Any, name: str) -> Any:
+            return report.value(result, URIRef(_SH + name))
+
+        for result in report.objects(None, URIRef(_SH + "result")):
+            value = said(result, "value")
+            yield Finding(
+                shape=str(said(result, "sourceShape")),
+                component=str(said(result, "sourceConstraintComponent")),
+                focus=str(said(result, "focusNode")),
+                value=str(value) if value is not None else None,
+                literal=isinstance(value, Literal),
+            )
+
+
+_cache: dict[int, tuple["LogicalScenario | None", _Compiled]] = {}
+
+
+def _compiled(scenario: "LogicalScenario | None") -> _Compiled:
+    """Return the shapes of a scenario, compiled at its first check."""
+    kept = _cache.get(id(scenario))  # a scenario has no hash; being kept here, its id stays its own
+    if kept is None:
+        while len(_cache) >= _KEPT:
+            _cache.pop(next(iter(_cache)))
+        kept = _cache[id(scenario)] = (scenario, _Compiled(scenario))
+    return kept[1]
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep rdflib from logging a traceback for each ill-typed literal: it is a finding."""
+    logger = logging.getLogger("rdflib.term")
+
+    def refuse(_: logging.LogRecord) -> bool:
+        return False
+
+    logger.addFilter(refuse)
+    try:
+        yield
+    finally:
+        logger.removeFilter(refuse)

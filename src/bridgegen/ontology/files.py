@@ -1,0 +1,231 @@
+"""Scenarios as ``.owl`` files: RDF/XML that Protégé opens, with the ontology merged in.
+
+A saved file is self-contained. Loading takes the ontology's own statements out again, so that
+what was saved and what is loaded are the same individuals; what a user added to the ontology
+(a subclass, say) stays with them.
+"""
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from xml.parsers import expat
+
+import pyoxigraph as ox
+
+from bridgegen.errors import FileFormatError, StorageError
+from bridgegen.ontology.graph import Individuals, as_number
+from bridgegen.ontology.vocabulary import (
+    DOUBLE,
+    INTEGER,
+    ONTOLOGY,
+    OWL,
+    OWL_ONTOLOGY,
+    PREFIXES,
+    SCENARIOS,
+    TYPE,
+    Subject,
+    bg,
+    tbox,
+)
+
+MAX_BYTES = 100 * 2**20
+MAX_DEPTH = 256
+"""Of anonymous nodes that describe one another, as compared with the ontology's own."""
+
+_IMPORTS = ox.NamedNode(OWL + "imports")
+_RDF_XML = ox.RdfFormat.RDF_XML
+
+
+def save(individuals: Individuals, path: Path | str, include_tbox: bool = True) -> None:
+    """Write individuals to a file; it is there whole or not at all.
+
+    Args:
+        individuals: of a scenario or a road network.
+        path: where to; a file that exists is replaced.
+        include_tbox: merge ``bridgegen.owl`` in; otherwise the file imports it by its IRI.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(to_bytes(individuals, include_tbox))
+        part.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:
+    """Return what `save` writes."""
+    header: list[ox.Quad] = []
+    by_subject: dict[object, list[ox.Quad]] = {}
+    for quad in individuals.quads:
+        if quad.predicate == TYPE and quad.object == OWL_ONTOLOGY:
+            header.append(quad)
+        else:
+            by_subject.setdefault(quad.subject, []).append(quad)
+    header = header or [ox.Quad(ox.NamedNode(SCENARIOS + "unnamed"), TYPE, OWL_ONTOLOGY)]
+    if not include_tbox:
+        header.append(ox.Quad(header[0].subject, _IMPORTS, ox.NamedNode(ONTOLOGY)))
+    prefixes = dict(PREFIXES)
+    if isinstance(header[0].subject, ox.NamedNode):
+        prefixes["this"] = header[0].subject.value + "#"
+    quads = [*header, *(tbox().quads if include_tbox else ())]
+    for about_one in by_subject.values():
+        quads += about_one
+    data = ox.serialize(quads, format=_RDF_XML, prefixes=prefixes)
+    assert data is not None
+    return data
+
+
+def load(path: Path | str) -> Individuals:
+    """Read individuals from an RDF/XML file, ours or Protégé's.
+
+    Raises:
+        FileFormatError: missing, not a file, unreadable, larger than 100 MiB, not RDF/XML, nested
+            deeper than 256 levels, or with a DOCTYPE (entities are never expanded).
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise FileFormatError(f"{path}: cannot be read: not a file")
+        if size > MAX_BYTES:
+            raise FileFormatError(f"{path}: may have at most {MAX_BYTES} bytes, got {size}")
+        data = path.read_bytes()
+    except OSError as error:
+        raise FileFormatError(f"{path}: cannot be read: {error.strerror}") from None
+    return from_bytes(data, str(path))
+
+
+def from_bytes(data: bytes, place: str = "document") -> Individuals:
+    """Read individuals from RDF/XML text; see `load`."""
+    _check_xml(data, place)
+    try:
+        quads = list(ox.parse(data, format=_RDF_XML, base_iri=SCENARIOS + "unnamed"))
+    except (SyntaxError, ValueError) as error:
+        raise FileFormatError(f"{place}: not RDF/XML: {_first_line(error)}") from None
+    return Individuals(_typed(quad) for quad in _without_tbox(quads))
+
+
+def _check_xml(data: bytes, place: str) -> None:
+    """Refuse what is not XML, or hostile, before the RDF parser sees it."""
+    parser = expat.ParserCreate()
+    depth = 0
+
+    def on_doctype(*_: object) -> None:
+        raise FileFormatError(f"{place}: a DOCTYPE is refused (entities are never expanded)")
+
+    def on_start(*_: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_DEPTH:
+            line = parser.CurrentLineNumber
+            raise FileFormatError(
+                f"{place}: elements may nest {MAX_DEPTH} deep, line {line} is deeper"
+            )
+
+    def on_end(*_: object) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartDoctypeDeclHandler = on_doctype
+    parser.StartElementHandler = on_start
+    parser.EndElementHandler = on_end
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise FileFormatError(
+            f"{place}: not well-formed XML: {_first_line(error)} (in Protégé, save as RDF/XML)"
+        ) from None
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).splitlines() or [type(error).__name__]
+    return lines[0]
+
+
+def _typed(quad: ox.Quad) -> ox.Quad:
+    """Give a number the datatype that the ontology asks for (Protégé may write xsd:decimal)."""
+    value = quad.object
+    wanted = _number_ranges().get(quad.predicate)
+    if wanted is None or not isinstance(value, ox.Literal) or value.datatype == wanted:
+        return quad
+    number = as_number(value)
+    if number is None or (wanted == INTEGER and number != int(number)):
+        return quad
+    return ox.Quad(
+        quad.subject, quad.predicate, ox.Literal(int(number) if wanted == INTEGER else number)
+    )
+
+
+@cache
+def _number_ranges() -> dict[ox.NamedNode, ox.NamedNode]:
+    return {
+        bg(name): target for name, target in tbox().ranges.items() if target in (DOUBLE, INTEGER)
+    }
+
+
+def _without_tbox(quads: list[ox.Quad]) -> list[ox.Quad]:
+    """Leave out what ``bridgegen.owl`` says, anonymous nodes (of a list, say) included."""
+    known = _known()
+    described = _Anonymous(quads)
+    return [quad for quad in quads if described.key(quad) not in known]
+
+
+@cache
+def _known() -> frozenset[object]:
+    described = _Anonymous(tbox().quads)
+    return frozenset(described.key(quad) for quad in tbox().quads)
+
+
+class _Anonymous:
+    """Tells statements about anonymous nodes apart by what they say, their ids being arbitrary."""
+
+    def __init__(self, quads: Iterable[ox.Quad]) -> None:
+        self.about: dict[object, list[ox.Quad]] = {}
+        self.parent: dict[object, ox.Quad] = {}
+        for quad in quads:
+            if isinstance(quad.subject, ox.BlankNode):
+                self.about.setdefault(quad.subject, []).append(quad)
+            if isinstance(quad.object, ox.BlankNode):
+                self.parent[quad.object] = quad
+
+    def key(self, quad: ox.Quad) -> object:
+        """Return what identifies a statement: itself, or the whole tree that it is part of."""
+        if not self.about:
+            return quad
+        for _ in range(MAX_DEPTH):
+            if quad.subject not in self.parent:
+                break
+            quad = self.parent[quad.subject]
+        if isinstance(quad.subject, ox.BlankNode):
+            return self.text(quad.subject, MAX_DEPTH)
+        if isinstance(quad.object, ox.BlankNode):
+            return (quad.subject, quad.predicate, self.text(quad.object, MAX_DEPTH))
+        return quad
+
+    def text(self, node: Subject, depth: int) -> str:
+        """Return all that a tree of anonymous nodes says, in a fixed order."""
+        if depth == 0:
+            return str(node)
+        return (
+            "["
+            + ";".join(
+                sorted(
+                    f"{quad.predicate} "
+                    + (
+                        self.text(quad.object, depth - 1)
+                        if isinstance(quad.object, ox.BlankNode)
+                        else str(quad.object)
+                    )
+                    for quad in self.about.get(node, ())
+                )
+            )
+            + "]"
+        )

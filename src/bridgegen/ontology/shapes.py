@@ -1,0 +1,285 @@
+"""SHACL shapes: what every scenario's individuals must be, and the constraints of one scenario.
+
+The structure (which properties, of which kind, how many) is compiled from ``bridgegen.owl``; the
+constraints from the declarations of `bridgegen.odd` that also make the decoder. Both are plain
+SHACL with SPARQL 1.1, in Turtle: any SHACL processor can run them.
+
+Values of the weather's parameters are found as properties of the parts of a ``bg:Weather``;
+those of all others on whatever individual binds the parameter (``bg:has_parameter``).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+from bridgegen.odd.expression import Expression
+from bridgegen.odd.parameters import TOLERANCE, Axis
+from bridgegen.ontology.individuals import WEATHER, reason
+from bridgegen.ontology.sparql import binds, literal, variable
+from bridgegen.ontology.vocabulary import BG, ONTOLOGY, XSD, tbox
+
+if TYPE_CHECKING:
+    from bridgegen.odd.scenario import LogicalScenario
+
+SHAPES = ONTOLOGY + "/shapes#"
+
+WEATHER_PATHS = {
+    name: f"{'(bg:hasSun|bg:has_sun)' if link == 'hasSun' else f'bg:{link}'}/bg:has_{name}"
+    for link, _, names in WEATHER
+    for name in names
+}
+"""From a ``bg:Weather`` to the value of each of its parameters."""
+
+_HEADER = f"""\
+@prefix bg: <{BG}> .
+@prefix sh: <http://www.w3.org/ns/shacl#> .
+@prefix xsd: <{XSD}> .
+@prefix : <{SHAPES}> .
+
+:prefixes sh:declare
+  [ sh:prefix "bg" ; sh:namespace "{BG}"^^xsd:anyURI ] ,
+  [ sh:prefix "xsd" ; sh:namespace "{XSD}"^^xsd:anyURI ] .
+"""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One constraint of a scenario as a SHACL-SPARQL constraint.
+
+    Attributes:
+        key: local name of its shape.
+        target: the parameter that breaks the rule, if one does.
+        focus: the class whose individuals are asked.
+        text: the rule, as formula.
+        limit: the formula of the side that the target is compared with, if there is one.
+        why: reason and source, one sentence; may be empty.
+        select: the query; it returns each focus node that breaks the rule, with the value.
+    """
+
+    key: str
+    target: str
+    focus: str
+    text: str
+    limit: Expression | None
+    why: str
+    select: str
+
+
+def turtle(scenario: "LogicalScenario | None" = None) -> str:
+    """Return the shapes as Turtle: the structure, and a scenario's constraints."""
+    parts = [_HEADER, structure()]
+    if scenario is not None and any(name in WEATHER_PATHS for name in scenario.parameters):
+        parts.append(_required("Scenario", "has_weather"))
+    parts += [_sparql_shape(rule) for rule in rules(scenario)]
+    return "\n".join(parts)
+
+
+# -- structure, from bridgegen.owl -----------------------------------------------------------------
+
+
+@cache
+def structure() -> str:
+    """Return the shapes of single properties: kind, number and range of values; what is required.
+
+    One shape per property instead of one per class: pyshacl looks at all individuals at once then,
+    which takes it half the time.
+    """
+    ontology = tbox()
+    shapes = []
+    for name, target in ontology.ranges.items():
+        data = target.value.startswith(XSD)
+        facts = [f"sh:{'datatype' if data else 'class'} <{target.value}>"]
+        if name in ontology.functional:
+            facts.append("sh:maxCount 1")
+        if name in ontology.above:
+            facts.append(f'sh:minExclusive "{ontology.above[name]!r}"^^xsd:double')
+        if name in ontology.allowed:
+            facts.append(f"sh:in ( {' '.join(map(_quoted, ontology.allowed[name]))} )")
+        shapes.append(
+            f":property-{name} a sh:PropertyShape ; sh:targetSubjectsOf bg:{name} ; "
+            f"sh:path bg:{name} ; {' ; '.join(facts)} ."
+        )
+    shapes += [_required(cls, name) for cls, names in ontology.requires.items() for name in names]
+    return "\n".join(shapes)
+
+
+def _required(cls: str, name: str) -> str:
+    return (
+        f":{cls}-{name} a sh:PropertyShape ; sh:targetClass bg:{cls} ; "
+        f"sh:path bg:{name} ; sh:minCount 1 ."
+    )
+
+
+def _general_rules() -> Iterator[Rule]:
+    """Yield what holds in every scenario but takes a query to say."""
+    yield Rule(
+        "one-value", "", "Scenario", "a parameter has one value, wherever it is bound", None, "",
+        "SELECT DISTINCT $this ?value WHERE { "
+        "?node bg:has_parameter ?parameter ; ?property ?value . "
+        "?node_2 bg:has_parameter ?parameter ; ?property_2 ?value_2 . "
+        f"{_bound_by('?parameter')} {_bound_by('?parameter', '_2')} "
+        "FILTER(?value != ?value_2) $this a bg:Scenario . }",
+    )  # fmt: skip
+    yield Rule(
+        "on-its-road", "", "LanePosition",
+        "a lane position lies on the road of its lane", None, "",
+        "SELECT $this ?value WHERE { $this bg:on_lane/^bg:has_lane ?road ; "
+        "bg:has_distance_to_junction ?value . ?road bg:has_length ?length . "
+        "OPTIONAL { ?nearer bg:has_continuation+ ?road ; bg:has_length ?before } } "
+        "GROUP BY $this ?value ?length HAVING("
+        f"xsd:double(?value) < SUM(COALESCE(?before, 0.0e0)) - {literal(TOLERANCE)} || "
+        "xsd:double(?value) > SUM(COALESCE(?before, 0.0e0)) + xsd:double(?length) "
+        f"+ {literal(TOLERANCE)})",
+    )  # fmt: skip
+
+
+def _declared_ranges() -> Rule:
+    low, high = _slack("xsd:double(?low)", -1), _slack("xsd:double(?high)", 1)
+    return Rule(
+        "declared-range", "", "Parameter", "has_low <= value <= has_high", None, "",
+        "SELECT DISTINCT $this ?value WHERE { $this bg:has_low ?low ; bg:has_high ?high . "
+        f"?node bg:has_parameter $this ; ?property ?value . {_bound_by('$this')} "
+        "BIND(xsd:double(?value) AS ?x) "
+        f"FILTER(!COALESCE(?x >= {low} && ?x <= {high}, false)) }}",
+    )  # fmt: skip
+
+
+# -- constraints, from the declarations in odd -----------------------------------------------------
+
+
+def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
+    """Compile what holds in every scenario and one scenario's ranges, bounds and formulas.
+
+    Without a scenario, the ranges are those that the individuals declare themselves.
+    """
+    found = list(_general_rules())
+    if scenario is None:
+        return (*found, _declared_ranges())
+    for name, parameter in scenario.parameters.items():
+        low, high = (_slack(literal(value), side) for value, side in
+                     ((parameter.low, -1), (parameter.high, 1)))  # fmt: skip
+        x = variable(name)
+        kept = f"{x} >= {low} && {x} <= {high}"
+        text = f"{parameter.low:g} <= {name} <= {parameter.high:g}"
+        found.append(_rule(f"range-{name}", name, text, kept, present=True, axis=parameter.axis))
+        if parameter.kind == "integer":
+            kept = f"ABS({x} - ROUND({x})) <= {literal(TOLERANCE)}"
+            found.append(_rule(f"whole-{name}", name, f"{name} is a whole number", kept))
+    for number, bound in enumerate(scenario.bounds):
+        for sign, expression, side in ((">=", bound.lo, -1), ("<=", bound.hi, 1)):
+            if expression is not None:
+                found.append(
+                    _rule(
+                        f"bound-{number}-{'low' if side < 0 else 'high'}-{bound.target}",
+                        bound.target,
+                        f"{bound.target} {sign} {expression}",
+                        f"{variable(bound.target)} {sign} {_slack('?limit', side)}",
+                        limit=expression,
+                        why=reason(bound),
+                    )
+                )
+    for derived in scenario.derived:
+        x = variable(derived.name)
+        found.append(
+            _rule(
+                f"derived-{derived.name}",
+                derived.name,
+                str(derived),
+                f"ABS({x} - ?limit) <= {literal(TOLERANCE)} * (1.0e0 + ABS(?limit))",
+                limit=derived.value,
+                why=reason(derived),
+                present=True,
+                axis=derived.axis,
+            )
+        )
+    return tuple(found)
+
+
+def _rule(
+    key: str,
+    target: str,
+    text: str,
+    kept: str,
+    *,
+    limit: Expression | None = None,
+    why: str = "",
+    present: bool = False,
+    axis: Axis | None = None,
+) -> Rule:
+    """Return a rule about one parameter.
+
+    Args:
+        key: local name of its shape.
+        target: the parameter.
+        text: the rule as people read it.
+        kept: the filter that holds where the rule is kept; ``?limit`` is the limit's value.
+        limit: what the target is compared with.
+        why: the reason.
+        present: whether the rule is broken, too, where the target has no value at all.
+        axis: the target's; a map made elsewhere has no static parameters.
+    """
+    names = sorted({target} | (limit.names if limit else frozenset()))
+    focus = "Weather" if all(name in WEATHER_PATHS for name in names) else "Scenario"
+    lines = []
+    for name in names:
+        pattern = _pattern(name, focus)
+        lines.append(f"OPTIONAL {{ {pattern} }}" if present and name == target else pattern)
+        lines.append(f"BIND(xsd:double({_raw(name)}) AS {variable(name)})")
+    if limit is not None:
+        lines.append(binds(limit, "limit"))
+    lines.append(f"BIND({_raw(target)} AS ?value)")
+    lines.append(f"FILTER(!COALESCE({kept}, false))")
+    if axis is Axis.STATIC:
+        map_file = "$this bg:has_road_network/bg:has_map_file ?map_file"
+        lines.append(f"FILTER(BOUND({_raw(target)}) || NOT EXISTS {{ {map_file} }})")
+    select = f"SELECT DISTINCT $this ?value WHERE {{ {' '.join(lines)} }}"
+    return Rule(key, target, focus, text, limit, why, select)
+
+
+def _pattern(name: str, focus: str) -> str:
+    """Return the graph pattern that finds a parameter's value as `_raw`."""
+    if name in WEATHER_PATHS:
+        start = "" if focus == "Weather" else "bg:has_weather/"
+        return f"$this {start}{WEATHER_PATHS[name]} {_raw(name)} ."
+    parameter, suffix = f"?parameter_{name}_x", f"_{name}_x"
+    return (
+        f'{parameter} bg:has_name "{name}" . ?node{suffix} bg:has_parameter {parameter} ; '
+        f"?property{suffix} {_raw(name)} . {_bound_by(parameter, suffix)}"
+    )
+
+
+def _raw(name: str) -> str:
+    """Return the variable for a parameter's value as the graph has it, before it is a double."""
+    return f"?raw_{name}_x"
+
+
+def _bound_by(parameter: str, suffix: str = "") -> str:
+    """Return the pattern that makes ``?property`` one that a parameter binds."""
+    return (
+        f"{parameter} bg:binds_property ?bound{suffix} . "
+        f'FILTER(STR(?property{suffix}) = CONCAT("{BG}", ?bound{suffix}))'
+    )
+
+
+def _slack(limit: str, side: int) -> str:
+    """Move a limit outwards by the one tolerance of all checks."""
+    sign = "+" if side > 0 else "-"
+    return f"({limit} {sign} {literal(TOLERANCE)} * (1.0e0 + ABS({limit})))"
+
+
+# -- Turtle ----------------------------------------------------------------------------------------
+
+
+def _sparql_shape(rule: Rule) -> str:
+    message = f"{rule.text}: {rule.why}" if rule.why else rule.text
+    return (
+        f":{rule.key} a sh:NodeShape ; sh:targetClass bg:{rule.focus} ;\n"
+        f"  sh:sparql [ sh:prefixes :prefixes ; sh:message {_quoted(message)} ;\n"
+        f"    sh:select {_quoted(rule.select)} ] .\n"
+    )
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return '"' + escaped.replace("\r", "\\r") + '"'

@@ -1,0 +1,122 @@
+"""Files in, files out: a scenario's ontology to OpenDRIVE and OpenSCENARIO, and checks of any."""
+
+from pathlib import Path
+
+from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
+from bridgegen.odd.scenario import load as load_scenario
+from bridgegen.odd.scenario import names as scenario_names
+from bridgegen.ontology.check import check
+from bridgegen.ontology.files import load
+from bridgegen.ontology.graph import Individuals
+from bridgegen.openx.opendrive import read as opendrive_read
+from bridgegen.openx.opendrive import validate as opendrive_validate
+from bridgegen.openx.opendrive import write as opendrive_write
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario import read as openscenario_read
+from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.openx.openscenario import write as openscenario_write
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.xml import read_bytes
+
+
+def convert_file(owl: Path, folder: Path | None = None) -> tuple[list[Path], list[str]]:
+    """Write the ``.xodr`` and ``.xosc`` of a scenario's ontology.
+
+    Args:
+        owl: the ontology with its individuals, as written or as somebody edited it.
+        folder: where to write; beside the ontology by default.
+
+    Returns:
+        The files written, and a sentence for each constraint that the individuals break: they
+        are converted all the same, for a test may well mean to break one.
+
+    Raises:
+        FileFormatError: not an ontology that can be read.
+        OntologyError: an individual lacks what a scenario needs.
+        StorageError: the files cannot be written.
+    """
+    individuals = load(owl)
+    folder = folder or owl.parent
+    road = folder / f"{owl.stem}.xodr"
+    scenario = folder / f"{owl.stem}.xosc"
+    roads = road_bytes(individuals, owl.parent)
+    storyboard = openscenario_write.to_xml(openscenario_from_owl(individuals, road.name))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        road.write_bytes(roads)
+        scenario.write_bytes(storyboard)
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+    return [road, scenario], [str(one) for one in check(individuals)]
+
+
+def road_bytes(individuals: Individuals, beside: Path) -> bytes:
+    """Return the OpenDRIVE file of a scenario: the map that it names, or OWL2OpenDRIVE's."""
+    network = individuals.one("RoadNetwork")
+    map_file = individuals.optional_text(network, "has_map_file")
+    if map_file is None:
+        return opendrive_write.to_xml(opendrive_from_owl(individuals))
+    return read_bytes(beside / map_file)
+
+
+def validate_file(path: Path) -> list[str]:
+    """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
+
+    An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
+    ``.xosc`` is checked with the map that it names.
+
+    Raises:
+        InputError: a file of another kind.
+    """
+    kinds = {
+        ".owl": _ontology,
+        ".xodr": _roads,
+        ".xosc": _storyboard,
+        ".yaml": _logical,
+        ".yml": _logical,
+    }
+    if path.suffix.lower() not in kinds:
+        raise InputError(f"{path}: the file's name must end in {', '.join(kinds)}")
+    try:
+        return [_placed(path, problem) for problem in kinds[path.suffix.lower()](path)]
+    except BridgeGenError as error:
+        return [_placed(path, problem) for problem in error.problems]
+
+
+def _placed(path: Path, problem: str) -> str:
+    return problem if str(path) in problem else f"{path}: {problem}"
+
+
+def _ontology(path: Path) -> list[str]:
+    individuals = load(path)
+    name = individuals.text(individuals.one("Scenario"), "has_name")
+    scenario = load_scenario(name) if name in scenario_names() else None
+    return [str(one) for one in check(individuals, scenario)]
+
+
+def _roads(path: Path) -> list[str]:
+    return opendrive_validate.problems(opendrive_read.read(path))
+
+
+def _storyboard(path: Path) -> list[str]:
+    scenario = openscenario_read.read(path)
+    return openscenario_validate.problems(scenario, roads_of(scenario, path))
+
+
+def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
+    """Read the map that a scenario file names.
+
+    Raises:
+        FileFormatError: it names none, or the map cannot be read.
+    """
+    logic_file = scenario.road_network.logic_file
+    if logic_file is None:
+        raise FileFormatError(f"{path}: RoadNetwork needs a LogicFile, the OpenDRIVE map")
+    return opendrive_read.read(path.parent / str(logic_file.filepath))
+
+
+def _logical(path: Path) -> list[str]:
+    load_scenario(path)
+    return []

@@ -1,0 +1,227 @@
+"""The road network as areas and lines, for a bird's-eye view."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.openx.opendrive.geometry import reference_pose
+from bridgegen.openx.opendrive.lanes import borders, breaks, points, section_end
+from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
+from bridgegen.openx.opendrive.plan_view import Line
+from bridgegen.openx.opendrive.references import contacts
+
+AREAS = ("driving", "junction", "shoulder", "sidewalk", "median")
+"""Kinds that are areas; the last point is joined to the first."""
+
+LINES = ("edge", "solid", "broken", "centre", "stop")
+"""Kinds that are lines: the border of what cars drive on; between lanes of one direction;
+between the directions; across the lanes into a junction."""
+
+Shape = tuple[str, Float]
+
+_BESIDE = {
+    "shoulder": "shoulder",
+    "parking": "shoulder",
+    "stop": "shoulder",
+    "biking": "shoulder",
+    "sidewalk": "sidewalk",
+    "curb": "sidewalk",
+    "median": "median",
+}
+"""How lanes are drawn that cars do not travel on; others are left out."""
+
+
+def outline(model: OpenDrive, junction_id: str | None = None, *, step: float = 1.0) -> list[Shape]:
+    """Return what to draw: areas first, lines after them.
+
+    Args:
+        model: the road network.
+        junction_id: draw this junction and its legs only, each up to the next junction.
+        step: distance between points on curves [m]; straight parts have only their ends.
+
+    Returns:
+        Pairs of a kind (one of ``AREAS`` or ``LINES``) and its points, ``(P, 2)`` float64 [m].
+
+    Raises:
+        InputError: there is no such junction.
+    """
+    junctions = [model.junction(junction_id)] if junction_id else list(model.junctions)
+    roads = _legs(model, junction_id) if junction_id else list(model.roads)
+    shapes = [shape for road in roads if not road.is_connecting for shape in _road(road, step)]
+    for junction in junctions:
+        shapes += _junction(model, junction, step)
+    return sorted(shapes, key=lambda shape: shape[0] in LINES)
+
+
+def _legs(model: OpenDrive, junction_id: str) -> list[Road]:
+    """Return the roads that touch a junction and those that continue them."""
+    found: dict[str, Road] = {}
+    todo = [road for road in model.roads if contacts(road, junction_id)]
+    while todo:
+        road = todo.pop()
+        if road.id not in found and not road.is_connecting:
+            found[road.id] = road
+            for link in (road.predecessor, road.successor):
+                if link and link.element_type == "road":
+                    todo.append(model.road(link.element_id))
+    return list(found.values())
+
+
+def _road(road: Road, step: float) -> Iterator[Shape]:
+    for index, section in enumerate(road.sections):
+        s = _stations(road, index, step)
+        t = borders(road, index, s)
+        drivable = sorted(lane.id for lane in section.lanes if lane.drivable)
+        for lane in section.lanes:
+            kind = _BESIDE.get(lane.type)
+            if kind:
+                yield kind, _area(road, s, _border(t, lane.id, outer=False), t[lane.id])
+        if drivable:
+            left = _border(t, drivable[-1], outer=drivable[-1] > 0)
+            right = _border(t, drivable[0], outer=drivable[0] < 0)
+            yield "driving", _area(road, s, right, left)
+            yield "edge", points(road, s, left)
+            yield "edge", points(road, s, right)
+        yield from _between(road, section, s, t, drivable)
+    for contact in ("start", "end"):
+        yield from _stop_line(road, contact)
+
+
+def _between(
+    road: Road, section: LaneSection, s: Float, t: dict[int, Float], drivable: list[int]
+) -> Iterator[Shape]:
+    """Yield the lines between neighbouring lanes that cars drive on."""
+    order = sorted(lane_id for lane_id in t if lane_id)
+    for right, left in pairwise(order):
+        if right not in drivable or left not in drivable:
+            continue
+        inner = min(right, left, key=abs)  # its outer border lies between them, unless 0 does
+        border = t[inner] if right * left > 0 else t[0]
+        if road.direction(right) != road.direction(left):
+            yield "centre", points(road, s, border)
+            continue
+        lane = section.lane(inner) if right * left > 0 else section.center[0]
+        marks = {mark.type for mark in lane.road_marks} - {"none"} if lane else set()
+        if marks:
+            kind = "solid" if any("solid" in mark for mark in marks) else "broken"
+            yield kind, points(road, s, border)
+
+
+def _stop_line(road: Road, contact: str) -> Iterator[Shape]:
+    link = road.link(contact)
+    if link is None or link.element_type != "junction":
+        return
+    outwards = 1 if contact == "end" else -1
+    lanes = [
+        lane.id
+        for lane in road.section_at(contact).lanes
+        if lane.drivable and road.direction(lane.id) == outwards
+    ]
+    if lanes:
+        s, t = _at(road, contact)
+        sides = [
+            _border(t, lane_id, outer=outer)[0] for lane_id in lanes for outer in (True, False)
+        ]
+        yield "stop", points(road, np.repeat(s, 2), np.array([min(sides), max(sides)]))
+
+
+def _junction(model: OpenDrive, junction: Junction, step: float) -> Iterator[Shape]:
+    """Yield the area between the legs; its corners follow the right turns, where there are any."""
+    ends = [
+        (road, end)
+        for road in model.roads
+        if not road.is_connecting
+        for end in contacts(road, junction.id)
+        if any(lane.drivable for lane in road.section_at(end).lanes)
+    ]
+    if len(ends) < 2:
+        return
+    ends.sort(key=lambda end: _outward(*end))
+    ring: list[Float] = []
+    for (road, end), (following, _) in zip(ends, ends[1:] + ends[:1], strict=True):
+        s, t = _at(road, end)
+        drivable = [lane.id for lane in road.section_at(end).lanes if lane.drivable]
+        sides = [
+            _border(t, lane_id, outer=outer)[0] for lane_id in drivable for outer in (True, False)
+        ]
+        # Seen from the junction the right edge comes first: that is counter-clockwise.
+        edges = [min(sides), max(sides)] if end == "start" else [max(sides), min(sides)]
+        ring.append(points(road, np.repeat(s, 2), np.array(edges)))
+        corner = _corner(model, junction, road, following, step)
+        if corner is not None:
+            ring.append(corner)
+            yield "edge", corner
+    yield "junction", np.concatenate(ring)
+
+
+def _corner(
+    model: OpenDrive, junction: Junction, road: Road, following: Road, step: float
+) -> Float | None:
+    """Return the outer border of the way from a leg to the next one counter-clockwise."""
+    for connection in model.connections_from.get((junction.id, road.id), ()):
+        way = model.road(connection.connecting_road)
+        forward = connection.contact_point == "start"
+        onward = way.link("end" if forward else "start")
+        lanes = {link.to_lane for link in connection.lane_links}
+        if onward is None or onward.element_id != following.id or not lanes:
+            continue
+        side = 1 if max(lanes, key=abs) > 0 else -1
+        found = []
+        for index, section in enumerate(way.sections):
+            ids = [lane.id for lane in section.lanes if lane.drivable and lane.id * side > 0]
+            if ids:
+                s = _stations(way, index, step)
+                found.append(points(way, s, borders(way, index, s)[max(ids, key=abs)]))
+        if found:
+            line = np.concatenate(found)
+            return line if forward else line[::-1]
+    return None
+
+
+def _outward(road: Road, end: str) -> float:
+    h = reference_pose(road, 0.0 if end == "start" else road.length).h
+    return (h + (0.0 if end == "start" else math.pi)) % math.tau
+
+
+def _at(road: Road, end: str) -> tuple[Float, dict[int, Float]]:
+    """Return a road's end as an array of one s, and the t of its lanes' outer borders there."""
+    s = np.array([0.0 if end == "start" else road.length])
+    return s, borders(road, 0 if end == "start" else len(road.sections) - 1, s)
+
+
+def _border(t: dict[int, Float], lane_id: int, *, outer: bool) -> Float:
+    return t[lane_id] if outer else t[lane_id - int(math.copysign(1, lane_id))]
+
+
+def _area(road: Road, s: Float, right: Float, left: Float) -> Float:
+    return np.concatenate((points(road, s, right), points(road, s, left)[::-1]))
+
+
+def _stations(road: Road, index: int, step: float) -> Float:
+    """Return the s [m] at which to evaluate a lane section: dense only where something bends."""
+    section = road.sections[index]
+    low, high = section.s, section_end(road, index)
+    cuts = {low, high}
+    bending: list[tuple[float, float]] = []
+    for position, geometry in enumerate(road.plan_view):
+        end = road.plan_view[position + 1].s if position + 1 < len(road.plan_view) else road.length
+        cuts.add(geometry.s)
+        if not isinstance(geometry.shape, Line):
+            bending.append((geometry.s, end))
+    for lane in section.lanes:
+        cuts.update(breaks(road, section, lane))
+    records = [(section.s, lane.widths) for lane in section.lanes] + [(0.0, road.lane_offsets)]
+    for origin, cubics in records:
+        for position, cubic in enumerate(cubics):
+            last = position + 1 == len(cubics)
+            if cubic.b or cubic.c or cubic.d:
+                end = high if last else origin + cubics[position + 1].s
+                bending.append((origin + cubic.s, end))
+    for a, b in bending:
+        a, b = max(a, low), min(b, high)
+        if b > a:
+            cuts.update(np.linspace(a, b, max(2, math.ceil((b - a) / step) + 1)).tolist())
+    return np.array(sorted(cut for cut in cuts if low <= cut <= high))

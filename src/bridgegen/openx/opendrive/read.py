@@ -1,0 +1,236 @@
+"""OpenDRIVE text → model. Everything that is wrong with a file is reported at once, by line."""
+
+import math
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+
+from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.openx.opendrive.declaration import ID, Field, plan
+from bridgegen.openx.opendrive.geometry import impossible_shape
+from bridgegen.openx.opendrive.model import Connection, Junction, OpenDrive, Road
+from bridgegen.openx.opendrive.plan_view import Geometry
+from bridgegen.openx.opendrive.references import broken_references
+from bridgegen.openx.xml import parse_xml
+
+NUMBER_LIMIT = 1e9
+"""Largest absolute value of any number in a file."""
+
+SHOWN = 20
+"""How many problems of a file are spelled out."""
+
+_BEYOND_US = {
+    ("lane", "border"): "a lane's outer border as <border> (give the lane a <width>)",
+    ("signal", "positionInertial"): "a signal's <positionInertial>",
+}
+
+_Tree = dict[str, "Field | _Tree"]
+
+
+def read(source: Path | str | bytes, place: str | None = None) -> OpenDrive:
+    """Read a road network.
+
+    What the model has no place for is dropped (see `bridgegen.openx.opendrive.model`).
+
+    Args:
+        source: a path, or the document itself as bytes.
+        place: what to call it in messages; the path by default.
+
+    Raises:
+        FileFormatError: unreadable or malformed, or with values, ids or links that cannot be:
+            all such problems, with their lines.
+        UnsupportedError: it is valid but uses what this version cannot represent.
+    """
+    path = Path(source) if isinstance(source, str) else source
+    place = place or (str(path) if isinstance(path, Path) else "document")
+    root = parse_xml(path, place)
+    if _tag(root) != "OpenDRIVE":
+        raise FileFormatError(f"{place}: the root element must be OpenDRIVE, got {_tag(root)}")
+    reader = _Reader()
+    model = reader.record(OpenDrive, root)
+    _complain(place, reader)
+    assert isinstance(model, OpenDrive)
+    for record, problem in broken_references(model):
+        reader.problems.append((reader.lines[id(record)], problem))
+    _complain(place, reader)
+    return model
+
+
+def _complain(place: str, reader: "_Reader") -> None:
+    beyond = [(line, f"{what} is not supported") for line, what in reader.beyond]
+    if reader.problems:
+        raise FileFormatError(*_sentences(place, reader.problems + beyond))
+    if beyond:
+        raise UnsupportedError(*_sentences(place, beyond))
+
+
+def _sentences(place: str, problems: list[tuple[int, str]]) -> Iterator[str]:
+    for line, problem in sorted(problems, key=lambda one: one[0])[:SHOWN]:
+        yield f"{place}, line {line}: {problem}"
+    if len(problems) > SHOWN:
+        yield f"{place}: and {len(problems) - SHOWN} more such problems"
+
+
+class _Reader:
+    """Builds records from elements, and collects what is wrong.
+
+    Attributes:
+        problems: (line, sentence) of everything that cannot be.
+        beyond: the same of what is valid but not supported.
+        lines: where roads, junctions and connections stand, by ``id()`` of the record.
+    """
+
+    def __init__(self) -> None:
+        self.problems: list[tuple[int, str]] = []
+        self.beyond: list[tuple[int, str]] = []
+        self.lines: dict[int, int] = {}
+
+    def record(self, cls: type, element: etree._Element) -> Any:
+        """Return a record of a class, or None where anything in it is wrong (and was noted)."""
+        before = len(self.problems)
+        attributes, below, tree = _table(cls)
+        values: dict[str, Any] = {}
+        for one, key in attributes:
+            raw = element.get(key)
+            if raw is not None:
+                values[one.name] = self._value(one, str(raw), element)
+            elif one.required:
+                self._note(element, f"attribute {key} is required")
+        found: dict[str, list[Any]] = {}
+        if len(element):
+            self._collect(element, tree, found)
+        for one in below:
+            items = found.get(one.name, [])
+            if one.form.role in ("children", "ids"):
+                self._require(element, one, len(items) >= one.form.least)
+                values[one.name] = tuple(items)
+            else:
+                self._require(element, one, bool(items) or not one.required)
+                if len(items) > 1:
+                    self._note(element, f"only one <{_name(one)}> is allowed, got {len(items)}")
+                values[one.name] = items[0] if items else None
+        if len(self.problems) > before:
+            return None
+        record = cls(**values)
+        self._look_at(record, element)
+        return record
+
+    def _look_at(self, record: object, element: etree._Element) -> None:
+        if isinstance(record, Geometry):
+            problem = impossible_shape(record)
+            if problem:
+                self._note(element, problem)
+        elif isinstance(record, Road | Junction | Connection):
+            self.lines[id(record)] = _line(element)
+            kind = element.get("type", "default")
+            if isinstance(record, Junction) and kind != "default":
+                self.beyond.append((_line(element), f"junction {record.id}: type '{kind}'"))
+
+    def _collect(self, element: etree._Element, tree: _Tree, found: dict[str, list[Any]]) -> None:
+        for item in element:
+            tag = _tag(item)
+            branch = tree.get(tag)
+            if isinstance(branch, Field):
+                found.setdefault(branch.name, []).append(self._item(branch, item))
+            elif branch is not None:
+                self._collect(item, branch, found)
+            elif (_tag(element), tag) in _BEYOND_US:
+                what = f"{_where(item)}: {_BEYOND_US[_tag(element), tag]}"
+                self.beyond.append((_line(item), what))
+
+    def _item(self, one: Field, item: etree._Element) -> Any:
+        role = one.form.role
+        if role == "text":
+            return (item.text or "").strip()
+        if role == "ids":
+            return self._value(ID, str(item.get("id", "")), item)
+        return self.record(one.tags[_tag(item)] if role == "choice" else one.types[0], item)
+
+    def _value(self, one: Field, raw: str, element: etree._Element) -> Any:
+        try:
+            return _parse(one, raw)
+        except ValueError as error:
+            unit = f" [{one.form.unit}]" if one.form.unit else ""
+            shown = raw if len(raw) <= 40 else raw[:40] + "…"
+            self._note(element, f"{one.form.path[0]}{unit} must be {error}, got '{shown}'")
+
+    def _require(self, element: etree._Element, one: Field, there: bool) -> None:
+        if not there:
+            got = ", ".join(_tag(item) for item in element) or "nothing"
+            self._note(element, f"<{_name(one)}> is required, got {got}")
+
+    def _note(self, element: etree._Element, problem: str) -> None:
+        self.problems.append((_line(element), f"{_where(element)}: {problem}"))
+
+
+@cache
+def _table(cls: type) -> tuple[list[tuple[Field, str]], list[Field], _Tree]:
+    """Return a class's attributes with their names, its other fields, and these by their tags."""
+    attributes = [(one, one.form.path[0]) for one in plan(cls) if one.form.role == "attribute"]
+    below = [one for one in plan(cls) if one.form.role != "attribute"]
+    tree: _Tree = {}
+    for one in below:
+        paths: list[tuple[str, ...]] = [(tag,) for tag in one.tags]
+        for path in paths or [one.form.path]:
+            level = tree
+            for tag in path[:-1]:
+                branch = level.setdefault(tag, {})
+                assert isinstance(branch, dict)
+                level = branch
+            level[path[-1]] = one
+    return attributes, below, tree
+
+
+def _parse(one: Field, raw: str) -> float | int | bool | str:
+    """Return the value that a text stands for; a ValueError says what it must be."""
+    form = one.form
+    if form.words and (float not in one.types or raw in form.words):
+        if raw not in form.words:
+            raise ValueError(f"one of {', '.join(form.words)}")
+        return raw
+    kind = one.types[0]
+    if kind is str:
+        return raw
+    if kind is bool:
+        if raw not in ("true", "false", "1", "0"):
+            raise ValueError("true or false")
+        return raw in ("true", "1")
+    try:
+        value = int(raw) if kind is int else float(raw)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or "_" in raw:
+        raise ValueError("a whole number" if kind is int else "a finite number")
+    high = NUMBER_LIMIT if form.high is None else form.high
+    if abs(value) > high:
+        raise ValueError(f"within ±{high:g}")
+    if form.above is not None and value <= form.above:
+        raise ValueError(f"> {form.above:g}")
+    if form.low is not None and value < form.low:
+        raise ValueError(f"≥ {form.low:g}")
+    return value
+
+
+def _tag(element: etree._Element) -> str:
+    """Return an element's name without its namespace."""
+    tag = str(element.tag)
+    return tag.rpartition("}")[2] if "}" in tag else tag
+
+
+def _name(one: Field) -> str:
+    return "> or <".join(one.tags) or "/".join(one.form.path)
+
+
+def _line(element: etree._Element) -> int:
+    return element.sourceline or 0
+
+
+def _where(element: etree._Element) -> str:
+    """Return what to call an element: the things with an id that it is in, and its own tag."""
+    around = [element, *element.iterancestors()]
+    named = [f"{_tag(one)} {one.get('id')}" for one in reversed(around) if one.get("id")]
+    own = [] if element.get("id") else [f"<{_tag(element)}>"]
+    return ", ".join(named + own)

@@ -1,0 +1,72 @@
+"""Ids that occur twice, and links to what is not there: what no reader of a map can get over."""
+
+from collections.abc import Iterator
+
+from bridgegen.openx.opendrive.model import CONTACTS, Connection, Junction, OpenDrive, Road
+
+Owner = Road | Junction | Connection
+
+
+def broken_references(model: OpenDrive) -> Iterator[tuple[Owner, str]]:
+    """Yield each broken reference: the record that makes it, and a sentence."""
+    seen: set[tuple[str, str]] = set()
+    for kind, records in (("road", model.roads), ("junction", model.junctions)):
+        for record in records:
+            if (kind, record.id) in seen:
+                yield record, f"{kind} id must be unique, got '{record.id}' twice"
+            seen.add((kind, record.id))
+    for road in model.roads:
+        if road.is_connecting and ("junction", road.junction) not in seen:
+            yield road, f"road {road.id}: junction '{road.junction}' is not in the file"
+        for end, link in (("predecessor", road.predecessor), ("successor", road.successor)):
+            if link is None:
+                continue
+            if (link.element_type, link.element_id) not in seen:
+                what = f"{link.element_type} '{link.element_id}'"
+                yield road, f"road {road.id}: its {end}, {what}, is not in the file"
+            elif link.element_type == "road" and link.contact_point is None:
+                yield road, f"road {road.id}: its {end} is a road and needs a contactPoint"
+    for junction in model.junctions:
+        for connection in junction.connections:
+            yield from _connection(model, junction, connection)
+
+
+def _connection(
+    model: OpenDrive, junction: Junction, connection: Connection
+) -> Iterator[tuple[Owner, str]]:
+    name = f"junction {junction.id}, connection {connection.id}"
+    roads = model.roads_by_id
+    incoming = roads.get(connection.incoming_road)
+    connecting = roads.get(connection.connecting_road)
+    if incoming is None:
+        yield connection, f"{name}: incomingRoad '{connection.incoming_road}' is not in the file"
+    if connecting is None:
+        problem = f"{name}: connectingRoad '{connection.connecting_road}' is not in the file"
+        yield connection, problem
+        return
+    if connecting.junction != junction.id:
+        yield (
+            connection,
+            f"{name}: connectingRoad {connecting.id} must be of this junction, "
+            f"got junction '{connecting.junction}'",
+        )
+    if incoming and not contacts(incoming, junction.id):
+        yield connection, f"{name}: incomingRoad {incoming.id} has no link to this junction"
+    for link in connection.lane_links:
+        if incoming and not any(
+            incoming.section_at(contact).lane(link.from_lane)
+            for contact in contacts(incoming, junction.id)
+        ):
+            yield connection, f"{name}: road {incoming.id} has no lane {link.from_lane} there"
+        if not connecting.section_at(connection.contact_point).lane(link.to_lane):
+            yield connection, f"{name}: road {connecting.id} has no lane {link.to_lane} there"
+
+
+def contacts(road: Road, junction_id: str) -> list[str]:
+    """Return the ends of a road, ``"start"`` and ``"end"``, that touch a junction."""
+    found = []
+    for contact in CONTACTS:
+        link = road.link(contact)
+        if link and link.element_type == "junction" and link.element_id == junction_id:
+            found.append(contact)
+    return found

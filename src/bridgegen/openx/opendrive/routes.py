@@ -1,0 +1,218 @@
+"""From one lane to another along the road network: which lanes, and where their centre runs.
+
+A route keeps to its lane until a lane link leads on: it changes roads, never lanes.
+"""
+
+import heapq
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lanes import lane_at, section_end, section_index
+from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.openx.opendrive.path import LanePath, Piece, joined, pieces_of, sample
+
+
+class Place(NamedTuple):
+    """A place on a lane: OpenSCENARIO's LanePosition without an offset.
+
+    Attributes:
+        road_id: OpenDRIVE's id.
+        lane_id: OpenDRIVE's id.
+        s: along the road [m].
+    """
+
+    road_id: str
+    lane_id: int
+    s: float
+
+    def __str__(self) -> str:
+        return f"road {self.road_id}, lane {self.lane_id}, s={self.s:g} m"
+
+
+class Stretch(NamedTuple):
+    """A lane of one lane section: a node of the network."""
+
+    road_id: str
+    section: int
+    lane_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A part of a route on one lane section, from ``s`` to ``s_end`` [m along the road]."""
+
+    road_id: str
+    lane_id: int
+    s: float
+    s_end: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Route:
+    """A chain of lanes.
+
+    Attributes:
+        steps: the lanes, in the order of travel.
+        length: of the lanes' centre line [m].
+        pieces: that centre line, see `bridgegen.openx.opendrive.path`.
+    """
+
+    steps: tuple[Step, ...]
+    length: float
+    pieces: tuple[Piece, ...]
+
+    def sample(self, ds: float) -> LanePath:
+        """Return the lanes' centre line at every ``ds`` [m] travelled.
+
+        Raises:
+            InputError: the step is not positive, or there would be too many samples.
+        """
+        return sample(self.pieces, self.length, ds)
+
+    def station(self, road_id: str, s: float) -> tuple[float, float]:
+        """Return a, b with: distance travelled on the route = a + b · s around a place.
+
+        Exact as long as s stays on the same line or arc of the reference line; a place on one of
+        the route's roads before its start or after its end continues the nearest piece.
+
+        Raises:
+            InputError: the route does not use the road.
+        """
+        on_road = [piece for piece in self.pieces if piece.road_id == road_id]
+        if not on_road:
+            roads = ", ".join(dict.fromkeys(step.road_id for step in self.steps))
+            raise InputError(f"the route runs over roads {roads}, got road {road_id}")
+        nearest = min(on_road, key=lambda piece: _away(piece, s))
+        b = nearest.length / (nearest.s_end - nearest.s)
+        return nearest.station - b * nearest.s, b
+
+
+def plan_route(
+    model: OpenDrive,
+    start: tuple[str, int, float],
+    via: Sequence[tuple[str, int, float]],
+    end: tuple[str, int, float],
+) -> Route:
+    """Return the shortest route over given places, without a lane change.
+
+    Args:
+        model: the road network.
+        start: road id, lane id and s [m] of the start.
+        via: places to pass, in this order.
+        end: where the route ends.
+
+    Raises:
+        InputError: a place is not on the road network, or no lane leads from one to the next.
+    """
+    places = [Place(*place) for place in (start, *via, end)]
+    for place in places:
+        lane_at(model.road(place.road_id), place.lane_id, place.s)
+    steps: list[Step] = []
+    for a, b in pairwise(places):
+        steps += _leg(model, a, b)
+    pieces: list[Piece] = []
+    station = 0.0
+    for step in steps:
+        road = model.road(step.road_id)
+        if step.s != step.s_end:
+            index = section_index(road, 0.5 * (step.s + step.s_end))
+            found = pieces_of(road, index, step.lane_id, step.s, step.s_end, station)
+            pieces += found
+            station = sum((piece.length for piece in found), station)
+    if not pieces:
+        raise InputError(f"a route must have a length, got one that ends where it starts: {start}")
+    return Route(tuple(steps), station, tuple(joined(pieces)))
+
+
+def next_stretches(model: OpenDrive, stretch: Stretch) -> Iterator[Stretch]:
+    """Yield the lanes that a lane leads to, in the direction of travel."""
+    road = model.roads_by_id[stretch.road_id]
+    forward = road.direction(stretch.lane_id) > 0
+    lane = road.sections[stretch.section].lane(stretch.lane_id)
+    if lane is None:
+        return
+    onward = lane.successors if forward else lane.predecessors
+    index = stretch.section + (1 if forward else -1)
+    if 0 <= index < len(road.sections):
+        yield from (Stretch(road.id, index, lane_id) for lane_id in onward)
+        return
+    link = road.link("end" if forward else "start")
+    if link is None:
+        return
+    if link.element_type == "road":
+        for lane_id in onward:
+            yield from _enter(model, link.element_id, link.contact_point, lane_id)
+        return
+    for connection in model.connections_from.get((link.element_id, road.id), ()):
+        for each in connection.lane_links:
+            if each.from_lane == lane.id:
+                contact = connection.contact_point
+                yield from _enter(model, connection.connecting_road, contact, each.to_lane)
+
+
+def _enter(model: OpenDrive, road_id: str, contact: str | None, lane_id: int) -> Iterator[Stretch]:
+    """Yield a road's lane at one of its ends, if traffic on it leads away from there."""
+    road = model.road(road_id)
+    inwards = 1 if contact == "start" else -1
+    if road.direction(lane_id) == inwards:
+        yield Stretch(road_id, 0 if inwards > 0 else len(road.sections) - 1, lane_id)
+
+
+def _leg(model: OpenDrive, start: Place, end: Place) -> list[Step]:
+    """Return the steps of the shortest way from one place to the next (Dijkstra)."""
+    first, last = _stretch(model, start), _stretch(model, end)
+    way = model.roads_by_id[start.road_id].direction(start.lane_id)
+    if first == last and (end.s - start.s) * way >= 0.0:
+        return [Step(start.road_id, start.lane_id, start.s, end.s)]
+    # The start counts from its place to the lane's end; it is not "seen", so that a way back to
+    # a place behind it is found.
+    come_from: dict[Stretch, Stretch | None] = {}
+    rest = abs(_ends(model, first)[1] - start.s)
+    queue: list[tuple[float, int, Stretch, Stretch | None]] = []
+    count = 0
+    for following in next_stretches(model, first):
+        count += 1
+        heapq.heappush(queue, (rest, count, following, None))
+    while queue:
+        distance, _, stretch, before = heapq.heappop(queue)
+        if stretch in come_from:
+            continue
+        come_from[stretch] = before
+        if stretch == last:
+            break
+        entry, exit_ = _ends(model, stretch)
+        for following in next_stretches(model, stretch):
+            if following not in come_from:
+                count += 1
+                heapq.heappush(queue, (distance + abs(exit_ - entry), count, following, stretch))
+    else:
+        raise InputError(f"no lane leads from {start} to {end} without a lane change")
+    chain: list[Stretch] = []
+    at: Stretch | None = last
+    while at is not None:
+        chain.append(at)
+        at = come_from[at]
+    steps = [Step(start.road_id, start.lane_id, start.s, _ends(model, first)[1])]
+    steps += [Step(one.road_id, one.lane_id, *_ends(model, one)) for one in chain[:0:-1]]
+    return [*steps, Step(end.road_id, end.lane_id, _ends(model, last)[0], end.s)]
+
+
+def _stretch(model: OpenDrive, place: Place) -> Stretch:
+    road = model.road(place.road_id)
+    return Stretch(place.road_id, section_index(road, place.s), place.lane_id)
+
+
+def _ends(model: OpenDrive, stretch: Stretch) -> tuple[float, float]:
+    """Return where traffic enters and leaves a lane of a section [m along the road]."""
+    road: Road = model.roads_by_id[stretch.road_id]
+    low, high = road.sections[stretch.section].s, section_end(road, stretch.section)
+    return (low, high) if road.direction(stretch.lane_id) > 0 else (high, low)
+
+
+def _away(piece: Piece, s: float) -> float:
+    """Return how far a place is outside a piece [m]; 0 within."""
+    low, high = min(piece.s, piece.s_end), max(piece.s, piece.s_end)
+    return max(low - s, s - high, 0.0)

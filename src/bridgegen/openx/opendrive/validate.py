@@ -1,0 +1,294 @@
+"""What is wrong with a road network beyond its form: links, lanes and geometry that do not meet.
+
+No schema and no single reader finds all of it: `carla.Map` loads most broken maps silently, and
+no checker reports a junction whose id is also a road's, into which CARLA then finds no way.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+
+from bridgegen.openx.opendrive.geometry import pose
+from bridgegen.openx.opendrive.lanes import lane_pose, section_end
+from bridgegen.openx.opendrive.model import (
+    CONTACTS,
+    Connection,
+    Junction,
+    Lane,
+    LaneSection,
+    OpenDrive,
+    Road,
+)
+from bridgegen.openx.opendrive.references import broken_references
+
+GAP = 0.05
+"""How far two ends that should meet may be apart [m]."""
+KINK = 0.02
+"""By how much the heading may jump where they meet [rad]."""
+SLACK = 1e-3
+"""By how much an s may be off [m]."""
+
+
+def problems(model: OpenDrive) -> list[str]:
+    """Return what is wrong with a road network, one sentence each, with road, lane and value.
+
+    Ids and references come first; where these are broken, nothing else is looked at.
+    """
+    broken = [sentence for _, sentence in broken_references(model)]
+    broken += _collisions(model)
+    if broken:
+        return broken
+    found: list[str] = []
+    for road in model.roads:
+        found += _reference_line(road)
+        found += _sections(road)
+        found += _along(road)
+        found += _things(road)
+    if not found:
+        for road in model.roads:
+            found += _ends(model, road)
+        for junction in model.junctions:
+            found += _junction(model, junction)
+    found += _controllers(model)
+    return found
+
+
+def _collisions(model: OpenDrive) -> Iterator[str]:
+    for junction in model.junctions:
+        if junction.id in model.roads_by_id:
+            yield (
+                f"a junction's id must differ from every road's, got '{junction.id}' for both "
+                "(CARLA then finds no way into the junction)"
+            )
+
+
+# -- one road ------------------------------------------------------------------------------------
+
+
+def _reference_line(road: Road) -> Iterator[str]:
+    s = 0.0
+    for index, geometry in enumerate(road.plan_view):
+        if abs(geometry.s - s) > SLACK:
+            yield f"road {road.id}: geometry {index} must start at {s:.6g} m, got {geometry.s:.6g}"
+        s = geometry.s + geometry.length
+    if abs(road.length - s) > SLACK:
+        got = f"got {road.length:.6g}"
+        yield f"road {road.id}: length must be that of its geometry, {s:.6g} m, {got}"
+    for index, (one, following) in enumerate(pairwise(road.plan_view), start=1):
+        end = pose(one, one.length)
+        gap = math.dist(end[:2], (following.x, following.y))
+        kink = abs(math.remainder(end.h - following.hdg, math.tau))
+        if gap > GAP or kink > KINK:
+            yield (
+                f"road {road.id}: geometry {index} must begin where the one before ends, got a gap "
+                f"of {gap:.3g} m and {kink:.3g} rad"
+            )
+
+
+def _sections(road: Road) -> Iterator[str]:
+    starts = [section.s for section in road.sections]
+    if starts[0] > SLACK:
+        yield f"road {road.id}: the first laneSection must start at s=0 m, got {starts[0]:.6g}"
+    for a, b in pairwise(starts):
+        if b < a:
+            yield f"road {road.id}: laneSections must be in order of s, got {b:.6g} after {a:.6g} m"
+    if starts[-1] > road.length + SLACK:
+        yield (
+            f"road {road.id}: the laneSection at s={starts[-1]:.6g} m must start before the road's "
+            f"end, {road.length:.6g} m"
+        )
+    for index, section in enumerate(road.sections):
+        where = f"road {road.id}, laneSection at s={section.s:.6g} m"
+        if [lane.id for lane in section.center] != [0]:
+            got = ", ".join(str(lane.id) for lane in section.center)
+            yield f"{where}: the center must be one lane 0, got {got}"
+        for side, name, lanes in ((1, "left", section.left), (-1, "right", section.right)):
+            ids = sorted((lane.id for lane in lanes), key=abs)
+            if ids != [side * k for k in range(1, len(ids) + 1)]:
+                yield f"{where}: lanes on the {name} must count from {side}, got {ids}"
+        length = section_end(road, index) - section.s
+        for lane in section.lanes:
+            yield from _widths(f"{where}, lane {lane.id}", lane, length)
+
+
+def _widths(where: str, lane: Lane, length: float) -> Iterator[str]:
+    if not lane.widths:
+        if lane.drivable:
+            yield f"{where}: a {lane.type} lane must have a width, got none"
+        return
+    if lane.widths[0].s > SLACK:
+        yield f"{where}: the first width must start at sOffset=0 m, got {lane.widths[0].s:.6g}"
+    ends = [width.s for width in lane.widths[1:]] + [length]
+    for width, end in zip(lane.widths, ends, strict=True):
+        if end < width.s - SLACK:
+            got = f"got sOffset={width.s:.6g} m"
+            yield f"{where}: widths must be in order and within the section, {got}"
+            continue
+        least = _least((width.a, width.b, width.c, width.d), end - width.s)
+        if least < -SLACK:
+            yield f"{where}: width must be ≥ 0 m, got {least:.3g}"
+
+
+def _least(cubic: tuple[float, float, float, float], end: float) -> float:
+    """Return the smallest value of a cubic on [0, end]."""
+    a, b, c, d = cubic
+    candidates = [0.0, end]
+    if d:
+        root = c * c - 3.0 * b * d
+        if root >= 0.0:
+            candidates += [(-c + sign * math.sqrt(root)) / (3.0 * d) for sign in (1.0, -1.0)]
+    elif c:
+        candidates.append(-b / (2.0 * c))
+    return min(a + x * (b + x * (c + x * d)) for x in candidates if 0.0 <= x <= end)
+
+
+def _along(road: Road) -> Iterator[str]:
+    """Yield broken links between the lane sections of a road."""
+    for one, following in pairwise(road.sections):
+        for a, b, ahead in ((one, following, True), (following, one, False)):
+            for lane in a.lanes:
+                for target in lane.successors if ahead else lane.predecessors:
+                    other = b.lane(target)
+                    back = (
+                        () if other is None else other.predecessors if ahead else other.successors
+                    )
+                    what = (
+                        f"road {road.id}, laneSection at s={a.s:.6g} m, lane {lane.id}: its "
+                        f"{'successor' if ahead else 'predecessor'} {target}"
+                    )
+                    if other is None:
+                        yield f"{what} is not in the section at s={b.s:.6g} m"
+                    elif lane.id not in back and lane.drivable:
+                        yield f"{what} must link back to it, got {list(back) or 'nothing'}"
+                    elif road.direction(target) != road.direction(lane.id):
+                        yield f"{what} runs the other way"
+
+
+def _things(road: Road) -> Iterator[str]:
+    """Yield objects and signals that are not on their road."""
+    kinds: tuple[tuple[str, Iterable[tuple[str, float]]], ...] = (
+        ("object", ((one.id, one.s) for one in road.objects)),
+        ("signal", ((one.id, one.s) for one in road.signals)),
+        ("signalReference", ((one.id, one.s) for one in road.signal_references)),
+    )
+    for kind, things in kinds:
+        for name, s in things:
+            if s > road.length + SLACK:
+                where = f"road {road.id}: {kind} {name}"
+                yield f"{where} must have s ≤ {road.length:.6g} m, got {s:.6g}"
+
+
+# -- where roads meet ----------------------------------------------------------------------------
+
+
+def _ends(model: OpenDrive, road: Road) -> Iterator[str]:
+    for contact in CONTACTS:
+        link = road.link(contact)
+        if link is None or link.element_type != "road":
+            continue
+        assert link.contact_point is not None  # as `broken_references` said
+        other = model.road(link.element_id)
+        there = f"the {link.contact_point} of road {other.id}"
+        what = f"road {road.id}: its {contact} is at {there}, which"
+        back = other.link(link.contact_point)
+        wanted = ("junction", road.junction) if road.is_connecting else ("road", road.id)
+        got = (back.element_type, back.element_id) if back else ("nothing", "")
+        if not other.is_connecting and got != wanted:
+            yield f"{what} must link back to {' '.join(wanted)}, got {' '.join(got).strip()}"
+            continue
+        yield from _lanes_across(road, contact, other, link.contact_point)
+
+
+def _lanes_across(road: Road, contact: str, other: Road, other_contact: str) -> Iterator[str]:
+    section: LaneSection = road.section_at(contact)
+    there = other.section_at(other_contact)
+    for lane in section.lanes:
+        if not lane.drivable:
+            continue
+        for target in lane.successors if contact == "end" else lane.predecessors:
+            what = (
+                f"road {road.id}, lane {lane.id}: lane {target} of road {other.id} at its {contact}"
+            )
+            if there.lane(target) is None:
+                yield f"{what} is not there"
+                continue
+            leaves = (road.direction(lane.id) > 0) == (contact == "end")
+            enters = (other.direction(target) > 0) == (other_contact == "start")
+            if leaves != enters:
+                yield f"{what} runs the other way"
+                continue
+            yield from _gap(what, road, lane.id, contact, other, target, other_contact)
+
+
+def _gap(
+    what: str, road: Road, lane_id: int, contact: str, other: Road, target: int, other_contact: str
+) -> Iterator[str]:
+    a = lane_pose(road, lane_id, 0.0 if contact == "start" else road.length)
+    b = lane_pose(other, target, 0.0 if other_contact == "start" else other.length)
+    gap, kink = math.dist(a[:2], b[:2]), abs(math.remainder(a.h - b.h, math.tau))
+    if gap > GAP or kink > KINK:
+        yield f"{what} must begin where it ends, got a gap of {gap:.3g} m and {kink:.3g} rad"
+
+
+def _junction(model: OpenDrive, junction: Junction) -> Iterator[str]:
+    served: set[tuple[str, int]] = set()
+    entered: set[str] = set()
+    for connection in junction.connections:
+        yield from _connection(model, junction, connection)
+        entered.add(connection.connecting_road)
+        served.update((connection.incoming_road, link.from_lane) for link in connection.lane_links)
+    for road in model.connecting_roads(junction.id):
+        if road.id not in entered:
+            yield f"junction {junction.id}: no connection leads into its road {road.id}"
+    for road in model.roads:
+        for contact in CONTACTS:
+            link = road.link(contact)
+            if link is None or (link.element_type, link.element_id) != ("junction", junction.id):
+                continue
+            for lane in road.section_at(contact).lanes:
+                leaves = (road.direction(lane.id) > 0) == (contact == "end")
+                if lane.type == "driving" and leaves and (road.id, lane.id) not in served:
+                    yield f"junction {junction.id}: no way on for lane {lane.id} of road {road.id}"
+
+
+def _connection(model: OpenDrive, junction: Junction, connection: Connection) -> Iterator[str]:
+    name = f"junction {junction.id}, connection {connection.id}"
+    incoming = model.road(connection.incoming_road)
+    way = model.road(connection.connecting_road)
+    entry = connection.contact_point
+    link = way.link(entry)
+    if link is None or (link.element_type, link.element_id) != ("road", incoming.id):
+        got = f"{link.element_type} {link.element_id}" if link else "nothing"
+        yield f"{name}: the {entry} of road {way.id} must link to road {incoming.id}, got {got}"
+        return
+    if not connection.lane_links:
+        yield f"{name}: a laneLink is required, got none"
+    for each in connection.lane_links:
+        contact = "end" if incoming.direction(each.from_lane) > 0 else "start"
+        what = (
+            f"{name}: lane {each.to_lane} of road {way.id} after lane {each.from_lane} of road "
+            f"{incoming.id}"
+        )
+        if (
+            incoming.section_at(contact).lane(each.from_lane) is None
+            or link.contact_point != contact
+        ):
+            lane = f"lane {each.from_lane} of road {incoming.id}"
+            yield f"{name}: {lane} does not lead into the junction"
+        elif (way.direction(each.to_lane) > 0) != (entry == "start"):
+            yield f"{what} runs the other way"
+        else:
+            yield from _gap(what, incoming, each.from_lane, contact, way, each.to_lane, entry)
+
+
+def _controllers(model: OpenDrive) -> Iterator[str]:
+    signals = {signal.id for road in model.roads for signal in road.signals}
+    known = {controller.id for controller in model.controllers}
+    for controller in model.controllers:
+        for control in controller.controls:
+            if control.signal_id not in signals:
+                yield f"controller {controller.id}: signal '{control.signal_id}' is not in the file"
+    for junction in model.junctions:
+        for used in junction.controllers:
+            if used.id not in known:
+                yield f"junction {junction.id}: controller '{used.id}' is not in the file"

@@ -1,0 +1,113 @@
+"""The head of a file: its header, parameters, properties, and the files that it names."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from bridgegen.openx.openscenario.element import TEXT, AtLeast, Element, Tag
+from bridgegen.openx.openscenario.enumerations import ParameterType, Rule
+from bridgegen.openx.openscenario.values import DateTime, LiteralString, String, UnsignedShort
+
+
+@dataclass(frozen=True)
+class Property(Element):
+    """A name and a value that the standard leaves to the user."""
+
+    name: String
+    value: String
+
+
+@dataclass(frozen=True)
+class File(Element):
+    """A file by its path, relative to the one that names it."""
+
+    filepath: String
+
+
+@dataclass(frozen=True)
+class CustomContent(Element):
+    """Free text."""
+
+    text: Annotated[str, TEXT] = ""
+
+
+@dataclass(frozen=True)
+class Properties(Element):
+    """What the standard leaves to the user."""
+
+    properties: tuple[Property, ...] = ()
+    files: tuple[File, ...] = ()
+    custom_contents: tuple[CustomContent, ...] = ()
+
+    def get(self, name: str) -> String | None:
+        """Return the value of the first property of that name."""
+        return next((p.value for p in self.properties if p.name == name), None)
+
+
+@dataclass(frozen=True)
+class License(Element):
+    """The terms under which a file may be used."""
+
+    name: String
+    resource: String | None = None
+    spdx_id: String | None = None
+    text: Annotated[str, TEXT] = ""
+
+
+@dataclass(frozen=True)
+class FileHeader(Element):
+    """Who wrote the file, when, what for, and in which version of the standard."""
+
+    rev_major: UnsignedShort
+    rev_minor: UnsignedShort
+    date: DateTime
+    description: String
+    author: String
+    license: License | None = None
+    properties: Properties | None = None
+
+
+@dataclass(frozen=True)
+class ValueConstraint(Element):
+    """A comparison that a parameter's value must satisfy."""
+
+    rule: Rule
+    value: LiteralString
+
+
+@dataclass(frozen=True)
+class ValueConstraintGroup(Element):
+    """Constraints that must all hold."""
+
+    constraints: Annotated[tuple[ValueConstraint, ...], AtLeast(1)]
+
+
+@dataclass(frozen=True)
+class ParameterDeclaration(Element):
+    """A parameter with its value; of its constraint groups one must hold."""
+
+    name: LiteralString
+    parameter_type: ParameterType
+    value: LiteralString
+    constraint_groups: Annotated[tuple[ValueConstraintGroup, ...], Tag("ConstraintGroup")] = ()
+
+
+@dataclass(frozen=True)
+class ParameterDeclarations(Element):
+    """The parameters of a scenario."""
+
+    parameters: tuple[ParameterDeclaration, ...] = ()
+
+
+@dataclass(frozen=True)
+class CatalogLocations(Element):
+    """Where catalogues lie; this version reads none."""
+
+
+@dataclass(frozen=True)
+class RoadNetwork(Element):
+    """The OpenDRIVE file, and what to draw it with."""
+
+    logic_file: Annotated[File | None, Tag("LogicFile")] = None
+    scene_graph_file: Annotated[File | None, Tag("SceneGraphFile")] = field(
+        default=None, kw_only=True
+    )

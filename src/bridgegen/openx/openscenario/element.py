@@ -1,0 +1,240 @@
+"""How the model is declared: dataclass fields are the XML attributes and child elements.
+
+One declaration serves reading, writing and checking. A field's annotation says it all:
+
+- an alias of ``values`` (``Double``, ``String``, …) or an enumeration: an attribute, whose XML name
+  is the field's in camelCase;
+- an ``Element`` class: a child of that tag; a union of classes: a choice of one of them;
+- ``tuple[X, ...]``: any number of them, ``Annotated[…, AtLeast(1)]`` one or more;
+- ``… | None``: optional;
+- ``Annotated[X, Tag("StartTrigger")]``: the tag, where it is not the class's name;
+- ``Annotated[str, TEXT]``: the element's own text.
+"""
+
+import re
+import types
+import typing
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from typing import Any, Union, get_args, get_origin
+
+from bridgegen.openx.openscenario.values import Expr, Kind, ParameterRef
+
+
+@dataclass(frozen=True)
+class Element:
+    """An element of an OpenSCENARIO file.
+
+    Attributes:
+        line: where it stands in the file that it was read from, for messages; 0 if it was not
+            read. Two elements are equal wherever they stand.
+    """
+
+    line: int = field(default=0, compare=False, repr=False, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Tag:
+    """The tag of a child, where it differs from its class's name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class AtLeast:
+    """The least number of repeated children."""
+
+    count: int
+
+
+@dataclass(frozen=True)
+class Range:
+    """The range that the standard gives for a number."""
+
+    low: float
+    high: float = float("inf")
+
+
+class Meaning(StrEnum):
+    """What a text means beyond its type."""
+
+    TEXT = "the element's text"
+    ENTITY = "the name of an entity"
+
+
+TEXT = Meaning.TEXT
+ENTITY = Meaning.ENTITY
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """An XML attribute.
+
+    Attributes:
+        field: the dataclass field.
+        name: in the file.
+        kind: its data type; ``STRING`` for an enumeration.
+        enum: the enumeration, if it is one.
+        required: whether the element must have it.
+        is_literal: whether it takes no reference to a parameter.
+        limits: the standard's range, if it gives one.
+        is_entity: whether it names an entity.
+    """
+
+    field: str
+    name: str
+    kind: Kind
+    enum: type[StrEnum] | None
+    required: bool
+    is_literal: bool
+    limits: Range | None
+    is_entity: bool
+
+
+@dataclass(frozen=True)
+class Child:
+    """A child element, or a choice of them, or a list.
+
+    Attributes:
+        field: the dataclass field.
+        options: tag → class.
+        tags: class → tag.
+        at_least: how many there must be.
+        many: whether there may be more than one.
+    """
+
+    field: str
+    options: dict[str, type[Element]]
+    tags: dict[type[Element], str]
+    at_least: int
+    many: bool
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What an element's class declares.
+
+    Attributes:
+        attributes: by XML name, in order.
+        children: in the order that the standard prescribes.
+        by_tag: tag → the child that it fills.
+        text: the field of the element's text, if it has any.
+    """
+
+    attributes: dict[str, Attribute]
+    children: tuple[Child, ...]
+    by_tag: dict[str, Child]
+    text: str | None
+
+
+_DECLARATIONS: dict[type[Element], Declaration] = {}
+
+
+def declaration(cls: type[Element]) -> Declaration:
+    """Return what a class declares, worked out from its annotations once.
+
+    Raises:
+        TypeError: an annotation that declares nothing.
+    """
+    found = _DECLARATIONS.get(cls)
+    if found is None:
+        found = _DECLARATIONS[cls] = _declare(cls)
+    return found
+
+
+def _declare(cls: type[Element]) -> Declaration:
+    hints = typing.get_type_hints(cls, include_extras=True)
+    attributes: dict[str, Attribute] = {}
+    children: list[Child] = []
+    text = None
+    for item in fields(cls):
+        if item.name == "line":
+            continue
+        options, marks, many = _unfold(hints[item.name])
+        required = type(None) not in options
+        options = [option for option in options if option is not type(None)]
+        kinds = [mark for mark in marks if isinstance(mark, Kind)]
+        enums = [o for o in options if isinstance(o, type) and issubclass(o, StrEnum)]
+        if TEXT in marks:
+            text = item.name
+        elif kinds or enums:
+            limits = [mark for mark in marks if isinstance(mark, Range)]
+            name = _camel_case(item.name)
+            attributes[name] = Attribute(
+                field=item.name, name=name, kind=kinds[0] if kinds else Kind.STRING,
+                enum=enums[0] if enums else None, required=required,
+                is_literal=ParameterRef not in options,
+                limits=limits[0] if limits else None, is_entity=ENTITY in marks,
+            )  # fmt: skip
+        elif options and all(isinstance(o, type) and issubclass(o, Element) for o in options):
+            tags = [mark.name for mark in marks if isinstance(mark, Tag)]
+            names = tags if tags else [option.__name__ for option in options]
+            counts = [mark.count for mark in marks if isinstance(mark, AtLeast)]
+            at_least = counts[0] if counts else int(required and not many)
+            by_name = dict(zip(names, options, strict=True))
+            children.append(
+                Child(item.name, by_name, {c: t for t, c in by_name.items()}, at_least, many)
+            )
+        else:
+            raise TypeError(f"{cls.__name__}.{item.name} declares neither attribute nor child")
+    by_tag = {tag: child for child in children for tag in child.options}
+    return Declaration(attributes, tuple(children), by_tag, text)
+
+
+def _unfold(hint: Any) -> tuple[list[Any], list[Any], bool]:
+    """Return an annotation's alternatives, its marks, and whether it is a tuple of any length."""
+    origin = get_origin(hint)
+    if origin is typing.Annotated:
+        base, *marks = get_args(hint)
+        options, inner, many = _unfold(base)
+        return options, [*marks, *inner], many
+    if origin in (Union, types.UnionType):
+        parts = [_unfold(arg) for arg in get_args(hint)]
+        return (
+            [option for options, _, _ in parts for option in options],
+            [mark for _, marks, _ in parts for mark in marks],
+            any(many for _, _, many in parts),
+        )
+    if origin is tuple:
+        options, marks, _ = _unfold(get_args(hint)[0])
+        return options, marks, True
+    return [hint], [], False
+
+
+def _camel_case(name: str) -> str:
+    return re.sub(r"_([a-z0-9])", lambda match: match[1].upper(), name)
+
+
+def children_of(element: Element) -> Iterator[tuple[str, Element]]:
+    """Yield an element's children with their tags, in the standard's order."""
+    for child in declaration(type(element)).children:
+        value = getattr(element, child.field)
+        for one in value if child.many else () if value is None else (value,):
+            yield child.tags[type(one)], one
+
+
+def walk(element: Element) -> Iterator[Element]:
+    """Yield an element and all below it, parents first."""
+    yield element
+    for _, child in children_of(element):
+        yield from walk(child)
+
+
+def values_of(element: Element) -> Iterator[tuple[Attribute, Any]]:
+    """Yield an element's attributes that are present, with their values."""
+    for attribute in declaration(type(element)).attributes.values():
+        value = getattr(element, attribute.field)
+        if value is not None:
+            yield attribute, value
+
+
+def references(element: Element) -> frozenset[str]:
+    """Return the names of all parameters that an element and all below it refer to."""
+    return frozenset(
+        name
+        for one in walk(element)
+        for _, value in values_of(one)
+        if isinstance(value, ParameterRef | Expr)
+        for name in value.names
+    )

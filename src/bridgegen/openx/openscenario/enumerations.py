@@ -1,0 +1,204 @@
+"""The standard's enumerations, values verbatim, the union of versions 1.0 to 1.3."""
+
+from enum import StrEnum
+
+
+class ParameterType(StrEnum):
+    """The type of a parameter; ``integer`` is the old name of ``int``."""
+
+    BOOLEAN = "boolean"
+    DATE_TIME = "dateTime"
+    DOUBLE = "double"
+    INTEGER = "integer"
+    INT = "int"
+    STRING = "string"
+    UNSIGNED_INT = "unsignedInt"
+    UNSIGNED_SHORT = "unsignedShort"
+
+
+class Rule(StrEnum):
+    """How a condition compares."""
+
+    EQUAL_TO = "equalTo"
+    GREATER_THAN = "greaterThan"
+    LESS_THAN = "lessThan"
+    GREATER_OR_EQUAL = "greaterOrEqual"
+    LESS_OR_EQUAL = "lessOrEqual"
+    NOT_EQUAL_TO = "notEqualTo"
+
+
+class ConditionEdge(StrEnum):
+    """The change of a condition's truth that counts; ``none`` is being true."""
+
+    NONE = "none"
+    RISING = "rising"
+    FALLING = "falling"
+    RISING_OR_FALLING = "risingOrFalling"
+
+
+class CoordinateSystem(StrEnum):
+    """In which a distance is measured."""
+
+    ENTITY = "entity"
+    LANE = "lane"
+    ROAD = "road"
+    TRAJECTORY = "trajectory"
+    WORLD = "world"
+
+
+class RelativeDistanceType(StrEnum):
+    """Which distance; ``cartesianDistance`` is 1.0's name of ``euclidianDistance``."""
+
+    LATERAL = "lateral"
+    LONGITUDINAL = "longitudinal"
+    CARTESIAN_DISTANCE = "cartesianDistance"
+    EUCLIDIAN_DISTANCE = "euclidianDistance"
+
+
+class RoutingAlgorithm(StrEnum):
+    """Which way a distance along roads takes."""
+
+    ASSIGNED_ROUTE = "assignedRoute"
+    FASTEST = "fastest"
+    LEAST_INTERSECTIONS = "leastIntersections"
+    SHORTEST = "shortest"
+    UNDEFINED = "undefined"
+
+
+class TriggeringEntitiesRule(StrEnum):
+    """Whether one of the triggering entities suffices."""
+
+    ALL = "all"
+    ANY = "any"
+
+
+class Priority(StrEnum):
+    """What an event does to the others of its maneuver; ``overwrite`` is ``override`` up to 1.1."""
+
+    OVERWRITE = "overwrite"
+    OVERRIDE = "override"
+    PARALLEL = "parallel"
+    SKIP = "skip"
+
+
+class DynamicsShape(StrEnum):
+    """The course of a transition."""
+
+    CUBIC = "cubic"
+    LINEAR = "linear"
+    SINUSOIDAL = "sinusoidal"
+    STEP = "step"
+
+
+class DynamicsDimension(StrEnum):
+    """What limits a transition."""
+
+    DISTANCE = "distance"
+    RATE = "rate"
+    TIME = "time"
+
+
+class FollowingMode(StrEnum):
+    """Whether the dynamics or the position of a transition is kept."""
+
+    FOLLOW = "follow"
+    POSITION = "position"
+
+
+class RouteStrategy(StrEnum):
+    """How a route reaches its next waypoint."""
+
+    FASTEST = "fastest"
+    LEAST_INTERSECTIONS = "leastIntersections"
+    RANDOM = "random"
+    SHORTEST = "shortest"
+
+
+class ReferenceContext(StrEnum):
+    """Whether an orientation is the world's or the lane's."""
+
+    ABSOLUTE = "absolute"
+    RELATIVE = "relative"
+
+
+class VehicleCategory(StrEnum):
+    """The kind of a vehicle."""
+
+    BICYCLE = "bicycle"
+    BUS = "bus"
+    CAR = "car"
+    MOTORBIKE = "motorbike"
+    SEMITRAILER = "semitrailer"
+    TRAILER = "trailer"
+    TRAIN = "train"
+    TRAM = "tram"
+    TRUCK = "truck"
+    VAN = "van"
+
+
+class Role(StrEnum):
+    """What a vehicle serves for."""
+
+    NONE = "none"
+    AMBULANCE = "ambulance"
+    CIVIL = "civil"
+    FIRE = "fire"
+    MILITARY = "military"
+    POLICE = "police"
+    PUBLIC_TRANSPORT = "publicTransport"
+    ROAD_ASSISTANCE = "roadAssistance"
+
+
+class ControllerType(StrEnum):
+    """What a controller commands."""
+
+    LATERAL = "lateral"
+    LONGITUDINAL = "longitudinal"
+    LIGHTING = "lighting"
+    ANIMATION = "animation"
+    MOVEMENT = "movement"
+    APPEARANCE = "appearance"
+    ALL = "all"
+
+
+class FractionalCloudCover(StrEnum):
+    """The eighths of the sky that clouds cover; ``nineOktas``: the sky cannot be seen."""
+
+    ZERO = "zeroOktas"
+    ONE = "oneOktas"
+    TWO = "twoOktas"
+    THREE = "threeOktas"
+    FOUR = "fourOktas"
+    FIVE = "fiveOktas"
+    SIX = "sixOktas"
+    SEVEN = "sevenOktas"
+    EIGHT = "eightOktas"
+    NINE = "nineOktas"
+
+
+class CloudState(StrEnum):
+    """The sky up to 1.1."""
+
+    CLOUDY = "cloudy"
+    FREE = "free"
+    OVERCAST = "overcast"
+    RAINY = "rainy"
+    SKY_OFF = "skyOff"
+
+
+class PrecipitationType(StrEnum):
+    """What falls."""
+
+    DRY = "dry"
+    RAIN = "rain"
+    SNOW = "snow"
+
+
+class Wetness(StrEnum):
+    """The water on the road."""
+
+    DRY = "dry"
+    MOIST = "moist"
+    WET_WITH_PUDDLES = "wetWithPuddles"
+    LOW_FLOODED = "lowFlooded"
+    HIGH_FLOODED = "highFlooded"

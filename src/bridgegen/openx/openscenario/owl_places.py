@@ -1,0 +1,143 @@
+"""OWL2OpenSCENARIO, its places: from a distance to the junction to a lane position.
+
+An individual says on which lane of a leg, and how far from the junction. A leg may be a chain of
+roads, and a road's reference line may run towards the junction or away from it.
+"""
+
+from dataclasses import dataclass
+
+from bridgegen.errors import OntologyError
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import Subject
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.owl_quantities import Quantities, Quantity
+from bridgegen.openx.openscenario.values import Double, format_double
+
+_ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
+
+
+@dataclass(frozen=True)
+class _Road:
+    """A road of a leg; ``near`` is its end that is nearer to the junction."""
+
+    node: Subject
+    road_id: str
+    length: float
+    near: str
+
+
+class Places:
+    """The lane positions of a scenario's individuals.
+
+    Raises:
+        OntologyError: the roads lack a property, or lead back into themselves.
+    """
+
+    def __init__(self, individuals: Individuals, quantities: Quantities) -> None:
+        self._individuals = individuals
+        self._quantities = quantities
+        self._of_lane: dict[Subject, tuple[tuple[_Road, ...], int]] = {}
+        for junction in individuals.of_class("Intersection"):
+            for leg in individuals.links(junction, "has_leg"):
+                roads = self._chain(leg)
+                for index, road in enumerate(roads):
+                    for lane in individuals.links(road.node, "has_lane"):
+                        self._of_lane[lane] = roads, index
+
+    def position(self, node: Subject, *, oriented: bool) -> osc.Position:
+        """Return where an individual of class LanePosition is.
+
+        A distance that is bound to a parameter becomes an expression on the road that holds its
+        present value.
+
+        Args:
+            node: the individual.
+            oriented: whether to state the driving direction (esmini compares an orientation that
+                a ReachPositionCondition states, so a destination has none).
+
+        Raises:
+            OntologyError: a property is missing, the lane belongs to no leg, or the distance lies
+                beyond the leg's end.
+        """
+        individuals = self._individuals
+        lane = individuals.link(node, "on_lane")
+        try:
+            roads, index = self._of_lane[lane]
+        except KeyError:
+            raise OntologyError(
+                f"on_lane of {individuals.describe(node)} must be a lane of one of the "
+                f"intersection's legs, got {individuals.describe(lane)}"
+            ) from None
+        distance = self._quantities.get(node, "has_distance_to_junction")
+        at = self._holds(node, roads, self._quantities.value(distance))
+        lane = self._same_lane(lane, roads[index], roads[at])
+        position = osc.LanePosition(
+            road_id=roads[at].road_id,
+            lane_id=str(individuals.integer(lane, "has_lane_id")),
+            s=self._station(roads[at], sum(road.length for road in roads[:at]), distance),
+            orientation=_ALONG_LANE if oriented else None,
+        )
+        return osc.Position(position)
+
+    def _chain(self, leg: Subject) -> tuple[_Road, ...]:
+        individuals = self._individuals
+        roads: list[_Road] = []
+        node: Subject | None = leg
+        while node is not None:
+            if any(road.node == node for road in roads):
+                raise OntologyError(f"{individuals.describe(node)} must not continue itself")
+            near = individuals.text(node, "has_junction_end")
+            if near not in ("start", "end"):
+                raise OntologyError(
+                    f"has_junction_end of {individuals.describe(node)} must be 'start' or 'end', "
+                    f"got '{near}'"
+                )
+            road_id = individuals.text(node, "has_road_id")
+            roads.append(_Road(node, road_id, individuals.number(node, "has_length"), near))
+            node = individuals.optional_link(node, "has_continuation")
+        return tuple(roads)
+
+    def _holds(self, node: Subject, roads: tuple[_Road, ...], distance: float) -> int:
+        """Return which road of a leg holds a distance from the junction [m]."""
+        end = 0.0
+        for index, road in enumerate(roads):
+            end += road.length
+            if 0.0 <= distance <= end:
+                return index
+        raise OntologyError(
+            f"has_distance_to_junction [m] of {self._individuals.describe(node)} must lie on its "
+            f"leg, 0 to {end!r}, got {distance!r}"
+        )
+
+    def _same_lane(self, lane: Subject, on: _Road, other: _Road) -> Subject:
+        """Return the lane of another road of the leg that continues a lane: as many further in."""
+        individuals = self._individuals
+        if on == other:
+            return lane
+        direction = individuals.text(lane, "has_direction")
+        own, others = (
+            sorted(
+                (abs(individuals.integer(one, "has_lane_id")), one.value, one)
+                for one in individuals.links(road.node, "has_lane")
+                if individuals.text(one, "has_direction") == direction
+            )
+            for road in (on, other)
+        )
+        rank = next(k for k, item in enumerate(own) if item[2] == lane)
+        if len(own) != len(others):
+            raise OntologyError(
+                f"{individuals.describe(lane)} must continue on road {other.road_id}, which has "
+                f"{len(others)} lanes of that direction, not {len(own)}"
+            )
+        return others[rank][2]
+
+    def _station(self, road: _Road, before: float, distance: Quantity) -> Double:
+        """Return s on a road that begins ``before`` metres from the junction."""
+        if road.near == "start" and before == 0.0:
+            return distance
+        if road.near == "start":
+            formula = f"x-{format_double(before)}"
+        else:
+            formula = f"{format_double(before + road.length)}-x"
+        s = self._quantities.apply(formula, distance)
+        return min(max(s, 0.0), road.length) if isinstance(s, float) else s  # rounding

@@ -1,0 +1,138 @@
+"""OWL2OpenSCENARIO, its numbers: an individual's value, or the parameter that it is bound to.
+
+The value of a parameter lives on the individuals that are bound to it. The file declares each
+dynamic parameter with that value and refers to it by ``$name``, so it is concrete and searchable.
+"""
+
+import math
+import re
+from functools import lru_cache
+
+import pyoxigraph as ox
+
+from bridgegen.errors import OntologyError
+from bridgegen.odd.expression import Expression, parse
+from bridgegen.odd.parameters import Axis
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import Subject, bg
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.values import format_double
+
+Quantity = float | osc.ParameterRef
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class Quantities:
+    """The numbers of a scenario's individuals, as the storyboard needs them.
+
+    Attributes:
+        values: every dynamic parameter's value by name, in alphabetical order.
+
+    Raises:
+        OntologyError: a parameter has no value, two values, or no identifier for a name.
+    """
+
+    def __init__(self, individuals: Individuals, scenario: Subject) -> None:
+        self._individuals = individuals
+        bearers: dict[object, list[Subject]] = {}
+        has_parameter = bg("has_parameter")
+        for quad in individuals.quads:
+            if quad.predicate == has_parameter and not isinstance(quad.subject, ox.Triple):
+                bearers.setdefault(quad.object, []).append(quad.subject)
+        found: dict[str, tuple[float, Subject]] = {}
+        for parameter in individuals.links(scenario, "has_parameter_declaration"):
+            if individuals.text(parameter, "has_axis") == Axis.STATIC:
+                continue
+            name = individuals.text(parameter, "has_name")
+            if not _NAME.fullmatch(name):
+                raise OntologyError(f"a parameter's name must be an identifier, got '{name}'")
+            if name in found:
+                raise OntologyError(f"parameter {name} is declared twice")
+            value = self._value(name, parameter, bearers.get(parameter, []))
+            found[name] = value, parameter
+        self._nodes = {name: found[name][1] for name in sorted(found)}
+        self.values = {name: found[name][0] for name in sorted(found)}
+
+    def _value(self, name: str, parameter: Subject, bearers: list[Subject]) -> float:
+        individuals = self._individuals
+        found: dict[float, str] = {}
+        for node in bearers:
+            for bound in individuals.texts(parameter, "binds_property"):
+                value = individuals.optional_number(node, bound)
+                if value is not None:
+                    found.setdefault(value, individuals.describe(node))
+        if not found:
+            raise OntologyError(
+                f"parameter {name} must have a value: no individual that is bound to it has one"
+            )
+        if len(found) > 1:
+            shown = ", ".join(f"{value!r} on {who}" for value, who in sorted(found.items()))
+            raise OntologyError(f"parameter {name} must have one value, got {shown}")
+        return next(iter(found))
+
+    def get(self, node: Subject, name: str) -> Quantity:
+        """Return an individual's number, or the reference to the parameter that it is bound to.
+
+        Raises:
+            OntologyError: there is no number, or it is bound to a static parameter, on which a
+                storyboard never depends.
+        """
+        number = self._individuals.number(node, name)
+        parameter = self._individuals.parameter(node, name)
+        if parameter is None:
+            return number
+        if parameter not in self.values:
+            raise OntologyError(
+                f"{name} of {self._individuals.describe(node)} must be bound to a dynamic "
+                f"parameter that the scenario declares, got {parameter}"
+            )
+        return osc.ParameterRef(f"${parameter}")
+
+    def value(self, quantity: Quantity) -> float:
+        """Return the number that a quantity has now."""
+        return self.values[quantity.name] if isinstance(quantity, osc.ParameterRef) else quantity
+
+    def apply(self, formula: str, quantity: Quantity) -> float | osc.Expr:
+        """Return a formula of ``x`` at a quantity: its value, or an expression over the parameter.
+
+        Args:
+            formula: in what OpenSCENARIO 1.2 and `bridgegen.odd.expression` have in common.
+            quantity: what ``x`` stands for.
+
+        Raises:
+            OntologyError: the formula has no finite value there.
+        """
+        now = self.value(quantity)
+        value = float(_parse(formula).evaluate({"x": now}))
+        if not math.isfinite(value):
+            raise OntologyError(f"{formula} must have a finite value, got x = {now!r} ({quantity})")
+        if isinstance(quantity, osc.ParameterRef):
+            # In brackets: esmini pastes the value's text, whose sign would meet an operator.
+            return osc.Expr("${" + re.sub(r"\bx\b", f"({quantity})", formula) + "}")
+        return value
+
+    def declarations(self) -> list[osc.ParameterDeclaration]:
+        """Return the declaration of each dynamic parameter, its range as constraints."""
+        return [
+            osc.ParameterDeclaration(
+                name, osc.ParameterType.DOUBLE, format_double(value), self._range(name)
+            )
+            for name, value in self.values.items()
+        ]
+
+    def _range(self, name: str) -> tuple[osc.ValueConstraintGroup, ...]:
+        limits = (
+            (osc.Rule.GREATER_OR_EQUAL, "has_low"),
+            (osc.Rule.LESS_OR_EQUAL, "has_high"),
+        )
+        constraints = tuple(
+            osc.ValueConstraint(rule, format_double(limit))
+            for rule, bound in limits
+            if (limit := self._individuals.optional_number(self._nodes[name], bound)) is not None
+        )
+        return (osc.ValueConstraintGroup(constraints),) if constraints else ()
+
+
+@lru_cache(maxsize=256)
+def _parse(formula: str) -> Expression:
+    return parse(formula)

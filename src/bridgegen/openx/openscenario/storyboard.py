@@ -1,0 +1,108 @@
+"""The storyboard and the whole file."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from bridgegen.openx.openscenario.actions import Action, GlobalAction, PrivateAction
+from bridgegen.openx.openscenario.conditions import Trigger
+from bridgegen.openx.openscenario.declarations import (
+    CatalogLocations,
+    FileHeader,
+    ParameterDeclarations,
+    RoadNetwork,
+)
+from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range, Tag
+from bridgegen.openx.openscenario.entities import Actors, Entities
+from bridgegen.openx.openscenario.enumerations import Priority
+from bridgegen.openx.openscenario.values import ParameterRef, String, UnsignedInt
+
+
+@dataclass(frozen=True)
+class Event(Element):
+    """Actions that start together when the trigger fires."""
+
+    name: String
+    priority: Priority | ParameterRef
+    actions: Annotated[tuple[Action, ...], AtLeast(1)]
+    start_trigger: Annotated[Trigger | None, Tag("StartTrigger")] = None
+    maximum_execution_count: Annotated[UnsignedInt | None, Range(1)] = None
+
+
+@dataclass(frozen=True)
+class Maneuver(Element):
+    """Events that belong together."""
+
+    name: String
+    events: Annotated[tuple[Event, ...], AtLeast(1)]
+
+
+@dataclass(frozen=True)
+class ManeuverGroup(Element):
+    """Maneuvers and whose they are."""
+
+    name: String
+    maximum_execution_count: Annotated[UnsignedInt, Range(1)]
+    actors: Actors
+    maneuvers: tuple[Maneuver, ...] = ()
+
+
+@dataclass(frozen=True)
+class Act(Element):
+    """Maneuver groups that start together; without a start trigger, with the story."""
+
+    name: String
+    maneuver_groups: Annotated[tuple[ManeuverGroup, ...], AtLeast(1)]
+    start_trigger: Annotated[Trigger | None, Tag("StartTrigger")] = None
+    stop_trigger: Annotated[Trigger | None, Tag("StopTrigger")] = None
+
+
+@dataclass(frozen=True)
+class Story(Element):
+    """Acts that belong together."""
+
+    name: String
+    acts: Annotated[tuple[Act, ...], AtLeast(1)]
+
+
+@dataclass(frozen=True)
+class Private(Element):
+    """What an entity does at the start."""
+
+    entity_ref: Annotated[String, ENTITY]
+    private_actions: Annotated[tuple[PrivateAction, ...], AtLeast(1)]
+
+
+@dataclass(frozen=True)
+class InitActions(Element):
+    """What is done at the start."""
+
+    global_actions: tuple[GlobalAction, ...] = ()
+    privates: tuple[Private, ...] = ()
+
+
+@dataclass(frozen=True)
+class Init(Element):
+    """The start."""
+
+    actions: Annotated[InitActions, Tag("Actions")]
+
+
+@dataclass(frozen=True)
+class Storyboard(Element):
+    """Start, stories and end."""
+
+    init: Init
+    stories: tuple[Story, ...] = ()
+    stop_trigger: Annotated[Trigger | None, Tag("StopTrigger")] = None
+
+
+@dataclass(frozen=True)
+class OpenScenario(Element):
+    """A scenario file."""
+
+    file_header: FileHeader
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
+    catalog_locations: CatalogLocations = field(default_factory=CatalogLocations, kw_only=True)
+    road_network: RoadNetwork
+    entities: Entities
+    storyboard: Storyboard

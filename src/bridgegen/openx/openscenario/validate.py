@@ -1,0 +1,151 @@
+"""What is wrong with a scenario beyond its syntax: references, ranges, and places on the map."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lanes import lane_at
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.routes import plan_route
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.element import (
+    Attribute,
+    children_of,
+    values_of,
+    walk,
+)
+from bridgegen.openx.openscenario.values import Value
+
+Problem = tuple[int, str]
+
+
+def problems(scenario: osc.OpenScenario, road_network: OpenDrive | None = None) -> list[str]:
+    """Return all that is wrong, one sentence each, with the line where the scenario was read.
+
+    Checked: parameters; names that must differ; entities that are referred to; the standard's
+    ranges; that whoever acts is there to act; and, on a road network, that every lane position
+    lies on a lane and every route can be driven without a lane change.
+
+    Args:
+        scenario: parameters are taken at their declared values.
+        road_network: the one that its ``LogicFile`` names.
+    """
+    found = parameters.problems(scenario)
+    if found:  # nothing can be resolved
+        return found
+    check = _Check(scenario, road_network)
+    texts = [
+        *check.names(),
+        *check.attributes(),
+        *check.actors(),
+        *(check.places() if road_network is not None else ()),
+    ]
+    texts = sorted(dict.fromkeys(texts), key=lambda problem: problem[0])
+    return [f"{text} (line {line})" if line else text for line, text in texts]
+
+
+class _Check:
+    """A scenario with the values of its parameters."""
+
+    def __init__(self, scenario: osc.OpenScenario, road_network: OpenDrive | None) -> None:
+        self.scenario = scenario
+        self.road_network = road_network
+        self.values = parameters.values(scenario)
+        self.numbers = parameters.numbers(scenario)
+        objects = scenario.entities.scenario_objects
+        self.entities = [str(self.value(one.name)) for one in objects]
+
+    def value(self, value: Value) -> Any:
+        """Return a value at the declared values of the parameters."""
+        if isinstance(value, osc.Expr):
+            return float(value.resolve(self.numbers))
+        return self.values[value.name] if isinstance(value, osc.ParameterRef) else value
+
+    def names(self) -> Iterator[Problem]:
+        """Yield names that two elements of one kind beside each other share."""
+        for element in walk(self.scenario):
+            seen: set[tuple[str, Any]] = set()
+            for tag, child in children_of(element):
+                name = getattr(child, "name", None)
+                if name is None or tag == "Property":
+                    continue
+                name = self.value(name)
+                if (tag, name) in seen:
+                    yield child.line, f"the name of a {tag} must be its own, got '{name}' twice"
+                seen.add((tag, name))
+
+    def attributes(self) -> Iterator[Problem]:
+        """Yield entities that do not exist, and numbers outside the standard's ranges."""
+        for element in walk(self.scenario):
+            for attribute, raw in values_of(element):
+                value = self.value(raw)
+                what = f"{attribute.name} of {type(element).__name__}"
+                if attribute.is_entity and value not in self.entities:
+                    known = ", ".join(self.entities) or "none"
+                    yield element.line, f"{what} must be one of {known}, got '{value}'"
+                elif attribute.kind.is_number and not _in_range(attribute, value):
+                    given = (
+                        f"{raw} = {value:g}"
+                        if isinstance(raw, osc.ParameterRef | osc.Expr)
+                        else f"{value:g}"
+                    )
+                    yield element.line, f"{what} must {_range_text(attribute)}, got {given}"
+
+    def actors(self) -> Iterator[Problem]:
+        """Yield maneuver groups whose private actions are nobody's."""
+        for group in walk(self.scenario):
+            if isinstance(group, osc.ManeuverGroup) and not group.actors.entity_refs:
+                private = any(isinstance(below, osc.PrivateAction) for below in walk(group))
+                if private and not self.value(group.actors.select_triggering_entities):
+                    yield group.line, f"the actions of ManeuverGroup {group.name} must have actors"
+
+    def places(self) -> Iterator[Problem]:
+        """Yield lane positions off the map, and routes that cannot be driven."""
+        roads = self.road_network
+        assert roads is not None
+        found: dict[int, tuple[str, int, float]] = {}  # by identity: equal ones may stand apart
+        for element in walk(self.scenario):
+            if isinstance(element, osc.LanePosition):
+                try:
+                    place = self.place(element)
+                    lane_at(roads.road(place[0]), place[1], place[2])
+                    found[id(element)] = place
+                except InputError as error:
+                    yield element.line, f"LanePosition: {error}"
+        for element in walk(self.scenario):
+            if isinstance(element, osc.Route):
+                stops = [id(waypoint.position.position) for waypoint in element.waypoints]
+                if all(stop in found for stop in stops):
+                    first, *via, last = [found[stop] for stop in stops]
+                    try:
+                        plan_route(roads, first, via, last)
+                    except InputError as error:
+                        yield element.line, f"Route {element.name}: {error}"
+
+    def place(self, position: osc.LanePosition) -> tuple[str, int, float]:
+        """Return road id, lane id and s [m] of a lane position.
+
+        Raises:
+            InputError: the lane's id is not a whole number.
+        """
+        lane_id = str(self.value(position.lane_id))
+        try:
+            return str(self.value(position.road_id)), int(lane_id), self.value(position.s)
+        except ValueError:
+            raise InputError(f"laneId must be a whole number, got '{lane_id}'") from None
+
+
+def _in_range(attribute: Attribute, value: float) -> bool:
+    limits = attribute.limits
+    return not math.isnan(value) and (limits is None or limits.low <= value <= limits.high)
+
+
+def _range_text(attribute: Attribute) -> str:
+    limits = attribute.limits
+    if limits is None:
+        return "be a number"
+    if math.isinf(limits.high):
+        return f"be at least {limits.low:g}"
+    return f"be {limits.low:g} to {limits.high:g}"

@@ -1,0 +1,286 @@
+"""Attribute values of OpenSCENARIO: literals, ``$name`` references and ``${…}`` expressions.
+
+Each data type of the standard is a type alias that carries its ``Kind``; the model's fields are
+annotated with these aliases, and reading, writing and checking follow the kind. An enumeration is
+a ``StrEnum`` and needs no kind.
+
+Source: ASAM OpenSCENARIO XML 1.2, sections 9.1 (parameters) and 9.2 (expressions), and its XSD.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from decimal import Decimal
+from enum import Enum
+from functools import lru_cache
+from typing import Annotated, TypeVar
+
+from bridgegen.arrays import Float
+from bridgegen.errors import FileFormatError, InputError
+from bridgegen.odd.expression import RESERVED, Expression, parse
+
+V = TypeVar("V")
+
+_REFERENCE = re.compile(r"\$[A-Za-z_][A-Za-z0-9_]*")
+_EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}")
+_WORD = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+# The words of an expression besides parameters: what can be evaluated, and the standard's others.
+_FUNCTIONS = RESERVED | {"tan", "acos", "atan", "not", "and", "or"}
+
+
+class Kind(Enum):
+    """A data type of the standard's attributes, named as a parameter's type is."""
+
+    BOOLEAN = "boolean"
+    DATE_TIME = "dateTime"
+    DOUBLE = "double"
+    INT = "int"
+    STRING = "string"
+    UNSIGNED_INT = "unsignedInt"
+    UNSIGNED_SHORT = "unsignedShort"
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it takes part in arithmetic."""
+        return self in _NUMBERS
+
+    @property
+    def is_integer(self) -> bool:
+        """Whether it is a whole number."""
+        return self in _RANGES
+
+
+_RANGES = {
+    Kind.INT: (-(2**31), 2**31 - 1),
+    Kind.UNSIGNED_INT: (0, 2**32 - 1),
+    Kind.UNSIGNED_SHORT: (0, 2**16 - 1),
+}
+_NUMBERS = frozenset({Kind.DOUBLE, *_RANGES})
+_PATTERNS = {
+    Kind.BOOLEAN: re.compile("true|false|0|1"),
+    Kind.DATE_TIME: re.compile(
+        r"-?\d{4,}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])"
+        r"T([01]\d|2[0-3]):[0-5]\d:[0-5]\d(\.\d+)?(Z|[+-]\d\d:\d\d)?",
+        re.ASCII,
+    ),
+    Kind.DOUBLE: re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|-?INF", re.ASCII),
+    **dict.fromkeys(_RANGES, re.compile(r"[+-]?\d{1,20}", re.ASCII)),
+}
+
+
+@dataclass(frozen=True)
+class ParameterRef:
+    """A reference to a declared parameter.
+
+    Attributes:
+        text: as in the file, ``$name``.
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        if not _REFERENCE.fullmatch(self.text):
+            raise FileFormatError(f"a parameter reference reads $name, got '{self.text}'")
+
+    @property
+    def name(self) -> str:
+        """The parameter's name, without the ``$``."""
+        return self.text[1:]
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The one parameter that it needs."""
+        return frozenset({self.name})
+
+    def resolve(self, parameters: Mapping[str, V]) -> V:
+        """Return the parameter's value: a scalar, or one per row.
+
+        Raises:
+            KeyError: the parameter is missing.
+        """
+        return parameters[self.name]
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Expr:
+    """An arithmetic expression over declared parameters.
+
+    Attributes:
+        text: as in the file, ``${…}`` with ``$name`` for each parameter.
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        if not _EXPRESSION.fullmatch(self.text):
+            raise FileFormatError(f"an expression reads ${{…}}, got '{self.text}'")
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The parameters that it needs."""
+        return self.expression.names
+
+    @property
+    def expression(self) -> Expression:
+        """The compiled form, with ``name`` for each ``$name``.
+
+        Raises:
+            FileFormatError: not an expression that can be evaluated.
+        """
+        return _compile(self.text)
+
+    def resolve(self, parameters: Mapping[str, float | Float]) -> Float:
+        """Return the value over scalars, or one per row over columns of N rows.
+
+        Raises:
+            FileFormatError: not an expression that can be evaluated.
+            KeyError: a parameter is missing.
+        """
+        return self.expression.evaluate({name: parameters[name] for name in self.names})
+
+    def __str__(self) -> str:
+        return self.text
+
+
+Boolean = Annotated[bool | ParameterRef | Expr, Kind.BOOLEAN]
+DateTime = Annotated[str | ParameterRef, Kind.DATE_TIME]
+Double = Annotated[float | ParameterRef | Expr, Kind.DOUBLE]
+Int = Annotated[int | ParameterRef | Expr, Kind.INT]
+LiteralString = Annotated[str, Kind.STRING]
+String = Annotated[str | ParameterRef, Kind.STRING]
+UnsignedInt = Annotated[int | ParameterRef | Expr, Kind.UNSIGNED_INT]
+UnsignedShort = Annotated[int | ParameterRef | Expr, Kind.UNSIGNED_SHORT]
+
+Literal = bool | int | float | str
+Value = Literal | ParameterRef | Expr
+
+
+def resolve(value: Value, parameters: Mapping[str, float | Float]) -> Value | Float:
+    """Return a literal as it is, and a reference or an expression by its parameters' values.
+
+    Raises:
+        FileFormatError: not an expression that can be evaluated.
+        KeyError: a parameter is missing.
+    """
+    return value.resolve(parameters) if isinstance(value, ParameterRef | Expr) else value
+
+
+@lru_cache(maxsize=1024)
+def _compile(text: str) -> Expression:
+    body = text[2:-1]
+    words = _WORD.findall(body)
+    bare = sorted({w for w in words if w[0].isalpha() or w[0] == "_"} - _FUNCTIONS)
+    if bare:
+        raise FileFormatError(
+            f"'{text}': unknown name {bare[0]}; a parameter is written ${bare[0]}"
+        )
+    taken = sorted({w[1:] for w in words if w[0] == "$"} & _FUNCTIONS)
+    if taken:
+        raise FileFormatError(f"'{text}': the parameter ${taken[0]} has the name of a function")
+    try:
+        return parse(body.replace("$", ""))
+    except InputError as error:
+        raise FileFormatError(f"'{text}' cannot be evaluated: {error}") from None
+
+
+def parse_literal(kind: Kind, text: str) -> Literal:
+    """Return a literal by its XSD type; a date stays text.
+
+    Raises:
+        FileFormatError: not of that type, out of its range, or NaN.
+    """
+    if kind is Kind.STRING:
+        return text
+    text = text.strip(" \t\r\n")
+    if not _PATTERNS[kind].fullmatch(text):
+        raise FileFormatError(f"must be of type {kind.value}, got '{text[:80]}'")
+    if kind is Kind.BOOLEAN:
+        return text in ("true", "1")
+    if kind is Kind.DATE_TIME:
+        return _checked_date(text)
+    if kind is Kind.DOUBLE:
+        value = float(text)
+        if math.isinf(value) and "INF" not in text:
+            raise FileFormatError(f"must be of type double, got '{text[:80]}', which overflows")
+        return value
+    number = int(text)
+    low, high = _RANGES[kind]
+    if not low <= number <= high:
+        raise FileFormatError(f"must be of type {kind.value}, {low} to {high}, got {number}")
+    return number
+
+
+def _checked_date(text: str) -> str:
+    year, month, day = re.findall(r"\d+", text)[:3]
+    try:
+        date(int(year) % 400 or 400, int(month), int(day))  # the calendar repeats after 400 years
+    except ValueError:
+        raise FileFormatError(f"must be of type dateTime, got '{text}': no such day") from None
+    return text
+
+
+def parse_value(kind: Kind, text: str) -> Value:
+    """Return an attribute's value: a literal, a ``$name`` or a ``${…}``.
+
+    Raises:
+        FileFormatError: malformed, or an expression where the standard has none.
+    """
+    if _REFERENCE.fullmatch(text):
+        return ParameterRef(text)
+    if text.startswith("${") and kind not in (Kind.STRING, Kind.DATE_TIME):
+        expression = Expr(text)
+        _compile(text)
+        return expression
+    return parse_literal(kind, text)
+
+
+def format_double(value: float) -> str:
+    """Return the shortest decimal text that reads back as the same double.
+
+    Without an exponent from 1e-15 to 1e22: esmini pastes a parameter's text into an expression,
+    and its expressions have no exponents.
+
+    Raises:
+        ValueError: NaN, which no attribute of the standard means.
+    """
+    if math.isnan(value):
+        raise ValueError("NaN cannot be written")
+    if math.isinf(value):
+        return "INF" if value > 0 else "-INF"
+    text = repr(float(value))
+    if "e" in text and 1e-15 <= abs(value) < 1e22:
+        text = format(Decimal(text), "f")
+    return text
+
+
+def format_value(kind: Kind, value: Value) -> str:
+    """Return the text of an attribute's value.
+
+    Raises:
+        TypeError: a value of another type than the attribute's.
+        ValueError: NaN, or a string that would be read back as a reference.
+    """
+    if isinstance(value, ParameterRef | Expr):
+        return value.text
+    if kind in (Kind.STRING, Kind.DATE_TIME):
+        if not isinstance(value, str):
+            raise TypeError(f"text is expected, got {value!r}")
+        if _REFERENCE.fullmatch(value):
+            raise ValueError(f"the text '{value}' would be read as a reference to a parameter")
+        return value
+    if kind is Kind.BOOLEAN:
+        if not isinstance(value, bool):
+            raise TypeError(f"true or false is expected, got {value!r}")
+        return "true" if value else "false"
+    if isinstance(value, str | bool):
+        raise TypeError(f"a number is expected, got {value!r}")
+    if kind is Kind.DOUBLE:
+        return format_double(value)
+    if not isinstance(value, int):
+        raise TypeError(f"a whole number is expected, got {value!r}")
+    return str(value)

@@ -1,0 +1,40 @@
+"""From the model to an OpenSCENARIO file, driven by the model's declaration."""
+
+from lxml import etree
+
+from bridgegen.openx.openscenario.element import Element, children_of, declaration, values_of
+from bridgegen.openx.openscenario.storyboard import OpenScenario
+from bridgegen.openx.openscenario.values import ParameterRef, format_value
+
+
+def to_xml(scenario: OpenScenario) -> bytes:
+    """Return the file: UTF-8, indented, the same bytes for the same model.
+
+    Numbers are written so that reading gives the same double back.
+
+    Raises:
+        TypeError: a value of another type than its attribute's.
+        ValueError: NaN, a text that XML or the standard cannot hold, or too few children.
+    """
+    root = etree.Element("OpenSCENARIO")
+    _fill(root, "OpenSCENARIO", scenario)
+    return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
+
+
+def _fill(node: etree._Element, tag: str, element: Element) -> None:
+    declared = declaration(type(element))
+    try:
+        for attribute, value in values_of(element):
+            if attribute.enum is not None and not isinstance(value, ParameterRef):
+                value = attribute.enum(value).value
+            node.set(attribute.name, format_value(attribute.kind, value))
+        if declared.text is not None:
+            node.text = getattr(element, declared.text)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{tag}: {error}") from None
+    for child in declared.children:
+        if child.many and len(getattr(element, child.field)) < child.at_least:
+            names = " or ".join(child.options)
+            raise ValueError(f"{tag} must have at least {child.at_least} {names}")
+    for name, below in children_of(element):
+        _fill(etree.SubElement(node, name), name, below)

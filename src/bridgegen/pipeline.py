@@ -1,0 +1,237 @@
+"""The job in one file: rows of X → scenarios → rollouts → metrics → objectives.
+
+Read this first. `Pipeline.evaluate` is the whole path of a batch, one line per stage; everything
+else here prepares it.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen import ego as egos
+from bridgegen import metrics as measures
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.errors import FileFormatError
+from bridgegen.objective import Objective, Thresholds, needs_sample
+from bridgegen.odd.parameters import Axis
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.space import SearchSpace
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.individuals import build, build_static
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.road_map import RoadMap
+from bridgegen.openx.convert import roads_of
+from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.simulation.embedded.network import Network, compile_network
+from bridgegen.simulation.embedded.program import Program, compile_storyboard
+from bridgegen.simulation.embedded.simulator import simulate
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+
+SAMPLE = 400
+"""Random scenarios from which weights and scales are taken, where an objective needs them."""
+
+CHUNK = 128
+"""Rows that one thread rolls out at a time: enough to keep it busy, few enough for its cache."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a batch of N rows came to.
+
+    Attributes:
+        metrics: ``(N, M)`` float64, NaN in a failed row.
+        F: ``(N, n_obj)`` float64, minimised; a filler in a failed row.
+        critical: ``(N,)`` bool.
+        status: ``(N,)`` int8, 0 is success.
+    """
+
+    metrics: Float
+    F: Float
+    critical: Bool
+    status: npt.NDArray[np.int8]
+
+
+class Pipeline:
+    """Everything between a row and its objectives, for one scenario, ego and road network.
+
+    Attributes:
+        scenario: the logical scenario.
+        space: its search space; names the columns of X.
+        driver: the ego's driver.
+        road_map: the map that it takes place on, or None for the generated crossroads.
+        objective: set by ``choose_objective``.
+        metrics: the names of all metrics that are recorded.
+        static_names: the parameters that the road network depends on.
+        program: the compiled storyboard.
+    """
+
+    objective: Objective
+
+    def __init__(
+        self,
+        scenario: LogicalScenario,
+        space: SearchSpace,
+        *,
+        ego: str = "route-follower",
+        road_map: RoadMap | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.space = space
+        self.driver = egos.get(ego)
+        self.road_map = road_map
+        self.metrics = tuple(measures.METRICS)
+        self.static_names = tuple(
+            name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC
+        )
+        searches_roads = not road_map and bool({*self.static_names} & {*space.variables})
+        nominal = space.values(space.decode(np.full((1, space.n_var), 0.5))[0])
+        individuals = self.individuals(nominal)
+        storyboard = openscenario_from_owl(individuals, "nominal.xodr")
+        self.program = compile_storyboard(storyboard, scenario.name)
+        self._network: Network | None = None
+        if not searches_roads:
+            self._network = compile_network(self.program, [self.roads(individuals)])
+        self._threads = ThreadPoolExecutor(os.cpu_count() or 1, "rollout")
+
+    def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
+        """Set the objective: the given one, or the scenario's, sampled where it says so.
+
+        Args:
+            objective: as an earlier run recorded it.
+            seed: of the random sample that entropy weights and scales are taken from. Its
+                scenarios are not part of the search and not charged to its budget.
+        """
+        if objective is None:
+            spec = self.scenario.objective
+            sample = None
+            if needs_sample(spec.weights, spec.scale):
+                U = np.random.Generator(np.random.PCG64([seed, 1])).random((SAMPLE, self.space.n_var))
+                sample = (self._measure(self.space.decode(U))[0], self.metrics)
+            limits = spec.critical
+            objective = Objective.build(
+                [(term.metric, term.weight) for term in spec.terms],
+                weights=spec.weights,
+                scale=spec.scale,
+                thresholds=Thresholds(
+                    limits.n_collision_above, limits.d_min_below, limits.v_d_at_least
+                ),
+                sample=sample,
+            )
+        self.objective = objective
+        return objective
+
+    def evaluate(self, X: Float) -> Evaluation:
+        """Evaluate N rows; a row's result depends on that row alone.
+
+        Args:
+            X: ``(N, len(space.names))`` float64, feasible rows.
+        """
+        metrics, status = self._measure(X)
+        F, ok = self.objective.F(metrics, self.metrics)
+        critical = self.objective.critical(metrics, self.metrics)
+        return Evaluation(metrics, F, critical & ok, status)
+
+    def rollout(self, X: Float) -> Rollout:
+        """Roll out N rows as ``evaluate`` does, and keep the motion."""
+        columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
+        network, rows = self._roads_of(X)
+        return simulate(self.program, network, columns, rows)
+
+    def individuals(self, values: Mapping[str, float]) -> Individuals:
+        """Return one concrete scenario's individuals."""
+        site = self.road_map.site if self.road_map else None
+        return build(self.scenario, values, driver=self.driver.name, site=site)
+
+    def roads(self, individuals: Individuals) -> OpenDrive:
+        """Return the road network of a scenario's individuals: its map, or OWL2OpenDRIVE's."""
+        return self.road_map.model if self.road_map else opendrive_from_owl(individuals)
+
+    def _measure(self, X: Float) -> tuple[Float, npt.NDArray[np.int8]]:
+        """Roll out and measure in chunks on all cores; the kernels run without the GIL."""
+        size = max(1, min(CHUNK, -(-len(X) // (os.cpu_count() or 1))))
+        chunks = [X[i : i + size] for i in range(0, len(X), size)]
+        parts = list(self._threads.map(self._measure_chunk, chunks))
+        if not parts:
+            return np.empty((0, len(self.metrics))), np.empty(0, np.int8)
+        return np.concatenate([m for m, _ in parts]), np.concatenate([s for _, s in parts])
+
+    def _measure_chunk(self, X: Float) -> tuple[Float, npt.NDArray[np.int8]]:
+        rollout = self.rollout(X)
+        return measures.evaluate(rollout, self.metrics), rollout.status
+
+    def _roads_of(self, X: Float) -> tuple[Network, Int]:
+        """Return the compiled road networks of some rows, and which row has which."""
+        if self._network is not None:
+            return self._network, np.zeros(len(X), dtype=np.int64)
+        columns = [self.space.index(name) for name in self.static_names]
+        static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
+        models = [
+            opendrive_from_owl(build_static(dict(zip(self.static_names, row.tolist(), strict=True))))
+            for row in static
+        ]
+        return compile_network(self.program, models), rows.reshape(-1).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class FileResult:
+    """What one scenario file came to.
+
+    Attributes:
+        driver: who drove the ego.
+        status: "ok", or why there is no result.
+        seconds: simulated until the stop trigger fired [s].
+        parameters: the file's numeric parameters.
+        metrics: by name, in the metric's unit.
+        rollout: the motion, N = 1.
+    """
+
+    driver: str
+    status: str
+    seconds: float
+    parameters: Mapping[str, float]
+    metrics: Mapping[str, float]
+    rollout: Rollout
+
+
+def simulate_file(
+    path: Path, *, ego: str | None = None, metrics: Sequence[str] | None = None
+) -> FileResult:
+    """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
+
+    Args:
+        path: the ``.xosc`` file.
+        ego: the ego's driver; what the file's controller says by default.
+        metrics: names; all by default.
+
+    Raises:
+        FileFormatError: a file is missing, malformed or inconsistent.
+        UnsupportedError: an element that the simulator cannot run, by name and line.
+        UnknownNameError: no such driver or metric.
+    """
+    names = tuple(metrics or measures.METRICS)
+    driver = egos.get(ego) if ego else None
+    scenario = read_scenario(path)
+    roads = roads_of(scenario, path)
+    problems = openscenario_validate.problems(scenario, roads)
+    if problems:
+        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
+    program = compile_storyboard(scenario, str(path), driver=driver)
+    network = compile_network(program, [roads])
+    rollout = simulate(program, network, {}, np.zeros(1, dtype=np.int64))
+    values = measures.evaluate(rollout, names)[0]
+    return FileResult(
+        driver=program.driver.name,
+        status=STATUS_MESSAGES[int(rollout.status[0])],
+        seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
+        parameters=program.parameters,
+        metrics=dict(zip(names, values.tolist(), strict=True)),
+        rollout=rollout,
+    )

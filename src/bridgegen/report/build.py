@@ -1,0 +1,166 @@
+"""From a run's rows to the report's data: the kept scenarios are rolled out again for playback."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bridgegen import metrics as measures
+from bridgegen.openx.opendrive.outline import outline
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.data import (
+    Column,
+    Entity,
+    Evaluations,
+    Outline,
+    Playback,
+    ReportData,
+    RunSummary,
+)
+from bridgegen.store import Rows
+from bridgegen.store.summary import Summary
+
+
+def build_report(
+    pipeline: Pipeline,
+    rows: Rows,
+    summary: Summary,
+    *,
+    kept: Sequence[tuple[str, int, tuple[str, ...]]],
+    algorithm: str,
+    seed: int,
+    budget: int,
+    command: str,
+    finished: bool,
+    version: str,
+) -> ReportData:
+    """Return all that the page shows.
+
+    Args:
+        pipeline: what evaluated the rows.
+        rows: all of the run, in order.
+        summary: of the same rows.
+        kept: name, evaluation and files of the handed-over scenarios, most critical first.
+        algorithm: its name.
+        seed: of the run.
+        budget: of the run.
+        command: the command line that makes the run again.
+        finished: whether the budget is spent.
+        version: of BridgeGen.
+    """
+    scenario, limits = pipeline.scenario, pipeline.objective.thresholds
+    site = pipeline.road_map.site if pipeline.road_map else None
+    weights = ", ".join(
+        f"{name} {weight:.4g}"
+        for name, weight in zip(pipeline.objective.names, pipeline.objective.weights, strict=True)
+    )
+    head = RunSummary(
+        scenario=scenario.name,
+        title=scenario.title,
+        description=scenario.description.strip(),
+        road=f"{site.name}, junction {site.junction_id}" if site else "generated crossroads",
+        ego=pipeline.driver.name,
+        algorithm=algorithm,
+        seed=seed,
+        budget=budget,
+        n_evaluations=summary.evaluations,
+        n_critical=summary.critical,
+        r_critic=summary.r_critic,
+        critical_rule=(
+            f"more than {limits.n_collision_above:g} collisions, or d_min below "
+            f"{limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
+        ),
+        critical_distance=limits.d_min_below,
+        first_critical=summary.first,
+        fiftieth_critical=summary.fiftieth,
+        d_min_best=summary.d_min_best,
+        d_min_median=summary.d_min_median,
+        v_d_best=summary.v_d_best,
+        v_d_median=summary.v_d_median,
+        wall_seconds=summary.seconds,
+        finished=finished,
+        version=version,
+        command=command,
+        settings={
+            "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
+            "weights of the objective": weights,
+            "simulated": f"{scenario.duration:g} s at {pipeline.program.time_step:g} s",
+        },
+    )
+    return ReportData(head, _evaluations(pipeline, rows), _playbacks(pipeline, rows, kept))
+
+
+def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
+    space, declared = pipeline.space, pipeline.scenario.parameters
+    lines = {line.name: line for line in pipeline.scenario.table()}
+    parameters = tuple(
+        Column(
+            name,
+            unit,
+            np.ascontiguousarray(rows.X[:, i]),
+            lines[name].description,
+            declared[name].low if name in declared else None,
+            declared[name].high if name in declared else None,
+            name in space.variables,
+        )
+        for i, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
+    )
+    metrics = tuple(
+        Column(name, measures.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
+               measures.get(name).description)
+        for j, name in enumerate(pipeline.metrics)
+    )  # fmt: skip
+    n_obj = rows.F.shape[1]
+    objectives = tuple(
+        Column("F" if n_obj == 1 else f"F{j + 1}", "1", np.ascontiguousarray(rows.F[:, j]))
+        for j in range(n_obj)
+    )
+    return Evaluations(rows.batch, parameters, metrics, objectives, rows.critical, rows.status)
+
+
+def _playbacks(
+    pipeline: Pipeline, rows: Rows, kept: Sequence[tuple[str, int, tuple[str, ...]]]
+) -> tuple[Playback, ...]:
+    if not kept:
+        return ()
+    at = [evaluation for _, evaluation, _ in kept]
+    rollout = pipeline.rollout(rows.X[at])
+    bodies = tuple(
+        Entity(name, *box) for name, box in zip(rollout.names, rollout.box.tolist(), strict=True)
+    )
+    nearest = rollout.distance.min(axis=1)
+    roads: dict[bytes, tuple[Outline, ...]] = {}
+    playbacks = []
+    for k, (name, evaluation, files) in enumerate(kept):
+        values = pipeline.space.values(rows.X[evaluation])
+        x, y = rollout.x[k], rollout.y[k]
+        playbacks.append(
+            Playback(
+                name=name,
+                rank=k + 1,
+                evaluation=evaluation,
+                parameters=values,
+                metrics=dict(zip(pipeline.metrics, rows.metrics[evaluation].tolist(), strict=True)),
+                critical=bool(rows.critical[evaluation]),
+                time_step=rollout.time_step,
+                entities=bodies,
+                x=x, y=y, h=rollout.h[k], v=rollout.v[k],
+                distance=nearest[k],
+                lanes=_road(pipeline, values, roads),
+                n_steps=int(rollout.n_steps[k]),
+                files=files,
+            )
+        )  # fmt: skip
+    return tuple(playbacks)
+
+
+def _road(
+    pipeline: Pipeline, values: dict[str, float], known: dict[bytes, tuple[Outline, ...]]
+) -> tuple[Outline, ...]:
+    """Return the drawing of a scenario's road network, the same object for the same network."""
+    static = [] if pipeline.road_map else [values[name] for name in pipeline.static_names]
+    key = np.array(static).tobytes()
+    if key not in known:
+        model = pipeline.roads(pipeline.individuals(values))
+        junction = pipeline.road_map.site.junction_id if pipeline.road_map else None
+        known[key] = tuple(Outline(kind, points) for kind, points in outline(model, junction))
+    return known[key]

@@ -1,0 +1,186 @@
+// The charts over all evaluations, by Plotly: the iterations and the scatter plot.
+
+const rows = data.rows;
+const MOST_GL = 50000, MOST_SVG = 3000; // points that stay fluid
+
+const hasGl = (() => {
+  let answer = null;
+  return () => {
+    if (answer === null) {
+      const context = document.createElement("canvas").getContext("webgl");
+      answer = Boolean(context);
+      context?.getExtension("WEBGL_lose_context")?.loseContext();
+    }
+    return answer;
+  };
+})();
+
+// Plotly reads a little HTML and %{…} in texts: names must stay names.
+const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;").replace(/%/g, "&#37;");
+
+function layout(extra) {
+  const axis = { gridcolor: palette.grid, zerolinecolor: palette.line, linecolor: palette.line, automargin: true, title: { standoff: 8 } };
+  const { xaxis, yaxis, ...rest } = extra;
+  return {
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: palette.ink },
+    margin: { l: 8, r: 10, t: 8, b: 8 }, hoverlabel: { bgcolor: palette.card, bordercolor: palette.line, font: { color: palette.ink } },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12 } }, dragmode: false,
+    xaxis: { ...axis, ...xaxis }, yaxis: { ...axis, ...yaxis }, ...rest,
+  };
+}
+const CONFIG = { responsive: true, displaylogo: false, displayModeBar: false };
+
+// ---- over the iterations ----
+
+function trendFigure(name, trend) {
+  const b = data.batches, unit = unitText(trend.unit), best = name === "d_min" ? "smallest" : "largest";
+  const when = b.first.map((first, i) => (first === b.last[i] ? `iteration ${first}` : `iterations ${first}–${b.last[i]}`));
+  const line = (y, label, style) => ({
+    x: b.last, y, name: label, customdata: when, hovertemplate: `%{customdata}<br>${label} %{y:.3g} ${unit}<extra></extra>`, ...style,
+  });
+  const few = b.last.length < 3;
+  return [
+    line(trend.lower, "lower quartile", { mode: few ? "markers" : "lines", line: { width: 0 }, marker: { color: palette.accent, symbol: "line-ew-open" }, showlegend: false }),
+    line(trend.upper, "upper quartile", { mode: few ? "markers" : "lines", line: { width: 0 }, marker: { color: palette.accent, symbol: "line-ew-open" }, fill: few ? "none" : "tonexty", fillcolor: palette.band, showlegend: false }),
+    line(trend.median, "median", { mode: few ? "markers" : "lines", line: { color: palette.accent, width: 2.5 }, marker: { color: palette.accent, size: 8 } }),
+    line(trend.best, best, { mode: "markers", marker: { color: palette.critical, size: 6, symbol: "diamond" }, cliponaxis: false }),
+  ];
+}
+
+function shareFigure() {
+  const b = data.batches, percent = (values) => values.map((v) => (v === null ? null : 100 * v));
+  const hover = (label) => `iteration %{x}<br>${label} %{y:.1f} %<extra></extra>`;
+  return [
+    { type: "bar", x: b.last, y: percent(b.share), name: "this iteration", marker: { color: palette.critical, opacity: 0.55 }, hovertemplate: hover("this iteration") },
+    { x: b.last, y: percent(b.cumulative), name: "so far (R_critic)", mode: b.last.length < 3 ? "markers" : "lines", line: { color: palette.ink, width: 2.5 }, hovertemplate: hover("so far") },
+  ];
+}
+
+function trendPlots() {
+  const host = $("trend-plots");
+  const figures = Object.entries(data.batches.trends).map(([name, trend]) => [`${name} [${unitText(trend.unit)}]`, () => trendFigure(name, trend)]);
+  figures.push(["critical share [%]", shareFigure]);
+  return figures.map(([title, traces]) => {
+    const plot = element("div", { class: "plot", role: "img", "aria-label": `${title} over the iterations` });
+    host.append(element("div", { class: "card" }, element("h3", {}, title), plot));
+    const share = traces === shareFigure, top = Math.max(5, 110 * Math.max(...data.batches.share));
+    const last = data.batches.last.at(-1), whole = { range: [0.4, last + 0.6], ...(last < 12 ? { dtick: 1 } : {}) };
+    const axes = { xaxis: { title: { text: "iteration", standoff: 6 }, ...whole }, yaxis: { rangemode: "tozero", ...(share ? { range: [0, top] } : {}) } };
+    return [plot, () => Plotly.react(plot, traces(), layout({ ...axes, bargap: 0.15 }), CONFIG)];
+  });
+}
+
+// ---- parameter space ----
+
+const NOT_SEARCHED = { evaluation: "Evaluation", iteration: "Iteration" };
+function valuesOf(name) {
+  if (name === "evaluation") return rows.evaluation.map((i) => i + 1);
+  return name === "iteration" ? rows.iteration : columns.get(name).values;
+}
+
+let passes = () => true; // whether a row passes the filters of the parallel coordinates
+
+// At most `most` of the rows that pass, evenly chosen; half of the places are the critical ones'
+// if there are as many.
+function subsample(most, passing = passes) {
+  const every = (list, n) => (list.length <= n ? list : Array.from({ length: n }, (_, i) => list[Math.floor((i * list.length) / n)]));
+  const hit = [], other = [];
+  rows.critical.forEach((critical, i) => { if (passing(i)) (critical ? hit : other).push(i); });
+  const room = Math.max(most - other.length, Math.ceil(most / 2));
+  const hits = every(hit, room);
+  return { hits, others: every(other, most - hits.length) };
+}
+
+function fillAxes() {
+  const varies = (column) => column.values.some((v) => v !== null && v !== column.values.find((w) => w !== null));
+  const groups = [["Searched parameters", (c) => c.group === "parameter" && c.searched], ["Metrics", (c) => c.group === "metric"],
+    ["Objectives (minimised)", (c) => c.group === "objective"], ["Derived and fixed", (c) => c.group === "parameter" && !c.searched && varies(c)]];
+  for (const select of [$("axis-x"), $("axis-y")]) {
+    for (const [label, belongs] of groups) {
+      const options = rows.columns.filter(belongs).map((c) => element("option", { value: c.name, title: c.description }, titled(c.name)));
+      if (options.length) select.append(element("optgroup", { label }, ...options));
+    }
+    select.append(element("optgroup", { label: "Order" }, ...Object.entries(NOT_SEARCHED).map(([value, text]) => element("option", { value }, text))));
+  }
+  const names = rows.columns.map((c) => c.name);
+  const [x, y] = [...rows.telling, ...names, "evaluation", "iteration"];
+  $("axis-x").value = x;
+  $("axis-y").value = y;
+}
+
+const keptOn = (name) => {
+  const at = new Map(rows.evaluation.map((evaluation, i) => [evaluation, i]));
+  const values = valuesOf(name);
+  return data.kept.map((kept) => (at.has(kept.evaluation) ? values[at.get(kept.evaluation)] : null));
+};
+
+function scatterFigure() {
+  const gl = hasGl();
+  const { hits, others } = subsample(gl ? MOST_GL : MOST_SVG);
+  const [nameX, nameY] = [$("axis-x").value, $("axis-y").value];
+  const [x, y] = [valuesOf(nameX), valuesOf(nameY)];
+  const shown = hits.length + others.length;
+  $("space-note").textContent = shown < rows.critical.length ? `${number(shown)} of ${number(rows.critical.length)} evaluations drawn` : "";
+  const hover = `${plain(titled(nameX))} %{x}<br>${plain(titled(nameY))} %{y}<br>evaluation %{customdata}<extra></extra>`;
+  const trace = (part, name, marker) => ({
+    type: gl ? "scattergl" : "scatter", mode: "markers", name: `${name} (${number(part.length)})`, marker, hovertemplate: hover,
+    x: part.map((i) => x[i]), y: part.map((i) => y[i]), customdata: part.map((i) => rows.evaluation[i] + 1),
+  });
+  const chosen = window.bridgegen.state()?.chosen;
+  const crowd = Math.min(1, Math.sqrt(1500 / Math.max(1, shown))); // smaller and fainter where there are many
+  return [
+    trace(others, "not critical", { color: palette.plain, size: 3 + 3 * crowd, opacity: 0.25 + 0.35 * crowd, symbol: "circle" }),
+    trace(hits, "critical", { color: palette.critical, size: 5 + 3 * crowd, opacity: 0.5 + 0.3 * crowd, symbol: "diamond", line: { width: 0.5, color: palette.card } }),
+    {
+      type: "scatter", mode: "markers+text", name: "kept (click to play)", x: keptOn(nameX), y: keptOn(nameY),
+      text: data.kept.map((kept) => `${kept.rank}`), textposition: "top right", textfont: { size: 11, color: palette.ink },
+      customdata: data.kept.map((_, i) => i), hovertemplate: hover.replace("evaluation %{customdata}", "scenario %{text}: click to play"),
+      marker: { symbol: "circle-open", size: data.kept.map((_, i) => (i === chosen ? 19 : 13)), color: palette.ink, line: { width: data.kept.map((_, i) => (i === chosen ? 3.5 : 1.5)) } },
+      visible: data.kept.length ? true : "legendonly", showlegend: data.kept.length > 0, kept: true,
+    },
+  ];
+}
+
+function drawScatter() {
+  const plot = $("scatter"), narrow = innerWidth < 700;
+  const axis = (id) => ({ title: { text: plain(titled($(id).value)), standoff: 8 }, zeroline: false });
+  const extra = { xaxis: axis("axis-x"), yaxis: axis("axis-y"), dragmode: narrow ? false : "zoom", hovermode: "closest" };
+  const config = { ...CONFIG, displayModeBar: narrow ? false : "hover", modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  Plotly.react(plot, scatterFigure(), layout(extra), config);
+  if (plot.listening) return;
+  plot.listening = true;
+  plot.on("plotly_click", ({ points: [point] }) => { if (point.data.mode === "markers+text") window.bridgegen.select(point.customdata); });
+}
+
+// Each chart is drawn when it comes near the screen, and again when the colour scheme changes.
+function drawCharts() {
+  const charts = new Map(trendPlots());
+  const drawn = new Set();
+  const redraw = (plot) => { charts.get(plot)(); window.bridgegen.chartsDrawn.push(plot); };
+  if (rows.critical.length) {
+    fillAxes();
+    charts.set($("scatter"), drawScatter);
+    $("parallel-card").hidden = !rows.telling.length;
+    if (rows.telling.length) {
+      const parallel = new Parallel($("parallel"), () => { if (drawn.has($("scatter"))) drawScatter(); });
+      charts.set($("parallel"), () => parallel.draw());
+      window.bridgegen.filter = (name, low, high) => parallel.filter(name, low, high);
+    }
+    for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", drawScatter);
+    $("swap").addEventListener("click", () => {
+      [$("axis-x").value, $("axis-y").value] = [$("axis-y").value, $("axis-x").value];
+      drawScatter();
+    });
+  } else $("space").hidden = $("iterations").hidden = true;
+  const watch = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries) {
+      if (!isIntersecting || drawn.has(target)) continue;
+      drawn.add(target);
+      redraw(target);
+    }
+  }, { rootMargin: "500px" });
+  for (const plot of charts.keys()) watch.observe(plot);
+  darkScheme.addEventListener("change", () => drawn.forEach(redraw));
+  window.bridgegen.chosen = () => { if (drawn.has($("scatter"))) drawScatter(); };
+}

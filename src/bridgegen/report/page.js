@@ -1,0 +1,196 @@
+// Shared by all scripts: the data, formatting, colours; and the parts of the page without motion.
+
+const $ = (id) => document.getElementById(id);
+const data = JSON.parse($("data").textContent);
+const columns = new Map(data.rows.columns.map((column) => [column.name, column]));
+const darkScheme = matchMedia("(prefers-color-scheme: dark)");
+const NARROW = "\u202f"; // narrow no-break space, between a number and its unit
+
+function element(tag, attributes = {}, ...children) {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  node.append(...children);
+  return node;
+}
+
+function number(value, digits = 4) {
+  if (value === null || value === undefined) return "–";
+  if (value < 0) return `−${number(-value, digits)}`;
+  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e6)) return value.toExponential(2);
+  if (Number.isInteger(value)) return value.toLocaleString("en-GB");
+  const whole = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
+  return value.toFixed(Math.max(0, Math.min(3, digits - whole)));
+}
+
+function unitText(unit) {
+  return { "": "", 1: "", "-": "", "–": "", count: "", deg: "°", "m/s^2": "m/s²" }[unit] ?? unit;
+}
+
+// A measured value keeps its decimals when they are zero; a count has none.
+function measured(value, unit, digits = 4) {
+  if (value === null || value === undefined || unit === "count" || !Number.isInteger(value) || Math.abs(value) >= 1e6) return number(value, digits);
+  if (value < 0) return `−${measured(-value, unit, digits)}`;
+  return value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(Math.max(1, Math.abs(value))))));
+}
+
+function quantity(value, unit, digits) {
+  const text = unitText(unit);
+  return value === null || value === undefined || !text ? measured(value, unit, digits) : measured(value, unit, digits) + NARROW + text;
+}
+
+function titled(name) {
+  const unit = unitText(columns.get(name)?.unit ?? "");
+  return unit ? `${name} [${unit}]` : name;
+}
+
+let palette = {};
+function readPalette() {
+  const style = getComputedStyle(document.documentElement);
+  const names = ["bg", "card", "ink", "muted", "line", "soft", "accent", "critical", "plain", "band", "grid", "ground",
+    "asphalt", "asphalt-2", "marking", "stop", "ego", "other-1", "other-2", "other-3", "label", "hit"];
+  palette = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+}
+
+// The ego is always the same colour and drawn solid; the others differ by colour and by dashes.
+function entityColour(e) {
+  return e === 0 ? palette.ego : palette[`other-${((e - 1) % 3) + 1}`];
+}
+const DASHES = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
+
+async function copy(text, button) {
+  const label = button.textContent;
+  try {
+    await navigator.clipboard.writeText(text);
+  } catch {
+    // A page opened from disk may not be given the clipboard: select in a field and copy from there.
+    const field = element("textarea", { "aria-hidden": "true" });
+    field.value = text;
+    document.body.append(field);
+    field.select();
+    document.execCommand("copy");
+    field.remove();
+    button.focus();
+  }
+  button.textContent = "Copied";
+  setTimeout(() => { button.textContent = label; }, 1500);
+}
+
+function fillTable(body, rows) {
+  body.replaceChildren(...rows.map(([name, value]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", {}, value))));
+}
+
+function fillSummary() {
+  const s = data.summary;
+  $("title").textContent = s.title;
+  $("facts").replaceChildren(...s.facts.map((fact) => element("li", {}, fact)));
+  if (!s.finished) $("facts").append(element("li", { class: "warn" }, "not finished"));
+  $("sentences").replaceChildren(...s.sentences.map((sentence) => element("p", {}, sentence)));
+  $("description").textContent = s.description;
+  $("description").hidden = !s.description;
+  fillTable($("figures"), s.table);
+  const failed = data.rows.n_failed;
+  fillTable($("settings"), failed ? [...s.provenance, ["Failed evaluations", `${failed}, counted but not drawn`]] : s.provenance);
+  $("command").textContent = s.command;
+  $("copy-sentences").addEventListener("click", (event) => copy(s.sentences.join(" "), event.currentTarget));
+  $("copy-command").addEventListener("click", (event) => copy(s.command, event.currentTarget));
+}
+
+// ---- the list of kept scenarios ----
+
+const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
+const SHORT = { n_collision: "hits" };
+
+function listColumns() {
+  const names = Object.keys(data.kept[0].metrics);
+  const chosen = LISTED.filter((name) => names.includes(name));
+  return chosen.length ? chosen : names.slice(0, 4);
+}
+
+function fillList(choose) {
+  const names = listColumns();
+  const head = element("tr");
+  const body = $("list-body");
+  const sorting = { by: "rank", down: false };
+  const key = (kept) => (sorting.by === "rank" ? kept.rank : kept.metrics[sorting.by]);
+  const order = () => {
+    const sign = sorting.down ? -1 : 1;
+    const ranked = data.kept.map((kept, i) => ({ i, value: key(kept) }));
+    // What does not exist sorts last, whichever way.
+    ranked.sort((a, b) => (a.value === null) - (b.value === null) || sign * (a.value - b.value) || a.i - b.i);
+    body.append(...ranked.map(({ i }) => rows[i]));
+    for (const th of head.children) {
+      th.setAttribute("aria-sort", th.dataset.by === sorting.by ? (sorting.down ? "descending" : "ascending") : "none");
+    }
+  };
+  for (const name of ["rank", ...names]) {
+    const unit = name === "rank" ? "" : unitText(columns.get(name)?.unit ?? "");
+    const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? name, element("small", {}, unit || "\u00a0"));
+    button.addEventListener("click", () => {
+      sorting.down = sorting.by === name && !sorting.down;
+      sorting.by = name;
+      order();
+    });
+    head.append(element("th", { scope: "col", "data-by": name }, button));
+  }
+  const rows = data.kept.map((kept, i) => {
+    const label = `Play scenario ${kept.name}, rank ${kept.rank}`;
+    const row = element("tr", {}, element("td", {}, element("button", { type: "button", "aria-label": label }, `${kept.rank}`)));
+    for (const name of names) {
+      const value = kept.metrics[name];
+      const cell = element("td", {}, measured(value, columns.get(name)?.unit, 3));
+      if (name === "n_collision" && value > 0) cell.className = "hit";
+      row.append(cell);
+    }
+    row.addEventListener("click", () => choose(i));
+    return row;
+  });
+  body.addEventListener("keydown", (event) => {
+    const step = { ArrowDown: "nextElementSibling", ArrowUp: "previousElementSibling" }[event.key];
+    const next = step && event.target.closest("tr")?.[step];
+    if (!next) return;
+    event.preventDefault();
+    next.querySelector("button").focus();
+  });
+  $("list-head").append(head);
+  order();
+  return rows;
+}
+
+function fillDetails(kept) {
+  const line = (name, value, column) => {
+    const box = element("div", { title: column?.description ?? "" }, element("span", { class: "name" }, name), element("b", {}, quantity(value, column?.unit ?? "")));
+    const { low, high } = column ?? {};
+    if (typeof low === "number" && high > low && value !== null) {
+      const mark = element("i");
+      mark.style.left = `${(100 * Math.min(1, Math.max(0, (value - low) / (high - low)))).toFixed(1)}%`;
+      box.append(element("span", { class: "range", title: `range ${number(low)} to ${quantity(high, column.unit)}` }, mark));
+    }
+    return box;
+  };
+  const lines = (values) => Object.entries(values).map(([name, value]) => line(name, value, columns.get(name)));
+  const name = element("h3", {}, `Scenario ${kept.name}, evaluation ${number(kept.evaluation + 1)}`);
+  $("measures").replaceChildren(name, ...lines(kept.metrics));
+  const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
+  if (kept.files.length) {
+    // Always relative: a path with a scheme or a leading slash cannot lead elsewhere.
+    const links = kept.files.map((file) => element("a", { href: `./${file.split("/").map(encodeURIComponent).join("/")}` }, file));
+    parts.push(element("h3", {}, "Its files"), element("div", { class: "files" }, ...links));
+  }
+  $("details").replaceChildren(...parts);
+}
+
+function start() {
+  readPalette();
+  fillSummary();
+  const hook = { data, state: () => null, chartsDrawn: [], drawCharts };
+  window.bridgegen = hook; // for tests, and for whoever wants to drive the page
+  if (data.kept.length) {
+    const player = new Player(hook);
+    darkScheme.addEventListener("change", () => { readPalette(); player.redraw(); });
+  } else {
+    $("kept").hidden = true;
+    $("no-scenarios").hidden = false;
+    $("no-scenarios").textContent = data.rows.critical.includes(1) ? "None was kept." : "None was kept: nothing critical was found.";
+    darkScheme.addEventListener("change", readPalette);
+  }
+}

@@ -1,0 +1,192 @@
+// Parallel coordinates on a canvas: one line per evaluation, a filter on any axis.
+
+const MOST_LINES = 1500;
+
+class Parallel {
+  constructor(canvas, changed) {
+    this.canvas = canvas;
+    this.changed = changed;
+    const chosen = rows.columns.filter((c) => rows.telling.includes(c.name) || c.name in data.batches.trends);
+    this.axes = chosen.map((c) => this.axis(c.name, c.unit, c.values, c.low, c.high));
+    this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
+    this.byName = new Map(this.axes.map((axis) => [axis.name, axis]));
+    this.filters = new Map(); // axis name → [low, high]
+    passes = (i) => this.passes(i);
+    this.connect();
+    this.note();
+  }
+
+  axis(name, unit, values, low, high) {
+    const finite = values.filter((v) => v !== null);
+    const ends = [low ?? Math.min(...finite), high ?? Math.max(...finite)];
+    if (!(ends[1] > ends[0])) ends[1] = ends[0] + 1;
+    return { name, unit, values, low: ends[0], high: ends[1] };
+  }
+
+  passes(i) {
+    for (const [name, [low, high]] of this.filters) {
+      const value = this.byName.get(name).values[i];
+      if (value === null || value < low || value > high) return false;
+    }
+    return true;
+  }
+
+  // Sets or, without numbers, lifts the filter on an axis.
+  filter(name, low = null, high = null) {
+    const axis = this.byName.get(name);
+    if (low === null && high === null) this.filters.delete(name);
+    else this.filters.set(name, [low ?? -Infinity, high ?? Infinity]);
+    $("filter-axis").value = axis.name;
+    this.showNumbers();
+    this.note();
+    this.drawing ??= requestAnimationFrame(() => { this.drawing = null; this.draw(); });
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(this.changed, 60); // dragging must not wait for the scatter plot
+  }
+
+  showNumbers() {
+    const range = this.filters.get($("filter-axis").value) ?? [];
+    ["filter-low", "filter-high"].forEach((id, i) => {
+      if (document.activeElement !== $(id)) $(id).value = Number.isFinite(range[i]) ? Number(range[i].toPrecision(4)) : "";
+    });
+  }
+
+  note() {
+    let all = 0, hits = 0;
+    rows.critical.forEach((critical, i) => { if (this.passes(i)) { all += 1; hits += critical; } });
+    const share = all ? ` (${((100 * hits) / all).toFixed(1)}${NARROW}%)` : "";
+    $("filter-note").textContent = this.filters.size ? `${number(all)} of ${number(rows.critical.length)} pass, ${number(hits)} of them critical${share}` : "";
+    $("filter-clear").disabled = !this.filters.size;
+  }
+
+  frame() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const left = 46, right = width - 46;
+    return { top: 52, bottom: height - 16, x: (a) => left + ((right - left) * a) / Math.max(1, this.axes.length - 1) };
+  }
+
+  y(axis, value) {
+    const { top, bottom } = this.frame();
+    return bottom - ((value - axis.low) / (axis.high - axis.low)) * (bottom - top);
+  }
+
+  value(axis, y) {
+    const { top, bottom } = this.frame();
+    return axis.low + ((bottom - Math.min(bottom, Math.max(top, y))) / (bottom - top)) * (axis.high - axis.low);
+  }
+
+  draw() {
+    // Thousands of lines: kept off the graphics card, which is slower at them where it is emulated.
+    const { context: c, width, height } = fitCanvas(this.canvas, { willReadFrequently: true });
+    const { x } = this.frame();
+    c.clearRect(0, 0, width, height);
+    const { hits, others } = subsample(MOST_LINES, (i) => this.passes(i));
+    const lines = (list, colour, thick, density) => {
+      c.strokeStyle = colour;
+      c.lineWidth = thick;
+      c.globalAlpha = Math.min(0.9, Math.max(0.07, density / Math.max(1, list.length)));
+      for (const i of list) {
+        c.beginPath();
+        let down = false;
+        this.axes.forEach((axis, a) => {
+          const value = axis.values[i];
+          if (value !== null) c[down ? "lineTo" : "moveTo"](x(a), this.y(axis, value));
+          down = value !== null;
+        });
+        c.stroke();
+      }
+      c.globalAlpha = 1;
+    };
+    lines(others, palette.plain, 1, 120);
+    lines(hits, palette.critical, 1.2, 60);
+    this.axes.forEach((axis, a) => this.drawAxis(c, axis, x(a), a));
+  }
+
+  drawAxis(c, axis, x, a) {
+    const { top, bottom } = this.frame();
+    c.strokeStyle = palette.muted;
+    c.lineWidth = 1;
+    c.beginPath();
+    c.moveTo(x, top);
+    c.lineTo(x, bottom);
+    c.stroke();
+    const range = this.filters.get(axis.name);
+    if (range) {
+      const high = Math.max(top, this.y(axis, range[1])), low = Math.min(bottom, this.y(axis, range[0]));
+      c.fillStyle = palette.band;
+      c.strokeStyle = palette.accent;
+      c.lineWidth = 2;
+      c.fillRect(x - 8, high, 16, low - high);
+      c.strokeRect(x - 8, high, 16, low - high);
+    }
+    // Names take turns on two rows, so that long ones have room.
+    const ends = a === 0 ? "left" : a === this.axes.length - 1 ? "right" : "center";
+    const unit = unitText(axis.unit);
+    c.font = FONT;
+    c.textAlign = ends;
+    c.textBaseline = "middle";
+    c.fillStyle = range ? palette.accent : palette.ink;
+    c.fillText(unit ? `${axis.name} [${unit}]` : axis.name, x + { left: -40, right: 40, center: 0 }[ends], a % 2 ? 28 : 11);
+    c.font = FONT.replace("600 12px", "11px");
+    c.textAlign = "center";
+    c.lineJoin = "round";
+    c.lineWidth = 3.5;
+    c.strokeStyle = palette.card;
+    for (const [value, text] of this.marks(axis)) {
+      const y = this.y(axis, value) + (value === axis.low ? 8 : value === axis.high ? -8 : 0);
+      c.strokeText(text, x, y);
+      c.fillStyle = palette.ink;
+      c.fillText(text, x, y);
+    }
+  }
+
+  // Both ends of the range, and round numbers between them.
+  marks(axis) {
+    if (axis.words) return axis.words.map((text, i) => [i, text]);
+    const { low, high } = axis, span = high - low, step = roundStep(span / 4);
+    const between = Array.from({ length: 9 }, (_, i) => (Math.ceil(low / step) + i) * step);
+    const kept = between.filter((value) => value > low + 0.08 * span && value < high - 0.08 * span);
+    return [low, ...kept, high].map((value) => [value, number(Number(value.toPrecision(6)), 3)]);
+  }
+
+  connect() {
+    const select = $("filter-axis");
+    select.append(...this.axes.map((axis) => element("option", { value: axis.name }, axis.name === "critical" ? "critical (0 or 1)" : titled(axis.name))));
+    select.addEventListener("change", () => this.showNumbers());
+    for (const id of ["filter-low", "filter-high"]) {
+      $(id).addEventListener("input", () => {
+        const ends = [$("filter-low"), $("filter-high")].map((field) => (field.value === "" ? null : Number(field.value)));
+        this.filter(select.value, ...ends);
+      });
+    }
+    $("filter-clear").addEventListener("click", () => { this.filters.clear(); this.filter(select.value); });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    this.listen();
+  }
+
+  // By mouse or pen; a finger scrolls the page, and the fields above serve it instead.
+  listen() {
+    let drag = null;
+    const at = (event) => { const box = this.canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
+    this.canvas.addEventListener("pointerdown", (event) => {
+      const [px, py] = at(event), { x } = this.frame();
+      const near = this.axes.findIndex((_, a) => Math.abs(x(a) - px) < 20);
+      if (near < 0 || event.pointerType === "touch") return;
+      drag = { axis: this.axes[near], from: py, moved: false };
+      this.canvas.setPointerCapture(event.pointerId);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!drag) return;
+      const [, py] = at(event);
+      drag.moved ||= Math.abs(py - drag.from) > 3;
+      if (!drag.moved) return;
+      const ends = [this.value(drag.axis, drag.from), this.value(drag.axis, py)];
+      this.filter(drag.axis.name, Math.min(...ends), Math.max(...ends));
+    });
+    this.canvas.addEventListener("pointerup", () => {
+      if (drag && !drag.moved) this.filter(drag.axis.name);
+      drag = null;
+    });
+    this.canvas.addEventListener("pointercancel", () => { drag = null; });
+  }
+}

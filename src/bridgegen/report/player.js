@@ -1,0 +1,203 @@
+// The clock of the playback and its controls; the scene and the curves draw what it says.
+
+const PLAY_ICON = "M4 2v12l10-6z", PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
+
+class Player {
+  constructor(hook) {
+    this.hook = hook;
+    this.playing = false;
+    this.position = 0; // in steps; whole on a recorded instant
+    this.scene = new Scene($("scene"), () => this.redraw());
+    this.curves = new Curves($("curves"), (k) => this.seek(k));
+    this.rows = fillList((i) => this.choose(i, true));
+    this.connect();
+    Object.assign(hook, {
+      select: (i) => this.choose(i), seek: (k) => this.seek(k), play: () => this.play(), pause: () => this.pause(),
+      state: () => this.drawn,
+    });
+    const wanted = new URLSearchParams(location.hash.slice(1));
+    const named = data.kept.findIndex((kept) => kept.name === wanted.get("scenario"));
+    this.choose(Math.max(0, named));
+    const seconds = Number.parseFloat(wanted.get("t"));
+    if (named >= 0 && seconds >= 0) this.seek(Math.round(seconds / this.kept.time_step));
+  }
+
+  get last() {
+    return this.kept.distance.length - 1;
+  }
+
+  // Shows a scenario at its smallest gap, the moment that tells most; a click plays it from the start.
+  choose(i, andPlay = false) {
+    this.pause();
+    this.kept = data.kept[i];
+    this.chosen = i;
+    this.rows.forEach((row, k) => (k === i ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+    $("scrub").max = this.last;
+    $("scene-name").textContent = `${this.kept.name}`;
+    $("to-contact").hidden = !this.kept.contacts.length;
+    $("to-closest").hidden = this.kept.closest === null || this.kept.contacts.includes(this.kept.closest);
+    this.scene.show(this.kept);
+    this.curves.show(this.kept);
+    fillDetails(this.kept);
+    this.seek(this.kept.closest ?? 0, false);
+    this.hook.chosen?.(i);
+    if (!andPlay) return;
+    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if ($("player").getBoundingClientRect().bottom > innerHeight) {
+      $("player").scrollIntoView({ block: "nearest", behavior: calm ? "auto" : "smooth" });
+    }
+    this.link();
+    if (!calm) {
+      this.position = 0;
+      this.play();
+    }
+  }
+
+  seek(step, link = true) {
+    this.position = Math.min(this.last, Math.max(0, step));
+    if (link && !this.playing) this.link();
+    this.redraw();
+  }
+
+  // The page's address names scenario and time, so that it can be sent on.
+  link() {
+    clearTimeout(this.linking);
+    this.linking = setTimeout(() => {
+      const time = (Math.round(this.position) * this.kept.time_step).toFixed(2);
+      history.replaceState(null, "", `#${new URLSearchParams({ scenario: this.kept.name, t: time })}`);
+    }, 200);
+  }
+
+  play() {
+    if (this.playing) return;
+    if (this.position >= this.last) this.position = 0;
+    this.setPlaying(true);
+    let before = null;
+    const tick = (now) => {
+      if (!this.playing) return;
+      if (before !== null) {
+        // A hidden tab stops the clock; coming back must not jump.
+        const seconds = Math.min(0.1, (now - before) / 1000) * Number($("speed").value);
+        this.position = Math.min(this.last, this.position + seconds / this.kept.time_step);
+      }
+      before = now;
+      this.redraw();
+      if (this.position >= this.last) this.pause();
+      else requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
+  }
+
+  pause() {
+    if (!this.playing) return;
+    this.setPlaying(false);
+    this.position = Math.round(this.position);
+    this.link();
+    this.redraw();
+  }
+
+  setPlaying(playing) {
+    this.playing = playing;
+    $("play-icon").setAttribute("d", playing ? PAUSE_ICON : PLAY_ICON);
+    $("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+  }
+
+  step(by) {
+    this.pause();
+    this.seek(Math.round(this.position) + by);
+  }
+
+  redraw() {
+    const state = stateAt(this.kept, this.position);
+    this.scene.draw(state);
+    this.curves.draw(state);
+    $("clock").textContent = `${state.time.toFixed(2)} s  ·  gap ${state.distance === null ? "–" : `${state.distance.toFixed(2)} m`}`;
+    $("follow").setAttribute("aria-pressed", this.scene.view.follow);
+    this.drawFlag(state);
+    $("scrub").value = Math.round(this.position);
+    $("scrub").setAttribute("aria-valuetext", `${state.time.toFixed(2)} seconds`);
+    this.drawn = {
+      scenario: this.kept.name, chosen: this.chosen, position: this.position, playing: this.playing, ...state,
+      screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
+      scale: this.scene.view.scale,
+    };
+  }
+
+  drawFlag(state) {
+    const flag = $("flag");
+    const contact = this.kept.contacts.some((k) => state.index >= k && state.index < k + 1 / this.kept.time_step);
+    const closest = state.index === this.kept.closest;
+    flag.hidden = !contact && !closest;
+    flag.className = contact ? "" : "near";
+    flag.textContent = contact ? "collision" : "smallest gap";
+  }
+
+  connect() {
+    $("play").addEventListener("click", () => this.toggle());
+    $("back").addEventListener("click", () => this.step(-1));
+    $("forward").addEventListener("click", () => this.step(1));
+    $("scrub").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
+    $("zoom-in").addEventListener("click", () => this.scene.view.zoom(1.4));
+    $("zoom-out").addEventListener("click", () => this.scene.view.zoom(1 / 1.4));
+    $("zoom-fit").addEventListener("click", () => this.fit());
+    $("follow").addEventListener("click", () => this.follow());
+    $("to-closest").addEventListener("click", () => this.jump(this.kept.closest));
+    $("to-contact").addEventListener("click", () => this.jump(this.kept.contacts[0]));
+    document.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => {
+      if (this.scene.view.fitted) this.scene.fit();
+      this.redraw();
+    }).observe($("player"));
+  }
+
+  toggle() {
+    if (this.playing) this.pause();
+    else this.play();
+  }
+
+  jump(k) {
+    this.pause();
+    this.seek(k);
+  }
+
+  fit() {
+    this.scene.fit();
+    this.redraw();
+  }
+
+  // Keeps the ego in the middle, near enough to see it well; off again by itself when dragged.
+  follow() {
+    const { view } = this.scene;
+    if (view.follow) return this.fit();
+    view.follow = true;
+    view.fitted = false;
+    view.scale = Math.max(view.scale, 14);
+    this.redraw();
+  }
+
+  // Keys act while the focus is in the player, or nowhere and the player is in sight.
+  key(event) {
+    const focus = document.activeElement, inside = $("player").contains(focus);
+    if (event.ctrlKey || event.metaKey || event.altKey || focus?.id === "speed") return;
+    if (!inside && !(focus === document.body && this.inSight())) return;
+    if (event.key === " " && inside && focus.tagName === "BUTTON") return; // the button's own
+    const speed = $("speed");
+    const faster = (by) => { speed.selectedIndex = Math.min(speed.length - 1, Math.max(0, speed.selectedIndex + by)); };
+    const actions = {
+      " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
+      e: () => this.follow(), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.fit(),
+      d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.kept.contacts.length) this.jump(this.kept.contacts[0]); },
+      "+": () => this.scene.view.zoom(1.4), "=": () => this.scene.view.zoom(1.4), "-": () => this.scene.view.zoom(1 / 1.4),
+      "[": () => faster(-1), "]": () => faster(1),
+    };
+    const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+  }
+
+  inSight() {
+    const { top, bottom } = $("scene").getBoundingClientRect();
+    return Math.min(bottom, innerHeight) - Math.max(top, 0) > (bottom - top) / 2;
+  }
+}

@@ -1,0 +1,92 @@
+// Canvases: sharp on every screen; and the part of the world that the bird's-eye view shows.
+
+// Fits a canvas to its place on the page in device pixels; returns its size in CSS pixels.
+function fitCanvas(canvas, options) {
+  const ratio = window.devicePixelRatio || 1;
+  const width = canvas.clientWidth, height = canvas.clientHeight;
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const context = canvas.getContext("2d", options);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return { context, width, height, ratio };
+}
+
+const FONT = '600 12px system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
+
+// Where the middle of the canvas lies in the world [m], and how many pixels a metre has.
+class View {
+  constructor(canvas, changed) {
+    this.canvas = canvas;
+    this.changed = changed;
+    this.x = this.y = 0;
+    this.scale = 6;
+    this.fitted = true;
+    this.follow = false;
+    this.listen();
+  }
+
+  toScreen([x, y]) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return [width / 2 + (x - this.x) * this.scale, height / 2 - (y - this.y) * this.scale];
+  }
+
+  // Shows all of the points, with half a car and some air around them.
+  fit(points) {
+    this.fitted = true;
+    this.follow = false;
+    const { clientWidth: width, clientHeight: height } = this.canvas, margin = 5;
+    if (!points.length || !width) return;
+    const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
+    const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    const scale = Math.min(width / (x1 - x0 + 2 * margin), (height - 30) / (y1 - y0 + 2 * margin));
+    this.x = (x0 + x1) / 2;
+    this.y = (y0 + y1) / 2;
+    this.scale = Math.min(24, Math.max(0.5, scale));
+  }
+
+  // Keeps the world's point at the pixel `at` in its place.
+  zoom(factor, at = null) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const scale = Math.min(60, Math.max(0.5, this.scale * factor));
+    const [px, py] = at ?? [width / 2, height / 2];
+    const shift = 1 / this.scale - 1 / scale;
+    this.x += (px - width / 2) * shift;
+    this.y += (height / 2 - py) * shift;
+    this.scale = scale;
+    this.fitted = false;
+    this.changed();
+  }
+
+  move(dx, dy) {
+    this.x -= dx / this.scale;
+    this.y += dy / this.scale;
+    this.fitted = this.follow = false;
+    this.changed();
+  }
+
+  // Drag to move, pinch or ctrl + wheel to zoom; a plain wheel keeps scrolling the page.
+  listen() {
+    const pointers = new Map();
+    const spread = () => { const [a, b] = [...pointers.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
+    const at = (event) => { const box = this.canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
+    this.canvas.addEventListener("pointerdown", (event) => {
+      pointers.set(event.pointerId, at(event));
+      this.canvas.setPointerCapture(event.pointerId);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!pointers.has(event.pointerId)) return;
+      const before = pointers.get(event.pointerId), now = at(event), apart = pointers.size > 1 ? spread() : 0;
+      pointers.set(event.pointerId, now);
+      if (pointers.size > 1) return this.zoom(spread() / Math.max(1, apart), now);
+      this.move(now[0] - before[0], now[1] - before[1]);
+    });
+    for (const type of ["pointerup", "pointercancel"]) this.canvas.addEventListener(type, (event) => pointers.delete(event.pointerId));
+    this.canvas.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey && !event.metaKey) return;
+      event.preventDefault();
+      this.zoom(Math.exp(-event.deltaY * 0.004), at(event));
+    }, { passive: false });
+  }
+}

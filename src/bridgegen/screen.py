@@ -1,0 +1,143 @@
+"""What a person sees in the terminal: the progress bar, the tables, the errors."""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, NoReturn, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from bridgegen.errors import BridgeGenError
+
+if TYPE_CHECKING:
+    from bridgegen.campaign import Run, Watch
+    from bridgegen.campaign.loop import Progress as LoopProgress
+    from bridgegen.pipeline import FileResult
+
+_STAGES = {
+    "hand over": "writing the critical scenarios",
+    "report": "writing the report",
+}
+
+
+def fail(error: BridgeGenError) -> NoReturn:
+    """Print an error's problems, one a line, and end with exit status 2."""
+    for problem in error.problems or ("something is wrong",):
+        print(f"bridgegen: error: {problem}", file=sys.stderr)
+    sys.exit(2)
+
+
+class Screen:
+    """A campaign's live progress on stderr: evaluations, critical so far, best d_min, rate."""
+
+    def __init__(self, budget: int | None = None) -> None:
+        self._console = Console(stderr=True)
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[facts]}"),
+            TimeRemainingColumn(compact=True),
+            console=self._console,
+            transient=True,
+        )
+        self._task = self._progress.add_task("starting", total=budget, facts="")
+        self._critical, self._best = 0, float("inf")
+
+    @property
+    def watch(self) -> "Watch":
+        """The callbacks for a campaign."""
+        from bridgegen.campaign import Watch
+
+        return Watch(stage=self._stage, batch=self._batch)
+
+    def _stage(self, stage: str) -> None:
+        from bridgegen.compiled import is_compiled
+
+        if stage == "compile" and not is_compiled():
+            self._console.print(
+                "First run on this machine: compiling the simulator, about half a minute; "
+                "later runs start at once."
+            )
+        label = {"compile": "compiling", "search": "searching"}.get(stage, _STAGES.get(stage))
+        self._progress.update(self._task, description=label or stage)
+
+    def _batch(self, progress: "LoopProgress") -> None:
+        from bridgegen.metrics import METRICS
+
+        column = progress.result.metrics[:, list(METRICS).index("d_min")]
+        self._critical += int(progress.result.critical.sum())
+        good = column[progress.result.status == 0]
+        self._best = min(self._best, float(good.min())) if len(good) else self._best
+        rate = progress.evaluations / progress.seconds if progress.seconds > 0 else 0.0
+        self._progress.update(
+            self._task,
+            total=progress.budget,
+            completed=progress.evaluations,
+            facts=f"{self._critical} critical · best d_min {self._best:.2f} m · {rate:.0f}/s",
+        )
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._progress.stop()
+
+
+def print_summary(run: "Run") -> None:
+    """Print a run's figures and where its files are."""
+    s, settings = run.summary, run.settings
+    table = Table(show_header=False, box=None, pad_edge=False)
+    rows = [
+        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
+        ("search", f"{settings.algorithm}, seed {settings.seed}"),
+        ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
+        ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical)"),
+        ("first critical after", _count(s.first)),
+        ("50th critical after", _count(s.fiftieth)),
+        ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
+        ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
+        ("search time", f"{s.seconds:.2f} s"),
+        ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}"),
+        ("report", str(run.report)),
+    ]
+    for name, value in rows:
+        table.add_row(name, value)
+    Console(soft_wrap=True).print(table)
+
+
+def print_file_result(file: Path, result: "FileResult") -> None:
+    """Print what one scenario file came to."""
+    from bridgegen.metrics import METRICS
+
+    print(f"{file}: ego {result.driver}, {result.seconds:g} s simulated")
+    if result.status != "ok":
+        print(f"failed: {result.status}")
+    width = max(len(name) for name in result.metrics)
+    for name, value in result.metrics.items():
+        print(f"{name:<{width}}  {value!r} {METRICS[name].unit}")
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_json: bool) -> None:
+    """Print rows as a table, or as a JSON list of objects."""
+    if as_json:
+        print(json.dumps([dict(zip(head, row, strict=True)) for row in rows], indent=2))
+        return
+    table = Table(*head, box=None, pad_edge=False, header_style="bold")
+    for row in rows:
+        table.add_row(*("" if value is None else str(value) for value in row))
+    Console().print(table)
+
+
+def _count(value: int | None) -> str:
+    return "never" if value is None else f"{value} evaluations"

@@ -1,0 +1,114 @@
+"""Particle swarm optimisation, pymoo's."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import Penalty, Setting, Value, resolve
+
+
+class PSO:
+    """A swarm of particles drawn to their own best row and to the swarm's.
+
+    The inertia and the two pulls are constant, as in the paper; pymoo's adaptive variant would
+    replace them after the first generation. Where the paper is silent:
+
+    - particles start at rest. pymoo's default draws initial velocities from [0, max_velocity],
+      never negative, so that the whole swarm first drifts towards the cube's far corner;
+    - a particle that would leave the cube draws its velocity again, up to 20 times, and then
+      falls back to a random place between its old one and the face it crossed (pymoo's rule);
+    - each generation, the particle that holds the best row is replaced by a polynomial mutation
+      of that row;
+    - a swarm that has converged would ask for one row for ever (on a smooth function of ten
+      parameters that takes some 180 generations). It is scattered afresh, and forgets: what it
+      found is in the store, and another start may find another kind of critical scenario.
+
+    Source: Kennedy and Eberhart (1995), "Particle swarm optimization"; the inertia weight is Shi
+    and Eberhart's (1998). Hyper-parameters: paper, Table IV.
+    """
+
+    name: ClassVar[str] = "pso"
+    description: ClassVar[str] = "particle swarm optimisation of one objective (pymoo)"
+    source: ClassVar[str] = "Kennedy and Eberhart (1995), doi:10.1109/ICNN.1995.488968"
+    settings: ClassVar[Mapping[str, Setting]] = {
+        "population": Setting(40, "particles, and rows per batch", low=2, high=100_000),
+        "w": Setting(0.8, "inertia: share of the velocity that a particle keeps", 0.0, 2.0),
+        "c1": Setting(1.5, "pull towards the particle's own best row", 0.0, 4.0),
+        "c2": Setting(1.5, "pull towards the swarm's best row", 0.0, 4.0),
+        "max_velocity": Setting(
+            0.2, "largest step per generation and parameter, as a share of its range", 1e-6, 1.0
+        ),
+        "mutate_best": Setting(True, "replace the best row's particle by a mutation of that row"),
+        "restart_within": Setting(
+            1e-3,
+            "scatter the swarm afresh once half of its particles' best rows are this close to "
+            "the best one, as a share of each parameter's range; 0: never",
+            0.0,
+            1.0,
+        ),
+    }
+    many_objective: ClassVar[bool] = False
+
+    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+        self._values = resolve(PSO, n_var, n_obj, seed, settings)
+        self._n_var, self._seed, self._n_starts = n_var, seed, 0
+        self._penalty = Penalty(n_obj)
+        self._asked: Any = None
+        self._start()
+
+    def _start(self) -> None:
+        """Begin with a new swarm."""
+        from bridgegen.search._pymoo import quiet, unit_cube
+
+        values = self._values
+        with quiet():
+            from pymoo.algorithms.soo.nonconvex import pso
+            from pymoo.core.termination import NoTermination
+
+            self._pso = pso.PSO(
+                pop_size=values["population"],
+                w=values["w"],
+                c1=values["c1"],
+                c2=values["c2"],
+                adaptive=False,
+                initial_velocity="zero",
+                max_velocity_rate=values["max_velocity"],
+                pertube_best=values["mutate_best"],
+                seed=[self._seed, self._n_starts],
+            )
+            # The budget is the campaign's; pymoo's own criteria would end the search early.
+            self._pso.setup(unit_cube(self._n_var, 1), termination=NoTermination())
+        self._n_starts += 1
+
+    def ask(self) -> Float:
+        """Return where the particles are, one row each."""
+        self._asked = self._pso.ask()
+        U: Float = self._asked.get("X").astype(np.float64)
+        return U
+
+    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+        """Move the particles' and the swarm's best rows, and from them the next velocities.
+
+        Raises:
+            ValueError: U is not what was last asked.
+        """
+        if self._asked is None or not np.array_equal(U, self._asked.get("X")):
+            raise ValueError("U must be the rows that were last asked")
+        finite, failed = self._penalty.apply(F, ok)
+        self._asked.set("F", finite, "failed", failed)
+        # A particle whose best row is a failed one carries the penalty of that time; worse
+        # finite rows may have been told since, and any of them must count as an improvement.
+        for best in self._pso.pop if self._pso.is_initialized else ():
+            if best.get("failed"):
+                best.F = self._penalty.value
+        self._pso.tell(infills=self._asked)
+        self._asked = None
+        if self._converged():
+            self._start()
+
+    def _converged(self) -> bool:
+        best, own = self._pso.opt[0].get("X"), self._pso.pop.get("X")
+        distance = np.abs(own - best).max(axis=1)
+        return bool(np.median(distance) < self._values["restart_within"])

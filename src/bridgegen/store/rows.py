@@ -1,0 +1,212 @@
+"""The table of evaluations: its columns, and its rows as arrays."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.errors import InputError
+
+FIRST = ("id", "batch", "seconds", "u")
+LAST = ("status", "critical")
+
+
+class Evaluated(Protocol):
+    """What an evaluation of n rows hands over; any object with these arrays will do."""
+
+    @property
+    def metrics(self) -> Float:
+        """``(n, M)`` float64, NaN or ±inf where the metric says so."""
+
+    @property
+    def F(self) -> Float:
+        """``(n, n_obj)`` float64, smaller is more critical."""
+
+    @property
+    def critical(self) -> Bool:
+        """``(n,)`` bool."""
+
+    @property
+    def status(self) -> npt.NDArray[np.integer[Any]]:
+        """``(n,)`` integers, 0 is success."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """n evaluations as they were recorded.
+
+    Attributes:
+        id: ``(n,)`` int64, 0, 1, 2 … in the order of recording.
+        batch: ``(n,)`` int64, which transaction recorded them.
+        seconds: ``(n,)`` float64 [s], from the start of the run to the end of the row's batch.
+        U: ``(n, n_var)`` float64, the unit-cube rows, exact.
+        X: ``(n, len(parameters))`` float64, the concrete scenarios, exact (no −0.0).
+        metrics: ``(n, M)`` float64.
+        F: ``(n, n_obj)`` float64.
+        status: ``(n,)`` int64, 0 is success.
+        critical: ``(n,)`` bool.
+    """
+
+    id: Int
+    batch: Int
+    seconds: Float
+    U: Float
+    X: Float
+    metrics: Float
+    F: Float
+    status: Int
+    critical: Bool
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    def take(self, at: Int) -> "Rows":
+        """Return the rows at some positions, in that order."""
+        return Rows(*(getattr(self, one.name)[at] for one in fields(self)))
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns of the table, named once, when the run is created.
+
+    SQL takes no notice of case and has our own columns beside the user's, so a name that is
+    taken gets a suffix: a parameter "status" is in the column "status_parameter".
+
+    Attributes:
+        n_var: searched parameters.
+        X: the column of each parameter.
+        metrics: the column of each metric.
+        F: the column of each objective: f0, f1 …
+    """
+
+    n_var: int
+    X: tuple[str, ...]
+    metrics: tuple[str, ...]
+    F: tuple[str, ...]
+
+    @classmethod
+    def named(
+        cls, n_var: int, parameters: Sequence[str], metrics: Sequence[str], n_obj: int
+    ) -> "Columns":
+        """Choose the columns' names.
+
+        Raises:
+            InputError: a name that is empty, given twice, or cannot be written in SQL.
+        """
+        problems = []
+        for kind, given in (("parameter", parameters), ("metric", metrics)):
+            for name in dict.fromkeys(given):
+                # SQL ends at NUL; a lone surrogate is no character.
+                if not name.strip() or "\0" in name or any("\ud800" <= c <= "\udfff" for c in name):
+                    problems.append(f"a {kind}'s name must be a non-empty text, got {name!r}")
+                if given.count(name) > 1:
+                    problems.append(f"a {kind}'s name must be unique, got {name!r} twice")
+        if problems:
+            raise InputError(*problems)
+        F = tuple(f"f{i}" for i in range(n_obj))
+        taken = {name.lower() for name in (*FIRST, *F, *LAST)}
+        return cls(n_var, _free(parameters, "parameter", taken), _free(metrics, "metric", taken), F)
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """Every column, in the table's order."""
+        return (*FIRST, *self.X, *self.metrics, *self.F, *LAST)
+
+    def create_sql(self) -> str:
+        """Return the statement that makes the table."""
+        kinds = {"id": "INTEGER PRIMARY KEY", "batch": "INTEGER NOT NULL", "u": "BLOB NOT NULL"}
+        kinds |= {"status": "INTEGER NOT NULL", "critical": "INTEGER NOT NULL"}
+        columns = ", ".join(f"{quoted(name)} {kinds.get(name, 'REAL')}" for name in self.all)
+        return f"CREATE TABLE evaluations ({columns})"
+
+    def insert_sql(self) -> str:
+        """Return the statement that records one row."""
+        marks = ", ".join("?" * len(self.all))
+        return f"INSERT INTO evaluations VALUES ({marks})"
+
+    def pack(
+        self, start: int, batch: int, seconds: float, U: Float, X: Float, result: Evaluated
+    ) -> list[tuple[Any, ...]]:
+        """Return a batch as the values to insert.
+
+        Raises:
+            ValueError: an array has the wrong shape, or U is not finite.
+        """
+        n = len(U)
+        U = as_float("U", U, (n, self.n_var))
+        blobs = [row.tobytes() for row in U.astype("<f8")]
+        numbers = np.hstack(
+            [
+                as_float("X", X, (n, len(self.X)), finite=False),
+                as_float("metrics", result.metrics, (n, len(self.metrics)), finite=False),
+                as_float("F", result.F, (n, len(self.F)), finite=False),
+            ]
+        )
+        status, critical = np.asarray(result.status), np.asarray(result.critical)
+        for name, array in (("status", status), ("critical", critical)):
+            if array.shape != (n,):
+                raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
+        parts = zip(
+            blobs,
+            numbers.tolist(),
+            status.astype(np.int64).tolist(),
+            critical.astype(np.int64).tolist(),
+            strict=True,
+        )
+        return [
+            (start + k, batch, seconds, blob, *row, state, hit)
+            for k, (blob, row, state, hit) in enumerate(parts)
+        ]
+
+    def unpack(self, rows: Sequence[tuple[Any, ...]]) -> Rows:
+        """Return what SQL read as arrays.
+
+        Raises:
+            ValueError, TypeError: values that this table cannot hold.
+        """
+        n, first = len(rows), len(FIRST)
+        n_float = len(self.X) + len(self.metrics) + len(self.F)
+        # NULL arrives as None, which float64 takes as NaN.
+        numbers = np.array([row[first : first + n_float] for row in rows], dtype=np.float64)
+        numbers = numbers.reshape(n, n_float)
+        X, metrics, F = np.split(
+            numbers, np.cumsum([len(self.X), len(self.metrics)]).tolist(), axis=1
+        )
+        blob = b"".join(row[3] for row in rows)
+        U = np.frombuffer(blob, dtype="<f8").reshape(n, self.n_var)
+        return Rows(
+            id=_column(rows, 0, np.int64),
+            batch=_column(rows, 1, np.int64),
+            seconds=_column(rows, 2, np.float64),
+            U=U.astype(np.float64),
+            X=np.ascontiguousarray(X),
+            metrics=np.ascontiguousarray(metrics),
+            F=np.ascontiguousarray(F),
+            status=_column(rows, -2, np.int64),
+            critical=_column(rows, -1, np.bool_),
+        )
+
+
+def quoted(name: str) -> str:
+    """Return ``name`` as an SQL identifier, whatever it contains."""
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _column(rows: Sequence[tuple[Any, ...]], at: int, kind: type[Any]) -> Any:
+    return np.array([row[at] for row in rows], dtype=kind)
+
+
+def _free(names: Iterable[str], kind: str, taken: set[str]) -> tuple[str, ...]:
+    """Return a column for each name, and add it to those ``taken`` (in lower case)."""
+    columns = []
+    for name in names:
+        column, count = name, 1
+        while column.lower() in taken:
+            column = f"{name}_{kind}" + (f"_{count}" if count > 1 else "")
+            count += 1
+        taken.add(column.lower())
+        columns.append(column)
+    return tuple(columns)

@@ -1,0 +1,110 @@
+"""SQLite as the store needs it: connections, a lock that dies with its process, clear errors."""
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from urllib.parse import quote
+
+from bridgegen.errors import StorageError
+
+CAUSES = {
+    sqlite3.SQLITE_FULL: "the disk is full",
+    sqlite3.SQLITE_READONLY: "it is read-only",
+    sqlite3.SQLITE_CANTOPEN: "it cannot be opened (a missing folder, or no permission)",
+    sqlite3.SQLITE_PERM: "no permission",
+    sqlite3.SQLITE_IOERR: "reading or writing failed",
+    sqlite3.SQLITE_CORRUPT: "the file is damaged",
+    sqlite3.SQLITE_NOTADB: "it is not an SQLite database",
+    sqlite3.SQLITE_BUSY: "another process holds it",
+}
+
+
+@contextmanager
+def storage_errors(path: Path, doing: str, kept: str = "") -> Iterator[None]:
+    """Turn what SQLite and the system raise into one StorageError with the cause.
+
+    Args:
+        path: the file, for the message.
+        doing: what is being done to it ("written").
+        kept: what is safe all the same, a sentence.
+    """
+    try:
+        yield
+    except sqlite3.Error as error:
+        # The low byte is the primary code; errors of Python's own wrapper have none.
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        name = getattr(error, "sqlite_errorname", "")
+        detail = f"{error}, {name}" if name else str(error)
+        cause = f"{CAUSES[code]} ({detail})" if code in CAUSES else detail
+        raise StorageError(_sentence(path, doing, cause, kept)) from error
+    except OSError as error:
+        raise StorageError(_sentence(path, doing, str(error.strerror or error), kept)) from error
+
+
+def _sentence(path: Path, doing: str, cause: str, kept: str) -> str:
+    return f"{path}: cannot be {doing}: {cause}" + (f"; {kept}" if kept else "")
+
+
+def connect(path: Path, *, write: bool) -> sqlite3.Connection:
+    """Open an existing database, with explicit transactions only.
+
+    A reader never writes, and works on read-only media too.
+    """
+    mode = "rw"
+    if not write and not os.access(path.parent, os.W_OK):
+        # SQLite reads a WAL database only where it may make a -shm file, unless it is told that
+        # nobody writes. Nobody does where there is no log.
+        mode = "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
+    uri = f"file:{quote(str(path.absolute()))}?mode={mode}"
+    connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=10.0)
+    if not write:
+        connection.execute("PRAGMA query_only = ON")
+    return connection
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """All or nothing, an interrupt from the keyboard included."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        # SQLite has rolled back by itself after some errors; a full disk may refuse this too.
+        if connection.in_transaction:
+            with suppress(sqlite3.Error):
+                connection.execute("ROLLBACK")
+        raise
+
+
+class Lock:
+    """At most one writer per run, in this process or any other.
+
+    An empty SQLite database held in an exclusive transaction: SQLite's own file locks work on
+    every system, within one process too, and end when the process does, however it ends.
+
+    Raises:
+        StorageError: another writer holds it, or the folder cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with storage_errors(path.parent, "written"):
+            connection = sqlite3.connect(path, isolation_level=None, timeout=0.0)
+            try:
+                connection.execute("PRAGMA journal_mode = MEMORY")  # nothing is ever written
+                connection.execute("BEGIN EXCLUSIVE")
+            except sqlite3.OperationalError as error:
+                connection.close()
+                if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY:
+                    raise
+                raise StorageError(
+                    f"{path.parent}: another process is writing this run; "
+                    "wait for it, or stop it first"
+                ) from None
+        self._connection = connection
+
+    def release(self) -> None:
+        """Let others write."""
+        self._connection.close()

@@ -1,0 +1,298 @@
+"""One run's store: a folder with ``run.sqlite``, one transaction a batch."""
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from bridgegen.arrays import Float
+from bridgegen.errors import StorageError
+from bridgegen.store.rows import Columns, Evaluated, Rows, quoted
+from bridgegen.store.run_file import FILE, LOCK, SCHEMA, read_run, refuse_used, write_run
+from bridgegen.store.sqlite import Lock, connect, storage_errors, transaction
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Store:
+    """A run's settings and its evaluations, in the order of recording; nothing is ever changed.
+
+    Table ``evaluations``: id, batch, seconds, u (the unit-cube row, float64 little endian), one
+    column per parameter, metric and objective (f0, f1 …), status, critical. NaN is NULL. SQLite
+    keeps no sign of zero: −0.0 comes back as 0.0; every other float64 comes back bit for bit.
+    Table ``run``: key and value (JSON).
+
+    Made by :meth:`create` or :meth:`open`; a context manager.
+
+    Attributes:
+        folder: the run's folder.
+        settings: what the run was made with, as given to ``create``.
+        parameters: names of X's columns.
+        metrics: names of the metrics.
+        columns: how the table names them.
+    """
+
+    def __init__(
+        self, folder: Path, connection: sqlite3.Connection, run: dict[str, Any], lock: Lock | None
+    ) -> None:
+        self.folder = folder
+        self.settings: dict[str, Any] = run["settings"]
+        self.parameters: tuple[str, ...] = tuple(run["parameters"])
+        self.metrics: tuple[str, ...] = tuple(run["metrics"])
+        self.version: str = run["version"]
+        self.columns = Columns.named(run["n_var"], self.parameters, self.metrics, run["n_obj"])
+        self._connection = connection
+        self._lock = lock
+        self._finished: str | None = run.get("finished")
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path | str,
+        settings: Mapping[str, Any],
+        parameters: Sequence[str],
+        metrics: Sequence[str],
+        *,
+        n_var: int,
+        n_obj: int,
+    ) -> Self:
+        """Start a run in a new or empty folder, and hold it for writing.
+
+        Args:
+            folder: made with its parents if need be.
+            settings: all that it takes to go on with the run; JSON values, no NaN.
+            parameters: names of X's columns.
+            metrics: names of the metrics.
+            n_var: searched parameters, the width of U.
+            n_obj: objectives.
+
+        Raises:
+            StorageError: the folder holds a run or anything else, or cannot be written.
+            InputError: a name that cannot be a column.
+        """
+        folder = Path(folder)
+        columns = Columns.named(n_var, parameters, metrics, n_obj)
+        run = {
+            "schema": SCHEMA,
+            "version": version("bridgegen"),
+            "settings": settings,
+            "parameters": list(parameters),
+            "metrics": list(metrics),
+            "n_var": n_var,
+            "n_obj": n_obj,
+        }
+        refuse_used(folder)
+        with storage_errors(folder, "made"):
+            folder.mkdir(parents=True, exist_ok=True)
+        lock = Lock(folder / LOCK)
+        try:
+            refuse_used(folder)  # again, now that nobody else can be making one here
+            with storage_errors(folder, "written", "nothing was written"):
+                write_run(folder, columns, run)
+            return cls._connected(folder, lock)
+        except BaseException:
+            lock.release()
+            raise
+
+    @classmethod
+    def open(cls, folder: Path | str, *, write: bool = False) -> Self:
+        """Open an existing run, to read it (the default, also while it is being written).
+
+        Args:
+            folder: the run's folder.
+            write: go on with it; no other process may be writing it.
+
+        Raises:
+            StorageError: not a run, damaged, of another schema, locked, or not readable.
+        """
+        folder = Path(folder)
+        with storage_errors(folder, "read"):
+            if not (folder / FILE).is_file():
+                what = "holds no run" if folder.is_dir() else "there is no such folder"
+                raise StorageError(f"{folder}: {what} ({FILE} is missing)")
+        lock = Lock(folder / LOCK) if write else None
+        try:
+            return cls._connected(folder, lock)
+        except BaseException:
+            if lock:
+                lock.release()
+            raise
+
+    @classmethod
+    def _connected(cls, folder: Path, lock: Lock | None) -> Self:
+        path = folder / FILE
+        with storage_errors(path, "opened"):
+            connection = connect(path, write=lock is not None)
+        try:
+            store = cls(folder, connection, read_run(connection, path), lock)
+            if lock:
+                with storage_errors(path, "written"):
+                    # Where the file system has no shared memory SQLite keeps its rollback journal:
+                    # as safe, slower. NORMAL survives a killed process; a power cut can cost the
+                    # last batches, never consistency.
+                    connection.execute("PRAGMA journal_mode = WAL")
+                    connection.execute("PRAGMA synchronous = NORMAL")
+            return store
+        except BaseException:
+            connection.close()
+            raise
+
+    def close(self) -> None:
+        """Close the files and let others write."""
+        if self._lock:
+            # One plain file, readable from read-only media. Refused while somebody reads, or where
+            # the disk is full; the log then stays beside the file, and is as good.
+            with suppress(sqlite3.Error):
+                self._connection.execute("PRAGMA busy_timeout = 0")
+                self._connection.execute("PRAGMA journal_mode = DELETE")
+        self._connection.close()
+        if self._lock:
+            self._lock.release()
+            self._lock = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def append(self, U: Float, X: Float, result: Evaluated, seconds: float) -> None:
+        """Record one batch, whole or not at all.
+
+        Args:
+            U: ``(n, n_var)`` float64, unit-cube rows.
+            X: ``(n, len(parameters))`` float64, what they decode to.
+            result: metrics, F, critical and status of the n rows.
+            seconds: [s] since the start of the run.
+
+        Raises:
+            StorageError: the disk is full or fails; what was recorded before is kept.
+            ValueError: an array has the wrong shape.
+        """
+        start, batch = len(self), self.n_batches
+        kept = f"{start} evaluations are kept; go on with: bridgegen resume {self.folder}"
+        rows = self.columns.pack(start, batch, seconds, U, X, result)
+        with self._writing(kept):
+            if self._finished is not None:
+                self._connection.execute("DELETE FROM run WHERE key = 'finished'")
+            self._connection.executemany(self.columns.insert_sql(), rows)
+        self._finished = None
+
+    def finish(self, reason: str) -> None:
+        """Mark the run as finished, and why; another ``append`` takes the mark away.
+
+        Raises:
+            StorageError: the disk is full or fails; every evaluation is kept.
+        """
+        with self._writing("every evaluation is kept"):
+            self._connection.execute(
+                "INSERT OR REPLACE INTO run VALUES ('finished', ?)", (json.dumps(reason),)
+            )
+        self._finished = reason
+
+    @contextmanager
+    def _writing(self, kept: str) -> Iterator[None]:
+        if self._lock is None:
+            raise StorageError(f"{self.folder}: this run was opened for reading only")
+        with storage_errors(self.folder / FILE, "written", kept), transaction(self._connection):
+            yield
+
+    @property
+    def finished(self) -> str | None:
+        """Why the run ended, or None while it has not."""
+        return self._finished
+
+    @property
+    def n_obj(self) -> int:
+        """Objectives."""
+        return len(self.columns.F)
+
+    def __len__(self) -> int:
+        """Evaluations recorded."""
+        return self._number("SELECT coalesce(max(id) + 1, 0) FROM evaluations")
+
+    @property
+    def n_batches(self) -> int:
+        """Transactions recorded."""
+        last = "(SELECT max(id) FROM evaluations)"
+        return self._number(
+            f"SELECT coalesce((SELECT batch + 1 FROM evaluations WHERE id = {last}), 0)"
+        )
+
+    @property
+    def seconds(self) -> float:
+        """[s] from the start of the run to the last batch recorded; 0 for none."""
+        with self._reading():
+            row = self._connection.execute(
+                "SELECT seconds FROM evaluations ORDER BY id DESC LIMIT 1"
+            ).fetchone()
+        return float(row[0]) if row else 0.0
+
+    def read(self, start: int = 0, stop: int | None = None) -> Rows:
+        """Return the evaluations with ``start <= id < stop``.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
+        n = len(self)
+        stop = n if stop is None else min(stop, n)
+        names = ", ".join(map(quoted, self.columns.all))
+        sql = f"SELECT {names} FROM evaluations WHERE id >= ? AND id < ? ORDER BY id"
+        with self._reading():
+            found = self._connection.execute(sql, (start, stop)).fetchall()
+        try:
+            rows = self.columns.unpack(found)
+        except (TypeError, ValueError) as error:
+            raise self._damaged(str(error)) from error
+        if rows.id.tolist() != list(range(start, stop)):
+            raise self._damaged(f"evaluations between {start} and {stop - 1} are missing")
+        return rows
+
+    def rows(self, start: int = 0, stop: int | None = None, chunk: int = 4096) -> Iterator[Rows]:
+        """Yield the evaluations with ``start <= id < stop``, ``chunk`` at a time.
+
+        Memory stays bounded however long the run, and the run may grow meanwhile.
+        """
+        stop = len(self) if stop is None else min(stop, len(self))
+        for at in range(start, stop, chunk):
+            yield self.read(at, min(at + chunk, stop))
+
+    def frame(self) -> "pd.DataFrame":
+        """Return every evaluation as a table, without u; the index is id."""
+        import numpy as np
+        import pandas as pd
+
+        n, columns = len(self), self.columns
+        names = ["batch", "seconds", *columns.X, *columns.metrics, *columns.F, "status", "critical"]
+        data = {name: np.empty(n) for name in names}
+        data |= {"batch": np.empty(n, np.int64), "status": np.empty(n, np.int64)}
+        data |= {"critical": np.empty(n, np.bool_)}
+        for rows in self.rows(0, n):
+            at = slice(int(rows.id[0]), int(rows.id[-1]) + 1)
+            for name in ("batch", "seconds", "status", "critical"):
+                data[name][at] = getattr(rows, name)
+            for part, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
+                                 (columns.F, rows.F)):  # fmt: skip
+                for name, column in zip(part, values.T, strict=True):
+                    data[name][at] = column
+        return pd.DataFrame(data, index=pd.RangeIndex(n, name="id"), columns=names)
+
+    def _damaged(self, detail: str) -> StorageError:
+        return StorageError(f"{self.folder / FILE}: the file is damaged: {detail}")
+
+    def _reading(self) -> AbstractContextManager[None]:
+        return storage_errors(self.folder / FILE, "read")
+
+    def _number(self, sql: str) -> int:
+        with self._reading():
+            return int(self._connection.execute(sql).fetchone()[0])

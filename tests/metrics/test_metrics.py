@@ -1,0 +1,347 @@
+"""Every metric but ttc (which has its own file), by hand and against plain NumPy."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from bridgegen import metrics
+from bridgegen.errors import UnknownNameError
+from bridgegen.metrics.a_change import a_change
+from bridgegen.metrics.d_min import d_min
+from bridgegen.metrics.l_offset import l_offset
+from bridgegen.metrics.metric import Metric
+from bridgegen.metrics.n_brake import n_brake
+from bridgegen.metrics.n_collision import n_collision
+from bridgegen.metrics.v_d import v_d
+
+ALL = list(metrics.METRICS)
+
+
+# By hand. Boxes are 4 m × 2 m about the reference point; the other drives along the ego's axis, so
+# the distance is |x| − 4.
+
+
+def test_d_min_and_the_speed_at_its_first_instant(rollout_of):
+    rollout = rollout_of(
+        x=[[0, 0, 0, 0], [20, 7, 12, 7]],  # 16, 3, 8, 3 m
+        v=[[8, 7, 6, 5], [1, 1, 1, 1]],
+    )
+    assert d_min(rollout) == [3.0]
+    assert v_d(rollout) == [7.0]
+
+
+def test_the_first_instant_counts_over_all_entities(rollout_of):
+    rollout = rollout_of(
+        x=[[0, 0, 0], [20, 20, 9], [20, 9, 20]],  # both come to 5 m, the second one earlier
+        v=[[8, 7, 6], [1, 1, 1], [1, 1, 1]],
+    )
+    assert d_min(rollout) == [5.0]
+    assert v_d(rollout) == [7.0]
+
+
+def test_on_a_collision_v_d_is_the_speed_at_first_contact(rollout_of):
+    rollout = rollout_of(x=[[0, 0, 0, 0], [5, 3, 0, 9]], v=[[9, 8, 1, 1], [0, 0, 0, 0]])
+    assert d_min(rollout) == [0.0]
+    assert v_d(rollout) == [8.0]
+    assert n_collision(rollout) == [1.0]
+
+
+def test_alone_on_the_road(rollout_of):
+    rollout = rollout_of(x=[[[0.0, 1.0]]], v=5.0)
+    assert d_min(rollout) == [np.inf]
+    assert v_d(rollout) == [0.0]
+    assert n_collision(rollout) == [0.0]
+    assert metrics.get("ttc").compute(rollout) == [np.inf]
+
+
+def contact_at(rollout_of, *instants, of=400, **settings):
+    """One other vehicle, 10 m off but at the given instants, when it touches."""
+    x = np.full(of, 14.0)
+    x[list(instants)] = 3.0
+    return rollout_of(x=np.stack([np.zeros(of), x]), **settings)
+
+
+@pytest.mark.parametrize(
+    ("instants", "expected"),
+    [
+        ((), 0),
+        ((0,), 1),
+        ((399,), 1),
+        ((10, 11, 12, 13), 1),  # one lasting contact
+        ((10, 12), 1),
+        ((10, 110), 1),  # 5 s later: the same
+        ((10, 111), 2),  # 5.05 s later: another
+        ((10, 100, 190, 280), 1),  # each within 5 s of the one before
+        ((10, 120, 230), 3),
+        ((*range(10, 150), 200), 1),  # 5 s count from the end of a contact
+        ((0, 101, 150, 350), 3),
+    ],
+)
+def test_contacts_within_five_seconds_are_one(rollout_of, instants, expected):
+    assert n_collision(contact_at(rollout_of, *instants)) == [expected]
+
+
+def test_contacts_with_two_actors_are_two(rollout_of):
+    near, far = [3.0, 3.0, 3.0], [14.0, 14.0, 14.0]
+    assert n_collision(rollout_of(x=[[0.0] * 3, near, near])) == [2.0]
+    assert n_collision(rollout_of(x=[[0.0] * 3, near, far])) == [1.0]
+
+
+def test_the_merging_time_is_an_argument_in_seconds(rollout_of):
+    rollout = contact_at(rollout_of, 10, 31)  # 1.05 s
+    assert n_collision(rollout, merge_within=1.0) == [2.0]
+    assert n_collision(rollout, merge_within=1.05) == [1.0]
+    slower = contact_at(rollout_of, 10, 31, time_step=0.1)  # 2.1 s
+    assert n_collision(slower, merge_within=2.0) == [2.0]
+    assert n_collision(slower, merge_within=2.1) == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("a", "expected"),
+    [
+        ([0, 0, 0], 0),
+        ([0, -4.9, 0], 1),  # reaching the threshold counts
+        ([0, -4.89, 0], 0),
+        ([0, -5, -9, -5, 0], 1),  # one long braking
+        ([0, -5, -4, -5, 0], 2),
+        ([-6, -6, 0], 1),  # braking from the first instant on
+        ([0, 0, -6], 1),
+        ([6, 6, 6], 0),  # accelerating is not braking
+        ([0, -5, 5, -5, 5, -5], 3),
+    ],
+)
+def test_hard_braking_is_counted_by_its_rising_edges(rollout_of, a, expected):
+    assert n_brake(rollout_of(a=[[a]])) == [expected]
+
+
+def test_the_braking_threshold_is_an_argument(rollout_of):
+    rollout = rollout_of(a=[[[0, -3.5, 0, -5.0, 0, -2.9]]])
+    assert n_brake(rollout) == [1.0]
+    assert n_brake(rollout, threshold=3.0) == [2.0]
+
+
+def test_acceleration_change_within_half_a_second(rollout_of):
+    ramp = np.linspace(0, -8, 41)  # 0.2 m/s² per step of 0.05 s
+    assert a_change(rollout_of(a=ramp[None, None])) == pytest.approx([2.0])
+    step = np.r_[np.full(20, 1.0), np.full(20, -5.0)]
+    assert a_change(rollout_of(a=step[None, None])) == [6.0]
+    assert a_change(rollout_of(a=np.full((1, 1, 30), -3.0))) == [0.0]
+    assert a_change(rollout_of(a=[[[-3.0]]])) == [0.0]
+
+
+@pytest.mark.parametrize(("apart", "expected"), [(9, 7.0), (10, 7.0), (11, 4.0)])
+def test_ten_steps_are_half_a_second(rollout_of, apart, expected):
+    a = np.zeros(60)
+    a[20], a[20 + apart] = 4.0, -3.0
+    assert a_change(rollout_of(a=a[None, None])) == [expected]
+
+
+def test_the_window_is_an_argument_in_seconds(rollout_of):
+    a = np.zeros(60)
+    a[20], a[25] = 4.0, -3.0
+    rollout = rollout_of(a=a[None, None])
+    assert a_change(rollout, window=0.2) == [4.0]
+    assert a_change(rollout, window=0.25) == [7.0]
+    assert a_change(rollout_of(a=a[None, None], time_step=0.1), window=0.25) == [4.0]
+    assert a_change(rollout, window=1e3) == [7.0]  # longer than the recording
+
+
+def test_offset_counts_to_either_side_and_only_the_egos(rollout_of):
+    assert l_offset(rollout_of(offset=[[0.1, -0.7, 0.3], [9, 9, 9]])) == [0.7]
+    assert l_offset(rollout_of(offset=[[0.1, -0.2, 0.3], [9, 9, 9]])) == [0.3]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda r: n_collision(r, merge_within=0.0), r"merge_within \[s\] must be finite and > 0"),
+        (lambda r: a_change(r, window=np.nan), r"window \[s\] must be finite and > 0, got nan"),
+        (lambda r: n_brake(r, threshold=-3.0), r"threshold \[m/s²\] must be finite and > 0"),
+    ],
+)
+def test_senseless_arguments_are_refused(rollout_of, call, message):
+    with pytest.raises(ValueError, match=message):
+        call(rollout_of(x=np.zeros((1, 2, 3))))
+
+
+@pytest.mark.parametrize("field", ["x", "v", "a", "offset"])
+def test_a_state_that_is_not_finite_is_refused(driven, field):
+    rollout = driven(2, 2, 5)
+    getattr(rollout, field)[1, 0, 2] = np.nan
+    with pytest.raises(ValueError, match=rf"{field}.* must be finite, got nan at \[1, 0, 2\]"):
+        metrics.evaluate(rollout, ALL)
+
+
+# Laws that hold for every metric.
+
+
+def test_padding_is_not_read(driven):
+    rollout = driven()
+    before = metrics.evaluate(rollout, ALL)
+    spoiled = driven()
+    for i, n in enumerate(spoiled.n_steps):
+        for name in ("x", "y", "h", "v", "a", "offset"):
+            getattr(spoiled, name)[i, :, n:] = 1e3 * (i + 1)
+    np.testing.assert_array_equal(metrics.evaluate(spoiled, ALL), before)
+
+
+def test_every_metric_finds_something_in_the_rollouts_of_these_tests(driven):
+    values = metrics.evaluate(driven(200), ALL)
+    finite = np.where(np.isfinite(values), values, -1.0)
+    assert (finite.max(axis=0) > 0).all()
+    assert (np.ptp(finite, axis=0) > 0).all()
+
+
+def test_a_row_does_not_depend_on_its_batch(driven, rows_of):
+    rollout = driven(19, 4, 45)
+    whole = metrics.evaluate(rollout, ALL)
+    for rows in ([4], [18, 0, 7, 7], list(range(18, -1, -1))):
+        part = metrics.evaluate(rows_of(rollout, rows), ALL)
+        assert part.tobytes() == whole[rows].tobytes()
+
+
+def test_failed_scenarios_and_no_others_are_nan(driven):
+    good = metrics.evaluate(driven(), ALL)
+    rollout = driven()
+    rollout.status[[2, 7]] = [1, 2]
+    values = metrics.evaluate(rollout, ALL)
+    failed = rollout.status != 0
+    assert np.isnan(values[failed]).all()
+    np.testing.assert_array_equal(values[~failed], good[~failed])
+    assert not np.isnan(good).any()
+
+
+@given(turn=st.floats(-7, 7), dx=st.floats(-1e3, 1e3), dy=st.floats(-1e3, 1e3))
+def test_turning_and_moving_the_scene_changes_nothing(rollout_of, driven, turn, dx, dy):
+    scene = driven(30)
+    c, s = np.cos(turn), np.sin(turn)
+    moved = rollout_of(
+        box=scene.box,
+        x=scene.x * c - scene.y * s + dx,
+        y=scene.x * s + scene.y * c + dy,
+        h=scene.h + turn,
+        v=scene.v,
+        a=scene.a,
+        offset=scene.offset,
+        n_steps=scene.n_steps,
+    )
+    here, there = (metrics.evaluate(r, ALL) for r in (scene, moved))
+    for j, name in enumerate(ALL):
+        np.testing.assert_allclose(there[:, j], here[:, j], rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+# Parity with plain NumPy.
+
+
+def plain(rollout, i):
+    """All metrics of scenario i except ttc, the slow and obvious way."""
+    n = rollout.n_steps[i]
+    gap = rollout.distance[i, 1:, :n]
+    a, step = rollout.a[i, 0, :n], rollout.time_step
+    k = int(gap.min(axis=0).argmin())
+    count = 0
+    for row in gap:
+        touching = np.flatnonzero(row == 0) * step
+        count += bool(len(touching)) + int((np.diff(touching) > 5 + 1e-6).sum())
+    lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) * step
+    hard = np.r_[False, a <= -4.9]
+    return {
+        "d_min": gap.min(),
+        "v_d": rollout.v[i, 0, k],
+        "n_collision": count,
+        "l_offset": np.abs(rollout.offset[i, 0, :n]).max(),
+        "a_change": np.abs(np.subtract.outer(a, a))[lag <= 0.5 + 1e-6].max(),
+        "n_brake": (hard[1:] & ~hard[:-1]).sum(),
+    }
+
+
+@pytest.mark.parametrize("shape", [(40, 2, 120), (10, 5, 33), (3, 64, 7), (5, 2, 1)])
+def test_kernels_agree_with_plain_numpy(driven, shape):
+    rollout = driven(*shape, seed=shape[1])
+    names = [name for name in ALL if name != "ttc"]
+    got = metrics.evaluate(rollout, names)
+    expected = [[plain(rollout, i)[name] for name in names] for i in range(shape[0])]
+    np.testing.assert_array_equal(got, np.array(expected, dtype=float))
+
+
+@given(
+    a=arrays(float, st.integers(1, 60), elements=st.floats(-9, 4)),
+    window=st.integers(1, 70),
+)
+def test_acceleration_change_agrees_with_comparing_every_pair(rollout_of, a, window):
+    lag = np.abs(np.subtract.outer(np.arange(len(a)), np.arange(len(a))))
+    expected = np.abs(np.subtract.outer(a, a))[lag <= window].max()
+    assert a_change(rollout_of(a=a[None, None]), window=window * 0.05) == [expected]
+
+
+# The registry.
+
+
+def test_unknown_metric_suggests_the_nearest(driven):
+    for call in (lambda: metrics.get("dmin"), lambda: metrics.evaluate(driven(1), ["ttc", "dmin"])):
+        with pytest.raises(
+            UnknownNameError, match=r"unknown metric 'dmin'; did you mean 'd_min'\?"
+        ):
+            call()
+
+
+def test_metrics_of_the_first_version_and_their_units():
+    assert {name: m.unit for name, m in metrics.METRICS.items()} == {
+        "n_collision": "count", "ttc": "s", "d_min": "m", "v_d": "m/s", "l_offset": "m",
+        "a_change": "m/s²", "n_brake": "count",
+    }  # fmt: skip
+    assert all(m.name == name and m.description for name, m in metrics.METRICS.items())
+    assert {name for name, m in metrics.METRICS.items() if m.sense == "smaller"} == {"ttc", "d_min"}
+
+
+def test_columns_come_in_the_order_asked_for(driven):
+    rollout = driven()
+    values = metrics.evaluate(rollout, ["v_d", "d_min", "v_d"])
+    np.testing.assert_array_equal(
+        values, np.column_stack([v_d(rollout), d_min(rollout), v_d(rollout)])
+    )
+    assert metrics.evaluate(rollout, []).shape == (12, 0)
+
+
+def test_a_metric_needs_a_sense_and_a_finite_cap():
+    with pytest.raises(ValueError, match="sense must be"):
+        Metric("x", "m", "", "higher", 0.0, d_min)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"cap \[m\] of x must be finite, got inf"):
+        Metric("x", "m", "", "smaller", np.inf, d_min)
+
+
+def run_python(code: str, **environment: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env=os.environ | environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_importing_metrics_does_not_import_the_compiler():
+    run_python(
+        "import sys, bridgegen.metrics, bridgegen.objective\n"
+        "assert not {'numba', 'pandas', 'scipy'} & set(sys.modules)"
+    )
+
+
+def test_kernels_give_the_same_bits_without_compilation(driven):
+    folder = str(Path(__file__).parent)
+    code = (
+        f"import sys; sys.path.insert(0, {folder!r})\n"
+        "import conftest, numba\n"
+        "from bridgegen import metrics\n"
+        "assert numba.config.DISABLE_JIT\n"
+        "values = metrics.evaluate(conftest.drive_around(8, 3, 21), list(metrics.METRICS))\n"
+        "print(values.tobytes().hex())"
+    )
+    got = run_python(code, NUMBA_DISABLE_JIT="1").strip()
+    assert got == metrics.evaluate(driven(8, 3, 21), ALL).tobytes().hex()

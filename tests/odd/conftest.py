@@ -1,0 +1,79 @@
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+
+from bridgegen.odd.expression import parse
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.odd.scenario import (
+    LogicalScenario,
+    ObjectiveSpec,
+    Participant,
+    Term,
+    Waypoint,
+    load,
+)
+
+BuildScenario = Callable[..., LogicalScenario]
+
+
+def build_scenario(
+    parameters: Iterable[Parameter] = (),
+    bounds: Iterable[tuple[str, str | None, str | None]] = (),
+    derived: Iterable[tuple[str, str]] = (),
+    axes: tuple[Axis, ...] = (Axis.EXTENSION,),
+) -> LogicalScenario:
+    """A scenario around some parameters, made without a file (so without a file's checks)."""
+    return LogicalScenario(
+        name="made",
+        title="Made",
+        description="",
+        source="",
+        place="",
+        duration=20.0,
+        time_step=0.05,
+        template="crossroads",
+        participants=(Participant("ego", "car", Waypoint("P1", 40.0), Waypoint("P6", 40.0), 6.9),),
+        events=(),
+        axes=axes,
+        parameters={one.name: one for one in parameters},
+        bounds=tuple(
+            Bound(target, lo and parse(lo), hi and parse(hi), "a reason", "a source")
+            for target, lo, hi in bounds
+        ),
+        derived=tuple(
+            Derived(name, Axis.EXTENSION, "1", parse(value), "a reason", "a source")
+            for name, value in derived
+        ),
+        objective=ObjectiveSpec((Term("d_min", 1.0),), "fixed", "raw"),
+    )
+
+
+def parameter(
+    name: str, low: float = 0.0, high: float = 10.0, default: float | None = None, **more: object
+) -> Parameter:
+    return Parameter(
+        name, Axis.EXTENSION, "1", low, high, low if default is None else default, **more
+    )
+
+
+@pytest.fixture(scope="session")
+def build() -> BuildScenario:
+    return build_scenario
+
+
+@pytest.fixture(scope="session")
+def make_parameter() -> Callable[..., Parameter]:
+    return parameter
+
+
+@pytest.fixture(scope="session")
+def s4() -> LogicalScenario:
+    return load("crossroads-s4")
+
+
+@pytest.fixture(scope="session")
+def s4_text() -> str:
+    import bridgegen.catalogue as catalogue
+
+    return (Path(catalogue.__file__).parent / "crossroads-s4.yaml").read_text("utf-8")

@@ -1,0 +1,244 @@
+"""What every search algorithm must do; a new one passes by being registered."""
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridgegen.arrays import Float
+from bridgegen.campaign.loop import Reason, run_loop
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.search import ALGORITHMS, Algorithm
+from bridgegen.search.algorithm import resolve
+from bridgegen.store import Store
+
+pytestmark = pytest.mark.parametrize("algorithm", ALGORITHMS.values(), ids=ALGORITHMS)
+Kind = type[Algorithm]
+
+
+def sphere(U: Float, n_obj: int = 1) -> Float:
+    centres = np.linspace(0.3, 0.7, n_obj)
+    return np.stack([((U - c) ** 2).sum(axis=1) for c in centres], axis=1)
+
+
+def n_obj_of(algorithm: Kind) -> int:
+    return 2 if algorithm.many_objective else 1
+
+
+def drive(search: Algorithm, n_batches: int, n_obj: int, ok: float = 1.0) -> Float:
+    """Return the rows of n batches; about a share 1 − ok of them fails, with NaN as result."""
+    dice = np.random.default_rng(99)
+    asked = []
+    for _ in range(n_batches):
+        U = search.ask()
+        asked.append(U.copy())
+        good = dice.random(len(U)) < ok
+        F = np.where(good[:, None], sphere(U, n_obj), np.nan)
+        search.tell(U, F, good)
+    return np.concatenate(asked)
+
+
+def in_cube(U: Float, n_var: int) -> bool:
+    return U.dtype == np.float64 and U.shape[1] == n_var and bool(((U >= 0) & (U <= 1)).all())
+
+
+def evaluate(X: Float) -> SimpleNamespace:
+    F = sphere(X)
+    status = np.where(X[:, 0] > 0.9, 1, 0)  # a tenth of the cube cannot be simulated
+    F[status == 1] = np.nan
+    return SimpleNamespace(metrics=F, F=F, critical=F[:, 0] < 0.1, status=status)
+
+
+def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed: int = 3):
+    names = [f"p{i}" for i in range(n_var)]
+    if folder.exists():
+        store = Store.open(folder, write=True)
+    else:
+        store = Store.create(folder, {}, names, ["m"], n_var=n_var, n_obj=1)
+    with store:
+        result = run_loop(
+            algorithm(n_var, 1, seed), lambda U: U, evaluate, store, budget, stop=stop
+        )
+        rows = store.read()
+    return result, rows
+
+
+def test_it_describes_itself(algorithm: Kind):
+    assert algorithm.name
+    assert algorithm.name == algorithm.name.lower()
+    assert len(algorithm.description) > 10
+    assert len(algorithm.source) > 10
+    assert isinstance(algorithm.many_objective, bool)
+    for name, setting in algorithm.settings.items():
+        assert name.isidentifier()
+        assert len(setting.text) > 5
+        if isinstance(setting.default, int | float) and setting.low is not None:
+            assert setting.high is not None
+            assert setting.low <= setting.default <= setting.high
+
+
+@pytest.mark.parametrize("n_var", [1, 2, 10, 30])
+@pytest.mark.parametrize("ok", [1.0, 0.5, 0.0])
+def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: float):
+    n_obj = n_obj_of(algorithm)
+    U = drive(algorithm(n_var, n_obj, 0), 12, n_obj, ok)
+    assert in_cube(U, n_var)
+    assert len(U) >= 12
+
+
+@given(
+    seed=st.integers(0, 2**63),
+    n_var=st.integers(1, 6),
+    scale=st.sampled_from([0.0, 1e-300, 1.0, -1e12, 1e307]),
+    data=st.data(),
+)
+@settings(max_examples=15, deadline=None)
+def test_any_finite_objective_and_any_failures(algorithm: Kind, seed, n_var, scale, data):
+    n_obj = n_obj_of(algorithm)
+    search = algorithm(n_var, n_obj, seed)
+    for _ in range(4):
+        U = search.ask()
+        assert in_cube(U, n_var)
+        bits = data.draw(st.integers(0, 2 ** len(U) - 1))
+        ok = np.array([bits >> k & 1 for k in range(len(U))], dtype=bool)
+        F = np.where(ok[:, None], sphere(U, n_obj) * scale, [[np.inf] * n_obj])
+        search.tell(U, F, ok)
+
+
+def test_one_seed_one_result_whatever_others_draw(algorithm: Kind):
+    n_obj = n_obj_of(algorithm)
+    np.random.seed(1)  # noqa: NPY002  (the global generator is the point)
+    first = drive(algorithm(5, n_obj, 7), 8, n_obj, 0.8)
+    np.random.seed(2)  # noqa: NPY002
+    second = drive(algorithm(5, n_obj, 7), 8, n_obj, 0.8)
+    assert first.tobytes() == second.tobytes()
+    assert first.tobytes() != drive(algorithm(5, n_obj, 8), 8, n_obj, 0.8).tobytes()
+
+
+def test_two_searches_do_not_disturb_each_other(algorithm: Kind):
+    n_obj = n_obj_of(algorithm)
+    alone = drive(algorithm(3, n_obj, 5), 6, n_obj)
+    a, b = algorithm(3, n_obj, 5), algorithm(3, n_obj, 6)
+    beside = []
+    for _ in range(6):
+        beside.append(drive(a, 1, n_obj))
+        drive(b, 1, n_obj)
+    assert np.concatenate(beside).tobytes() == alone.tobytes()
+
+
+def test_the_global_generator_is_left_alone(algorithm: Kind):
+    n_obj = n_obj_of(algorithm)
+    np.random.seed(4)  # noqa: NPY002
+    before = np.random.get_state()[1].tobytes()  # noqa: NPY002
+    drive(algorithm(5, n_obj, 7), 4, n_obj, 0.5)
+    assert np.random.get_state()[1].tobytes() == before  # noqa: NPY002
+
+
+def test_it_says_nothing(algorithm: Kind, capfd):
+    n_obj = n_obj_of(algorithm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drive(algorithm(5, n_obj, 7), 4, n_obj, 0.5)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_told_arrays_are_not_changed(algorithm: Kind):
+    n_obj = n_obj_of(algorithm)
+    search = algorithm(3, n_obj, 0)
+    for _ in range(3):
+        U = search.ask()
+        F, ok = sphere(U, n_obj), np.arange(len(U)) % 2 == 0
+        F[~ok] = np.nan
+        copies = U.copy(), F.copy(), ok.copy()
+        search.tell(U, F, ok)
+        for array, copy in zip((U, F, ok), copies, strict=True):
+            np.testing.assert_array_equal(array, copy)
+
+
+def test_rows_may_be_changed_by_who_asked(algorithm: Kind):
+    n_obj = n_obj_of(algorithm)
+
+    def vandal(search: Algorithm) -> list[bytes]:
+        asked = []
+        for _ in range(4):
+            U = search.ask()
+            kept = U.copy()
+            asked.append(kept.tobytes())
+            U[:] = 0.5
+            search.tell(kept, sphere(kept, n_obj), np.ones(len(U), bool))
+        return asked
+
+    untouched = drive(algorithm(3, n_obj, 2), 4, n_obj)
+    assert b"".join(vandal(algorithm(3, n_obj, 2))) == untouched.tobytes()
+
+
+def test_constant_objective(algorithm: Kind):
+    search = algorithm(3, 1, 0)
+    for _ in range(10):
+        U = search.ask()
+        assert in_cube(U, 3)
+        search.tell(U, np.zeros((len(U), 1)), np.ones(len(U), bool))
+
+
+@pytest.mark.parametrize("budget", [1, 39, 40, 137])
+def test_the_budget_is_exact(algorithm: Kind, budget: int, tmp_path):
+    result, rows = run(tmp_path / "run", algorithm, budget)
+    assert result.reason is Reason.BUDGET
+    assert len(rows) == budget
+    assert len(np.unique(rows.X, axis=0)) == budget
+    assert in_cube(rows.U, 4)
+
+
+@pytest.mark.parametrize("stops", [[1], [2, 3], [1, 1, 1, 1]])
+def test_resumed_anywhere_the_result_is_the_same(algorithm: Kind, stops: list[int], tmp_path):
+    _, whole = run(tmp_path / "whole", algorithm, 210)
+    for n in stops:  # go on for n new batches, then stop
+        before = len(Store.open(tmp_path / "parts")) if (tmp_path / "parts").exists() else 0
+        left = iter([False] * (n + before // 40) + [True])
+        run(tmp_path / "parts", algorithm, 210, stop=lambda left=left: next(left))
+    result, parts = run(tmp_path / "parts", algorithm, 210)
+    assert result.reason is Reason.BUDGET
+    assert 0 < result.simulated < 210
+    for name in ("id", "U", "X", "metrics", "F", "status", "critical"):
+        assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes(), name
+
+
+def test_wrong_arguments_are_named(algorithm: Kind):
+    with pytest.raises(InputError, match="n_var ≥ 1 must hold, got 0"):
+        algorithm(0, 1, 0)
+    with pytest.raises(InputError, match="n_obj"):
+        algorithm(3, 0 if algorithm.many_objective else 2, 0)
+    with pytest.raises(InputError, match="seed ≥ 0 must hold, got -1"):
+        algorithm(3, 1, -1)
+    some = next(iter(algorithm.settings))
+    with pytest.raises(UnknownNameError, match=f"did you mean '{some}'"):
+        algorithm(3, 1, 0, **{some + "s": 1})
+
+
+def test_every_setting_is_checked_and_does_something(algorithm: Kind):
+    n_obj = n_obj_of(algorithm)
+    usual = drive(algorithm(3, n_obj, 0), 6, n_obj)
+    for name, setting in algorithm.settings.items():
+        with pytest.raises(InputError, match=name):
+            algorithm(3, n_obj, 0, **{name: None})
+        if isinstance(setting.default, bool):
+            other: object = not setting.default
+        elif isinstance(setting.default, int | float):
+            assert setting.low is not None, "numbers need a range"
+            assert setting.high is not None, "numbers need a range"
+            with pytest.raises(InputError, match=f"{name} must be in"):
+                algorithm(3, n_obj, 0, **{name: type(setting.default)(setting.high * 2 + 1)})
+            other = type(setting.default)((setting.default + min(setting.high, 100)) / 2)
+            assert other != setting.default
+        else:
+            continue
+        changed = drive(algorithm(3, n_obj, 0, **{name: other}), 6, n_obj)
+        assert changed.tobytes() != usual.tobytes(), f"{name} changes nothing"
+
+
+def test_defaults_are_what_is_resolved(algorithm: Kind):
+    values = resolve(algorithm, 3, 1, 0, {})
+    assert values == {name: setting.default for name, setting in algorithm.settings.items()}
