@@ -215,6 +215,17 @@ def test_entropy_weights_without_information():
     np.testing.assert_array_equal(entropy_weights([[0.0, 0.0], [0.0, 1.0]]), [0.0, 1.0])
 
 
+def test_entropy_weights_where_rounding_decides():
+    """Columns that vary in the last bits only: their entropy rounds to 1, or beyond."""
+    for m in range(2, 200):
+        nearly = np.ones((m, 1))
+        nearly[0] -= 2.0**-53
+        weights = entropy_weights(np.hstack([nearly, np.ones((m, 1))]))
+        np.testing.assert_allclose(weights, [1.0, 0.0])
+        informative = np.linspace(0, 1, m)[:, None]
+        assert (entropy_weights(np.hstack([nearly, informative])) >= 0.0).all()
+
+
 @pytest.mark.parametrize("R", [[[-0.1, 0.5]], [[np.nan, 0.5]], np.zeros((0, 2)), np.zeros(3)])
 def test_entropy_weights_refuse_what_is_no_share(R):
     with pytest.raises(ValueError, match="R must"):

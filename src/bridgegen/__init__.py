@@ -1,24 +1,24 @@
 """BridgeGen: safety-critical scenarios for the validation of automated vehicles.
 
-    import bridgegen as bg
-    run = bg.search("crossroads-s4", algorithm="pso", budget=1000, seed=0, out="runs/s4")
-    run.frame().query("critical").sort_values("d_min").head()
+import bridgegen as bg
+run = bg.run_search("crossroads-s4", algorithm="pso", budget=1000, seed=0, out="runs/s4")
+run.frame().query("critical").sort_values("d_min").head()
 """
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bridgegen.campaign import Run, resume, search
+    from bridgegen.campaign import Run, resume, run_search
     from bridgegen.odd.scenario import load
     from bridgegen.pipeline import simulate_file
 
-__all__ = ["Run", "load", "resume", "search", "simulate_file"]
+__all__ = ["Run", "load", "resume", "run_search", "simulate_file"]
 
 _HOMES = {
     "Run": "bridgegen.campaign",
     "load": "bridgegen.odd.scenario",
     "resume": "bridgegen.campaign",
-    "search": "bridgegen.campaign",
+    "run_search": "bridgegen.campaign",
     "simulate_file": "bridgegen.pipeline",
 }
 

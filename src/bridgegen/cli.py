@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bridgegen.errors import BridgeGenError, InputError
+from bridgegen.errors import BridgeGenError, InputError, Interrupted
 
 app = typer.Typer(
     name="bridgegen",
@@ -25,18 +25,15 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 def main() -> None:
     """Run the command line; a user's mistake is one message on stderr and exit status 2."""
-    from bridgegen.screen import fail
-
     try:
-        app(standalone_mode=True)
-    except BridgeGenError as error:
-        fail(error)
-    except KeyboardInterrupt as stop:
-        folder = getattr(stop, "folder", None)
-        print(f"\nbridgegen: {stop or 'stopped'}", file=sys.stderr)
-        if folder is not None:
-            print(f"bridgegen: go on with 'bridgegen resume {folder}'", file=sys.stderr)
+        app()
+    except Interrupted as stop:
+        print(f"bridgegen: {stop}", file=sys.stderr)
         sys.exit(130)
+    except BridgeGenError as error:
+        for problem in error.problems:
+            print(f"bridgegen: error: {problem}", file=sys.stderr)
+        sys.exit(2)
 
 
 @app.command()
@@ -80,7 +77,7 @@ def search(
     fixed = _numbers(fix or [])
     terms = _terms(objective) if objective else None
     with Screen(budget) as screen:
-        run = campaign.search(
+        run = campaign.run_search(
             scenario,
             algorithm=algorithm,
             budget=budget,

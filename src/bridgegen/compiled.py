@@ -29,7 +29,9 @@ def cache_folder() -> Path:
     name = f"kernels-{digest.hexdigest()[:16]}"
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     home = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "bridgegen"
-    fallback = Path(tempfile.gettempdir()) / f"bridgegen-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    fallback = (
+        Path(tempfile.gettempdir()) / f"bridgegen-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    )
     for parent in [Path(chosen)] if chosen else [home, fallback]:
         folder = parent / name
         try:

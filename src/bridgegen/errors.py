@@ -7,7 +7,8 @@
      │    ├── ScenarioError       a logical scenario (YAML) that breaks a rule
      │    ├── OntologyError       individuals that lack what a scenario needs, or contradict it
      │    └── UnsupportedError    valid, but outside what this version can do
-     └── StorageError             a run folder that exists, is read-only, is full, is not a run
+     ├── StorageError             a run folder that exists, is read-only, is full, is not a run
+     └── Interrupted              Ctrl-C; what is done is kept, and the run can be gone on with
 
 Every message states the rule, the value with its unit and the place; ``problems`` holds all that
 were found at once.
@@ -15,6 +16,7 @@ were found at once.
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 
 class BridgeGenError(Exception):
@@ -67,3 +69,20 @@ class UnsupportedError(InputError):
 
 class StorageError(BridgeGenError):
     """A run folder that exists already, cannot be written, is full, or is not a run."""
+
+
+class Interrupted(BridgeGenError):
+    """Ctrl-C ended a search.
+
+    Args:
+        folder: the run's; holds what was done.
+        evaluations: how many that is.
+        budget: how many it was to be.
+    """
+
+    def __init__(self, folder: Path, evaluations: int, budget: int) -> None:
+        super().__init__(
+            f"stopped after {evaluations} of {budget} evaluations; "
+            f"go on with 'bridgegen resume {folder}'"
+        )
+        self.folder, self.evaluations, self.budget = folder, evaluations, budget

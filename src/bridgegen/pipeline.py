@@ -7,7 +7,7 @@ else here prepares it.
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,15 +23,15 @@ from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build, build_static
+from bridgegen.openx.convert import roads_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
-from bridgegen.openx.convert import roads_of
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.simulation.embedded.network import Network, compile_network
-from bridgegen.simulation.embedded.program import Program, compile_storyboard
+from bridgegen.simulation.embedded.program import compile_storyboard
 from bridgegen.simulation.embedded.simulator import simulate
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 
@@ -113,7 +113,9 @@ class Pipeline:
             spec = self.scenario.objective
             sample = None
             if needs_sample(spec.weights, spec.scale):
-                U = np.random.Generator(np.random.PCG64([seed, 1])).random((SAMPLE, self.space.n_var))
+                U = np.random.Generator(np.random.PCG64([seed, 1])).random(
+                    (SAMPLE, self.space.n_var)
+                )
                 sample = (self._measure(self.space.decode(U))[0], self.metrics)
             limits = spec.critical
             objective = Objective.build(
@@ -145,9 +147,17 @@ class Pipeline:
         network, rows = self._roads_of(X)
         return simulate(self.program, network, columns, rows)
 
-    def individuals(self, values: Mapping[str, float]) -> Individuals:
-        """Return one concrete scenario's individuals."""
+    def individuals(self, values: Mapping[str, float], road_file: str = "") -> Individuals:
+        """Return one concrete scenario's individuals.
+
+        Args:
+            values: of every parameter, by name.
+            road_file: what the copy of the map will be called that is handed over with them; the
+                map's own name by default.
+        """
         site = self.road_map.site if self.road_map else None
+        if site and road_file:
+            site = replace(site, map_file=road_file)
         return build(self.scenario, values, driver=self.driver.name, site=site)
 
     def roads(self, individuals: Individuals) -> OpenDrive:
@@ -174,7 +184,9 @@ class Pipeline:
         columns = [self.space.index(name) for name in self.static_names]
         static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
         models = [
-            opendrive_from_owl(build_static(dict(zip(self.static_names, row.tolist(), strict=True))))
+            opendrive_from_owl(
+                build_static(dict(zip(self.static_names, row.tolist(), strict=True)))
+            )
             for row in static
         ]
         return compile_network(self.program, models), rows.reshape(-1).astype(np.int64)

@@ -1,17 +1,14 @@
-"""What a person sees in the terminal: the progress bar, the tables, the errors."""
+"""What a person sees in the terminal: the progress bar and the tables."""
 
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, NoReturn, Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
-
-from bridgegen.errors import BridgeGenError
 
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, Watch
@@ -22,13 +19,6 @@ _STAGES = {
     "hand over": "writing the critical scenarios",
     "report": "writing the report",
 }
-
-
-def fail(error: BridgeGenError) -> NoReturn:
-    """Print an error's problems, one a line, and end with exit status 2."""
-    for problem in error.problems or ("something is wrong",):
-        print(f"bridgegen: error: {problem}", file=sys.stderr)
-    sys.exit(2)
 
 
 class Screen:
@@ -97,7 +87,6 @@ class Screen:
 def print_summary(run: "Run") -> None:
     """Print a run's figures and where its files are."""
     s, settings = run.summary, run.settings
-    table = Table(show_header=False, box=None, pad_edge=False)
     rows = [
         ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
         ("search", f"{settings.algorithm}, seed {settings.seed}"),
@@ -112,8 +101,7 @@ def print_summary(run: "Run") -> None:
         ("report", str(run.report)),
     ]
     for name, value in rows:
-        table.add_row(name, value)
-    Console(soft_wrap=True).print(table)
+        print(f"{name:<22}{value}")
 
 
 def print_file_result(file: Path, result: "FileResult") -> None:

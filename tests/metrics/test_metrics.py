@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from bridgegen import metrics
 from bridgegen.errors import UnknownNameError
 from bridgegen.metrics.a_change import a_change
 from bridgegen.metrics.d_min import d_min
 from bridgegen.metrics.l_offset import l_offset
-from bridgegen.metrics.metric import Metric
+from bridgegen.metrics.metric import Metric, in_steps
 from bridgegen.metrics.n_brake import n_brake
 from bridgegen.metrics.n_collision import n_collision
 from bridgegen.metrics.v_d import v_d
@@ -271,14 +270,26 @@ def test_kernels_agree_with_plain_numpy(driven, shape):
     np.testing.assert_array_equal(got, np.array(expected, dtype=float))
 
 
-@given(
-    a=arrays(float, st.integers(1, 60), elements=st.floats(-9, 4)),
-    window=st.integers(1, 70),
+def test_acceleration_change_agrees_with_comparing_every_pair(rollout_of):
+    """For windows of every length, the doubling of windows has no seam."""
+    rng = np.random.default_rng(0)
+    for n in (1, 2, 7, 40):
+        lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+        a = np.cumsum(rng.normal(0, 1, (25, 1, n)), axis=-1)
+        pairs = np.abs(a[:, 0, :, None] - a[:, 0, None, :])
+        for window in range(1, 45):
+            expected = np.where(lag <= window, pairs, 0.0).max(axis=(1, 2))
+            got = a_change(rollout_of(a=a), window=window * 0.05)
+            np.testing.assert_array_equal(got, expected)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "time_step", "expected"),
+    [(0.5, 0.05, 10), (0.3, 0.1, 3), (5.0, 0.05, 100), (0.28, 0.05, 5), (0.04, 0.05, 0)],
 )
-def test_acceleration_change_agrees_with_comparing_every_pair(rollout_of, a, window):
-    lag = np.abs(np.subtract.outer(np.arange(len(a)), np.arange(len(a))))
-    expected = np.abs(np.subtract.outer(a, a))[lag <= window].max()
-    assert a_change(rollout_of(a=a[None, None]), window=window * 0.05) == [expected]
+def test_whole_steps_of_a_duration(seconds, time_step, expected):
+    """0.3 / 0.1 is 2.9999999999999996."""
+    assert in_steps("window", seconds, time_step) == expected
 
 
 # The registry.

@@ -76,6 +76,20 @@ def test_the_smallest_over_instants_and_others(rollout_of):
     assert ttc(rollout_of(x=[[0, 0, 0], first, [-99, 9, 29]], v=v)) == [1.0]
 
 
+def test_the_closest_instant_need_not_be_the_most_dangerous(rollout_of):
+    """1.5 m beside each other on parallel courses, and 20 m behind a standing one."""
+    for x, y in (([0, 24], [3.5, 0]), ([24, 0], [0, 3.5]), ([34, 0, 24], [0, 3.5, 0])):
+        v = np.where(np.array(y) > 0, 5.0, 0.0)
+        rollout = rollout_of(x=np.stack([0 * v, x]), y=np.stack([0 * v, y]), v=[5 + 0 * v, v])
+        assert ttc(rollout) == [4.0]
+
+
+def test_a_slow_approach_is_an_approach(rollout_of):
+    """Converging by a millionth of a radian: 1.499998 m at 1e-5 m/s."""
+    got = first_contact(rollout_of, pose(v=10), pose(y=3.5, h=-1e-6, v=10))
+    assert got == pytest.approx(149_999.8, rel=1e-6)
+
+
 def test_driving_on_at_constant_velocity_the_time_runs_down(rollout_of):
     """After k steps of straight driving ttc is its first value minus k steps."""
     time = 0.05 * np.arange(20)

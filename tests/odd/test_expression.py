@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError
@@ -172,6 +172,7 @@ _quarters = st.integers(-36, 36).map(lambda n: n / 4)
     st.recursive(_leaves, _grow, max_leaves=6),
     st.lists(st.tuples(_quarters, _quarters, _quarters), min_size=1, max_size=20),
 )
+@settings(deadline=None)
 def test_agrees_with_python_row_by_row(text, rows):
     table = np.array(rows)
     result = parse(text).evaluate(dict(zip("abc", table.T, strict=True)))
@@ -207,6 +208,7 @@ def test_bits_of_a_row_do_not_depend_on_the_batch(text):
 
 
 @given(st.text("ab 01.+-*/%()<>=!,einfotrmaxsqpow", max_size=60))
+@settings(deadline=None)
 def test_any_text_is_a_formula_or_one_clear_error(text):
     try:
         expression = parse(text)

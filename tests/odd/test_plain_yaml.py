@@ -2,10 +2,12 @@ import json
 import math
 
 import pytest
-from hypothesis import given
+import yaml
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import FileFormatError
+from bridgegen.odd import plain_yaml
 from bridgegen.odd.plain_yaml import MAX_BYTES, MAX_DEPTH, read_plain_yaml
 
 SCALARS = {
@@ -19,6 +21,15 @@ SCALARS = {
 }  # fmt: skip
 
 
+@pytest.fixture(params=["SafeLoader", "CSafeLoader"])
+def _either_parser(request, monkeypatch):
+    """The one in C, which is used where it is, and the one in Python must agree."""
+    if not hasattr(yaml, request.param):
+        pytest.skip("PyYAML without libyaml")
+    monkeypatch.setattr(plain_yaml, "_LOADER", getattr(yaml, request.param))
+
+
+@pytest.mark.usefixtures("_either_parser")
 @pytest.mark.parametrize(("text", "value"), SCALARS.items())
 def test_scalars(text, value):
     read = read_plain_yaml(f"key: {text}\n".encode(), "f.yaml").data
@@ -33,7 +44,11 @@ def test_nan_is_read():
 _texts = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Zl", "Zp"]), max_size=20)
 _plain = st.recursive(
     st.one_of(
-        st.none(), st.booleans(), st.integers(-(10**9), 10**9), st.floats(allow_nan=False), _texts
+        st.none(),
+        st.booleans(),
+        st.integers(-(10**9), 10**9),
+        st.floats(allow_nan=False, allow_infinity=False),
+        _texts,
     ),
     lambda inner: st.one_of(
         st.lists(inner, max_size=4), st.dictionaries(_texts, inner, max_size=4)
@@ -43,8 +58,9 @@ _plain = st.recursive(
 
 
 @given(_plain)
+@settings(deadline=None)
 def test_json_is_read_as_it_is(data):
-    text = json.dumps(data, ensure_ascii=False).replace("Infinity", ".inf")
+    text = json.dumps(data, ensure_ascii=False)
     assert read_plain_yaml(text.encode(), "f.yaml").data == data
 
 
@@ -74,6 +90,7 @@ HOSTILE = {
 }  # fmt: skip
 
 
+@pytest.mark.usefixtures("_either_parser")
 @pytest.mark.parametrize(("message", "text"), HOSTILE.items(), ids=[k[:30] for k in HOSTILE])
 def test_hostile_files(message, text):
     with pytest.raises(FileFormatError) as caught:
@@ -112,11 +129,13 @@ def test_byte_order_mark_is_skipped():
 
 
 @given(st.one_of(st.binary(max_size=60), st.text("a:-[]{}&*!|>'\"#%@ \n?,0", max_size=60)))
+@settings(deadline=None)
 def test_any_bytes_are_yaml_or_one_clear_error(data):
     data = data if isinstance(data, bytes) else data.encode()
     try:
         document = read_plain_yaml(data, "f.yaml")
-    except FileFormatError as error:
-        assert all("(f.yaml" in problem for problem in error.problems)
+    except FileFormatError as caught:
+        problems = caught.problems
     else:
-        assert document.place == "f.yaml"
+        problems = [document.at(("no", "such", "path"))]
+    assert all("f.yaml" in problem for problem in problems)

@@ -32,6 +32,7 @@ SPACES = {
 
 @pytest.mark.parametrize("name", SPACES)
 @given(data=st.data())
+@settings(deadline=None)
 def test_every_point_of_the_cube_is_feasible(name, data):
     space = SPACES[name]
     X = space.decode(data.draw(cubes(space.n_var)))
@@ -78,6 +79,7 @@ def test_random_constraints_leave_every_point_feasible(build, make_parameter, ch
 
 @pytest.mark.parametrize("name", SPACES)
 @given(data=st.data())
+@settings(deadline=None)
 def test_encode_inverts_decode(name, data):
     space = SPACES[name]
     U = data.draw(cubes(space.n_var))

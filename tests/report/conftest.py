@@ -70,9 +70,9 @@ def left_turn(speed: float, v_b: float, start: float, trigger: float) -> dict[st
 
 def gap(motion: dict[str, np.ndarray]) -> np.ndarray:
     """Box to box, from samples of the outlines (good to a few centimetres); 0 when inside."""
-    rim = np.concatenate([
-        np.stack([np.linspace(-2.3, 2.3, 24), np.full(24, q)], 1) for q in (-0.95, 0.95)
-    ] + [np.stack([np.full(9, p), np.linspace(-0.95, 0.95, 9)], 1) for p in (-2.3, 2.3)])  # fmt: skip
+    along, across = np.linspace(-2.3, 2.3, 24), np.linspace(-0.95, 0.95, 9)
+    sides = [np.stack([along, np.full(24, q)], 1) for q in (-0.95, 0.95)]
+    rim = np.concatenate(sides + [np.stack([np.full(9, p), across], 1) for p in (-2.3, 2.3)])
     c, s = np.cos(motion["h"][0])[:, None], np.sin(motion["h"][0])[:, None]
     ahead = rim[:, 0] + 1.4
     px = motion["x"][0][:, None] + ahead * c - rim[:, 1] * s
@@ -100,9 +100,8 @@ def make_report(n: int = 1000, kept: int = 10, seed: int = 0) -> ReportData:
     for name, goal in target.items():
         j = names.index(name)
         u[:, j] = np.clip(goal + (u[:, j] - goal) * (0.15 + 0.85 * heat), 0.0, 1.0)
-    value = {
-        name: low + u[:, j] * (high - low) for j, (name, (_, low, high)) in enumerate(LIMITS.items())
-    }
+    box = np.array([ends[1:] for ends in LIMITS.values()])
+    value = dict(zip(names, (box[:, 0] + u * (box[:, 1] - box[:, 0])).T, strict=True))
     motions = [
         left_turn(value["ego_speed"][i], value["bv_speed"][i], value["bv_start"][i],
                   value["bv_trigger_time"][i]) for i in range(n)
@@ -146,7 +145,7 @@ def make_report(n: int = 1000, kept: int = 10, seed: int = 0) -> ReportData:
             critical=bool(critical[i]), time_step=STEP,
             entities=(Entity("ego", **CAR), Entity("bv", **CAR)),
             **motions[i], distance=gaps[i], lanes=road, n_steps=ends[i],
-            files=tuple(f"critical/{rank + 1:04d}.{end}" for end in ("xosc", "xodr", "owl", "json")),
+            files=tuple(f"critical/{rank + 1:04d}.{end}" for end in ("xosc", "xodr", "owl")),
         )
         for rank, i in enumerate(order)
     )  # fmt: skip

@@ -148,6 +148,7 @@ def random_scene(n: int, e: int, t: int, seed: int = 0):
     x, y = rng.uniform(-12, 12, (2, n, e, t))
     h = rng.uniform(-4, 4, (n, e, t))
     h[:, :, 1::2] = h[:, :, 0:-1:2]  # headings that stay for an instant
+    h[:, :, 5::6] = h[:, :, :1]  # and that come back
     return size, x, y, h
 
 

@@ -10,7 +10,7 @@ from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.run import REPORT, Run
 from bridgegen.campaign.settings import Settings, fingerprint
-from bridgegen.errors import InputError, StorageError
+from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
 from bridgegen.odd.scenario import ObjectiveSpec, Term, load
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
@@ -21,14 +21,6 @@ from bridgegen.store import Store
 from bridgegen.store.summary import summarise
 
 MAX_BUDGET = 10_000_000
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended the search; ``folder`` holds what was done, and can be gone on with."""
-
-    def __init__(self, folder: Path, evaluations: int, budget: int) -> None:
-        super().__init__(f"stopped after {evaluations} of {budget} evaluations")
-        self.folder, self.evaluations, self.budget = folder, evaluations, budget
 
 
 @dataclass(frozen=True)
@@ -46,7 +38,7 @@ class Watch:
     written: Callable[[int], None] = lambda count: None
 
 
-def search(
+def run_search(
     scenario: str | Path,
     *,
     algorithm: str = "pso",
@@ -59,7 +51,7 @@ def search(
     junction: str | None = None,
     keep: int = 10,
     out: Path | str | None = None,
-    objective: Mapping[str, float | None] | None = None,
+    objective: dict[str, float | None] | None = None,
     weights: str | None = None,
     scale: str | None = None,
     watch: Watch | None = None,
@@ -120,6 +112,7 @@ def search(
         junction=roads.site.junction_id if roads else None,
         keep=keep,
         objective=chosen.to_dict(),
+        chosen={"objective": objective, "weights": weights, "scale": scale},
     )
     with Store.create(
         folder, settings.to_dict(), space.names, pipeline.metrics,

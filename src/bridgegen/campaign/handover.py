@@ -112,7 +112,7 @@ def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> lis
         OntologyError: its individuals break a constraint (SHACL).
         OSError: the folder cannot be written.
     """
-    individuals = pipeline.individuals(pipeline.space.values(x))
+    individuals = pipeline.individuals(pipeline.space.values(x), f"{name}.xodr")
     violations = check(individuals, pipeline.scenario)
     if violations:
         raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))

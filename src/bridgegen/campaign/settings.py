@@ -4,7 +4,7 @@ import hashlib
 import json
 import shlex
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any, Self
@@ -32,6 +32,8 @@ class Settings:
         junction: the junction of the map that was chosen.
         keep: how many scenarios are handed over.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
+        chosen: what the user chose of the objective instead of the scenario's: metrics with
+            weights, way of weighting, scale; None each where nothing.
     """
 
     scenario: str
@@ -46,7 +48,8 @@ class Settings:
     map_digest: str | None
     junction: str | None
     keep: int
-    objective: Mapping[str, Any] = field(default_factory=dict)
+    objective: Mapping[str, Any]
+    chosen: Mapping[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types."""
@@ -73,6 +76,12 @@ class Settings:
         words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
         for name, value in self.fixed.items():
             words += ["--fix", f"{name}={value!r}"]
+        if self.chosen["objective"]:
+            terms = self.chosen["objective"].items()
+            words += ["--objective", ",".join(m if w is None else f"{m}={w!r}" for m, w in terms)]
+        for option in ("weights", "scale"):
+            if self.chosen[option]:
+                words += [f"--{option}", self.chosen[option]]
         if self.map:
             words += ["--map", self.map, "--junction", str(self.junction)]
         return shlex.join([*words, "--out", str(folder)])

@@ -1,7 +1,12 @@
 """The reference ego: slows for bends, follows, yields and brakes by predicted conflict.
 
-Perception is perfect; every other body is predicted at constant velocity. The driver is a function
-of the present state alone.
+Perception is perfect, and so is knowledge of where the others are going (as if their indicators
+told): each is predicted along its route at its present speed. Where two routes come closer than
+two cars abreast lies their conflict zone; the ego enters it only if it will be clear of the other.
+The driver is a function of the present state alone.
+
+A conflict zone is a row of five: where the ego's route enters and leaves it [m], where the other's
+does [m], and 1 if the routes go on together from there (a merge), else 0. No zone: infinity.
 """
 
 import math
@@ -25,7 +30,7 @@ STOP_MARGIN = 1.5  # m, between the front bumper and the point of conflict
 HORIZON = 6.0  # s, how far it predicts
 BRAKE_FROM = 1.5  # m/s², it acts on a conflict once stopping for it needs this much
 SCAN_STEP = 1.0  # m, between the points of its route that it looks at
-SAME_WAY = 0.7  # cosine of the heading difference above which two bodies go the same way
+SAME_WAY = 0.9  # cosine of the heading difference above which two routes go on together
 
 
 @kernel
@@ -56,64 +61,83 @@ def follow(gap, v, leader_speed):  # type: ignore[no-untyped-def]
     desired = STANDSTILL_GAP + max(
         0.0,
         v * HEADWAY
-        + v
-        * (v - leader_speed)
-        / (2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)),
+        + v * (v - leader_speed) / (2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)),
     )
     ratio = desired / max(gap, 0.1)
     return COMFORT_ACCELERATION * (1.0 - ratio * ratio)
 
 
 @kernel
-def react(path, n, ds, s, v, own, qx, qy, qh, w, other):  # type: ignore[no-untyped-def]
+def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone):  # type: ignore[no-untyped-def]
+    """Fill ``zone`` with the first conflict zone of two routes."""
+    side = 0.5 * (body[1] + other_body[1]) + SIDE_MARGIN
+    zone[:] = (math.inf, math.inf, math.inf, math.inf, 0.0)
+    stride = max(int(0.5 * SCAN_STEP / ds), 1)
+    other_stride = max(int(0.5 * SCAN_STEP / other_ds), 1)
+    last_i, last_j = -1, -1
+    for i in range(0, n, stride):
+        nearest, at = math.inf, -1
+        for j in range(0, other_n, other_stride):
+            dx, dy = path[i, X] - other_path[j, X], path[i, Y] - other_path[j, Y]
+            gap = dx * dx + dy * dy
+            if gap < nearest:
+                nearest, at = gap, j
+        if nearest < side * side:
+            q = at * other_ds
+            if last_i < 0:
+                zone[0], zone[2], zone[3] = i * ds, q, q
+            zone[1], zone[2], zone[3] = i * ds, min(zone[2], q), max(zone[3], q)
+            last_i, last_j = i, at
+        elif last_i >= 0:
+            break
+    if last_i >= 0:
+        along = (
+            path[last_i, COS] * other_path[last_j, COS]
+            + path[last_i, SIN] * other_path[last_j, SIN]
+        )
+        zone[4] = 1.0 if along > SAME_WAY else 0.0
+
+
+@kernel
+def react(s, v, own, q, w, other, zone):  # type: ignore[no-untyped-def]
     """Return the acceleration [m/s²] that one other body asks for; +inf where it asks nothing.
 
-    ``own`` and ``other`` are rows (length, width, centre ahead of the reference point) [m];
-    (qx, qy), qh, w are the other's reference point, heading and speed.
+    The ego is at station s of its route at speed v, the other at q of its own at w; ``own`` and
+    ``other`` are rows (length, width, centre ahead of the reference point) [m].
     """
-    nothing = math.inf
     front, rear = own[2] + 0.5 * own[0], 0.5 * own[0] - own[2]
-    c, t = math.cos(qh), math.sin(qh)
-    cx, cy = qx + other[2] * c, qy + other[2] * t
-    half = 0.5 * other[0]
-    side = 0.5 * (own[1] + other[1]) + SIDE_MARGIN
-    first = int(s / ds)
-    # Somebody who follows in our own lane is not ours to yield to.
-    i = min(first, n - 1)
-    dx, dy = path[i, X] - cx, path[i, Y] - cy
-    same_way = c * path[i, COS] + t * path[i, SIN] > SAME_WAY
-    if same_way and dx * c + dy * t > 0.0 and abs(-dx * t + dy * c) < side:
-        return nothing
-    stride = max(int(SCAN_STEP / ds), 1)
-    last = min(n - 1, first + int(scan_length(v) / ds))
+    other_front, other_rear = other[2] + 0.5 * other[0], 0.5 * other[0] - other[2]
+    merges = zone[4] > 0.0
+    if s - rear > zone[1] or (q - other_rear > zone[3] and not merges):
+        return math.inf
+    to_enter = zone[0] - front - s  # what is left until our bumper is in
+    inside = q + other_front > zone[2]
+    if merges and inside:
+        # It drives before us, or will: its place on our route, counted from the common end.
+        ahead = zone[1] - (zone[3] - q)
+        if ahead >= s:
+            return follow(ahead - other_rear - front - s, v, w)
+        return math.inf
+    if to_enter <= 0.0:
+        return math.inf  # we are in: the way out is forward
+    if inside:
+        if w < 0.1:
+            return stop_for(to_enter, v)
+        leaves = (zone[3] + other_rear - q) / w
+        if to_enter / max(v, 1.0) < leaves + TIME_MARGIN:
+            return stop_for(to_enter, v)
+        return math.inf
+    if w < 0.1:
+        return math.inf
     pace = max(v, 1.0)
-    conflict = -1.0
-    for i in range(first, last, stride):
-        d = i * ds - s
-        if d < front:
-            continue
-        dx, dy = path[i, X] - cx, path[i, Y] - cy
-        along = dx * c + dy * t
-        across = abs(-dx * t + dy * c)
-        if across > side:
-            continue
-        if abs(along) < half + 0.5 * own[1]:
-            # It stands on our route now: a leader, or an obstacle.
-            speed = max(w * (c * path[i, COS] + t * path[i, SIN]), 0.0)
-            asked = follow(d - front, v, speed)
-            if conflict >= 0.0:
-                asked = min(asked, stop_for(conflict - front, v))
-            return asked
-        if conflict < 0.0 and w > 0.1:
-            enters = (along - half - 0.5 * own[1]) / w
-            leaves = (along + half + 0.5 * own[1]) / w
-            if leaves > 0.0 and enters < HORIZON:
-                arrives, clears = (d - front) / pace, (d + rear) / pace
-                if arrives < leaves + TIME_MARGIN and clears > enters - TIME_MARGIN:
-                    conflict = d
-    if conflict >= 0.0:
-        return stop_for(conflict - front, v)
-    return nothing
+    enters = (zone[2] - other_front - q) / w
+    width = 0.0 if merges else zone[3] - zone[2]
+    leaves = enters + (width + other[0]) / w
+    arrives = to_enter / pace
+    clears = arrives + (own[0] + (0.0 if merges else zone[1] - zone[0])) / pace
+    if enters < HORIZON and arrives < leaves + TIME_MARGIN and clears > enters - TIME_MARGIN:
+        return stop_for(to_enter, v)
+    return math.inf
 
 
 @kernel
@@ -126,13 +150,16 @@ def stop_for(distance, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def drive(path, n, ds, s, v, target, friction_limit, boxes, x, y, h, speed, k):  # type: ignore[no-untyped-def]
-    """Return the acceleration [m/s²] demanded at instant k among all bodies (rows 1.. of x, y …)."""
+def drive(path, n, ds, v, target, friction_limit, bodies, station, speed, k, zones):  # type: ignore[no-untyped-def]
+    """Return the acceleration [m/s²] demanded at instant k.
+
+    ``station`` ``(E,)`` [m] and ``speed`` ``(E, T)`` [m/s] are those of all, the ego's first.
+    """
+    s = station[0]
     planned = plan_speed(path, n, ds, s, v, target, friction_limit)
     demanded = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
-    for e in range(1, x.shape[0]):
-        asked = react(
-            path, n, ds, s, v, boxes[0], x[e, k], y[e, k], h[e, k], speed[e, k], boxes[e]
-        )
-        demanded = min(demanded, asked)
+    for e in range(1, len(station)):
+        if zones[e, 0] < math.inf:
+            asked = react(s, v, bodies[0], station[e], speed[e, k], bodies[e], zones[e])
+            demanded = min(demanded, asked)
     return demanded

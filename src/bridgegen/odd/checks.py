@@ -85,7 +85,7 @@ def use_problems(
     for name, one in declared.items():
         if name not in needed | read and one.axis is not Axis.EXTENSION:
             problems.append(
-                f"nothing uses {name} [{one.unit}] of the axis {one.axis}"
+                f"nothing in {place} uses {name} [{one.unit}] of the axis {one.axis}"
                 f"{nearest(name, needed - declared.keys())}{at(one.place)}"
             )
     return problems

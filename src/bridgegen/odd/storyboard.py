@@ -205,7 +205,7 @@ class Storyboard:
         limits = given.critical.model_dump()
         for key, value in limits.items():
             if not 0.0 <= value < math.inf:
-                self._say(f"{key} must be at least 0 and finite, got {value}", _CRITICAL)
+                self._say(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
         terms = tuple(Term(one.metric, one.weight) for one in given.terms)
         return ObjectiveSpec(terms, given.weights, given.scale, Critical(**limits))
 

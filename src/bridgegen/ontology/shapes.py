@@ -115,11 +115,10 @@ def _general_rules() -> Iterator[Rule]:
     """Yield what holds in every scenario but takes a query to say."""
     yield Rule(
         "one-value", "", "Scenario", "a parameter has one value, wherever it is bound", None, "",
-        "SELECT DISTINCT $this ?value WHERE { "
-        "?node bg:has_parameter ?parameter ; ?property ?value . "
-        "?node_2 bg:has_parameter ?parameter ; ?property_2 ?value_2 . "
-        f"{_bound_by('?parameter')} {_bound_by('?parameter', '_2')} "
-        "FILTER(?value != ?value_2) $this a bg:Scenario . }",
+        "SELECT $this (MIN(?raw) AS ?value) WHERE { $this a bg:Scenario . "
+        "?node bg:has_parameter ?parameter ; ?property ?raw . "
+        f"{_bound_by('?parameter')} }} "
+        "GROUP BY $this ?parameter HAVING(COUNT(DISTINCT ?raw) > 1)",
     )  # fmt: skip
     yield Rule(
         "on-its-road", "", "LanePosition",
@@ -242,10 +241,11 @@ def _pattern(name: str, focus: str) -> str:
     if name in WEATHER_PATHS:
         start = "" if focus == "Weather" else "bg:has_weather/"
         return f"$this {start}{WEATHER_PATHS[name]} {_raw(name)} ."
-    parameter, suffix = f"?parameter_{name}_x", f"_{name}_x"
+    # each different value once, however many lanes have it: the rules join several parameters
     return (
-        f'{parameter} bg:has_name "{name}" . ?node{suffix} bg:has_parameter {parameter} ; '
-        f"?property{suffix} {_raw(name)} . {_bound_by(parameter, suffix)}"
+        f"{{ SELECT DISTINCT $this {_raw(name)} WHERE {{ $this a bg:Scenario . "
+        f'?parameter bg:has_name "{name}" . ?node bg:has_parameter ?parameter ; '
+        f"?property {_raw(name)} . {_bound_by('?parameter')} }} }}"
     )
 
 
@@ -254,12 +254,9 @@ def _raw(name: str) -> str:
     return f"?raw_{name}_x"
 
 
-def _bound_by(parameter: str, suffix: str = "") -> str:
+def _bound_by(parameter: str) -> str:
     """Return the pattern that makes ``?property`` one that a parameter binds."""
-    return (
-        f"{parameter} bg:binds_property ?bound{suffix} . "
-        f'FILTER(STR(?property{suffix}) = CONCAT("{BG}", ?bound{suffix}))'
-    )
+    return f'{parameter} bg:binds_property ?bound . FILTER(STR(?property) = CONCAT("{BG}", ?bound))'
 
 
 def _slack(limit: str, side: int) -> str:

@@ -8,6 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from bridgegen.errors import OntologyError
+from bridgegen.odd.parameters import TOLERANCE
+
 SPEED_LIMIT = 13.9
 """Speed limit of generated legs [m/s]: 50 km/h, the usual limit in towns."""
 
@@ -116,9 +121,17 @@ class Site:
             values: ``lane_width`` [m], ``lanes_per_direction``, ``arm_length`` [m],
                 ``intersection_size`` [m]; others are ignored.
             name: of the road network.
+
+        Raises:
+            OntologyError: ``lanes_per_direction`` is no whole number.
         """
         width = float(values["lane_width"])
-        count = int(values["lanes_per_direction"])
+        lanes_per_direction = float(values["lanes_per_direction"])
+        if not abs(lanes_per_direction - np.round(lanes_per_direction)) <= TOLERANCE:
+            raise OntologyError(
+                f"lanes_per_direction must be a whole number, got {lanes_per_direction}"
+            )
+        count = round(lanes_per_direction)
         lanes = tuple(SiteLane(k, "in", width) for k in range(1, count + 1)) + tuple(
             SiteLane(-k, "out", width) for k in range(1, count + 1)
         )

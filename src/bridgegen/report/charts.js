@@ -24,8 +24,8 @@ function layout(extra) {
   return {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: palette.ink },
-    margin: { l: 8, r: 10, t: 8, b: 8 }, hoverlabel: { bgcolor: palette.card, bordercolor: palette.line, font: { color: palette.ink } },
-    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12 } }, dragmode: false,
+    margin: { l: 8, r: 10, t: 8, b: 8 }, hoverlabel: { bgcolor: palette.card, bordercolor: palette.line, font: { color: palette.ink, family: getComputedStyle(document.body).fontFamily } },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: palette.muted, activecolor: palette.accent }, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12 } }, dragmode: false,
     xaxis: { ...axis, ...xaxis }, yaxis: { ...axis, ...yaxis }, ...rest,
   };
 }
@@ -146,7 +146,11 @@ function drawScatter() {
   const plot = $("scatter"), narrow = innerWidth < 700;
   const axis = (id) => ({ title: { text: plain(titled($(id).value)), standoff: 8 }, zeroline: false });
   const extra = { xaxis: axis("axis-x"), yaxis: axis("axis-y"), dragmode: narrow ? false : "zoom", hovermode: "closest" };
-  const config = { ...CONFIG, displayModeBar: narrow ? false : "hover", modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  // Only these buttons: Plotly's own set has one that hands the data to a website.
+  const config = {
+    ...CONFIG, displayModeBar: narrow ? false : "hover", modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]],
+    toImageButtonOptions: { filename: "parameter-space", scale: 2 },
+  };
   Plotly.react(plot, scatterFigure(), layout(extra), config);
   if (plot.listening) return;
   plot.listening = true;
@@ -157,7 +161,7 @@ function drawScatter() {
 function drawCharts() {
   const charts = new Map(trendPlots());
   const drawn = new Set();
-  const redraw = (plot) => { charts.get(plot)(); window.bridgegen.chartsDrawn.push(plot); };
+  const redraw = (plot) => { charts.get(plot)(); window.bridgegen.chartsDrawn += 1; };
   if (rows.critical.length) {
     fillAxes();
     charts.set($("scatter"), drawScatter);
@@ -181,6 +185,7 @@ function drawCharts() {
     }
   }, { rootMargin: "500px" });
   for (const plot of charts.keys()) watch.observe(plot);
+  window.bridgegen.charts = charts.size;
   darkScheme.addEventListener("change", () => drawn.forEach(redraw));
   window.bridgegen.chosen = () => { if (drawn.has($("scatter"))) drawScatter(); };
 }

@@ -6,6 +6,7 @@ time to collision); the page shows a dash there.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf, isfinite
 
 from bridgegen.arrays import Bool, Float, Int, as_float
 
@@ -154,6 +155,13 @@ class Entity:
     width: float
     center_ahead: float
 
+    def __post_init__(self) -> None:
+        if not (0.0 < self.length < inf and 0.0 < self.width < inf and isfinite(self.center_ahead)):
+            raise ValueError(
+                f"box of '{self.name}' [m] must have length > 0, width > 0 and a finite centre, "
+                f"got {self.length}, {self.width}, {self.center_ahead}"
+            )
+
 
 @dataclass(frozen=True)
 class Outline:
@@ -230,7 +238,7 @@ class Playback:
         as_float(f"distance [m] of {place}", self.distance, shape[1:], finite=False)
         if not 1 <= self.n_steps <= shape[1]:
             raise ValueError(f"n_steps of {place} must be in 1..{shape[1]}, got {self.n_steps}")
-        if not 0.0 < self.time_step < float("inf"):
+        if not 0.0 < self.time_step < inf:
             raise ValueError(f"time_step [s] of {place} must be > 0, got {self.time_step}")
 
 

@@ -182,7 +182,7 @@ function fillDetails(kept) {
 function start() {
   readPalette();
   fillSummary();
-  const hook = { data, state: () => null, chartsDrawn: [], drawCharts };
+  const hook = { data, state: () => null, charts: 0, chartsDrawn: 0, drawCharts };
   window.bridgegen = hook; // for tests, and for whoever wants to drive the page
   if (data.kept.length) {
     const player = new Player(hook);

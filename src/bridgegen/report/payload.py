@@ -25,9 +25,9 @@ TRENDS = {"d_min": False, "v_d": True}
 
 
 def to_json(data: ReportData) -> str:
-    """Return the page's data as JSON that is safe inside a ``<script>`` element.
+    r"""Return the page's data as JSON that is safe inside a ``<script>`` element.
 
-    Every ``<`` is written as ``\\u003c``, so that no text in it can close the element or open a
+    Every ``<`` is written as ``\u003c``, so that no text in it can close the element or open a
     comment; everything that is not ASCII is escaped, so that lone surrogates (from file names)
     do not break the encoding.
     """
@@ -132,16 +132,21 @@ def _playback(p: Playback, road: int) -> dict[str, Any]:
     finite = np.where(np.isfinite(p.distance[real]), p.distance[real], np.inf)
     return {
         "name": p.name,
-        "rank": p.rank,
-        "evaluation": p.evaluation,
-        "critical": p.critical,
+        "rank": int(p.rank),
+        "evaluation": int(p.evaluation),
+        "critical": bool(p.critical),
         "parameters": {name: _number(value) for name, value in p.parameters.items()},
         "metrics": {name: _number(value) for name, value in p.metrics.items()},
         "files": list(p.files),
-        "time_step": p.time_step,
+        "time_step": float(p.time_step),
         "road": road,
         "entities": [
-            {"name": e.name, "length": e.length, "width": e.width, "center_ahead": e.center_ahead}
+            {
+                "name": e.name,
+                "length": float(e.length),
+                "width": float(e.width),
+                "center_ahead": float(e.center_ahead),
+            }
             for e in p.entities
         ],
         "x": [decimals(row[real], MILLIMETRE) for row in p.x],

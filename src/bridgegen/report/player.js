@@ -13,13 +13,14 @@ class Player {
     this.connect();
     Object.assign(hook, {
       select: (i) => this.choose(i), seek: (k) => this.seek(k), play: () => this.play(), pause: () => this.pause(),
-      state: () => this.drawn,
+      state: () => ({ ...this.drawn, playing: this.playing }),
     });
     const wanted = new URLSearchParams(location.hash.slice(1));
     const named = data.kept.findIndex((kept) => kept.name === wanted.get("scenario"));
     this.choose(Math.max(0, named));
     const seconds = Number.parseFloat(wanted.get("t"));
     if (named >= 0 && seconds >= 0) this.seek(Math.round(seconds / this.kept.time_step));
+    if (named >= 0) $("scenarios").scrollIntoView();
   }
 
   get last() {
@@ -117,7 +118,7 @@ class Player {
     $("scrub").value = Math.round(this.position);
     $("scrub").setAttribute("aria-valuetext", `${state.time.toFixed(2)} seconds`);
     this.drawn = {
-      scenario: this.kept.name, chosen: this.chosen, position: this.position, playing: this.playing, ...state,
+      scenario: this.kept.name, chosen: this.chosen, position: this.position, ...state,
       screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
       scale: this.scene.view.scale,
     };
@@ -167,7 +168,7 @@ class Player {
 
   // Keeps the ego in the middle, near enough to see it well; off again by itself when dragged.
   follow() {
-    const { view } = this.scene;
+    const view = this.scene.view;
     if (view.follow) return this.fit();
     view.follow = true;
     view.fitted = false;

@@ -40,7 +40,7 @@ class Scene {
   draw(state) {
     const { context: c, width, height, ratio } = fitCanvas(this.canvas);
     this.size = { width, height };
-    if (this.view.follow && this.centres[0][state.index]) {
+    if (this.view.follow && isPlaced(state.entities[0])) {
       const { x, y, h } = state.entities[0];
       [this.view.x, this.view.y] = boxCentre(this.kept.entities[0], x, y, h);
     }
@@ -214,7 +214,8 @@ class Scene {
       const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]);
       return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
     });
-    const taken = [...bodies.filter(Boolean), [0, 0, this.size.width, 44]];
+    const { width, height } = this.size;
+    const taken = [...bodies.filter(Boolean), [0, 0, width, 44], [0, height - 36, 130, height]]; // clock, zoom, scale bar
     const middles = bodies.map((box) => box && [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2]);
     const seen = middles.filter(Boolean);
     const hub = [0, 1].map((i) => seen.reduce((sum, p) => sum + p[i], 0) / seen.length);
@@ -230,7 +231,7 @@ class Scene {
         const x = mx + Math.cos(angle) * ((x1 - x0) / 2 + w / 2 + 5), y = my + Math.sin(angle) * ((y1 - y0) / 2 + h / 2 + 6);
         const box = [x - w / 2, y - h / 2, x + w / 2, y + h / 2];
         const hidden = taken.reduce((sum, other) => sum + overlap(box, other), 0);
-        const outside = w * h - overlap(box, [0, 0, this.size.width, this.size.height]);
+        const outside = w * h - overlap(box, [0, 0, width, height]);
         const turned = 0.15 * w * h * (1 - Math.cos(angle - away)), kept = this.places?.[e] === place ? 0.35 * w * h : 0;
         const cost = hidden + outside + turned - kept;
         if (cost < best.cost) best = { cost, place, x, y, box };

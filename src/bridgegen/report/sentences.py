@@ -38,7 +38,10 @@ def sentences(data: ReportData) -> list[str]:
 def summary_table(s: RunSummary) -> list[tuple[str, str]]:
     """Return the rows of the small table: what, and how much of it with its unit."""
     return [
-        ("Critical share, R_critic", f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})"),
+        (
+            "Critical share, R_critic",
+            f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})",
+        ),
         ("First critical", _at(s.first_critical)),
         ("50th critical", _at(s.fiftieth_critical)),
         ("Distance d_min, smallest", metres(s.d_min_best)),

@@ -101,21 +101,32 @@ def crossings(arms: tuple[Arm, ...]) -> Iterator[Crossing]:
     """Yield the ways across, leg by leg, lane by lane from the centre line, left before right.
 
     Straight on, lane k leads to lane k; left turns lead from the innermost lane to the innermost,
-    right turns from the outermost to the outermost.
+    right turns from the outermost to the outermost. A lane that none of this leads across (there
+    are fewer lanes opposite) goes straight on to the outermost.
     """
     around = sorted(arms, key=lambda arm: arm.heading_deg % 360.0)
     for arm in arms:
         first = around.index(arm)
         to = {turn: around[(first + k) % len(around)] for k, turn in enumerate(TURNS, start=1)}
-        last = len(arm.inbound) - 1
+        ahead, last = len(to["straight"].outbound) - 1, len(arm.inbound) - 1
         for lane in range(last + 1):
-            if lane == 0 and to["left"].outbound:
+            left = lane == 0 and bool(to["left"].outbound)
+            right = lane == last and bool(to["right"].outbound)
+            if left:
                 yield Crossing(arm, to["left"], 0, 0, "left")
-            if lane < len(to["straight"].outbound):
-                yield Crossing(arm, to["straight"], lane, lane, "straight")
-            if lane == last and to["right"].outbound:
-                outermost = len(to["right"].outbound) - 1
-                yield Crossing(arm, to["right"], last, outermost, "right")
+            if lane <= ahead or (ahead >= 0 and not left and not right):
+                yield Crossing(arm, to["straight"], lane, min(lane, ahead), "straight")
+            if right:
+                yield Crossing(arm, to["right"], last, len(to["right"].outbound) - 1, "right")
+
+
+def dead_ends(arms: tuple[Arm, ...]) -> Iterator[tuple[Arm, int]]:
+    """Yield the lanes that lead nowhere: the arm, and the lane's number from the centre line."""
+    served = {(crossing.arm.road_id, crossing.lane) for crossing in crossings(arms)}
+    for arm in arms:
+        for lane in range(len(arm.inbound)):
+            if (arm.road_id, lane) not in served:
+                yield arm, lane + 1
 
 
 def build(name: str, junction_id: str, size: float, arms: tuple[Arm, ...]) -> OpenDrive:

@@ -10,11 +10,12 @@ from typing import Literal
 from bridgegen.errors import InputError, OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
-from bridgegen.openx.opendrive.crossroads import Arm, build
+from bridgegen.openx.opendrive.crossroads import Arm, build, dead_ends
 from bridgegen.openx.opendrive.model import OpenDrive
 
 LEGS = 4
 _SLACK = 1e-9
+_LEAST_ANGLE = math.radians(1.0)
 
 
 def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
@@ -67,8 +68,11 @@ def _arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm:
         problems.append(f"{what}: has_junction_end must be start or end, got '{end}'")
     junction_end: Literal["start", "end"] = "end" if end == "end" else "start"
     limit = individuals.optional_number(leg, "has_speed_limit")
-    if limit is not None and limit <= 0.0:
-        problems.append(f"{what}: has_speed_limit [m/s] must be > 0, got {limit:g}")
+    if limit is not None and not 0.1 <= limit <= 200.0:
+        problems.append(f"{what}: has_speed_limit [m/s] must be 0.1 … 200, got {limit:g}")
+    heading = individuals.number(leg, "has_heading")
+    if not -360.0 <= heading <= 360.0:
+        problems.append(f"{what}: has_heading [deg] must be -360 … 360, got {heading:g}")
     length = individuals.number(leg, "has_length")
     if not 1.0 <= length <= 10_000.0:
         problems.append(f"{what}: has_length [m] must be 1 … 10000, got {length:g}")
@@ -108,7 +112,7 @@ def _arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm:
     return Arm(
         name=individuals.text(leg, "has_name"),
         road_id=_id(individuals, leg, "has_road_id", problems),
-        heading_deg=individuals.number(leg, "has_heading"),
+        heading_deg=heading,
         length=length,
         junction_end=junction_end,
         speed_limit=limit,
@@ -142,8 +146,12 @@ def _together(junction_id: str, size: float, arms: list[Arm]) -> list[str]:
         for value, count in counts.items()
         if count > 1
     ]
-    if not any(arm.inbound for arm in arms) or not any(arm.outbound for arm in arms):
-        problems.append("an intersection must have a lane in and a lane out, got none")
+    for arm, lane in dead_ends(tuple(arms)):
+        problems.append(
+            f"every lane in must lead across, but lane {lane} of leg {arm.name} has no leg to go to"
+        )
+    if not any(arm.inbound for arm in arms):
+        problems.append("an intersection must have a lane in, got none")
     around = sorted(arms, key=lambda arm: arm.heading_deg % 360.0)
     for arm, following in zip(around, around[1:] + around[:1], strict=True):
         need = 2.0 * _corner(arm, following)
@@ -156,15 +164,16 @@ def _together(junction_id: str, size: float, arms: list[Arm]) -> list[str]:
 
 
 def _corner(arm: Arm, following: Arm) -> float:
-    """Return how far from the centre the edges of two neighbouring legs meet [m].
+    """Return how far from the centre two neighbouring legs stop overlapping [m].
 
-    The left edge of one leg, seen outwards, meets the right edge of the next one.
+    The left edge of one leg, seen outwards, and the right edge of the next one cross at a point;
+    the legs overlap as long as both begin before it.
     """
     angle = math.radians((following.heading_deg - arm.heading_deg) % 360.0)
     left, right = sum(arm.inbound), sum(following.outbound)
-    if angle < math.radians(1.0):
+    if angle < _LEAST_ANGLE:
         return math.inf
-    if angle >= math.pi - math.radians(1.0):
+    if angle > math.pi - _LEAST_ANGLE:
         return 0.0
     cos, sin = math.cos(angle), math.sin(angle)
-    return max((right + left * cos) / sin, (left + right * cos) / sin)
+    return min((right + left * cos) / sin, (left + right * cos) / sin)

@@ -21,6 +21,9 @@ from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, ParamPoly3,
 TURN_LIMIT = 100.0
 """Largest change of heading within one geometry [rad]."""
 
+STEEPEST = 10.0
+"""Largest slope of a poly3 in its own frame."""
+
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 _BLOCK = 4096
@@ -141,12 +144,21 @@ def reference_line(road: Road, s: Float) -> Curve:
 def impossible_shape(geometry: Geometry) -> str | None:
     """Return what makes a geometry's shape impossible to follow, or None."""
     shape, length = geometry.shape, geometry.length
-    if isinstance(shape, Poly3 | ParamPoly3):
-        if isinstance(shape, ParamPoly3) and math.hypot(shape.b_u, shape.b_v) < 1e-9:
-            return "the paramPoly3 must start with a direction, got bU = bV = 0"
-        true = float(_table(geometry).length[-1])
-        if isinstance(shape, ParamPoly3) and not 0.5 * length < true < 2.0 * length:
+    if isinstance(shape, Poly3):
+        table = _table(geometry)
+        within = np.concatenate(([True], table.length[:-1] < length))
+        steepest = float(np.max(_speed(table.u, table.v, table.p)[within]))
+        if steepest > STEEPEST:
+            return f"the poly3 must rise by ≤ {STEEPEST:g} m per metre, got {steepest:.6g}"
+        return None
+    if isinstance(shape, ParamPoly3):
+        table = _table(geometry)
+        true = float(table.length[-1])
+        if not 0.5 * length < true < 2.0 * length:
             return f"length [m] must be the length of the paramPoly3, {true:.6g}, got {length:.6g}"
+        slowest = float(np.min(_speed(table.u, table.v, table.p))) * float(table.p[-1]) / true
+        if slowest < 1.0 / STEEPEST**2:
+            return "the paramPoly3 must have a direction everywhere, got one that stops"
         return None
     if isinstance(shape, Spiral):
         turn = length * max(abs(shape.curv_start), abs(shape.curv_end))

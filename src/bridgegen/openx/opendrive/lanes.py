@@ -18,6 +18,9 @@ from bridgegen.openx.opendrive.plan_view import Cubic
 Coefficients = tuple[float, float, float, float]
 ZERO: Coefficients = (0.0, 0.0, 0.0, 0.0)
 
+SLACK = 1e-6
+"""By how much a place may lie beyond its road's end [m]: the rounding of a file."""
+
 
 class LanePose(NamedTuple):
     """Where a lane's centre is at one s; ``h`` [rad] is the direction of travel."""
@@ -79,8 +82,10 @@ def lane_at(road: Road, lane_id: int, s: float) -> Lane:
     Raises:
         InputError: the road is shorter, or has no such lane there.
     """
-    if not 0.0 <= s <= road.length:
-        raise InputError(f"0 <= s <= {road.length:g} [m] must hold on road {road.id}, got s={s:g}")
+    if not -SLACK <= s <= road.length + SLACK:
+        raise InputError(
+            f"0 <= s [m] <= {road.length:.9g} must hold on road {road.id}, got s={s:.9g}"
+        )
     section = road.sections[section_index(road, s)]
     lane = section.lane(lane_id)
     if lane is None:

@@ -238,8 +238,8 @@ def joined(pieces: list[Piece]) -> list[Piece]:
         if last.taper is None:
             before = last.h + last.curvature * last.length
         else:
-            end = last.taper.at(np.array([0.0, last.length]))[2]
-            before = last.h + float(end[1] - end[0])
+            turned = last.taper.at(last.taper.travelled)[2]
+            before = last.h + float(turned[-1] - turned[0])
         turns = round((before - piece.h) / math.tau)
         found.append(piece._replace(h=piece.h + turns * math.tau) if turns else piece)
     return found
@@ -255,7 +255,7 @@ def sample(pieces: Sequence[Piece], length: float, ds: float) -> LanePath:
         raise InputError(
             f"{length / MOST_SAMPLES:g} <= ds [m] must hold on a route of {length:g} m, got {ds:g}"
         )
-    s = np.arange(math.ceil(length / ds - 1e-9) + 1) * ds
+    s: Float = np.arange(math.ceil(length / ds - 1e-9) + 1) * ds
     starts = np.array([piece.station for piece in pieces])
     which = np.maximum(np.searchsorted(starts, s, side="right") - 1, 0)
     table = np.array(

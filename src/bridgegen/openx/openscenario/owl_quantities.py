@@ -7,12 +7,13 @@ dynamic parameter with that value and refers to it by ``$name``, so it is concre
 import math
 import re
 from functools import lru_cache
+from keyword import iskeyword
 
 import pyoxigraph as ox
 
 from bridgegen.errors import OntologyError
-from bridgegen.odd.expression import Expression, parse
-from bridgegen.odd.parameters import Axis
+from bridgegen.odd.expression import RESERVED, Expression, parse
+from bridgegen.odd.parameters import Axis, slack
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject, bg
 from bridgegen.openx.openscenario import model as osc
@@ -29,7 +30,8 @@ class Quantities:
         values: every dynamic parameter's value by name, in alphabetical order.
 
     Raises:
-        OntologyError: a parameter has no value, two values, or no identifier for a name.
+        OntologyError: a parameter has no value, two values, one outside its range, or no
+            identifier for a name.
     """
 
     def __init__(self, individuals: Individuals, scenario: Subject) -> None:
@@ -44,8 +46,10 @@ class Quantities:
             if individuals.text(parameter, "has_axis") == Axis.STATIC:
                 continue
             name = individuals.text(parameter, "has_name")
-            if not _NAME.fullmatch(name):
-                raise OntologyError(f"a parameter's name must be an identifier, got '{name}'")
+            if not _NAME.fullmatch(name) or name in RESERVED or iskeyword(name):
+                raise OntologyError(
+                    f"a parameter's name must be an identifier of its own, got '{name}'"
+                )
             if name in found:
                 raise OntologyError(f"parameter {name} is declared twice")
             value = self._value(name, parameter, bearers.get(parameter, []))
@@ -68,7 +72,12 @@ class Quantities:
         if len(found) > 1:
             shown = ", ".join(f"{value!r} on {who}" for value, who in sorted(found.items()))
             raise OntologyError(f"parameter {name} must have one value, got {shown}")
-        return next(iter(found))
+        value = next(iter(found))
+        low, high = self._range(parameter)
+        if not low <= value <= high and (value < low - slack(low) or value > high + slack(high)):
+            unit = individuals.text(parameter, "has_unit")
+            raise OntologyError(f"{name} [{unit}] must be {low!r} to {high!r}, got {value!r}")
+        return value
 
     def get(self, node: Subject, name: str) -> Quantity:
         """Return an individual's number, or the reference to the parameter that it is bound to.
@@ -115,22 +124,24 @@ class Quantities:
         """Return the declaration of each dynamic parameter, its range as constraints."""
         return [
             osc.ParameterDeclaration(
-                name, osc.ParameterType.DOUBLE, format_double(value), self._range(name)
+                name, osc.ParameterType.DOUBLE, format_double(value), self._constraints(name)
             )
             for name, value in self.values.items()
         ]
 
-    def _range(self, name: str) -> tuple[osc.ValueConstraintGroup, ...]:
-        limits = (
-            (osc.Rule.GREATER_OR_EQUAL, "has_low"),
-            (osc.Rule.LESS_OR_EQUAL, "has_high"),
-        )
-        constraints = tuple(
+    def _constraints(self, name: str) -> tuple[osc.ValueConstraintGroup, ...]:
+        low, high = self._range(self._nodes[name])
+        constraints = [
             osc.ValueConstraint(rule, format_double(limit))
-            for rule, bound in limits
-            if (limit := self._individuals.optional_number(self._nodes[name], bound)) is not None
-        )
-        return (osc.ValueConstraintGroup(constraints),) if constraints else ()
+            for rule, limit in ((osc.Rule.GREATER_OR_EQUAL, low), (osc.Rule.LESS_OR_EQUAL, high))
+            if math.isfinite(limit)
+        ]
+        return (osc.ValueConstraintGroup(tuple(constraints)),) if constraints else ()
+
+    def _range(self, parameter: Subject) -> tuple[float, float]:
+        low = self._individuals.optional_number(parameter, "has_low")
+        high = self._individuals.optional_number(parameter, "has_high")
+        return -math.inf if low is None else low, math.inf if high is None else high
 
 
 @lru_cache(maxsize=256)

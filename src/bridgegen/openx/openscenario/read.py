@@ -4,6 +4,7 @@ What the model does not declare is refused by name and line, never skipped: a sc
 is a scenario that is understood.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,6 +21,7 @@ from bridgegen.openx.xml import parse_xml
 
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")
 MAX_PROBLEMS = 50
+_ENOUGH = 1000  # problems; a file with more is not worth reading on
 _HINT = "{http://www.w3.org/2001/XMLSchema-instance}"  # where to find an XSD: no content
 
 
@@ -47,7 +49,9 @@ def read(source: Path | str | bytes, place: str | None = None) -> OpenScenario:
             f"{place}: the root element must be OpenSCENARIO, got {_tag(root)} (line 1)"
         )
     reader = _Reader()
-    scenario = reader.element(OpenScenario, root)
+    scenario: Element | None = None
+    with suppress(_EnoughError):
+        scenario = reader.element(OpenScenario, root)
     reader.raise_problems(place)
     scenario = cast(OpenScenario, scenario)
     _check_version(scenario, place)
@@ -68,7 +72,14 @@ def _check_version(scenario: OpenScenario, place: str) -> None:
 
 def _shorten(problems: list[str]) -> list[str]:
     more = len(problems) - MAX_PROBLEMS
-    return problems if more <= 0 else [*problems[:MAX_PROBLEMS], f"… and {more} more problems"]
+    if more <= 0:
+        return problems
+    least = "at least " if len(problems) == _ENOUGH else ""
+    return [*problems[:MAX_PROBLEMS], f"… and {least}{more} more problems"]
+
+
+class _EnoughError(Exception):
+    """There are more problems than anybody wants to know."""
 
 
 @dataclass
@@ -87,10 +98,15 @@ class _Reader:
             raise error(*_shorten(texts))
 
     def wrong(self, node: etree._Element, text: str) -> None:
-        self.malformed.append((node.sourceline or 0, text))
+        self._note(self.malformed, node, text)
 
     def unknown(self, node: etree._Element, text: str) -> None:
-        self.unsupported.append((node.sourceline or 0, text))
+        self._note(self.unsupported, node, text)
+
+    def _note(self, problems: list[tuple[int, str]], node: etree._Element, text: str) -> None:
+        if len(self.malformed) + len(self.unsupported) == _ENOUGH:
+            raise _EnoughError
+        problems.append((node.sourceline or 0, text))
 
     def element(self, cls: type[Element], node: etree._Element) -> Element | None:
         """Return the model's element, or None if any part of it is wrong."""

@@ -115,7 +115,7 @@ def bicycle(x, y, h, v, demanded, curvature, wheelbase, limits, friction_limit, 
 
 @kernel
 def simulate_one(
-    paths, path_n, path_ds, station0, points, slots, bodies, init, triggers, groups, conditions,
+    paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups, conditions,
     acts, events, friction_slot, driver, dt, x, y, h, v, a, offset,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
     """Fill one scenario's ``(E, T)`` arrays; return (n_steps, status)."""
@@ -175,7 +175,7 @@ def simulate_one(
             demanded = hold_speed(v[0, k], command[0])
         else:
             demanded = drive(
-                paths[0], n0, ds0, s0, v[0, k], command[0], friction_limit, bodies, x, y, h, v, k
+                paths[0], n0, ds0, v[0, k], command[0], friction_limit, bodies, station, v, k, zones
             )
         nx, ny, nh, nv, given = bicycle(
             x[0, k], y[0, k], h[0, k], v[0, k], demanded, bend, bodies[0, 3], bodies[0, 4:7],
@@ -199,9 +199,7 @@ def simulate_one(
             if k < last:
                 station[e] = ahead
                 v[e, k + 1] = command[e]
-                x[e, k + 1], y[e, k + 1], h[e, k + 1] = pose(
-                    paths[e], path_n[e], path_ds[e], ahead
-                )
+                x[e, k + 1], y[e, k + 1], h[e, k + 1] = pose(paths[e], path_n[e], path_ds[e], ahead)
                 offset[e, k + 1] = 0.0
         if not (math.isfinite(nx) and math.isfinite(ny) and math.isfinite(nh)):
             status = NOT_FINITE
@@ -226,14 +224,14 @@ def ramp(command, target, rate, e, dt):  # type: ignore[no-untyped-def]
 
 @kernel
 def simulate_rows(
-    network, paths, path_n, path_ds, station0, points, slots, bodies, init, triggers, groups,
+    network, paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
     conditions, acts, events, friction_slot, driver, dt, x, y, h, v, a, offset, n_steps, status,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
     """Fill the batch's ``(N, E, T)`` arrays, row by row; ``network`` tells each row's roads."""
     for i in range(slots.shape[0]):
         p = network[i]
         n_steps[i], status[i] = simulate_one(
-            paths[p], path_n[p], path_ds[p], station0[i], points[p], slots[i], bodies, init,
+            paths[p], path_n[p], path_ds[p], zones[p], station0[i], points[p], slots[i], bodies, init,
             triggers, groups, conditions, acts, events, friction_slot, driver, dt,
             x[i], y[i], h[i], v[i], a[i], offset[i],
         )  # fmt: skip

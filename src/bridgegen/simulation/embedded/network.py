@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -26,6 +27,8 @@ class Network:
             [1/m]; rows from ``counts`` on are padding.
         counts: ``(P, E)`` int64, samples of each path.
         steps: ``(P, E)`` float64 [m], between two samples.
+        zones: ``(P, E, 5)`` float64: where the route of the ego meets that of each other; see
+            ``bridgegen.ego._reference_kernels``.
         station: ``(P, E, 2)`` float64: an entity that starts at s on its road starts a + b·s along
             its path.
         points: ``(P, C, 2)`` float64 [m], the position that a condition names; 0 where none.
@@ -34,6 +37,7 @@ class Network:
     paths: Float
     counts: Int
     steps: Float
+    zones: Float
     station: Float
     points: Float
 
@@ -53,6 +57,8 @@ def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
     Raises:
         InputError: a position that is not on a road, or a route that no lane leads along.
     """
+    from bridgegen.ego._reference_kernels import find_zone  # numba is slow to import
+
     shape = (len(models), len(program.names))
     tables: list[Float] = []
     counts, steps = np.empty(shape, dtype=np.int64), np.empty(shape)
@@ -76,7 +82,13 @@ def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
     paths = np.zeros((*shape, int(counts.max()), 6))
     for index, table in enumerate(tables):
         paths[index // shape[1], index % shape[1], : len(table)] = table
-    return Network(paths, counts, steps, station, points)
+    zones = np.full((*shape, 5), np.inf)
+    for p, e in product(range(shape[0]), range(1, shape[1])):
+        find_zone(
+            paths[p, 0], counts[p, 0], steps[p, 0], program.bodies[0],
+            paths[p, e], counts[p, e], steps[p, e], program.bodies[e], zones[p, e],
+        )  # fmt: skip
+    return Network(paths, counts, steps, zones, station, points)
 
 
 def _route(program: Program, model: OpenDrive, e: int) -> Route:

@@ -226,7 +226,7 @@ class _Compiler:
         if isinstance(value, osc.ParameterRef | Expr):
             if isinstance(value, osc.ParameterRef) and value.name in self.parameters:
                 return self.parameters[value.name]
-            self.unsupported(element, f"{name}=\"{value}\" (a number is needed)")
+            self.unsupported(element, f'{name}="{value}" (a number is needed)')
             return 0.0
         return float(value)
 
@@ -306,7 +306,10 @@ class _Compiler:
         missing = [name for name in self.names if name not in starts]
         if missing and not self.problems:
             raise InputError(
-                *(f"{self.place}: entity '{name}' needs an initial TeleportAction" for name in missing)
+                *(
+                    f"{self.place}: entity '{name}' needs an initial TeleportAction"
+                    for name in missing
+                )
             )
         return (
             [init[name] for name in self.names],
@@ -321,7 +324,7 @@ class _Compiler:
             self.unsupported(where, f"{type(where).__name__} here")
             return None
         if where.offset is not None and where.offset != 0.0:
-            self.unsupported(where, f"offset=\"{where.offset}\" (other than 0)")
+            self.unsupported(where, f'offset="{where.offset}" (other than 0)')
         turned = where.orientation
         if turned is not None and any(
             value not in (None, 0.0) for value in (turned.h, turned.p, turned.r)
@@ -330,7 +333,7 @@ class _Compiler:
         try:
             lane = int(str(where.lane_id))
         except ValueError:
-            self.unsupported(where, f"laneId=\"{where.lane_id}\" (a whole number is needed)")
+            self.unsupported(where, f'laneId="{where.lane_id}" (a whole number is needed)')
             return None
         return LanePoint(str(where.road_id), lane, where.s, where.line)
 
@@ -347,15 +350,13 @@ class _Compiler:
                         events += self._event(event, group, len(acts) - 1)
         return acts, events
 
-    def _event(
-        self, event: osc.Event, group: osc.ManeuverGroup, act: int
-    ) -> list[tuple[int, ...]]:
+    def _event(self, event: osc.Event, group: osc.ManeuverGroup, act: int) -> list[tuple[int, ...]]:
         if event.maximum_execution_count not in (None, 1):
-            self.unsupported(event, f"maximumExecutionCount=\"{event.maximum_execution_count}\"")
+            self.unsupported(event, f'maximumExecutionCount="{event.maximum_execution_count}"')
         if group.maximum_execution_count != 1:
-            self.unsupported(group, f"maximumExecutionCount=\"{group.maximum_execution_count}\"")
+            self.unsupported(group, f'maximumExecutionCount="{group.maximum_execution_count}"')
         if event.priority is osc.Priority.SKIP or isinstance(event.priority, osc.ParameterRef):
-            self.unsupported(event, f"priority=\"{event.priority}\"")
+            self.unsupported(event, f'priority="{event.priority}"')
         trigger = self._trigger(event.start_trigger, always=True)
         rows: list[tuple[int, ...]] = []
         for one in event.actions:
@@ -421,7 +422,7 @@ class _Compiler:
     def _condition(self, condition: osc.Condition) -> None:
         edge = _EDGES.get(condition.condition_edge, -1)  # type: ignore[arg-type]
         if edge < 0:
-            self.unsupported(condition, f"conditionEdge=\"{condition.condition_edge}\"")
+            self.unsupported(condition, f'conditionEdge="{condition.condition_edge}"')
         delay = round(self.literal(condition, "delay", condition.delay) / self.time_step)
         kind = condition.condition
         if isinstance(kind, osc.ByValueCondition):
@@ -431,7 +432,8 @@ class _Compiler:
             )
             if not self.triggers:  # the storyboard's own stop trigger is the first
                 self.stop_time = max(
-                    self.stop_time, self.literal(clock, "value", clock.value) + delay * self.time_step
+                    self.stop_time,
+                    self.literal(clock, "value", clock.value) + delay * self.time_step,
                 )
             return
         entities = kind.triggering_entities.entity_refs
@@ -442,7 +444,7 @@ class _Compiler:
         if isinstance(inner, osc.ReachPositionCondition):
             point = self._lane_point(inner.position)
             if point is not None and isinstance(point.s, osc.ParameterRef | Expr):
-                self.unsupported(inner, f"s=\"{point.s}\" of a position to be reached")
+                self.unsupported(inner, f's="{point.s}" of a position to be reached')
             self._append(_REACH_POSITION, entity, 0, 0, inner.tolerance, edge, delay, point)
             return
         other = self.names.index(str(inner.entity_ref))
@@ -450,15 +452,15 @@ class _Compiler:
             osc.RelativeDistanceType.EUCLIDIAN_DISTANCE, osc.RelativeDistanceType.CARTESIAN_DISTANCE,
         )  # fmt: skip
         if inner.relative_distance_type not in euclidian:
-            self.unsupported(inner, f"relativeDistanceType=\"{inner.relative_distance_type}\"")
+            self.unsupported(inner, f'relativeDistanceType="{inner.relative_distance_type}"')
         if inner.freespace is not False:
-            self.unsupported(inner, f"freespace=\"{str(inner.freespace).lower()}\"")
+            self.unsupported(inner, f'freespace="{str(inner.freespace).lower()}"')
         rule = self._rule(inner, inner.rule)
         self._append(_RELATIVE_DISTANCE, entity, other, rule, inner.value, edge, delay)
 
     def _rule(self, element: Element, rule: osc.Rule | osc.ParameterRef) -> int:
         if isinstance(rule, osc.ParameterRef):
-            self.unsupported(element, f"rule=\"{rule}\"")
+            self.unsupported(element, f'rule="{rule}"')
             return 0
         return _RULES[rule]
 

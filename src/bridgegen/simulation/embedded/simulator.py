@@ -41,7 +41,8 @@ def simulate(
     x, y, h, v, acceleration, offset = (np.empty((n, e, t)) for _ in range(6))
     n_steps, status = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int8)
     simulate_rows(
-        rows, network.paths, network.counts, network.steps, station, network.points, slots,
+        rows, network.paths, network.counts, network.steps, network.zones,
+        station, network.points, slots,
         program.bodies, program.init, program.triggers, program.groups, program.conditions,
         program.acts, program.events, program.friction_slot, program.driver.code,
         program.time_step, x, y, h, v, acceleration, offset, n_steps, status,

@@ -1,0 +1,226 @@
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign import handover
+from bridgegen.campaign.handover import most_critical
+from bridgegen.cli import main
+from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.store import Store
+
+TOWN05 = Path(__file__).parents[3] / "shared" / "data" / "Town05.xodr"
+
+
+def rows_of(folder: Path):
+    with Store.open(folder) as store:
+        return store.read()
+
+
+def same(a, b) -> bool:
+    return all(
+        np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
+        for name in ("id", "U", "X", "metrics", "F", "status", "critical")
+    )
+
+
+def variants():
+    yield pytest.param({"scenario": "crossroads-s4"}, id="s4")
+    yield pytest.param({"scenario": "crossroads-s1", "ego": "reference"}, id="reference")
+    yield pytest.param({"scenario": "crossroads-s3", "algorithm": "random"}, id="random")
+    yield pytest.param(
+        {"scenario": "crossroads-s2", "axes": ["static", "participants", "weather"]}, id="static"
+    )
+    yield pytest.param(
+        {"scenario": "crossroads-s4", "weights": "entropy", "scale": "standardised"}, id="entropy"
+    )
+    yield pytest.param(
+        {"scenario": "crossroads-s4", "road_map": TOWN05},
+        id="town05",
+        marks=pytest.mark.skipif(not TOWN05.exists(), reason="needs Town05.xodr"),
+    )
+
+
+@pytest.mark.parametrize("arguments", list(variants()))
+def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, arguments):
+    run = bg.run_search(**arguments, budget=200, keep=3, out=tmp_path / "run")
+    rows = rows_of(run.folder)
+    assert len(rows) == run.summary.evaluations == 200
+    assert run.finished
+    assert run.scenarios
+    assert run.report.stat().st_size > 10_000
+    for path in run.scenarios:
+        facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
+        result = bg.simulate_file(path)
+        recorded = rows.metrics[facts["evaluation"]]
+        assert list(result.metrics.values()) == recorded.tolist()
+        assert result.driver == run.settings.ego
+        assert facts["critical"]
+        for name, one in facts["metrics"].items():
+            assert one["value"] in (result.metrics[name], None)
+
+
+def test_most_critical_are_distinct_critical_and_in_order():
+    rng = np.random.default_rng(3)
+    U, F, critical = rng.random((300, 4)), rng.normal(size=(300, 1)), rng.random(300) < 0.5
+    kept = most_critical(U, F, critical, 20)
+    assert critical[kept].all()
+    assert (np.diff(F[kept, 0]) >= 0.0).all()
+    assert kept[0] == np.flatnonzero(critical)[np.argmin(F[critical, 0])]
+    for i, a in enumerate(kept):
+        for b in kept[:i]:
+            assert np.sqrt(((U[a] - U[b]) ** 2).mean()) >= handover.DISTINCT
+
+
+def test_the_recorded_command_makes_the_same_run(tmp_path, monkeypatch):
+    first = bg.run_search(
+        "crossroads-s4", budget=60, seed=5, algorithm="random", out=tmp_path / "a", keep=1,
+        fixed={"fog_density": 25.0}, weights="entropy",
+    )  # fmt: skip
+    words = shlex.split(first.settings.command(tmp_path / "b"))
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code in (0, None)
+    assert same(rows_of(tmp_path / "a"), rows_of(tmp_path / "b"))
+
+
+def test_one_seed_one_result_and_another_seed_another(tmp_path):
+    runs = [
+        bg.run_search("crossroads-s1", budget=80, seed=seed, out=tmp_path / str(i), keep=0)
+        for i, seed in enumerate((1, 1, 2))
+    ]
+    a, b, c = (rows_of(run.folder) for run in runs)
+    assert same(a, b)
+    assert not np.array_equal(a.U, c.U)
+
+
+def start(folder: Path, budget: int) -> subprocess.Popen[str]:
+    command = f"search crossroads-s4 --budget {budget} --seed 3 --keep 2 --out {folder}"
+    code = "from bridgegen.cli import main; main()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *command.split()],
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def wait_for_rows(folder: Path, process: subprocess.Popen[str], count: int) -> None:
+    end = time.monotonic() + 120
+    while time.monotonic() < end and process.poll() is None:
+        try:
+            with Store.open(folder) as store:
+                if len(store) >= count:
+                    return
+        except StorageError:
+            pass
+        time.sleep(0.01)
+    raise AssertionError(f"no {count} rows in time: {process.stderr and process.stderr.read()}")
+
+
+def test_killed_and_resumed_is_as_if_undisturbed(tmp_path):
+    undisturbed = bg.run_search(
+        "crossroads-s4", budget=4000, seed=3, keep=2, out=tmp_path / "whole"
+    )
+    process = start(tmp_path / "killed", 4000)
+    wait_for_rows(tmp_path / "killed", process, 200)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    before = rows_of(tmp_path / "killed")
+    assert 200 <= len(before) < 4000
+    resumed = bg.resume(tmp_path / "killed")
+    rows = rows_of(resumed.folder)
+    assert same(rows, rows_of(undisturbed.folder))
+    # What was done is kept as it was, not done again.
+    assert (rows.seconds[: len(before)] == before.seconds).all()
+    for a, b in zip(undisturbed.scenarios, resumed.scenarios, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+
+
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path):
+    process = start(tmp_path / "run", 200_000)
+    wait_for_rows(tmp_path / "run", process, 200)
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert f"bridgegen resume {tmp_path / 'run'}" in errors
+    assert "Traceback" not in errors
+    assert len(rows_of(tmp_path / "run")) >= 200
+
+
+def test_a_finished_run_gets_its_files_again(tmp_path):
+    run = bg.run_search("crossroads-s4", budget=120, out=tmp_path / "run", keep=1)
+    run.report.unlink()
+    again = bg.resume(run.folder)
+    assert again.report.exists()
+    assert again.summary == run.summary
+
+
+def test_a_run_is_never_overwritten(tmp_path):
+    bg.run_search("crossroads-s4", budget=40, out=tmp_path / "run", keep=0)
+    with pytest.raises(StorageError, match="resume"):
+        bg.run_search("crossroads-s4", budget=40, out=tmp_path / "run", keep=0)
+
+
+def test_a_changed_scenario_is_not_gone_on_with(tmp_path):
+    text = "\n".join(
+        (Path(bg.__file__).parent / "catalogue" / "crossroads-s4.yaml")
+        .read_text("utf-8")
+        .split("\n")
+    ).replace("scenario: crossroads-s4", "scenario: mine")
+    file = tmp_path / "mine.yaml"
+    file.write_text(text, "utf-8")
+    run = bg.run_search(file, budget=40, out=tmp_path / "run", keep=0)
+    assert bg.resume(run.folder).summary == run.summary
+    file.write_text(text.replace("high: 3.6", "high: 3.5"), "utf-8")
+    with pytest.raises(StorageError, match="not what it was"):
+        bg.resume(run.folder)
+
+
+def test_the_results_are_a_data_frame(tmp_path):
+    run = bg.run_search("crossroads-s4", budget=80, out=tmp_path / "run", keep=0)
+    frame = run.frame()
+    assert len(frame) == 80
+    assert {"ego_speed", "friction", "d_min", "v_d", "critical"} <= set(frame.columns)
+    assert frame["critical"].mean() == run.summary.r_critic
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"scenario": "crossroads-s5"}, "did you mean 'crossroads-s"),
+        ({"algorithm": "psso"}, "did you mean 'pso'"),
+        ({"ego": "referenze"}, "did you mean 'reference'"),
+        ({"objective": {"d_mim": 1.0}}, "did you mean 'd_min'"),
+        ({"axes": ["wether"]}, "weather"),
+        ({"weights": "entropie"}, "entropy"),
+        ({"fixed": {"fog": 1.0}}, "fog_density"),
+    ],
+)
+def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
+    with pytest.raises(UnknownNameError, match=message):
+        bg.run_search(**({"scenario": "crossroads-s4", "out": tmp_path / "run"} | arguments))
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"budget": 0}, "1 <= budget"),
+        ({"seed": -1}, "0 <= seed"),
+        ({"keep": -1}, "0 <= keep"),
+        ({"fixed": {"fog_density": 180.0}}, "fog_density"),
+        ({"road_map": Path("nowhere.xodr")}, "nowhere.xodr"),
+    ],
+)
+def test_a_number_out_of_range_is_one_clear_error(tmp_path, arguments, message):
+    with pytest.raises(InputError, match=message):
+        bg.run_search("crossroads-s4", out=tmp_path / "run", **arguments)
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,385 @@
+"""The page in a real browser: what it draws is what the data says, and it asks nobody for it."""
+
+import math
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridgegen.report.data import ReportData
+from bridgegen.report.page import write_report
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+CHROMIUM = shutil.which("chromium")
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed"),
+]
+OPTIONS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update"]
+
+
+@dataclass
+class Opened:
+    """A page, and whatever it complained about or asked for."""
+
+    page: Any
+    complaints: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def state(self) -> dict[str, Any]:
+        return self.page.evaluate("bridgegen.state()")
+
+    def scroll_through(self) -> None:
+        """Bring every chart into sight, and wait until all are drawn."""
+        self.page.evaluate(
+            """async () => {
+                 for (const chart of document.querySelectorAll(".plot, #parallel")) {
+                   chart.scrollIntoView();
+                   await new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(r)));
+                 }
+               }"""
+        )
+        self.page.wait_for_function("bridgegen.chartsDrawn >= bridgegen.charts")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def show(browser, tmp_path_factory):
+    """Write a report and open it from disk."""
+
+    def open_(data: ReportData, fragment: str = "", **context: Any) -> Opened:
+        path: Path = tmp_path_factory.mktemp("report") / "report.html"
+        write_report(path, data)
+        context.setdefault("viewport", {"width": 1280, "height": 720})
+        opened = Opened(browser.new_page(**context))
+        opened.page.on(
+            "console",
+            lambda m: opened.complaints.append(m.text) if m.type == "error" else None,
+        )
+        opened.page.on("pageerror", lambda error: opened.complaints.append(str(error)))
+        opened.page.on("request", lambda request: opened.requests.append(request.url))
+        opened.page.goto(path.as_uri() + fragment)
+        return opened
+
+    return open_
+
+
+@pytest.fixture(scope="module")
+def opened(show, report) -> Iterator[Opened]:
+    opened = show(report)
+    yield opened
+    opened.page.close()
+
+
+def scrub(page: Any, step: int) -> None:
+    page.locator("#scrub").evaluate(
+        "(e, k) => { e.value = k; e.dispatchEvent(new Event('input')); }", step
+    )
+
+
+def pixel(page: Any, at: list[float]) -> list[int]:
+    return page.evaluate(
+        "([x, y]) => [...document.getElementById('scene').getContext('2d')"
+        ".getImageData(Math.round(x), Math.round(y), 1, 1).data].slice(0, 3)",
+        at,
+    )
+
+
+def colour(page: Any, name: str) -> list[int]:
+    text = page.evaluate(f"getComputedStyle(document.documentElement).getPropertyValue('{name}')")
+    return [int(text.strip()[i : i + 2], 16) for i in (1, 3, 5)]
+
+
+def test_it_loads_without_a_complaint_or_a_request(opened):
+    opened.scroll_through()
+    assert opened.complaints == []
+    assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [
+        opened.page.url.split("#")[0]
+    ]
+
+
+def test_the_summary_is_shown(opened, report):
+    assert opened.page.inner_text("h1") == report.summary.title
+    assert f"{report.summary.n_critical} of them" in opened.page.inner_text("#sentences")
+    assert opened.page.inner_text("#command") == report.summary.command
+    assert opened.page.locator("#list-body tr").count() == len(report.kept)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_what_is_drawn_is_the_data(opened, report, share):
+    p = report.kept[1]
+    opened.page.evaluate("bridgegen.select(1)")
+    k = round(share * (p.n_steps - 1))
+    scrub(opened.page, k)
+    state = opened.state()
+    assert (state["scenario"], state["index"], state["playing"]) == (p.name, k, False)
+    assert state["time"] == pytest.approx(k * p.time_step, abs=1e-9)
+    assert state["distance"] == pytest.approx(p.distance[k], abs=5.01e-4)
+    for e, drawn in enumerate(state["entities"]):
+        for name in "xyhv":
+            assert drawn[name] == pytest.approx(getattr(p, name)[e, k], abs=5.01e-4)
+    # Metres to pixels is one scale for both axes, with y up.
+    (ax, ay), (bx, by) = state["screen"]
+    centre = [
+        (p.x[e, k] + 1.4 * math.cos(p.h[e, k]), p.y[e, k] + 1.4 * math.sin(p.h[e, k]))
+        for e in (0, 1)
+    ]
+    assert bx - ax == pytest.approx(state["scale"] * (centre[1][0] - centre[0][0]), abs=0.02)
+    assert by - ay == pytest.approx(-state["scale"] * (centre[1][1] - centre[0][1]), abs=0.02)
+    if p.distance[k] > 3.0:  # no cross, no label over it
+        assert pixel(opened.page, state["screen"][0]) == colour(opened.page, "--ego")
+        assert pixel(opened.page, state["screen"][1]) == colour(opened.page, "--other-1")
+
+
+def test_it_opens_at_the_smallest_gap_and_marks_it(opened, report):
+    opened.page.evaluate("bridgegen.select(0)")
+    p = report.kept[0]
+    assert opened.state()["index"] == p.distance[: p.n_steps].argmin()
+    assert opened.page.inner_text("#flag") == "collision"
+    scrub(opened.page, 0)
+    assert not opened.page.is_visible("#flag")
+    opened.page.click("#to-contact")
+    assert opened.state()["index"] == np.flatnonzero(p.distance <= 0.0)[0]
+
+
+def test_it_plays_at_the_speed_chosen_and_pauses(opened):
+    page = opened.page
+    page.evaluate("bridgegen.select(0)")
+    scrub(page, 0)
+    page.select_option("#speed", "2")
+    page.click("#play")
+    assert page.get_attribute("#play", "aria-label") == "Pause"
+    seconds = page.evaluate(
+        """() => new Promise((done) => requestAnimationFrame((from) => {
+             const start = bridgegen.state().time;
+             const tick = (now) => (now - from > 600
+               ? done((bridgegen.state().time - start) / ((now - from) / 1000))
+               : requestAnimationFrame(tick));
+             requestAnimationFrame(tick);
+           }))"""
+    )
+    page.click("#play")
+    assert not opened.state()["playing"]
+    assert 0.8 < seconds < 2.2  # slower only where the machine drops frames
+    held = opened.state()["position"]
+    assert held == round(held) > 0
+    page.wait_for_timeout(80)
+    assert opened.state()["position"] == held
+    page.select_option("#speed", "1")
+
+
+def test_it_stops_at_the_end_and_starts_over(opened, report):
+    last = report.kept[0].n_steps - 1
+    opened.page.evaluate("bridgegen.select(0)")
+    scrub(opened.page, last - 2)
+    opened.page.evaluate("bridgegen.play()")
+    opened.page.wait_for_function("!bridgegen.state().playing")
+    assert opened.state()["index"] == last
+    opened.page.evaluate("bridgegen.play()")
+    opened.page.wait_for_function("bridgegen.state().index < 100")
+    opened.page.evaluate("bridgegen.pause()")
+
+
+def test_keys(opened, report):
+    page = opened.page
+    page.evaluate("bridgegen.select(1)")
+    page.focus("#scene")
+    last = report.kept[1].n_steps - 1
+    for key, index in [
+        ("Home", 0), ("ArrowRight", 1), ("Shift+ArrowRight", 11), ("ArrowLeft", 10),
+        ("Shift+ArrowLeft", 0), ("ArrowLeft", 0), ("End", last), ("ArrowRight", last),
+    ]:  # fmt: skip
+        page.keyboard.press(key)
+        assert opened.state()["index"] == index, key
+    page.keyboard.press("Home")
+    page.keyboard.press("Space")
+    assert opened.state()["playing"]
+    page.keyboard.press("Space")
+    assert not opened.state()["playing"]
+    page.keyboard.press("]")
+    assert page.input_value("#speed") == "2"
+    page.keyboard.press("[")
+    before = opened.state()["scale"]
+    page.keyboard.press("+")
+    assert opened.state()["scale"] == pytest.approx(1.4 * before)
+    page.keyboard.press("f")
+    assert opened.state()["scale"] == pytest.approx(before)
+
+
+def test_keys_in_a_form_field_are_left_alone(opened):
+    opened.page.evaluate("bridgegen.select(1)")
+    before = opened.state()["index"]
+    opened.page.focus("#filter-low")
+    opened.page.keyboard.press("Home")
+    assert opened.state()["index"] == before
+
+
+def test_following_keeps_the_ego_in_the_middle(opened):
+    page = opened.page
+    page.click("#follow")
+    for k in (10, 60):
+        scrub(page, k)
+        box = page.locator("#scene").bounding_box()
+        middle = [box["width"] / 2, box["height"] / 2]
+        assert opened.state()["screen"][0] == pytest.approx(middle, abs=1.0)
+    page.click("#zoom-fit")
+    assert page.get_attribute("#follow", "aria-pressed") == "false"
+
+
+def test_a_click_in_the_curves_jumps(opened, report):
+    page = opened.page
+    page.evaluate("bridgegen.select(0)")
+    page.locator("#curves").scroll_into_view_if_needed()
+    box = page.locator("#curves").bounding_box()
+    left, right = 40, box["width"] - 14
+    page.mouse.click(box["x"] + left + 0.25 * (right - left), box["y"] + 60)
+    assert opened.state()["index"] == pytest.approx(0.25 * (report.kept[0].n_steps - 1), abs=1)
+
+
+def test_a_row_of_the_list_plays_its_scenario(opened, report):
+    opened.page.locator("#list-body tr button").nth(2).click()
+    state = opened.state()
+    assert state["scenario"] == report.kept[2].name
+    assert state["playing"]
+    opened.page.evaluate("bridgegen.pause()")
+    assert opened.page.locator("tr[aria-current]").inner_text().split()[0] == "3"
+    opened.page.wait_for_function("location.hash.startsWith('#scenario=0003&t=')")
+
+
+def test_the_list_sorts(opened, report):
+    ranks = (
+        "[...document.querySelectorAll('#list-body tr')].map((r) => Number(r.cells[0].innerText))"
+    )
+    speeds = {p.rank: p.metrics["v_d"] for p in report.kept}
+    head = opened.page.locator("#list-head button").nth(2)
+    head.click()
+    assert opened.page.evaluate(ranks) == sorted(speeds, key=speeds.__getitem__)
+    head.click()
+    assert opened.page.evaluate(ranks) == sorted(speeds, key=speeds.__getitem__, reverse=True)
+    opened.page.locator("#list-head button").nth(0).click()
+    assert opened.page.evaluate(ranks) == [1, 2, 3, 4]
+
+
+def test_critical_rows_differ_by_colour_and_by_shape(opened, report):
+    opened.scroll_through()
+    plain, critical, kept = opened.page.evaluate(
+        "document.getElementById('scatter').data.map((t) => "
+        "({ n: t.x.length, symbol: t.marker.symbol, color: t.marker.color }))"
+    )
+    assert critical["n"] == report.evaluations.critical.sum()
+    assert plain["n"] == 120 - critical["n"]
+    assert kept["n"] == len(report.kept)
+    assert plain["symbol"] != critical["symbol"]
+    assert plain["color"] != critical["color"]
+
+
+def test_axes_can_be_chosen(opened, report):
+    opened.scroll_through()
+    opened.page.select_option("#axis-x", "d_min")
+    x = opened.page.evaluate("[...document.getElementById('scatter').data[1].x]")
+    d_min = next(c.values for c in report.evaluations.metrics if c.name == "d_min")
+    assert x == pytest.approx(d_min[report.evaluations.critical], abs=1e-2)
+
+
+def test_a_filter_counts_and_thins_the_scatter_plot(opened, report):
+    opened.scroll_through()
+    e = report.evaluations
+    speed = next(c.values for c in e.parameters if c.name == "bv_speed")
+    opened.page.select_option("#filter-axis", "bv_speed")
+    opened.page.fill("#filter-low", "4")
+    passing = speed >= 4.0
+    note = opened.page.inner_text("#filter-note")
+    assert note.startswith(f"{passing.sum()} of 120 pass, {(passing & e.critical).sum()} of them")
+    opened.page.wait_for_function(
+        f"document.getElementById('scatter').data[1].x.length === {(passing & e.critical).sum()}"
+    )
+    opened.page.click("#filter-clear")
+    assert opened.page.inner_text("#filter-note") == ""
+
+
+def test_medians_over_the_iterations(opened, report):
+    opened.scroll_through()
+    e = report.evaluations
+    d_min = next(c.values for c in e.metrics if c.name == "d_min")
+    shown = opened.page.evaluate(
+        "[...document.querySelector('#trend-plots .plot').data.find((t) => t.name === 'median').y]"
+    )
+    want = [np.median(d_min[e.iteration == k]) for k in np.unique(e.iteration)]
+    assert shown == pytest.approx(want, abs=2e-3)
+
+
+def test_nothing_complained_so_far(opened):
+    assert opened.complaints == []
+
+
+def test_a_link_opens_scenario_and_time(show, report):
+    opened = show(report, "#scenario=0002&t=3.05")
+    assert (opened.state()["scenario"], opened.state()["index"]) == ("0002", 61)
+    opened.page.close()
+
+
+def test_both_colour_schemes_and_a_phone(show, report):
+    opened = show(report, viewport={"width": 390, "height": 844}, color_scheme="dark")
+    opened.scroll_through()
+    page = opened.page
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    dark = pixel(page, [3, 300])
+    page.emulate_media(color_scheme="light")
+    page.wait_for_function("getComputedStyle(document.body).color === 'rgb(23, 32, 44)'")
+    light = pixel(page, [3, 300])
+    assert sum(light) > sum(dark) + 200
+    assert opened.complaints == []
+    page.close()
+
+
+@pytest.mark.parametrize(("n", "kept"), [(0, 0), (1, 1), (90, 0)])
+def test_small_runs_show_no_error(show, build, n, kept):
+    opened = show(build(n, kept))
+    if n:
+        opened.scroll_through()
+    assert opened.page.is_visible("#no-scenarios") == (kept == 0)
+    assert opened.page.is_visible("#space") == (n > 0)
+    assert opened.complaints == []
+    opened.page.close()
+
+
+def test_hostile_text_and_missing_numbers_are_harmless(show, report):
+    evil = '</script><img src=x onerror="window.hacked=1"><b>%{x}'
+    e, p = report.evaluations, report.kept[0]
+    x = p.x.copy()
+    x[1, 40:60] = np.nan
+    distance = np.where(np.arange(401) < 5, np.inf, p.distance)
+    holes = replace(e.parameters[0], name=evil, unit=evil, description=evil)
+    gaps = tuple(replace(c, values=np.where(e.critical, np.nan, c.values)) for c in e.metrics)
+    data = replace(
+        report,
+        summary=replace(report.summary, title=evil, command=evil, d_min_best=math.nan),
+        evaluations=replace(e, parameters=(holes, *e.parameters[1:]), metrics=gaps),
+        kept=(
+            replace(p, name=evil, x=x, distance=distance, files=("javascript:alert(1)", "//a/b")),
+        ),
+    )
+    opened = show(data)
+    opened.scroll_through()
+    page = opened.page
+    page.select_option("#axis-x", evil)
+    assert page.inner_text("h1") == evil
+    assert page.evaluate("window.hacked") is None
+    links = page.evaluate("[...document.querySelectorAll('.files a')].map((a) => a.href)")
+    assert all(link.startswith("file://") for link in links)
+    for k in (0, 50, 200):
+        scrub(page, k)
+        assert (opened.state()["entities"][1]["x"] is None) == (k == 50)
+    assert opened.complaints == []
+    page.close()

@@ -1,0 +1,182 @@
+import json
+import re
+import resource
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from importlib.resources import files
+
+import pytest
+
+from bridgegen.errors import StorageError
+from bridgegen.report import page
+from bridgegen.report.page import write_report
+from bridgegen.report.payload import to_json
+
+VOID = {"meta", "link", "input", "br", "img", "hr"}
+
+
+class Page(HTMLParser):
+    """Checks that tags balance; collects elements with their attributes and text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.text: dict[str, str] = {}
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        names = [name for name, _ in attrs]
+        assert len(set(names)) == len(names), f"attribute twice in <{tag}>"
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open:
+            self.text[self.open[-1]] = self.text.get(self.open[-1], "") + data
+
+    def values(self, attribute: str) -> list[str]:
+        return [a[attribute] for _, a in self.elements if a.get(attribute)]
+
+
+@pytest.fixture(scope="module")
+def written(report, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(path, report)
+    return path.read_text(encoding="utf-8")
+
+
+def embedded(text: str) -> str:
+    found = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)
+    assert len(found) == 1
+    return found[0]
+
+
+def test_it_is_well_formed(written):
+    parsed = Page(written)
+    ids = parsed.values("id")
+    assert len(set(ids)) == len(ids)
+    for attribute in ("for", "aria-labelledby", "aria-describedby"):
+        assert set(parsed.values(attribute)) <= set(ids)
+    assert {link[1:] for link in parsed.values("href") if link.startswith("#")} <= set(ids)
+    assert ("html", {"lang": "en"}) in parsed.elements
+    assert sum(tag == "h1" for tag, _ in parsed.elements) == 1
+
+
+def test_every_control_has_a_name(written):
+    parsed = Page(written)
+    for tag, attributes in parsed.elements:
+        if tag == "canvas" or attributes.get("role") in {"img", "group"}:
+            assert attributes.get("aria-label"), (tag, attributes)
+
+
+def test_nothing_is_fetched(written):
+    parsed = Page(written)
+    for attribute in ("src", "srcset", "data", "action", "poster", "background"):
+        assert parsed.values(attribute) == []
+    assert [h for h in parsed.values("href") if not h.startswith("#")] == ["data:,"]
+    policy = next(a["content"] for _, a in parsed.elements if "http-equiv" in a)
+    assert policy.startswith("default-src 'none';")
+    assert "http" not in policy
+    assert "connect-src" not in policy
+    own = b"".join(page._own(name) for name in (*page.SCRIPTS, "page.css", "page.html")).decode()
+    for word in ("http:", "https:", "fetch(", "XMLHttpRequest", "import(", "url(", "@import"):
+        assert word not in own
+
+
+def test_the_data_inside_is_the_data(written, report):
+    assert embedded(written) == to_json(report)
+
+
+def test_every_id_that_a_script_asks_for_exists(written):
+    scripts = b"".join(page._own(name) for name in page.SCRIPTS).decode()
+    asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
+    assert len(asked) > 30
+    assert asked <= set(Page(written).values("id"))
+
+
+def test_every_file_of_ours_is_used():
+    ours = {f.name for f in files("bridgegen.report").iterdir() if f.name.endswith((".js", ".css"))}
+    assert ours == {*page.SCRIPTS, "page.css"}
+
+
+@pytest.mark.parametrize(
+    "title",
+    ["</title><script>alert(1)</script>", "a & b <i>", "{{data}}", "Süd 交差点", "lone \udc80"],
+)
+def test_a_hostile_title_is_text(tmp_path, with_summary, title):
+    data = with_summary(title=title, scenario=title)
+    write_report(tmp_path / "r.html", data)
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    shown = title.encode("utf-8", "replace").decode()
+    assert Page(text).text["title"].strip() == f"{shown}: {shown} – BridgeGen"
+    assert json.loads(embedded(text))["summary"]["title"] == title
+    assert sum(tag == "script" for tag, _ in Page(text).elements) == 4
+
+
+@pytest.mark.parametrize(("n", "kept"), [(0, 0), (1, 1), (2, 0), (41, 3)])
+def test_small_runs_make_a_page(tmp_path, build, n, kept):
+    data = build(n, kept)
+    write_report(tmp_path / "r.html", data)
+    sent = json.loads(embedded((tmp_path / "r.html").read_text(encoding="utf-8")))
+    assert len(sent["rows"]["evaluation"]) == n
+    assert len(sent["kept"]) == kept
+
+
+def test_the_size_stays_in_bounds(tmp_path, build):
+    write_report(tmp_path / "r.html", build(400, 10))
+    assert (tmp_path / "r.html").stat().st_size < 7e6
+
+
+def test_plotly_is_read_but_not_imported(tmp_path):
+    code = (
+        "import sys; from bridgegen.report import page; assert b'Plotly' in page._plotly();"
+        "heavy = {'plotly', 'pandas', 'pymoo', 'numba'} & set(sys.modules); assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_missing_folder_is_one_clear_error(tmp_path, report):
+    path = tmp_path / "nowhere" / "report.html"
+    with pytest.raises(StorageError, match=r"nowhere/report.html: the report cannot be written"):
+        write_report(path, report)
+
+
+def test_a_folder_in_its_place_is_one_clear_error(tmp_path, report):
+    (tmp_path / "report.html").mkdir()
+    with pytest.raises(StorageError, match="cannot be written"):
+        write_report(tmp_path / "report.html", report)
+    assert [f.name for f in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_full_disk_keeps_the_old_report_and_leaves_no_part(tmp_path, report, with_summary):
+    path = tmp_path / "report.html"
+    path.write_text("old")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, hard))  # writing on fails, as when full
+    try:
+        with pytest.raises(StorageError, match="cannot be written"):
+            write_report(path, report)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_text() == "old"
+    assert [f.name for f in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_report_replaces_an_older_one(tmp_path, report):
+    path = tmp_path / "report.html"
+    path.write_text("old")
+    write_report(path, replace(report, kept=()))
+    assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")

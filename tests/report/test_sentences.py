@@ -1,0 +1,111 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridgegen.report import sentences
+from bridgegen.report.data import ReportData
+
+THIN = "\N{NARROW NO-BREAK SPACE}"
+
+
+def of(data: ReportData) -> list[str]:
+    return [sentence.replace(THIN, " ") for sentence in sentences.sentences(data)]
+
+
+def test_three_sentences(with_summary):
+    data = with_summary(
+        n_evaluations=1000, n_critical=312, r_critic=0.312, first_critical=14, fiftieth_critical=120
+    )
+    first, second, third = of(data)
+    assert first == (
+        "1,000 concrete scenarios of “Left turn into the path of a crossing car” were simulated "
+        "with the driver route-follower on the generated crossroads, chosen by pso in 3.4 s."
+    )
+    assert second == (
+        "312 of them (31.2 %) are critical (a collision, or d_min below 2 m while v_d is at least "
+        "1 m/s); the first was found at evaluation 14, the 50th at 120."
+    )
+    e = data.evaluations
+    values = {c.name: c.values for c in e.metrics}
+    hits = values["n_collision"] > 0
+    top = values["v_d"][hits].max()
+    assert third == (
+        f"{hits.sum()} scenarios end in a collision, the fastest at {top:.1f} m/s "
+        f"({3.6 * top:.0f} km/h)."
+    )
+
+
+def test_without_a_collision_the_closest_pass_counts(report):
+    e = report.evaluations
+    metrics = tuple(
+        replace(c, values=np.zeros(120)) if c.name == "n_collision" else c for c in e.metrics
+    )
+    data = replace(
+        report,
+        evaluations=replace(e, metrics=metrics),
+        summary=replace(report.summary, d_min_best=0.4321),
+    )
+    assert of(data)[-1] == "There is no collision; the closest pass leaves 0.43 m."
+
+
+def test_failed_evaluations_are_no_collisions(report):
+    failed = replace(report.evaluations, status=np.ones(120, np.int64))
+    assert "There is no collision" in of(replace(report, evaluations=failed))[-1]
+
+
+def test_nothing_critical(with_summary):
+    data = with_summary(n_critical=0, first_critical=None, fiftieth_critical=None, r_critic=0.0)
+    assert of(data)[1:] == [
+        "None of them is critical (critical means a collision, or d_min below 2 m while v_d is at "
+        "least 1 m/s)."
+    ]
+
+
+def test_stopped_early(with_summary):
+    data = with_summary(finished=False, budget=5000)
+    assert of(data)[0].endswith("in 3.4 s; the run stopped before its budget of 5,000.")
+    assert ("Done", "120 evaluations, interrupted") in sentences.provenance(data.summary)
+
+
+def test_nothing_done(build):
+    assert of(build(0, 0)) == [
+        "No scenario of “Left turn into the path of a crossing car” has been simulated yet."
+    ]
+
+
+def test_one_is_singular(with_summary):
+    data = with_summary(n_evaluations=1, budget=1, n_critical=0)
+    assert of(data)[0].startswith("1 concrete scenario of")
+    assert " was simulated " in of(data)[0]
+    assert of(data)[1].startswith("It is not critical")
+    assert ("Budget", "1 evaluation") in sentences.provenance(data.summary)
+
+
+def test_the_table_shows_a_dash_for_what_does_not_exist(with_summary):
+    nan = float("nan")
+    data = with_summary(
+        r_critic=nan, d_min_best=nan, d_min_median=nan, v_d_best=nan, v_d_median=float("inf"),
+        first_critical=None, fiftieth_critical=None, n_critical=0, n_evaluations=0,
+        wall_seconds=nan,
+    )  # fmt: skip
+    table = dict(sentences.summary_table(data.summary))
+    assert table["Critical share, R_critic"] == "– (0 of 0)"
+    assert table["First critical"] == table["50th critical"] == "not reached"
+    assert {value for name, value in table.items() if "d_min" in name or "v_d" in name} == {"–"}
+    assert table["Wall time"] == "–"
+
+
+def test_settings_follow_in_the_order_given(with_summary):
+    data = with_summary(settings={"inertia": "0.8", "c1": "1.5"}, started="")
+    rows = sentences.provenance(data.summary)
+    assert rows[-2:] == [("inertia", "0.8"), ("c1", "1.5")]
+    assert "Started" not in dict(rows)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.04, "0.0 s"), (119.94, "119.9 s"), (125.0, "2 min 5 s"), (7261.0, "2 h 1 min")],
+)
+def test_a_duration_takes_the_unit_that_suits_it(seconds, text):
+    assert sentences.duration(seconds).replace(THIN, " ") == text
