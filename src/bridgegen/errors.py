@@ -3,7 +3,7 @@
     BridgeGenError
      ├── InputError               what the user gave breaks a rule; exit status 2
      │    ├── UnknownNameError    no such scenario, algorithm, metric …; suggests the nearest
-     │    ├── FileFormatError     a file that is missing, unreadable, malformed, hostile or too large
+     │    ├── FileFormatError     a file that is missing, unreadable, malformed, hostile, too big
      │    ├── ScenarioError       a logical scenario (YAML) that breaks a rule
      │    ├── OntologyError       individuals that lack what a scenario needs, or contradict it
      │    └── UnsupportedError    valid, but outside what this version can do

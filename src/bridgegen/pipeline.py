@@ -113,9 +113,8 @@ class Pipeline:
             spec = self.scenario.objective
             sample = None
             if needs_sample(spec.weights, spec.scale):
-                U = np.random.Generator(np.random.PCG64([seed, 1])).random(
-                    (SAMPLE, self.space.n_var)
-                )
+                rng = np.random.Generator(np.random.PCG64([seed, 1]))
+                U = rng.random((SAMPLE, self.space.n_var))
                 sample = (self._measure(self.space.decode(U))[0], self.metrics)
             limits = spec.critical
             objective = Objective.build(

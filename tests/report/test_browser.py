@@ -284,6 +284,14 @@ def test_critical_rows_differ_by_colour_and_by_shape(opened, report):
     assert plain["color"] != critical["color"]
 
 
+def test_no_button_hands_the_data_to_a_website(opened):
+    opened.scroll_through()
+    titles = opened.page.evaluate(
+        "[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)"
+    )
+    assert sorted(titles) == ["Download plot as a PNG", "Pan", "Reset axes", "Zoom"]
+
+
 def test_axes_can_be_chosen(opened, report):
     opened.scroll_through()
     opened.page.select_option("#axis-x", "d_min")

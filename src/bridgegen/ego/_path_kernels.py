@@ -12,7 +12,7 @@ X, Y, H, COS, SIN, CURVATURE = 0, 1, 2, 3, 4, 5
 
 
 @kernel
-def locate(n, ds, s):  # type: ignore[no-untyped-def]
+def locate(n, ds, s):
     """Return (i, f): station s lies at the fraction f between rows i and i + 1."""
     u = s / ds
     i = int(u)
@@ -24,7 +24,7 @@ def locate(n, ds, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pose(path, n, ds, s):  # type: ignore[no-untyped-def]
+def pose(path, n, ds, s):
     """Return (x, y, heading) at station s; beyond the ends, on the tangent."""
     i, f = locate(n, ds, s)
     return (
@@ -35,7 +35,7 @@ def pose(path, n, ds, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def project(path, n, ds, s, x, y):  # type: ignore[no-untyped-def]
+def project(path, n, ds, s, x, y):
     """Return (station, offset) of a point's foot on the path near station s; left is positive.
 
     Newton's method on the tangent's dot product; two steps from the previous instant's foot are
@@ -57,7 +57,7 @@ def project(path, n, ds, s, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pursue(path, n, ds, s, x, y, h, distance):  # type: ignore[no-untyped-def]
+def pursue(path, n, ds, s, x, y, h, distance):
     """Return the curvature [1/m] of the circle through the rear axle and a point ahead.
 
     Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, 1992.

@@ -34,13 +34,13 @@ SAME_WAY = 0.9  # cosine of the heading difference above which two routes go on 
 
 
 @kernel
-def scan_length(v):  # type: ignore[no-untyped-def]
+def scan_length(v):
     """Return how far ahead [m] the driver looks: to stop comfortably, and a reaction more."""
     return 12.0 + 1.5 * v + v * v / (2.0 * COMFORT_DECELERATION)
 
 
 @kernel
-def plan_speed(path, n, ds, s, v, target, friction_limit):  # type: ignore[no-untyped-def]
+def plan_speed(path, n, ds, s, v, target, friction_limit):
     """Return the speed [m/s] that the bends ahead allow, at most ``target``."""
     lateral = min(LATERAL_COMFORT, FRICTION_SHARE * friction_limit)
     stride = max(int(SCAN_STEP / ds), 1)
@@ -56,7 +56,7 @@ def plan_speed(path, n, ds, s, v, target, friction_limit):  # type: ignore[no-un
 
 
 @kernel
-def follow(gap, v, leader_speed):  # type: ignore[no-untyped-def]
+def follow(gap, v, leader_speed):
     """Return the interaction part of the IDM's acceleration [m/s²] for a leader at a gap [m]."""
     desired = STANDSTILL_GAP + max(
         0.0,
@@ -68,7 +68,7 @@ def follow(gap, v, leader_speed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone):  # type: ignore[no-untyped-def]
+def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone):
     """Fill ``zone`` with the first conflict zone of two routes."""
     side = 0.5 * (body[1] + other_body[1]) + SIDE_MARGIN
     zone[:] = (math.inf, math.inf, math.inf, math.inf, 0.0)
@@ -99,7 +99,7 @@ def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone
 
 
 @kernel
-def react(s, v, own, q, w, other, zone):  # type: ignore[no-untyped-def]
+def react(s, v, own, q, w, other, zone):
     """Return the acceleration [m/s²] that one other body asks for; +inf where it asks nothing.
 
     The ego is at station s of its route at speed v, the other at q of its own at w; ``own`` and
@@ -141,7 +141,7 @@ def react(s, v, own, q, w, other, zone):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def stop_for(distance, v):  # type: ignore[no-untyped-def]
+def stop_for(distance, v):
     """Return the acceleration [m/s²] that stops before a point; +inf while that is not urgent."""
     needed = v * v / (2.0 * max(distance - STOP_MARGIN, 0.1))
     if needed >= BRAKE_FROM or distance < STOP_MARGIN + 0.5:
@@ -150,7 +150,7 @@ def stop_for(distance, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def drive(path, n, ds, v, target, friction_limit, bodies, station, speed, k, zones):  # type: ignore[no-untyped-def]
+def drive(path, n, ds, v, target, friction_limit, bodies, station, speed, k, zones):
     """Return the acceleration [m/s²] demanded at instant k.
 
     ``station`` ``(E,)`` [m] and ``speed`` ``(E, T)`` [m/s] are those of all, the ego's first.

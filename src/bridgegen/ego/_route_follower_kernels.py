@@ -9,13 +9,13 @@ SPEED_TIME = 0.5  # s, time constant of the speed controller
 
 
 @kernel
-def steer(path, n, ds, s, x, y, h, v):  # type: ignore[no-untyped-def]
+def steer(path, n, ds, s, x, y, h, v):
     """Return the curvature [1/m] that follows the path (pure pursuit)."""
     ahead = min(max(PREVIEW * v, PREVIEW_MIN), PREVIEW_MAX)
     return pursue(path, n, ds, s, x, y, h, ahead)
 
 
 @kernel
-def hold_speed(v, target):  # type: ignore[no-untyped-def]
+def hold_speed(v, target):
     """Return the acceleration [m/s²] that brings the speed to its target."""
     return (target - v) / SPEED_TIME

@@ -20,12 +20,13 @@ const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;"
 
 function layout(extra) {
   const axis = { gridcolor: palette.grid, zerolinecolor: palette.line, linecolor: palette.line, automargin: true, title: { standoff: 8 } };
-  const { xaxis, yaxis, ...rest } = extra;
+  const { xaxis, yaxis, ...rest } = extra, clear = "rgba(0,0,0,0)";
+  const font = { family: getComputedStyle(document.body).fontFamily, size: 12, color: palette.ink };
   return {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: palette.ink },
-    margin: { l: 8, r: 10, t: 8, b: 8 }, hoverlabel: { bgcolor: palette.card, bordercolor: palette.line, font: { color: palette.ink, family: getComputedStyle(document.body).fontFamily } },
-    modebar: { bgcolor: "rgba(0,0,0,0)", color: palette.muted, activecolor: palette.accent }, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12 } }, dragmode: false,
+    paper_bgcolor: clear, plot_bgcolor: clear, font, margin: { l: 8, r: 10, t: 8, b: 8 }, dragmode: false,
+    hoverlabel: { bgcolor: palette.card, bordercolor: palette.line, font },
+    modebar: { bgcolor: clear, color: palette.muted, activecolor: palette.accent },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
     xaxis: { ...axis, ...xaxis }, yaxis: { ...axis, ...yaxis }, ...rest,
   };
 }

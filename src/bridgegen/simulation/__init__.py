@@ -1,0 +1,1 @@
+"""One protocol, several simulators: rows of parameters in, rollouts out."""

@@ -193,18 +193,17 @@ def test_a_row_is_the_same_to_the_last_bit_whatever_its_batch():
             assert (getattr(part, name) == getattr(whole, name)[order]).all(), name
 
 
-@given(st.floats(0.0, 2 * math.pi), st.booleans())
+@given(st.floats(5.0, 9.0), st.floats(4.0, 10.0))
 @settings(max_examples=10)
-def test_motion_does_not_depend_on_where_north_is(angle, fast):
+def test_motion_does_not_depend_on_where_north_is(speed, other):
     """The same crossroads seen from another leg: legs are alike, so distances must be."""
-    speed = 9.0 if fast else 5.0
     gaps = []
     for first, second, third in ((3, 2, 4), (2, 1, 3), (1, 4, 2)):
         text = scenario(
             ("ego", "bv"),
             start("ego", lane(first, 1, 40), speed, lane(first, 1, 40), lane(third, -1, 90))
             + start(
-                "bv", lane(second, 1, 20), 4.0 + angle, lane(second, 1, 20), lane(third, -1, 90)
+                "bv", lane(second, 1, 20), other, lane(second, 1, 20), lane(third, -1, 90)
             ),
         )
         gaps.append(run(text).distance[0, 1])

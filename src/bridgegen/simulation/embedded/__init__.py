@@ -1,0 +1,1 @@
+"""The embedded simulator: a storyboard and roads are compiled once, then rolled out N times."""

@@ -26,7 +26,7 @@ STEP, LINEAR_RATE, LINEAR_TIME = 0, 1, 2
 
 
 @kernel
-def compare(value, rule, limit):  # type: ignore[no-untyped-def]
+def compare(value, rule, limit):
     """Apply an OpenSCENARIO Rule."""
     if rule == GREATER:
         return value > limit
@@ -42,7 +42,7 @@ def compare(value, rule, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def observe(c, conditions, points, slots, now, x, y, k):  # type: ignore[no-untyped-def]
+def observe(c, conditions, points, slots, now, x, y, k):
     """Return whether the condition's rule holds at instant k, before edge and delay."""
     kind, a, b, rule = conditions[c, 0], conditions[c, 1], conditions[c, 2], conditions[c, 3]
     limit = slots[conditions[c, 4]]
@@ -55,7 +55,7 @@ def observe(c, conditions, points, slots, now, x, y, k):  # type: ignore[no-unty
 
 
 @kernel
-def holds(c, conditions, history, k):  # type: ignore[no-untyped-def]
+def holds(c, conditions, history, k):
     """Return whether the condition, with its edge and delay, is met at instant k.
 
     An edge needs an earlier observation, so none is seen at the first instant.
@@ -73,7 +73,7 @@ def holds(c, conditions, history, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fires(trigger, triggers, groups, conditions, history, k):  # type: ignore[no-untyped-def]
+def fires(trigger, triggers, groups, conditions, history, k):
     """Return whether any condition group of a trigger is met as a whole."""
     for g in range(triggers[trigger, 0], triggers[trigger, 1]):
         met = groups[g, 1] > groups[g, 0]
@@ -87,7 +87,7 @@ def fires(trigger, triggers, groups, conditions, history, k):  # type: ignore[no
 
 
 @kernel
-def bicycle(x, y, h, v, demanded, curvature, wheelbase, limits, friction_limit, dt):  # type: ignore[no-untyped-def]
+def bicycle(x, y, h, v, demanded, curvature, wheelbase, limits, friction_limit, dt):
     """Return (x, y, h, v, a) one step on, and the acceleration that the tyres gave.
 
     Kinematic bicycle at the rear axle. ``limits`` are (speed, acceleration, deceleration). Inside
@@ -115,9 +115,9 @@ def bicycle(x, y, h, v, demanded, curvature, wheelbase, limits, friction_limit, 
 
 @kernel
 def simulate_one(
-    paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups, conditions,
-    acts, events, friction_slot, driver, dt, x, y, h, v, a, offset,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
+    conditions, acts, events, friction_slot, driver, dt, x, y, h, v, a, offset,
+):  # fmt: skip
     """Fill one scenario's ``(E, T)`` arrays; return (n_steps, status)."""
     n_entities, n_steps = x.shape
     history = np.zeros((conditions.shape[0], n_steps), dtype=np.bool_)
@@ -215,7 +215,7 @@ def simulate_one(
 
 
 @kernel
-def ramp(command, target, rate, e, dt):  # type: ignore[no-untyped-def]
+def ramp(command, target, rate, e, dt):
     """Move one entity's commanded speed towards its target by one step."""
     change = target[e] - command[e]
     most = rate[e] * dt
@@ -226,12 +226,12 @@ def ramp(command, target, rate, e, dt):  # type: ignore[no-untyped-def]
 def simulate_rows(
     network, paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
     conditions, acts, events, friction_slot, driver, dt, x, y, h, v, a, offset, n_steps, status,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Fill the batch's ``(N, E, T)`` arrays, row by row; ``network`` tells each row's roads."""
     for i in range(slots.shape[0]):
         p = network[i]
         n_steps[i], status[i] = simulate_one(
-            paths[p], path_n[p], path_ds[p], zones[p], station0[i], points[p], slots[i], bodies, init,
-            triggers, groups, conditions, acts, events, friction_slot, driver, dt,
+            paths[p], path_n[p], path_ds[p], zones[p], station0[i], points[p], slots[i], bodies,
+            init, triggers, groups, conditions, acts, events, friction_slot, driver, dt,
             x[i], y[i], h[i], v[i], a[i], offset[i],
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The roads of a compiled storyboard: each entity's route as a sampled path, for P road networks."""
+"""The roads of a compiled storyboard: each entity's route as a path, on P road networks."""
 
 import math
 from collections.abc import Sequence

@@ -5,7 +5,7 @@
 compiled storyboard runs over it unchanged. Roads enter only in ``network.py``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -448,9 +448,8 @@ class _Compiler:
             self._append(_REACH_POSITION, entity, 0, 0, inner.tolerance, edge, delay, point)
             return
         other = self.names.index(str(inner.entity_ref))
-        euclidian = (
-            osc.RelativeDistanceType.EUCLIDIAN_DISTANCE, osc.RelativeDistanceType.CARTESIAN_DISTANCE,
-        )  # fmt: skip
+        kinds = osc.RelativeDistanceType
+        euclidian = (kinds.EUCLIDIAN_DISTANCE, kinds.CARTESIAN_DISTANCE)
         if inner.relative_distance_type not in euclidian:
             self.unsupported(inner, f'relativeDistanceType="{inner.relative_distance_type}"')
         if inner.freespace is not False:
@@ -469,5 +468,5 @@ def _is_ego(one: osc.ScenarioObject) -> bool:
     return str(one.name).lower() == "ego"
 
 
-def _table(rows: list[tuple[int, ...]], width: int) -> Int:
+def _table(rows: Sequence[tuple[int, ...]], width: int) -> Int:
     return np.array(rows, dtype=np.int64).reshape(len(rows), width)
