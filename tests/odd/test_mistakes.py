@@ -109,6 +109,12 @@ MISTAKES = [
     ),
     (
         "rate: 3.0",
+        "rate: true",
+        "events.bv_sets_off.rate must be a number or the name of a parameter, got True",
+        "rate: true",
+    ),
+    (
+        "rate: 3.0",
         "rate: 0",
         "events.bv_sets_off.rate [m/s²] must be greater than 0 and finite, got 0",
         "rate: 0",

@@ -98,9 +98,11 @@ def test_hostile_files(message, text):
     assert message.replace("!!", "tag:yaml.org,2002:") in caught.value.problems
 
 
-def test_deepest_that_is_allowed():
-    text = "[" * MAX_DEPTH + "]" * MAX_DEPTH
+def test_depth_is_counted_in_entries():
+    text = "[" * MAX_DEPTH + "x" + "]" * MAX_DEPTH
     assert read_plain_yaml(text.encode(), "f.yaml").data is not None
+    with pytest.raises(FileFormatError, match="may nest 32 deep"):
+        read_plain_yaml(f"[{text}]".encode(), "f.yaml")
 
 
 def test_a_bomb_of_aliases_does_not_expand():

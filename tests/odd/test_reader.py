@@ -140,6 +140,19 @@ def test_a_parameter_without_effect_is_refused(refuse, s4_text):
     ]
 
 
+def test_a_rate_must_stay_above_zero(refuse, write, s4_text):
+    entry = (
+        "{axis: participants, unit: m/s², low: 0, high: 4, default: 3, description: d, source: s}"
+    )
+    text = s4_text.replace("rate: 3.0", "rate: bv_rate")
+    text = text.replace("parameters:\n", f"parameters:\n  bv_rate: {entry}\n")
+    (problem,) = refuse(text)
+    assert problem.startswith(
+        "events.bv_sets_off.rate [m/s²] must be greater than 0, 'bv_rate' goes down to 0 ("
+    )
+    assert load(write(text.replace("low: 0,", "low: 0.1,"))).events[0].rate == "bv_rate"
+
+
 def test_what_road_and_weather_need_has_its_axis_unit_and_kind(write, refuse, s4_text):
     import bridgegen.catalogue as catalogue
 

@@ -96,6 +96,28 @@ def test_encode_gives_the_point_back_where_intervals_have_width():
     np.testing.assert_allclose(space.encode(space.decode(U)), U, atol=1e-9)
 
 
+def test_encode_gives_whole_numbers_the_middle_of_their_share():
+    space = SPACES["static"]
+    lanes = space.variables.index("lanes_per_direction")
+    X = [space.row({"lanes_per_direction": count}) for count in (1, 2, 3)]
+    assert space.encode(X)[:, lanes] == pytest.approx([1 / 6, 3 / 6, 5 / 6])
+
+
+def test_encode_stays_in_the_cube_for_values_within_the_tolerance():
+    space = SPACES["default"]
+    X = np.tile(space.row({}), (2, 1))
+    X[:, space.index("bv_trigger_time")] = [-0.5 * TOLERANCE, 10.0 + TOLERANCE]
+    U = space.encode(X)[:, space.variables.index("bv_trigger_time")]
+    assert U.tolist() == [0.0, 1.0]
+
+
+def test_rounding_takes_no_whole_number_away(build, make_parameter):
+    parameters = [make_parameter("a", 0.2, 0.2), make_parameter("n", kind="integer")]
+    assert (0.1 + 0.2) * 10 > 3  # in floating point
+    space = build(parameters, [("n", "(0.1 + a)*10", "(0.1 + a)*10")]).space()
+    assert space.decode([[0.5]])[0].tolist() == [0.2, 3.0]
+
+
 def test_a_row_has_the_same_bits_alone_in_a_batch_and_from_any_memory():
     space = SPACES["every"]
     U = np.random.default_rng(4).random((1003, space.n_var))

@@ -287,9 +287,9 @@ def test_critical_rows_differ_by_colour_and_by_shape(opened, report):
 def test_no_button_hands_the_data_to_a_website(opened):
     opened.scroll_through()
     titles = opened.page.evaluate(
-        "[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)"
+        "[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title.toLowerCase())"
     )
-    assert sorted(titles) == ["Download plot as a PNG", "Pan", "Reset axes", "Zoom"]
+    assert sorted(titles) == ["download plot as a png", "pan", "reset axes", "zoom"]
 
 
 def test_axes_can_be_chosen(opened, report):
@@ -385,7 +385,8 @@ def test_hostile_text_and_missing_numbers_are_harmless(show, report):
     assert page.inner_text("h1") == evil
     assert page.evaluate("window.hacked") is None
     links = page.evaluate("[...document.querySelectorAll('.files a')].map((a) => a.href)")
-    assert all(link.startswith("file://") for link in links)
+    folder = page.url.rsplit("/", 1)[0]
+    assert all(link.startswith(f"{folder}/") for link in links)
     for k in (0, 50, 200):
         scrub(page, k)
         assert (opened.state()["entities"][1]["x"] is None) == (k == 50)

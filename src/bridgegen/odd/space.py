@@ -275,9 +275,8 @@ class SearchSpace:
         label = f"{name} [{parameter.unit}], {parameter.low:g} to {parameter.high:g}"
         names = frozenset().union(*(bound.names for bound in self._bounds[name]))
         self._refuse(f"{rules} leaves no value to {label},", names, table, empty)
-        # Limits that cross by less than the tolerance meet, inside the box.
-        hi = np.clip(hi, parameter.low, parameter.high)
-        return np.minimum(lo, hi), hi
+        # Where limits cross, by less than the tolerance, the upper one holds; inside the range.
+        return lo, np.clip(hi, parameter.low, parameter.high)
 
     def _refuse(
         self,

@@ -40,11 +40,13 @@ function trendFigure(name, trend) {
   const line = (y, label, style) => ({
     x: b.last, y, name: label, customdata: when, hovertemplate: `%{customdata}<br>${label} %{y:.3g} ${unit}<extra></extra>`, ...style,
   });
-  const few = b.last.length < 3;
+  const few = b.last.length < 3; // too few for lines
+  const mode = few ? "markers" : "lines", color = palette.accent;
+  const quartile = { mode, line: { width: 0 }, marker: { color, symbol: "line-ew-open" }, showlegend: false };
   return [
-    line(trend.lower, "lower quartile", { mode: few ? "markers" : "lines", line: { width: 0 }, marker: { color: palette.accent, symbol: "line-ew-open" }, showlegend: false }),
-    line(trend.upper, "upper quartile", { mode: few ? "markers" : "lines", line: { width: 0 }, marker: { color: palette.accent, symbol: "line-ew-open" }, fill: few ? "none" : "tonexty", fillcolor: palette.band, showlegend: false }),
-    line(trend.median, "median", { mode: few ? "markers" : "lines", line: { color: palette.accent, width: 2.5 }, marker: { color: palette.accent, size: 8 } }),
+    line(trend.lower, "lower quartile", quartile),
+    line(trend.upper, "upper quartile", { ...quartile, fill: few ? "none" : "tonexty", fillcolor: palette.band }),
+    line(trend.median, "median", { mode, line: { color, width: 2.5 }, marker: { color, size: 8 } }),
     line(trend.best, best, { mode: "markers", marker: { color: palette.critical, size: 6, symbol: "diamond" }, cliponaxis: false }),
   ];
 }
@@ -53,8 +55,14 @@ function shareFigure() {
   const b = data.batches, percent = (values) => values.map((v) => (v === null ? null : 100 * v));
   const hover = (label) => `iteration %{x}<br>${label} %{y:.1f} %<extra></extra>`;
   return [
-    { type: "bar", x: b.last, y: percent(b.share), name: "this iteration", marker: { color: palette.critical, opacity: 0.55 }, hovertemplate: hover("this iteration") },
-    { x: b.last, y: percent(b.cumulative), name: "so far (R_critic)", mode: b.last.length < 3 ? "markers" : "lines", line: { color: palette.ink, width: 2.5 }, hovertemplate: hover("so far") },
+    {
+      type: "bar", x: b.last, y: percent(b.share), name: "this iteration", hovertemplate: hover("this iteration"),
+      marker: { color: palette.critical, opacity: 0.55 },
+    },
+    {
+      x: b.last, y: percent(b.cumulative), name: "so far (R_critic)", hovertemplate: hover("so far"),
+      mode: b.last.length < 3 ? "markers" : "lines", line: { color: palette.ink, width: 2.5 },
+    },
   ];
 }
 
@@ -67,7 +75,8 @@ function trendPlots() {
     host.append(element("div", { class: "card" }, element("h3", {}, title), plot));
     const share = traces === shareFigure, top = Math.max(5, 110 * Math.max(...data.batches.share));
     const last = data.batches.last.at(-1), whole = { range: [0.4, last + 0.6], ...(last < 12 ? { dtick: 1 } : {}) };
-    const axes = { xaxis: { title: { text: "iteration", standoff: 6 }, ...whole }, yaxis: { rangemode: "tozero", ...(share ? { range: [0, top] } : {}) } };
+    const xaxis = { title: { text: "iteration", standoff: 6 }, ...whole };
+    const axes = { xaxis, yaxis: { rangemode: "tozero", ...(share ? { range: [0, top] } : {}) } };
     return [plot, () => Plotly.react(plot, traces(), layout({ ...axes, bargap: 0.15 }), CONFIG)];
   });
 }
@@ -102,7 +111,8 @@ function fillAxes() {
       const options = rows.columns.filter(belongs).map((c) => element("option", { value: c.name, title: c.description }, titled(c.name)));
       if (options.length) select.append(element("optgroup", { label }, ...options));
     }
-    select.append(element("optgroup", { label: "Order" }, ...Object.entries(NOT_SEARCHED).map(([value, text]) => element("option", { value }, text))));
+    const order = Object.entries(NOT_SEARCHED).map(([value, text]) => element("option", { value }, text));
+    select.append(element("optgroup", { label: "Order" }, ...order));
   }
   const names = rows.columns.map((c) => c.name);
   const [x, y] = [...rows.telling, ...names, "evaluation", "iteration"];
@@ -132,13 +142,19 @@ function scatterFigure() {
   const crowd = Math.min(1, Math.sqrt(1500 / Math.max(1, shown))); // smaller and fainter where there are many
   return [
     trace(others, "not critical", { color: palette.plain, size: 3 + 3 * crowd, opacity: 0.25 + 0.35 * crowd, symbol: "circle" }),
-    trace(hits, "critical", { color: palette.critical, size: 5 + 3 * crowd, opacity: 0.5 + 0.3 * crowd, symbol: "diamond", line: { width: 0.5, color: palette.card } }),
+    trace(hits, "critical", {
+      color: palette.critical, size: 5 + 3 * crowd, opacity: 0.5 + 0.3 * crowd, symbol: "diamond",
+      line: { width: 0.5, color: palette.card },
+    }),
     {
       type: "scatter", mode: "markers+text", name: "kept (click to play)", x: keptOn(nameX), y: keptOn(nameY),
       text: data.kept.map((kept) => `${kept.rank}`), textposition: "top right", textfont: { size: 11, color: palette.ink },
       customdata: data.kept.map((_, i) => i), hovertemplate: hover.replace("evaluation %{customdata}", "scenario %{text}: click to play"),
-      marker: { symbol: "circle-open", size: data.kept.map((_, i) => (i === chosen ? 19 : 13)), color: palette.ink, line: { width: data.kept.map((_, i) => (i === chosen ? 3.5 : 1.5)) } },
-      visible: data.kept.length ? true : "legendonly", showlegend: data.kept.length > 0, kept: true,
+      marker: {
+        symbol: "circle-open", size: data.kept.map((_, i) => (i === chosen ? 19 : 13)), color: palette.ink,
+        line: { width: data.kept.map((_, i) => (i === chosen ? 3.5 : 1.5)) },
+      },
+      showlegend: data.kept.length > 0,
     },
   ];
 }

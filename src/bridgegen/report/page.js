@@ -158,7 +158,8 @@ function fillList(choose) {
 
 function fillDetails(kept) {
   const line = (name, value, column) => {
-    const box = element("div", { title: column?.description ?? "" }, element("span", { class: "name" }, name), element("b", {}, quantity(value, column?.unit ?? "")));
+    const text = element("b", {}, quantity(value, column?.unit ?? ""));
+    const box = element("div", { title: column?.description ?? "" }, element("span", { class: "name" }, name), text);
     const { low, high } = column ?? {};
     if (typeof low === "number" && high > low && value !== null) {
       const mark = element("i");

@@ -55,7 +55,8 @@ class Parallel {
     let all = 0, hits = 0;
     rows.critical.forEach((critical, i) => { if (this.passes(i)) { all += 1; hits += critical; } });
     const share = all ? ` (${((100 * hits) / all).toFixed(1)}${NARROW}%)` : "";
-    $("filter-note").textContent = this.filters.size ? `${number(all)} of ${number(rows.critical.length)} pass, ${number(hits)} of them critical${share}` : "";
+    const text = `${number(all)} of ${number(rows.critical.length)} pass, ${number(hits)} of them critical${share}`;
+    $("filter-note").textContent = this.filters.size ? text : "";
     $("filter-clear").disabled = !this.filters.size;
   }
 
@@ -151,7 +152,8 @@ class Parallel {
 
   connect() {
     const select = $("filter-axis");
-    select.append(...this.axes.map((axis) => element("option", { value: axis.name }, axis.name === "critical" ? "critical (0 or 1)" : titled(axis.name))));
+    const text = (axis) => (axis.words ? "critical (0 or 1)" : titled(axis.name));
+    select.append(...this.axes.map((axis) => element("option", { value: axis.name }, text(axis))));
     select.addEventListener("change", () => this.showNumbers());
     for (const id of ["filter-low", "filter-high"]) {
       $(id).addEventListener("input", () => {

@@ -43,11 +43,11 @@ def corners_outside(
     B's centre is at (px, py), its direction (c, s); la, wa, lb, wb are half lengths and widths.
     """
     ux, uy, vx, vy = lb * c, lb * s, wb * s, wb * c
-    front = min(
+    front: float = min(
         outside(px + (ux + vx), py + (uy - vy), la, wa),
         outside(px + (ux - vx), py + (uy + vy), la, wa),
     )
-    rear = min(
+    rear: float = min(
         outside(px - (ux - vx), py - (uy + vy), la, wa),
         outside(px - (ux + vx), py - (uy - vy), la, wa),
     )

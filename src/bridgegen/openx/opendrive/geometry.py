@@ -141,6 +141,11 @@ def reference_line(road: Road, s: Float) -> Curve:
     return out
 
 
+def stretch(geometry: Geometry) -> float:
+    """Return the metres of reference line per metre of s: 1, but for a paramPoly3 of wrong length."""
+    return _table(geometry).scale if isinstance(geometry.shape, ParamPoly3) else 1.0
+
+
 def impossible_shape(geometry: Geometry) -> str | None:
     """Return what makes a geometry's shape impossible to follow, or None."""
     shape, length = geometry.shape, geometry.length

@@ -22,6 +22,7 @@ from bridgegen.openx.opendrive.geometry import (
     integrate,
     invert,
     pose,
+    stretch,
 )
 from bridgegen.openx.opendrive.lanes import (
     Coefficients,
@@ -140,7 +141,7 @@ class Taper:
         return np.hypot(forward, sideways)
 
     def least_stretch(self) -> float:
-        """Return the smallest of 1 - curvature · t, which must stay positive."""
+        """Return the least that the centre advances per metre of road; it must stay positive."""
         return float(np.min(self._frame(self.nodes)[0]))
 
     def at(self, travelled: Float) -> tuple[Float, Float, Float, Float, Float]:
@@ -148,9 +149,11 @@ class Taper:
         distance = invert(self.speed, self.nodes, self.travelled, travelled)
         forward, sideways, line, (t, dt, ddt) = self._frame(distance)
         square = forward * forward + sideways * sideways
-        turn = -line.curvature_rate * t - line.curvature * dt
+        scale = stretch(self.geometry)
+        slowing = -scale * (scale * line.curvature_rate * t + line.curvature * dt)
         tilt = np.arctan2(sideways, forward)
-        curvature = (line.curvature + (ddt * forward - dt * turn) / square) / np.sqrt(square)
+        tilting = (ddt * forward - dt * slowing) / square
+        curvature = (scale * line.curvature + tilting) / np.sqrt(square)
         h = line.h + tilt
         if self.direction < 0:
             h, curvature = h + math.pi, -curvature
@@ -168,7 +171,7 @@ class Taper:
         a, b, c, d = self.t
         t = a + local * (b + local * (c + local * d))
         dt = b + local * (2.0 * c + local * 3.0 * d)
-        forward = (1.0 - line.curvature * t).reshape(distance.shape)
+        forward = (stretch(self.geometry) * (1.0 - line.curvature * t)).reshape(distance.shape)
         return forward, dt.reshape(distance.shape), line, (t, dt, 2.0 * c + local * 6.0 * d)
 
 

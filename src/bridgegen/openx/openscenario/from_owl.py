@@ -15,9 +15,13 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.owl_places import Places
 from bridgegen.openx.openscenario.owl_quantities import Quantities
 from bridgegen.openx.openscenario.owl_weather import environment
+from bridgegen.openx.openscenario.values import format_double
 
 DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""
+
+TIME_STEP = "time_step"
+"""Property of the header: the step [s] at which the scenario was evaluated; the standard has none."""
 
 EGO = "ego"
 ARRIVAL = 2.0

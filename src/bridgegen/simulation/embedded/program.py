@@ -17,6 +17,7 @@ from bridgegen.ego import DRIVERS, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.from_owl import TIME_STEP
 from bridgegen.openx.openscenario.values import Expr, Value
 
 DEFAULT_TIME_STEP = 0.05  # s
@@ -234,7 +235,7 @@ class _Compiler:
 
     def _declared_time_step(self) -> float:
         properties = self.scenario.file_header.properties
-        text = properties.get("time_step") if properties else None
+        text = properties.get(TIME_STEP) if properties else None
         if text is None:
             return DEFAULT_TIME_STEP
         try:
