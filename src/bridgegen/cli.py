@@ -201,14 +201,9 @@ def list_parameters(
 ) -> None:
     """The parameters of a scenario, with ranges and constraints."""
     from bridgegen.odd.scenario import load
-    from bridgegen.screen import print_table
+    from bridgegen.screen import print_parameters
 
-    rows = [
-        (p.name, str(p.axis), p.unit, p.low, p.high, p.default, p.bounds, p.description)
-        for p in load(scenario).table()
-    ]
-    head = ("parameter", "axis", "unit", "low", "high", "default", "constraints", "description")
-    print_table(head, rows, as_json=as_json)
+    print_parameters(load(scenario).table(), as_json=as_json)
 
 
 def _terms(text: str) -> dict[str, float | None]:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -13,6 +14,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, Watch
     from bridgegen.campaign.loop import Progress as LoopProgress
+    from bridgegen.odd.scenario import ParameterLine
     from bridgegen.pipeline import FileResult
 
 _STAGES = {
@@ -125,6 +127,21 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_jso
     for row in rows:
         table.add_row(*("" if value is None else str(value) for value in row))
     Console().print(table)
+
+
+def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None:
+    """Print parameters with range and default; below each, what it is and its constraints."""
+    if as_json:
+        print(json.dumps([{**asdict(line), "axis": str(line.axis)} for line in lines], indent=2))
+        return
+    width = max(len(line.name) for line in lines)
+    for line in lines:
+        span = "derived" if line.low is None else f"{line.low:g} to {line.high:g} {line.unit}"
+        default = "" if line.default is None else f", default {line.default:g}"
+        print(f"{line.name:<{width}}  {line.axis}, {span}{default}")
+        for text in (line.description, *line.bounds.split("; ")):
+            if text:
+                print(f"{'':<{width}}    {text}")
 
 
 def _count(value: int | None) -> str:

@@ -94,10 +94,14 @@ def test_a_missing_value_is_named_with_its_individual(reader, name):
 
 
 def test_two_values_are_one_too_many():
-    individuals = graph(*ROAD, ("r", "has_length", ox.Literal(1.0)), ("r", "has_length", ox.Literal(2.0)))
+    individuals = graph(
+        *ROAD, ("r", "has_length", ox.Literal(1.0)), ("r", "has_length", ox.Literal(2.0))
+    )
     with pytest.raises(OntologyError, match="must be one value, got 1, 2"):
         individuals.number(node("r"), "has_length")
-    individuals = graph(*ROAD, ("r", "has_continuation", node("s")), ("r", "has_continuation", node("t")))
+    individuals = graph(
+        *ROAD, ("r", "has_continuation", node("s")), ("r", "has_continuation", node("t"))
+    )
     with pytest.raises(OntologyError, match="must be one individual, got s, t"):
         individuals.link(node("r"), "has_continuation")
 
@@ -113,7 +117,9 @@ def test_a_link_is_no_value_and_a_value_no_link():
 def test_one_wants_exactly_one():
     with pytest.raises(OntologyError, match=r"class Road is needed, got 0$"):
         graph().one("Road")
-    with pytest.raises(OntologyError, match=r"class Road is needed, got 2 \(A \(Road\), s \(Road\)\)|s"):
+    with pytest.raises(
+        OntologyError, match=r"class Road is needed, got 2 \(A \(Road\), s \(Road\)\)|s"
+    ):
         graph(*ROAD, ("s", "a", "Road")).one("Road")
     assert graph(*ROAD).one("Road") == node("r")
 
@@ -172,7 +178,7 @@ def test_parameters_are_found_by_the_property_they_bind():
 
 def test_two_parameters_of_one_value_contradict_each_other():
     individuals = graph(
-        ("a", "a", "SpeedAction"), ("a", "has_parameter", node("p")), ("a", "has_parameter", node("q")),
+        ("a", "has_parameter", node("p")), ("a", "has_parameter", node("q")),
         ("p", "has_name", ox.Literal("x")), ("p", "binds_property", ox.Literal("has_rate")),
         ("q", "has_name", ox.Literal("y")), ("q", "binds_property", ox.Literal("has_rate")),
     )  # fmt: skip
@@ -194,11 +200,17 @@ def renamed(individuals, salt):
     number = count()
 
     def new(term):
-        if isinstance(term, ox.NamedNode) and term.value.startswith(SCENARIOS) and "#" in term.value:
+        if (
+            isinstance(term, ox.NamedNode)
+            and term.value.startswith(SCENARIOS)
+            and "#" in term.value
+        ):
             if term not in names:
                 k = next(number)
                 names[term] = (
-                    ox.BlankNode() if k % 5 == 4 else ox.NamedNode(f"urn:x:{(k * 7919 + salt) % 10007}")
+                    ox.BlankNode()
+                    if k % 5 == 4
+                    else ox.NamedNode(f"urn:x:{(k * 7919 + salt) % 10007}")
                 )
             return names[term]
         return term
@@ -219,7 +231,10 @@ def test_answers_depend_on_no_iri(individuals, salt):
         legs = which.links(crossing, "has_leg")
         return (
             [which.text(leg, "has_name") for leg in legs],
-            [sorted(which.integer(x, "has_lane_id") for x in which.links(leg, "has_lane")) for leg in legs],
+            [
+                sorted(which.integer(x, "has_lane_id") for x in which.links(leg, "has_lane"))
+                for leg in legs
+            ],
             which.text(which.link(ego, "has_controller"), "has_driver"),
             which.number(start, "has_distance_to_junction"),
             sorted(

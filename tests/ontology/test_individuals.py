@@ -13,9 +13,14 @@ from bridgegen.odd.scenario import Waypoint, names
 from bridgegen.odd.scenario import load as load_scenario
 from bridgegen.ontology.individuals import STATIC_BINDINGS, build, build_static
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.vocabulary import OWL_ONTOLOGY
+from bridgegen.ontology.vocabulary import BG, OWL_ONTOLOGY
 
-STATIC = {"lane_width": 3.25, "lanes_per_direction": 2.0, "arm_length": 70.0, "intersection_size": 30.0}
+STATIC = {
+    "lane_width": 3.25,
+    "lanes_per_direction": 2.0,
+    "arm_length": 70.0,
+    "intersection_size": 30.0,
+}
 
 
 def participant(individuals, name):
@@ -245,7 +250,7 @@ def test_static_parameters_are_bound_wherever_they_show(individuals):
 
 
 def test_constraints_are_annotated_for_people(individuals):
-    query = """PREFIX bg: <https://w3id.org/bridgegen#> SELECT ?c WHERE { bg:has_cloudiness bg:constraint ?c }"""
+    query = f"SELECT ?c WHERE {{ <{BG}has_cloudiness> <{BG}constraint> ?c }}"
     (row,) = individuals.store.query(query)
     assert row["c"].value.startswith("cloudiness >= precipitation: Rain falls from clouds")
     assert "\n" not in row["c"].value
@@ -283,7 +288,9 @@ def test_on_a_map_made_elsewhere(scenario, values):
     assert individuals.text(road, "has_road_id") == "B-far"  # 33 m is beyond the first 20
     assert individuals.integer(lane, "has_lane_id") == -1
     near = build(scenario, {**dynamic, "bv_start": 12.0}, driver="x", site=chained())
-    lane = near.link(near.link(near.link(participant(near, "bv"), "has_route"), "has_start"), "on_lane")
+    lane = near.link(
+        near.link(near.link(participant(near, "bv"), "has_route"), "has_start"), "on_lane"
+    )
     (road,) = (r for r in near.of_class("Road") if lane in near.links(r, "has_lane"))
     assert near.text(road, "has_road_id") == "B-near"
 

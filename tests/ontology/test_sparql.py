@@ -105,7 +105,9 @@ def formulas():
         pair = st.tuples(inner, inner)
         compare = st.tuples(inner, st.sampled_from(["<", "<=", ">", ">=", "=="]), inner)
         return (
-            st.tuples(inner, st.sampled_from("+-*/"), inner).map(lambda p: f"({p[0]} {p[1]} {p[2]})")
+            st.tuples(inner, st.sampled_from("+-*/"), inner).map(
+                lambda p: f"({p[0]} {p[1]} {p[2]})"
+            )
             | st.tuples(st.sampled_from(["sin", "abs", "floor", "sqrt", "sign"]), inner).map(
                 lambda p: f"{p[0]}({p[1]})"
             )

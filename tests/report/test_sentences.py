@@ -20,7 +20,7 @@ def test_three_sentences(with_summary):
     first, second, third = of(data)
     assert first == (
         "1,000 concrete scenarios of “Left turn into the path of a crossing car” were simulated "
-        "with the driver route-follower on the generated crossroads, chosen by pso in 3.4 s."
+        "with the driver route-follower on generated crossroads, chosen by pso in 3.4 s."
     )
     assert second == (
         "312 of them (31.2 %) are critical (a collision, or d_min below 2 m while v_d is at least "

@@ -6,7 +6,8 @@ what was saved and what is loaded are the same individuals; what a user added to
 """
 
 import os
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -25,14 +26,13 @@ from bridgegen.ontology.vocabulary import (
     PREFIXES,
     SCENARIOS,
     TYPE,
-    Subject,
     bg,
     tbox,
 )
 
 MAX_BYTES = 100 * 2**20
 MAX_DEPTH = 256
-"""Of anonymous nodes that describe one another, as compared with the ontology's own."""
+"""Of XML elements, and of anonymous nodes that are compared with the ontology's own."""
 
 _IMPORTS = ox.NamedNode(OWL + "imports")
 _RDF_XML = ox.RdfFormat.RDF_XML
@@ -173,59 +173,47 @@ def _number_ranges() -> dict[ox.NamedNode, ox.NamedNode]:
 
 def _without_tbox(quads: list[ox.Quad]) -> list[ox.Quad]:
     """Leave out what ``bridgegen.owl`` says, anonymous nodes (of a list, say) included."""
-    known = _known()
-    described = _Anonymous(quads)
-    return [quad for quad in quads if described.key(quad) not in known]
+    plain, trees = _known()
+    ours = {quad for key, tree in _trees(quads) if key in trees for quad in tree}
+    return [quad for quad in quads if quad not in plain and quad not in ours]
 
 
 @cache
-def _known() -> frozenset[object]:
-    described = _Anonymous(tbox().quads)
-    return frozenset(described.key(quad) for quad in tbox().quads)
+def _known() -> tuple[frozenset[ox.Quad], frozenset[str]]:
+    quads = tbox().quads
+    return frozenset(quads), frozenset(key for key, _ in _trees(quads))
 
 
-class _Anonymous:
-    """Tells statements about anonymous nodes apart by what they say, their ids being arbitrary."""
+def _trees(quads: Iterable[ox.Quad]) -> Iterator[tuple[str, list[ox.Quad]]]:
+    """Yield each tree of anonymous nodes: what it says, their ids being arbitrary, and its quads.
 
-    def __init__(self, quads: Iterable[ox.Quad]) -> None:
-        self.about: dict[object, list[ox.Quad]] = {}
-        self.parent: dict[object, ox.Quad] = {}
-        for quad in quads:
-            if isinstance(quad.subject, ox.BlankNode):
-                self.about.setdefault(quad.subject, []).append(quad)
-            if isinstance(quad.object, ox.BlankNode):
-                self.parent[quad.object] = quad
-
-    def key(self, quad: ox.Quad) -> object:
-        """Return what identifies a statement: itself, or the whole tree that it is part of."""
-        if not self.about:
-            return quad
-        for _ in range(MAX_DEPTH):
-            if quad.subject not in self.parent:
-                break
-            quad = self.parent[quad.subject]
-        if isinstance(quad.subject, ox.BlankNode):
-            return self.text(quad.subject, MAX_DEPTH)
+    A node that is referred to twice ends its tree, so each is visited once at most, and circles
+    not at all.
+    """
+    about: dict[object, list[ox.Quad]] = {}
+    references: Counter[object] = Counter()
+    roots: list[ox.Quad | ox.BlankNode] = []
+    for quad in quads:
         if isinstance(quad.object, ox.BlankNode):
-            return (quad.subject, quad.predicate, self.text(quad.object, MAX_DEPTH))
-        return quad
+            references[quad.object] += 1
+            if not isinstance(quad.subject, ox.BlankNode):
+                roots.append(quad)
+        if isinstance(quad.subject, ox.BlankNode):
+            about.setdefault(quad.subject, []).append(quad)
+    roots += [node for node in about if isinstance(node, ox.BlankNode) and not references[node]]
 
-    def text(self, node: Subject, depth: int) -> str:
-        """Return all that a tree of anonymous nodes says, in a fixed order."""
-        if depth == 0:
+    def text(node: object, tree: list[ox.Quad], depth: int) -> str:
+        if not isinstance(node, ox.BlankNode) or references[node] > 1 or depth == 0:
             return str(node)
-        return (
-            "["
-            + ";".join(
-                sorted(
-                    f"{quad.predicate} "
-                    + (
-                        self.text(quad.object, depth - 1)
-                        if isinstance(quad.object, ox.BlankNode)
-                        else str(quad.object)
-                    )
-                    for quad in self.about.get(node, ())
-                )
-            )
-            + "]"
-        )
+        own = about.get(node, [])
+        tree += own
+        said = sorted(f"{quad.predicate} {text(quad.object, tree, depth - 1)}" for quad in own)
+        return f"[{' ; '.join(said)}]"
+
+    for root in roots:
+        tree: list[ox.Quad] = []
+        if isinstance(root, ox.Quad):
+            tree.append(root)
+            yield f"{root.subject} {root.predicate} {text(root.object, tree, MAX_DEPTH)}", tree
+        else:
+            yield text(root, tree, MAX_DEPTH), tree

@@ -4,11 +4,10 @@ The same description comes from the static parameters (`Site.generated`) or from
 made elsewhere (`bridgegen.openx.opendrive.site.find_site`).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
-
-import numpy as np
 
 from bridgegen.errors import OntologyError
 from bridgegen.odd.parameters import TOLERANCE
@@ -126,12 +125,10 @@ class Site:
             OntologyError: ``lanes_per_direction`` is no whole number.
         """
         width = float(values["lane_width"])
-        lanes_per_direction = float(values["lanes_per_direction"])
-        if not abs(lanes_per_direction - np.round(lanes_per_direction)) <= TOLERANCE:
-            raise OntologyError(
-                f"lanes_per_direction must be a whole number, got {lanes_per_direction}"
-            )
-        count = round(lanes_per_direction)
+        lanes_each_way = float(values["lanes_per_direction"])
+        count = round(lanes_each_way) if math.isfinite(lanes_each_way) else 0
+        if not abs(lanes_each_way - count) <= TOLERANCE:
+            raise OntologyError(f"lanes_per_direction must be a whole number, got {lanes_each_way}")
         lanes = tuple(SiteLane(k, "in", width) for k in range(1, count + 1)) + tuple(
             SiteLane(-k, "out", width) for k in range(1, count + 1)
         )

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bridgegen import metrics as measures
+from bridgegen.objective import Thresholds
 from bridgegen.openx.opendrive.outline import outline
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
@@ -65,10 +66,7 @@ def build_report(
         n_evaluations=summary.evaluations,
         n_critical=summary.critical,
         r_critic=summary.r_critic,
-        critical_rule=(
-            f"more than {limits.n_collision_above:g} collisions, or d_min below "
-            f"{limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
-        ),
+        critical_rule=_rule(limits),
         critical_distance=limits.d_min_below,
         first_critical=summary.first,
         fiftieth_critical=summary.fiftieth,
@@ -87,6 +85,14 @@ def build_report(
         },
     )
     return ReportData(head, _evaluations(pipeline, rows), _playbacks(pipeline, rows, kept))
+
+
+def _rule(limits: Thresholds) -> str:
+    """Return what counts as critical, in words."""
+    many = limits.n_collision_above
+    contact = "a collision" if many == 0 else f"more than {many:g} collisions"
+    close = f"d_min below {limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
+    return f"{contact}, or {close}"
 
 
 def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:

@@ -17,7 +17,7 @@ def sentences(data: ReportData) -> list[str]:
     words = [
         f"{_count(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
         f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego} "
-        f"on the {s.road}, chosen by {s.algorithm} in {duration(s.wall_seconds)}."
+        f"on {s.road}, chosen by {s.algorithm} in {duration(s.wall_seconds)}."
     ]
     if not s.finished:
         words[0] = words[0][:-1] + f"; the run stopped before its budget of {s.budget:,}."

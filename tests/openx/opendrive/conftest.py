@@ -3,11 +3,13 @@
 import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from hypothesis import strategies as st
 
 from bridgegen.ontology.individuals import build_static
+from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
@@ -61,6 +63,35 @@ def static() -> st.SearchStrategy[Values]:
         return values(width, lanes, pick(st.floats(45.0, 100.0)), size)
 
     return draw()
+
+
+@pytest.fixture(scope="session")
+def sites() -> st.SearchStrategy[Site]:
+    """Four legs at any headings at least 45° apart, with lanes and widths of any kind."""
+    widths = st.lists(st.floats(2.75, 4.0), min_size=1, max_size=3)
+
+    @st.composite
+    def leg(pick: st.DrawFn, number: int, heading: float) -> Leg:
+        end: Literal["start", "end"] = pick(st.sampled_from(("start", "end")))
+        side = 1 if end == "start" else -1
+        lanes = [SiteLane(side * k, "in", width) for k, width in enumerate(pick(widths), 1)]
+        lanes += [SiteLane(-side * k, "out", width) for k, width in enumerate(pick(widths), 1)]
+        road_id = str(number * pick(st.sampled_from((1, 7))))
+        road = ArmRoad(road_id, pick(st.floats(45.0, 100.0)), end, tuple(lanes), 13.9)
+        return Leg("ABCD"[number - 1], heading, (road,))
+
+    @st.composite
+    def site(pick: st.DrawFn) -> Site:
+        gaps = pick(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4))
+        total = sum(gaps)
+        heading, legs = pick(st.floats(-360.0, 0.0)), []
+        for number, gap in enumerate(gaps, start=1):
+            legs.append(pick(leg(number, heading)))
+            heading += 45.0 + (180.0 * gap / total if total > 0.1 else 45.0)
+        junction_id = pick(st.sampled_from(("100", "5", "999999")))
+        return Site("crossing", None, junction_id, 90.0, tuple(pick(st.permutations(legs))))
+
+    return site()
 
 
 @pytest.fixture(scope="session")

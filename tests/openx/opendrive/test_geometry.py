@@ -28,7 +28,9 @@ from bridgegen.openx.opendrive.plan_view import (
 CURVATURE = st.floats(-0.2, 0.2)
 
 
-def geometry(shape: object, length: float, x: float = 0.0, y: float = 0.0, h: float = 0.0) -> Geometry:
+def geometry(
+    shape: object, length: float, x: float = 0.0, y: float = 0.0, h: float = 0.0
+) -> Geometry:
     return Geometry(0.0, x, y, h, length, shape)  # type: ignore[arg-type]
 
 

@@ -25,7 +25,15 @@ from bridgegen.openx.opendrive.model import (
     Width,
 )
 from bridgegen.openx.opendrive.path import LanePath
-from bridgegen.openx.opendrive.plan_view import Arc, Cubic, Geometry, Line, ParamPoly3, Poly3, Spiral
+from bridgegen.openx.opendrive.plan_view import (
+    Arc,
+    Cubic,
+    Geometry,
+    Line,
+    ParamPoly3,
+    Poly3,
+    Spiral,
+)
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.routes import Route, plan_route
 from bridgegen.openx.opendrive.write import to_xml
@@ -129,7 +137,9 @@ def test_left_turn_by_hand(crossroads: Callable[..., OpenDrive]) -> None:
 
 
 @given(data=st.data())
-def test_any_crossroads(data: st.DataObject, static: Any, crossroads: Callable[..., OpenDrive]) -> None:
+def test_any_crossroads(
+    data: st.DataObject, static: Any, crossroads: Callable[..., OpenDrive]
+) -> None:
     values = data.draw(static)
     model = crossroads(*values.values())
     origin, target = data.draw(st.sampled_from(WAYS))
@@ -143,7 +153,11 @@ def test_any_crossroads(data: st.DataObject, static: Any, crossroads: Callable[.
     straight = (origin, target) in (("3", "1"), ("2", "4"), ("1", "3"), ("4", "2"))
     quarter = (size + values["lane_width"]) / 2 * math.pi / 2
     assert inside == pytest.approx(size if straight else quarter)
-    for road_id, s, station in ((origin, start, 0.0), (origin, 0.0, start), (target, 0.0, start + inside)):
+    for road_id, s, station in (
+        (origin, start, 0.0),
+        (origin, 0.0, start),
+        (target, 0.0, start + inside),
+    ):
         a, b = route.station(road_id, s)
         assert a + b * s == pytest.approx(station)
     np.testing.assert_allclose(path.lane_width, values["lane_width"])
@@ -197,7 +211,9 @@ def test_town05(town05: OpenDrive, start: Any, end: Any, roads: list[str]) -> No
     path = route.sample(0.1)
     check_path(path, tolerance=0.03)  # the map's joints leave gaps of millimetres
     np.testing.assert_allclose(path.lane_width, 3.5, atol=0.02)
-    assert math.dist((path.x[0], path.y[0]), lane_pose(town05.road(start[0]), *start[1:])[:2]) < 1e-9
+    assert (
+        math.dist((path.x[0], path.y[0]), lane_pose(town05.road(start[0]), *start[1:])[:2]) < 1e-9
+    )
     a, b = route.station(end[0], end[2])
     assert a + b * end[2] == pytest.approx(route.length)
 
@@ -220,7 +236,8 @@ ROADS = {
     ),
     "poly3": road((Poly3(0.0, 0.0, 0.01, -1e-4), 50.0), sections=lanes()),
     "paramPoly3": road(
-        (ParamPoly3(0, 49.5, 3.0, -7.0, 0, 0, 30.0, -18.0, "normalized"), 50.0), sections=lanes(*TAPER)
+        (ParamPoly3(0, 49.5, 3.0, -7.0, 0, 0, 30.0, -18.0, "normalized"), 50.0),
+        sections=lanes(*TAPER),
     ),
 }  # fmt: skip
 
@@ -237,7 +254,9 @@ def test_curves_and_tapers_against_summation(name: str, lane_id: int) -> None:
     assert route.length == pytest.approx(travelled[-1], rel=1e-6)
     inside = path.s <= route.length
     for got, wanted in ((path.x, x), (path.y, y), (path.lane_width, width)):
-        np.testing.assert_allclose(got[inside], np.interp(path.s, travelled, wanted)[inside], atol=1e-4)
+        np.testing.assert_allclose(
+            got[inside], np.interp(path.s, travelled, wanted)[inside], atol=1e-4
+        )
     check_path(path)
 
 
@@ -288,15 +307,9 @@ def test_lane_inside_a_bend_that_folds_over() -> None:
 
 def ring() -> OpenDrive:
     """A road east, and a way back to its start: one lane, a loop of 100 m."""
-    section = (
-        LaneSection(
-            0.0,
-            center=(Lane(0),),
-            right=(
-                Lane(-1, "driving", predecessors=(-1,), successors=(-1,), widths=lanes()[0].right[0].widths),
-            ),
-        ),
-    )  # fmt: skip
+    width = (Width(0.0, 3.0, 0.0, 0.0, 0.0),)
+    lane = Lane(-1, "driving", predecessors=(-1,), successors=(-1,), widths=width)
+    section = (LaneSection(0.0, center=(Lane(0),), right=(lane,)),)
     shape = Arc(math.tau / 100)
     half = road((shape, 50.0))
     end = road((shape, 50.0), (Line(), 1.0)).plan_view[1]
@@ -342,8 +355,20 @@ def test_shortest_of_two_ways() -> None:
 
     roads = (
         way("1", 10.0, after=RoadLink("junction", "9")),
-        way("2", 30.0, "9", before=RoadLink("road", "1", "end"), after=RoadLink("road", "4", "start")),
-        way("3", 20.0, "9", before=RoadLink("road", "1", "end"), after=RoadLink("road", "4", "start")),
+        way(
+            "2",
+            30.0,
+            "9",
+            before=RoadLink("road", "1", "end"),
+            after=RoadLink("road", "4", "start"),
+        ),
+        way(
+            "3",
+            20.0,
+            "9",
+            before=RoadLink("road", "1", "end"),
+            after=RoadLink("road", "4", "start"),
+        ),
         way("4", 10.0, before=RoadLink("junction", "9")),
     )
     connections = tuple(
@@ -365,7 +390,12 @@ def test_shortest_of_two_ways() -> None:
         (("3", 1, 61.0), [], ("1", -1, 1.0), r"0 <= s \[m\] <= 60 must hold on road 3, got s=61"),
         (("3", 1, math.nan), [], ("1", -1, 1.0), "must hold on road 3, got s=nan"),
         (("3", 1, 40.0), [("3", 2, 30.0)], ("1", -1, 1.0), "without a lane change"),
-        (("3", 1, 40.0), [], ("1", -2, 1.0), "no lane leads from road 3, lane 1, s=40 m to road 1, l"),
+        (
+            ("3", 1, 40.0),
+            [],
+            ("1", -2, 1.0),
+            "no lane leads from road 3, lane 1, s=40 m to road 1, l",
+        ),
         (("3", -1, 40.0), [], ("1", -1, 1.0), "no lane leads"),  # it leads away
         (("3", 1, 40.0), [], ("3", 1, 40.0), "a route must have a length"),
         (("3", 1, 30.0), [], ("3", 1, 40.0), "no lane leads"),  # behind, and no way round

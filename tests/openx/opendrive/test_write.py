@@ -62,11 +62,17 @@ def record(cls: type) -> st.SearchStrategy[Any]:
     if cls is plan_view.Geometry:
         given_fields["length"] = st.just(1.0)
     if cls is model.Road:  # without links to what is not there
-        given_fields |= {"junction": st.just("-1"), "predecessor": st.none(), "successor": st.none()}
+        given_fields |= {
+            "junction": st.just("-1"),
+            "predecessor": st.none(),
+            "successor": st.none(),
+        }
     return st.builds(cls, **given_fields)
 
 
-@given(roads=st.lists(record(model.Road), max_size=2, unique_by=lambda road: road.id), data=st.data())
+@given(
+    roads=st.lists(record(model.Road), max_size=2, unique_by=lambda road: road.id), data=st.data()
+)
 @settings(max_examples=40)
 def test_any_road_and_header(roads: list[model.Road], data: st.DataObject) -> None:
     header = data.draw(record(model.Header))
@@ -76,7 +82,9 @@ def test_any_road_and_header(roads: list[model.Road], data: st.DataObject) -> No
 
 
 @given(data=st.data())
-def test_any_crossroads(data: st.DataObject, static: Any, crossroads: Callable[..., OpenDrive]) -> None:
+def test_any_crossroads(
+    data: st.DataObject, static: Any, crossroads: Callable[..., OpenDrive]
+) -> None:
     made = crossroads(*data.draw(static).values())
     text = to_xml(made)
     assert read(text) == made

@@ -37,9 +37,9 @@ def find_site(
         map_name: the map's file name, as in ``Town05.xodr``.
 
     Raises:
-        InputError: the map has no such junction, or none is named and there are several.
-        UnsupportedError: the junction has not exactly four legs with lanes in and out, or a
-            leg's lanes change on the road that touches the junction.
+        InputError: the map has no such junction, or none is named and several would do.
+        UnsupportedError: the junction (or every junction) has not exactly four legs with lanes in
+            and out, or a leg's lanes change on the road that touches the junction.
     """
     name = (map_name or model.header.name or "map").rpartition("/")[2]
     stem = name.removesuffix(".xodr")
@@ -66,16 +66,17 @@ def _default_junction(model: OpenDrive, stem: str) -> str:
     known = KNOWN_SITES.get(stem)
     if known and any(junction.id == known for junction in model.junctions):
         return known
+    if len(model.junctions) == 1:
+        return model.junctions[0].id
     counts = {junction.id: len(list(_incoming(model, junction))) for junction in model.junctions}
     fitting = [name for name, count in counts.items() if count == len(LEG_NAMES)]
     if len(fitting) == 1:
         return fitting[0]
+    rule = f"a scenario takes place at a junction of {len(LEG_NAMES)} legs"
     listed = ", ".join(f"{name} ({count} legs)" for name, count in counts.items()) or "none"
-    rule = "one of them must be named" if fitting else "none of them can be used"
-    raise InputError(
-        f"a scenario takes place at a junction of {len(LEG_NAMES)} legs; {stem} has {len(fitting)} "
-        f"such, {rule}: {listed}"
-    )
+    if not fitting:
+        raise UnsupportedError(f"{rule}; {stem} has none such: {listed}")
+    raise InputError(f"{rule}; {stem} has {len(fitting)} such, one of them must be named: {listed}")
 
 
 def _incoming(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]]:

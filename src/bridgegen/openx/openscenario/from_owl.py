@@ -21,7 +21,7 @@ DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""
 
 TIME_STEP = "time_step"
-"""Property of the header: the step [s] at which the scenario was evaluated; the standard has none."""
+"""Property of the header: the step [s] of the evaluation, for which the standard has no place."""
 
 EGO = "ego"
 ARRIVAL = 2.0
@@ -76,12 +76,18 @@ class _Converter:
                 raise OntologyError(f"a parameter must not have the reserved name {text.name}")
         name = self._text(self.node, "has_name")
         return osc.OpenScenario(
-            osc.FileHeader(1, 2, date, name, "BridgeGen"),
+            osc.FileHeader(
+                1, 2, date, name, "BridgeGen", properties=osc.Properties(self._settings())
+            ),
             osc.RoadNetwork(osc.File(road_file)),
             osc.Entities(tuple(self._object(name, node) for name, node in participants.items())),
             osc.Storyboard(osc.Init(init), self._stories(), self._stop(participants[EGO])),
             parameter_declarations=osc.ParameterDeclarations((*declarations, *texts)),
         )
+
+    def _settings(self) -> tuple[osc.Property, ...]:
+        step = self.individuals.optional_number(self.node, "has_time_step")
+        return () if step is None else (osc.Property(TIME_STEP, format_double(step)),)
 
     def _participants(self) -> dict[str, Subject]:
         """Return the participants by name, the ego first, then in alphabetical order."""

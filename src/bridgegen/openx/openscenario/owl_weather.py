@@ -25,9 +25,8 @@ VISIBILITY = "10000/pow(200,x/100)"
 """Meteorological optical range [m] of fog density [%]: 10⁴·200^(−f/100), from clear (10 km) to
 thick fog (50 m). CARLA publishes no unit; ours, in the steps of WMO's visibility code."""
 
-WIND = "0.836*pow(x/10,1.5)"
-"""Speed [m/s] of wind intensity [%], ten per Beaufort number B: 0.836·B^1.5, 26.4 m/s at 100 %.
-Source: WMO-No. 8, the relation that the Beaufort scale was fitted by. CARLA publishes no unit."""
+WIND = "0.2*x"
+"""Speed [m/s] of wind intensity [%]: 20 m/s, a gale, at 100 %. CARLA publishes no unit; ours."""
 
 ELEVATION = "x*0.017453292519943295"
 """Elevation [rad] of the sun's altitude angle [deg]."""

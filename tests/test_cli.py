@@ -1,0 +1,226 @@
+"""The command line as a person meets it: what it prints, and how it refuses."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import bridgegen as bg
+from bridgegen.cli import main
+
+
+@pytest.fixture
+def cli(monkeypatch, capsys):
+    """Run a command line; return (exit status, standard output, standard error)."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> "bg.Run":
+    folder = tmp_path_factory.mktemp("runs") / "s4"
+    return bg.run_search("crossroads-s4", budget=120, keep=2, out=folder)
+
+
+def refused(result: tuple[int, str, str], *parts: str) -> None:
+    code, _, err = result
+    assert code == 2
+    assert "Traceback" not in err
+    for part in parts:
+        assert part in err, err
+
+
+def test_search_prints_the_run_s_figures(cli, tmp_path):
+    code, out, _ = cli(
+        "search", "crossroads-s4", "--budget", 80, "--keep", 1, "--out", tmp_path / "r"
+    )
+    assert code == 0
+    for label in (
+        "R_critic",
+        "first critical after",
+        "50th critical after",
+        "d_min",
+        "v_d",
+        "search time",
+    ):
+        assert label in out
+    assert str(tmp_path / "r" / "report.html") in out
+
+
+def test_simulate_prints_what_the_store_holds(cli, finished):
+    path = finished.scenarios[0]
+    code, out, _ = cli("simulate", path, "--json")
+    facts = json.loads(out)
+    recorded = json.loads(path.with_suffix(".json").read_text("utf-8"))
+    assert code == 0
+    assert facts["status"] == "ok"
+    assert facts["metrics"] == {name: one["value"] for name, one in recorded["metrics"].items()}
+    code, out, _ = cli("simulate", path)
+    assert code == 0
+    assert repr(facts["metrics"]["d_min"]) in out
+
+
+def test_simulate_with_another_driver(cli, finished):
+    path = finished.scenarios[0]
+    _, out, _ = cli("simulate", path, "--json", "--ego", "reference")
+    assert json.loads(out)["ego"] == "reference"
+    assert json.loads(out)["metrics"]["n_collision"] == 0.0
+
+
+def test_every_handed_over_file_is_valid(cli, finished):
+    files = [p for p in sorted((finished.folder / "critical").iterdir()) if p.suffix != ".json"]
+    code, out, _ = cli("validate", *files)
+    assert code == 0
+    assert out.count(": valid") == len(files) == 6
+
+
+def test_convert_gives_back_the_handed_over_files(cli, finished, tmp_path):
+    owl = finished.scenarios[0].with_suffix(".owl")
+    code, out, err = cli("convert", owl, "--out", tmp_path)
+    assert (code, err) == (0, "")
+    for kind in (".xodr", ".xosc"):
+        assert str(tmp_path / f"0001{kind}") in out
+        assert (tmp_path / f"0001{kind}").read_bytes() == owl.with_suffix(kind).read_bytes()
+
+
+def test_an_edited_ontology_converts_to_an_edited_scenario(cli, finished, tmp_path):
+    """As after a change in Protégé: the individual's value is the file's value."""
+    owl = finished.scenarios[0].with_suffix(".owl")
+    facts = json.loads(owl.with_suffix(".json").read_text("utf-8"))
+    value = repr(facts["parameters"]["bv_speed"]["value"])
+    text = owl.read_text("utf-8")
+    assert text.count(f">{value}<") == 1
+    edited = tmp_path / "edited.owl"
+    edited.write_text(text.replace(f">{value}<", ">1.25<"), "utf-8")
+    code, _, _ = cli("convert", edited)
+    assert code == 0
+    assert 'name="bv_speed" parameterType="double" value="1.25"' in (
+        tmp_path / "edited.xosc"
+    ).read_text("utf-8")
+    assert cli("simulate", tmp_path / "edited.xosc")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("what", "expected"),
+    [
+        (["scenarios"], "crossroads-s1"),
+        (["algorithms"], "pso"),
+        (["metrics"], "d_min"),
+        (["parameters", "crossroads-s4"], "bv_trigger_distance"),
+    ],
+)
+def test_lists(cli, what, expected):
+    code, out, _ = cli("list", *what, "--json")
+    assert code == 0
+    assert expected in {next(iter(row.values())) for row in json.loads(out)}
+    assert expected in cli("list", *what)[1]
+
+
+def test_a_run_folder_is_never_overwritten(cli, finished):
+    result = cli("search", "crossroads-s4", "--out", finished.folder)
+    refused(result, str(finished.folder), "bridgegen resume")
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["search", "crosroads-s4"], ["unknown scenario 'crosroads-s4'", "crossroads-s4"]),
+        (["search", "crossroads-s4", "--algorithm", "spo"], ["unknown algorithm 'spo'", "pso"]),
+        (["search", "crossroads-s4", "--objective", "dmin=1"], ["unknown metric 'dmin'", "d_min"]),
+        (["search", "crossroads-s4", "--fix", "fog"], ["--fix must read NAME=NUMBER, got 'fog'"]),
+        (["search", "crossroads-s4", "--fix", "fog_density=nan"], ["fog_density", "nan"]),
+        (["search", "crossroads-s4", "--budget", "-3"], ["budget", "-3"]),
+        (["search", "nowhere.yaml"], ["nowhere.yaml"]),
+        (["search", "crossroads-s4", "--map", "nowhere.xodr"], ["nowhere.xodr"]),
+        (["simulate", "nowhere.xosc"], ["nowhere.xosc"]),
+        (["convert", "nowhere.owl"], ["nowhere.owl"]),
+        (["validate", "nowhere.xodr"], ["nowhere.xodr"]),
+        (["validate", "pyproject.toml"], ["pyproject.toml", ".owl"]),
+        (["resume", "nowhere"], ["nowhere"]),
+        (["list", "parameters", "crossroads-s9"], ["unknown scenario"]),
+    ],
+)
+def test_a_mistake_is_one_clear_error(cli, words, parts, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pyproject.toml").touch()
+    refused(cli(*words), *parts)
+    assert not (tmp_path / "runs").exists()
+
+
+BOMB = """<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>
+<{root}>&b;</{root}>"""
+OUTSIDE = """<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>
+<{root}>&a;</{root}>"""
+
+
+@pytest.mark.parametrize("text", [BOMB, OUTSIDE, "<{root}>", "", "not XML", "<{root}/>", "\x00"])
+@pytest.mark.parametrize(
+    ("suffix", "root"), [("xosc", "OpenSCENARIO"), ("xodr", "OpenDRIVE"), ("owl", "rdf:RDF")]
+)
+def test_hostile_and_broken_files_are_refused(cli, tmp_path, text, suffix, root):
+    path = tmp_path / f"file.{suffix}"
+    path.write_text(text.format(root=root) if "{root}" in text else text, "utf-8")
+    result = cli("validate", path)
+    refused(result, str(path))
+    assert "root:" not in result[2]
+
+
+def test_what_is_outside_the_supported_set_is_named_with_its_line(cli, finished, tmp_path):
+    scenario = finished.scenarios[0]
+    text = scenario.read_text("utf-8").replace(
+        "<SpeedAction>", "<LaneChangeAction/>\n<SpeedAction>", 1
+    )
+    (tmp_path / "a.xosc").write_text(text, "utf-8")
+    (tmp_path / "0001.xodr").write_bytes(scenario.with_suffix(".xodr").read_bytes())
+    line = text[: text.index("<LaneChangeAction")].count("\n") + 1
+    refused(cli("simulate", tmp_path / "a.xosc"), "LaneChangeAction", f"line {line}")
+
+
+def test_an_individual_without_a_required_property_is_named(cli, finished, tmp_path):
+    lines = finished.scenarios[0].with_suffix(".owl").read_text("utf-8").splitlines()
+    at = max(i for i, line in enumerate(lines) if "has_wheelbase" in line)
+    (tmp_path / "a.owl").write_text("\n".join(lines[:at] + lines[at + 1 :]), "utf-8")
+    refused(cli("convert", tmp_path / "a.owl"), "has_wheelbase")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a file system that can be full")
+@pytest.mark.skipif(os.name != "posix", reason="needs a POSIX limit")
+def test_a_full_disk_is_one_clear_error_and_what_is_done_is_kept(tmp_path):
+    """A limit on file sizes stands for the full disk: writing fails in the midst of a run."""
+    code = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+from bridgegen.cli import main; main()
+"""
+    words = ["search", "crossroads-s4", "--budget", "20000", "--out", str(tmp_path / "run")]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "bridgegen: error:" in done.stderr
+    assert bg.Run(tmp_path / "run").summary.evaluations >= 40
+
+
+def test_a_command_without_documentation_fails_this_test(cli):
+    readme = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+    code, out, _ = cli("--help")
+    assert code == 0
+    for command in ("search", "resume", "simulate", "convert", "validate", "list"):
+        assert f"bridgegen {command}" in readme
+        assert command in out
