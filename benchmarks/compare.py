@@ -15,7 +15,7 @@ from scipy.stats import mannwhitneyu
 from bridgegen.campaign.loop import run_loop
 from bridgegen.odd.scenario import load
 from bridgegen.openx.opendrive.road_map import load_map
-from bridgegen.pipeline import Pipeline
+from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.search import get
 from bridgegen.store import Store
 from bridgegen.store.summary import Summary, summarise
@@ -49,26 +49,26 @@ def main() -> None:
     parser.add_argument("--map", type=Path)
     options = parser.parse_args()
     algorithms = options.algorithms.split(",")
-    print("| scenario | algorithm | R_critic, median (quartiles) | first | 50th | median d_min | p |")
+    print(
+        "| scenario | algorithm | R_critic, median (quartiles) | first | 50th | median d_min | p |"
+    )
     print("|---|---|---|---|---|---|---|")
     for name in SCENARIOS:
         scenario = load(name)
         road_map = load_map(options.map) if options.map else None
+        if road_map:
+            scenario = on_map(scenario, road_map)
         space = scenario.space()
         pipeline = Pipeline(scenario, space, ego=options.ego, road_map=road_map)
         pipeline.choose_objective()
         shares: dict[str, list[float]] = {}
         for algorithm in algorithms:
-            runs = [
-                one(pipeline, algorithm, seed, options.budget) for seed in range(options.seeds)
-            ]
+            runs = [one(pipeline, algorithm, seed, options.budget) for seed in range(options.seeds)]
             shares[algorithm] = [run.r_critic for run in runs]
             low, middle, high = np.quantile(shares[algorithm], (0.25, 0.5, 0.75))
             p = ""
             if algorithm != algorithms[0]:
-                test = mannwhitneyu(
-                    shares[algorithm], shares[algorithms[0]], alternative="greater"
-                )
+                test = mannwhitneyu(shares[algorithm], shares[algorithms[0]], alternative="greater")
                 p = f"{test.pvalue:.1e}"
             first = _median([run.first for run in runs])
             fiftieth = _median([run.fiftieth for run in runs])

@@ -98,7 +98,9 @@ def files() -> list[Row]:
     X = space.decode(np.random.default_rng(1).random((12, space.n_var)))
     with tempfile.TemporaryDirectory() as folder:
         each = [seconds(lambda x=x: write_scenario(pipeline, x, Path(folder), "a")) for x in X]
-    return [("one scenario's files, checked, ms", f"{1e3 * float(np.median(each[2:])):.0f}", "≤ 100")]
+    return [
+        ("one scenario's files, checked, ms", f"{1e3 * float(np.median(each[2:])):.0f}", "≤ 100")
+    ]
 
 
 def decoder() -> list[Row]:

@@ -191,6 +191,16 @@ class Pipeline:
         return compile_network(self.program, models), rows.reshape(-1).astype(np.int64)
 
 
+def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
+    """Return a scenario whose static parameters are what a map says.
+
+    A start that is searched stays on the road that touches the junction: a position in an
+    OpenSCENARIO file is on one road, whatever its parameter's value.
+    """
+    moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
+    return scenario.measured(road_map.site.measures([start.leg for start in moving]))
+
+
 @dataclass(frozen=True)
 class FileResult:
     """What one scenario file came to.

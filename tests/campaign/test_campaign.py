@@ -77,7 +77,15 @@ def test_most_critical_are_distinct_critical_and_in_order():
     assert kept[0] == np.flatnonzero(critical)[np.argmin(F[critical, 0])]
     for i, a in enumerate(kept):
         for b in kept[:i]:
-            assert np.sqrt(((U[a] - U[b]) ** 2).mean()) >= handover.DISTINCT
+            assert np.sqrt(((U[a] - U[b]) ** 2).mean()) >= min(handover.DISTINCT)
+
+
+def test_near_copies_do_not_crowd_out_what_is_different():
+    copies = np.full((50, 3), 0.9) + np.linspace(0.0, 0.2, 50)[:, None] * [0.2, 0.2, 0.2]
+    U = np.vstack([copies, [[0.1, 0.1, 0.1]]])
+    F = np.r_[np.full(50, -5.0), -1.0][:, None]
+    kept = most_critical(U, F, np.ones(51, dtype=bool), 2)
+    assert kept.tolist() == [0, 50]
 
 
 def test_the_recorded_command_makes_the_same_run(tmp_path, monkeypatch):
@@ -201,7 +209,6 @@ def test_the_results_are_a_data_frame(tmp_path):
         ({"objective": {"d_mim": 1.0}}, "did you mean 'd_min'"),
         ({"axes": ["wether"]}, "weather"),
         ({"weights": "entropie"}, "entropy"),
-        ({"fixed": {"fog": 1.0}}, "fog_density"),
     ],
 )
 def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
@@ -217,6 +224,7 @@ def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
         ({"seed": -1}, "0 <= seed"),
         ({"keep": -1}, "0 <= keep"),
         ({"fixed": {"fog_density": 180.0}}, "fog_density"),
+        ({"fixed": {"fog_densty": 1.0}}, "did you mean 'fog_density'"),
         ({"road_map": Path("nowhere.xodr")}, "nowhere.xodr"),
     ],
 )

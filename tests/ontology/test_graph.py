@@ -73,7 +73,7 @@ def test_a_whole_number_may_be_written_as_a_double():
     individuals = graph(("l", "a", "Lane"), ("l", "has_lane_id", typed("-2.0", "double")))
     assert individuals.integer(node("l"), "has_lane_id") == -2
     half = graph(("l", "a", "Lane"), ("l", "has_lane_id", typed("1.5", "double")))
-    with pytest.raises(OntologyError, match="a whole number, got 1.5"):
+    with pytest.raises(OntologyError, match=r"a whole number, got 1\.5"):
         half.integer(node("l"), "has_lane_id")
 
 

@@ -9,12 +9,12 @@ from bridgegen import search as toolkit
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.run import REPORT, Run
-from bridgegen.campaign.settings import Settings, fingerprint
+from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
 from bridgegen.odd.scenario import ObjectiveSpec, Term, load
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
-from bridgegen.pipeline import Pipeline
+from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
 from bridgegen.store import Store
@@ -89,10 +89,12 @@ def run_search(
     catalogue = load(scenario)
     logical = replace(catalogue, objective=_choose(catalogue.objective, objective, weights, scale))
     method = toolkit.get(algorithm)
+    roads = load_map(Path(road_map), junction) if road_map is not None else None
+    if roads:
+        logical = on_map(logical, roads)
     space = logical.space(axes, fixed)
     if space.n_var == 0:
         raise InputError(f"{logical.name}: nothing to search, every parameter is fixed")
-    roads = load_map(Path(road_map), junction) if road_map is not None else None
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     pipeline = Pipeline(logical, space, ego=ego, road_map=roads)
     watch.stage("compile")
@@ -100,7 +102,7 @@ def run_search(
     is_file = Path(scenario).suffix in (".yaml", ".yml")
     settings = Settings(
         scenario=str(Path(scenario).resolve()) if is_file else str(scenario),
-        fingerprint=fingerprint(catalogue),
+        fingerprint=catalogue.fingerprint,
         algorithm=method.name,
         budget=budget,
         seed=seed,
@@ -135,7 +137,7 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
     with Store.open(folder, write=True) as store:
         settings = Settings.from_dict(store.settings, store.folder)
         logical = load(settings.scenario)
-        if fingerprint(logical) != settings.fingerprint:
+        if logical.fingerprint != settings.fingerprint:
             raise StorageError(
                 f"{folder}: scenario {settings.scenario} is not what it was when the run began; "
                 "its results can still be read"
@@ -147,6 +149,7 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
                 raise StorageError(
                     f"{folder}: map {settings.map} is not what it was when the run began"
                 )
+            logical = on_map(logical, roads)
         space = logical.space(settings.axes, settings.fixed)
         pipeline = Pipeline(logical, space, ego=settings.ego, road_map=roads)
         watch.stage("compile")

@@ -19,9 +19,9 @@ from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
 from bridgegen.store import Rows
 
-DISTINCT = 0.1
+DISTINCT = (0.2, 0.1)
 """Two kept scenarios differ by at least this much: root mean square over the searched parameters,
-each scaled to 0..1."""
+each scaled to 0..1. The second distance counts where too few differ by the first."""
 
 FOLDER = "critical"
 
@@ -53,12 +53,21 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
     order = np.flatnonzero(critical)
     order = order[np.argsort(F[order].sum(axis=1), kind="stable")]
     kept: list[int] = []
-    while len(order) and len(kept) < keep:
-        best = int(order[0])
-        kept.append(best)
-        apart = np.sqrt(((U[order] - U[best]) ** 2).mean(axis=1))
-        order = order[apart >= DISTINCT]
-    return np.array(kept, dtype=np.int64)
+    for distance in DISTINCT:
+        near = np.zeros(len(order), dtype=bool)
+        for row in kept:
+            near |= _apart(U[order], U[row]) < distance
+        rest = order[~near]
+        while len(rest) and len(kept) < keep:
+            best = int(rest[0])
+            kept.append(best)
+            rest = rest[_apart(U[rest], U[best]) >= distance]
+    return order[np.isin(order, kept)]
+
+
+def _apart(U: Float, u: Float) -> Float:
+    distance: Float = np.sqrt(((U - u) ** 2).mean(axis=1))
+    return distance
 
 
 def hand_over(

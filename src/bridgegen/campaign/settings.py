@@ -1,17 +1,12 @@
 """What a run was made with: all that it takes to make it again, as JSON in its store."""
 
-import hashlib
-import json
 import shlex
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass
-from enum import Enum
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
 from bridgegen.errors import StorageError
-from bridgegen.odd.expression import Expression
-from bridgegen.odd.scenario import LogicalScenario
 
 
 @dataclass(frozen=True)
@@ -86,22 +81,3 @@ class Settings:
             words += ["--map", self.map, "--junction", str(self.junction)]
         return shlex.join([*words, "--out", str(folder)])
 
-
-def fingerprint(scenario: LogicalScenario) -> str:
-    """Return a digest of all that a scenario says, wherever its file lies."""
-    text = json.dumps(_plain(scenario), sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Expression):
-        return value.source
-    if isinstance(value, Enum):
-        return value.value
-    if is_dataclass(value):
-        return {one.name: _plain(getattr(value, one.name)) for one in fields(value) if one.compare}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [_plain(one) for one in value]
-    return value

@@ -1,7 +1,7 @@
 """Logical scenarios: what happens, what may vary, and what counts as critical."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal
@@ -23,6 +23,16 @@ class Waypoint:
 
     point: str
     distance: str | float
+
+    @property
+    def leg(self) -> str:
+        """The leg, "A" to "D"."""
+        return "ABCD"[(int(self.point[1:]) - 1) // 2]
+
+    @property
+    def direction(self) -> Literal["in", "out"]:
+        """Whether it is on a lane that leads to the junction or away from it."""
+        return "in" if int(self.point[1:]) % 2 else "out"
 
 
 @dataclass(frozen=True)
@@ -210,6 +220,22 @@ class LogicalScenario:
             ScenarioError: what is fixed does not fit (see ``SearchSpace``).
         """
         return SearchSpace(self, axes, fixed)
+
+    def measured(self, values: Mapping[str, float]) -> "LogicalScenario":
+        """Return this scenario at a place where some parameters are what they are.
+
+        Args:
+            values: by name, as a map tells them. They leave the search, and what limits them
+                here has no say over a map; what they limit, they limit still.
+        """
+        parameters = {
+            name: replace(one, low=values[name], high=values[name], default=values[name])
+            if name in values
+            else one
+            for name, one in self.parameters.items()
+        }
+        bounds = tuple(bound for bound in self.bounds if bound.target not in values)
+        return replace(self, parameters=parameters, bounds=bounds)
 
     def table(self) -> tuple[ParameterLine, ...]:
         """Return every parameter and derived quantity with its range and rules, for people."""

@@ -35,6 +35,7 @@ MAX_DEPTH = 256
 """Of XML elements, and of anonymous nodes that are compared with the ontology's own."""
 
 _IMPORTS = ox.NamedNode(OWL + "imports")
+_ONTOLOGY = ox.NamedNode(ONTOLOGY)
 _RDF_XML = ox.RdfFormat.RDF_XML
 
 
@@ -62,23 +63,17 @@ def save(individuals: Individuals, path: Path | str, include_tbox: bool = True) 
 
 def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:
     """Return what `save` writes."""
-    header: list[ox.Quad] = []
+    header: ox.NamedNode | ox.BlankNode | ox.Triple = ox.NamedNode(SCENARIOS + "unnamed")
     by_subject: dict[object, list[ox.Quad]] = {}
     for quad in individuals.quads:
         if quad.predicate == TYPE and quad.object == OWL_ONTOLOGY:
-            header.append(quad)
-        else:
-            by_subject.setdefault(quad.subject, []).append(quad)
-    header = header or [ox.Quad(ox.NamedNode(SCENARIOS + "unnamed"), TYPE, OWL_ONTOLOGY)]
-    if not include_tbox:
-        header.append(ox.Quad(header[0].subject, _IMPORTS, ox.NamedNode(ONTOLOGY)))
-    prefixes = dict(PREFIXES)
-    if isinstance(header[0].subject, ox.NamedNode):
-        prefixes["this"] = header[0].subject.value + "#"
-    quads = [*header, *(tbox().quads if include_tbox else ())]
-    for about_one in by_subject.values():
+            header = quad.subject
+        by_subject.setdefault(quad.subject, []).append(quad)
+    quads = by_subject.pop(header, [ox.Quad(header, TYPE, OWL_ONTOLOGY)])
+    quads += tbox().quads if include_tbox else [ox.Quad(header, _IMPORTS, _ONTOLOGY)]
+    for about_one in by_subject.values():  # each individual in one piece, however it was built
         quads += about_one
-    data = ox.serialize(quads, format=_RDF_XML, prefixes=prefixes)
+    data = ox.serialize(quads, format=_RDF_XML, prefixes=PREFIXES)
     assert data is not None
     return data
 
@@ -139,7 +134,7 @@ def _check_xml(data: bytes, place: str) -> None:
     parser.EndElementHandler = on_end
     try:
         parser.Parse(data, True)
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: encodings
         raise FileFormatError(
             f"{place}: not well-formed XML: {_first_line(error)} (in Protégé, save as RDF/XML)"
         ) from None
@@ -175,7 +170,13 @@ def _without_tbox(quads: list[ox.Quad]) -> list[ox.Quad]:
     """Leave out what ``bridgegen.owl`` says, anonymous nodes (of a list, say) included."""
     plain, trees = _known()
     ours = {quad for key, tree in _trees(quads) if key in trees for quad in tree}
-    return [quad for quad in quads if quad not in plain and quad not in ours]
+    return [
+        quad
+        for quad in quads
+        if quad not in plain
+        and quad not in ours
+        and not (quad.predicate == _IMPORTS and quad.object == _ONTOLOGY)
+    ]
 
 
 @cache

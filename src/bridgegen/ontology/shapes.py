@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 from bridgegen.odd.expression import Expression
 from bridgegen.odd.parameters import TOLERANCE, Axis
-from bridgegen.ontology.individuals import WEATHER, reason
+from bridgegen.ontology.builder import WEATHER
+from bridgegen.ontology.individuals import reason
 from bridgegen.ontology.sparql import binds, literal, variable
 from bridgegen.ontology.vocabulary import BG, ONTOLOGY, XSD, tbox
 

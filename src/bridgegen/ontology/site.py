@@ -5,7 +5,7 @@ made elsewhere (`bridgegen.openx.opendrive.site.find_site`).
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -109,6 +109,24 @@ class Site:
     junction_id: str
     size: float | None
     legs: tuple[Leg, ...]
+
+    def measures(self, legs: Iterable[str]) -> dict[str, float]:
+        """Return the static parameters as this site has them.
+
+        Args:
+            legs: names of the legs along which a start is searched: as ``arm_length`` counts the
+                shortest of their roads at the junction, for a start must not leave its road.
+        """
+        roads = {leg.name: leg.roads[0] for leg in self.legs}
+        lanes = [lane for road in roads.values() for lane in road.lanes]
+        counts = [len(road.along(way)) for road in roads.values() for way in ("in", "out")]
+        starts = [roads[name] for name in legs if name in roads] or list(roads.values())
+        found = {
+            "lane_width": min(lane.width for lane in lanes),
+            "lanes_per_direction": float(min(counts)),
+            "arm_length": min(road.length for road in starts),
+        }
+        return found if self.size is None else found | {"intersection_size": self.size}
 
     @classmethod
     def generated(cls, values: Mapping[str, float], name: str = "crossroads") -> "Site":

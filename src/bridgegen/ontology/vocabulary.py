@@ -33,6 +33,7 @@ DOUBLE = ox.NamedNode(XSD + "double")
 INTEGER = ox.NamedNode(XSD + "integer")
 NAMED_INDIVIDUAL = ox.NamedNode(OWL + "NamedIndividual")
 OWL_ONTOLOGY = ox.NamedNode(OWL + "Ontology")
+VERSION_INFO = ox.NamedNode(OWL + "versionInfo")
 EQUIVALENT_CLASS = ox.NamedNode(OWL + "equivalentClass")
 EQUIVALENT_PROPERTY = ox.NamedNode(OWL + "equivalentProperty")
 
@@ -119,7 +120,7 @@ def tbox() -> TBox:
     equal = links(EQUIVALENT_PROPERTY)
     return TBox(
         quads=quads,
-        version=first(ox.NamedNode(OWL + "versionInfo"))[local_name(header)],
+        version=first(VERSION_INFO)[local_name(header)],
         subclasses=subclasses,
         equivalents={local_name(term): pair for pair in equal for term in pair},
         requires={

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyoxigraph as ox
 
+from bridgegen.ontology.builder import WEATHER
 from bridgegen.ontology.graph import Individuals, local_value
-from bridgegen.ontology.individuals import WEATHER
 from bridgegen.ontology.shapes import WEATHER_PATHS, Rule
 from bridgegen.ontology.vocabulary import Subject, local_name, tbox
 

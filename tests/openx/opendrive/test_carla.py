@@ -4,7 +4,6 @@ CARLA is left-handed: its y is ours with the other sign, and so is its yaw.
 """
 
 import math
-import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -128,10 +127,9 @@ def test_town05_as_we_write_it(town05: OpenDrive) -> None:
     assert check_branches(town05, theirs, "965") == 8
 
 
-@pytest.mark.skipif("BRIDGEGEN_SLOW" not in os.environ, reason="every lane of Town05: 3 s")
 def test_every_lane_of_town05(town05_path: Any, town05: OpenDrive) -> None:
     theirs = carla.Map("Town05", town05_path.read_text())
-    assert compare(town05, theirs, list(town05.roads)) > 10_000
+    assert compare(town05, theirs, list(town05.roads), count=3) > 5_000
 
 
 def test_spirals_arcs_and_tapers() -> None:

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Literal
 
 import pyoxigraph as ox
@@ -12,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.errors import BridgeGenError, InputError, OntologyError, UnsupportedError
+from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
@@ -197,6 +199,14 @@ def test_more_lanes_in_than_there_are_opposite() -> None:
         "A1 left B1", "A1 straight C1", "A2 straight C2", "A3 straight C2", "A4 straight C2",
         "C1 straight A1", "C1 right B1", "D1 left A1", "D1 straight B1", "D1 right C2",
     ]  # fmt: skip
+
+
+def test_saved_and_loaded_individuals_make_the_same_file(tmp_path: Path) -> None:
+    path = tmp_path / "static.owl"
+    save(build_static(DEFAULT), path)
+    assert to_xml(opendrive_from_owl(load(path))) == to_xml(
+        opendrive_from_owl(build_static(DEFAULT))
+    )
 
 
 # -- what is refused -----------------------------------------------------------------------------

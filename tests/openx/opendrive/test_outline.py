@@ -89,9 +89,13 @@ def test_one_junction_of_town05(town05: OpenDrive) -> None:
     found = by_kind(outline(town05, "965"))
     assert len(found["driving"]) == 6  # roads 0, 1, 17, 47, 18, 40
     (area,) = found["junction"]
-    # Less than the square between the stop lines; their joints' gaps of millimetres do no harm.
-    assert 24.0**2 / 2 < Polygon(area).buffer(0.01).area < 24.6**2
-    assert Polygon(area).buffer(0.01).geom_type == "Polygon"
+    # A square of about 24.5 m less its corners: squares of about 5.2 m with a kerb in each.
+    shape = Polygon(area).buffer(0.01)  # joints leave gaps of millimetres
+    assert shape.geom_type == "Polygon"
+    assert shape.area == pytest.approx(24.5**2 - np.pi * 5.2**2, rel=0.02)
+    corners = [line for line in found["edge"] if LineString(line).length < 10.0]
+    assert len(corners) == 4
+    assert all(np.hypot(*np.diff(line, axis=0).T).max() < 1.1 for line in corners)  # no spurs
     assert len(found["sidewalk"]) == 12
     everything = by_kind(outline(town05))
     assert len(everything["junction"]) == 21

@@ -117,6 +117,9 @@ def test_path_and_bytes(tmp_path: Path) -> None:
         ('elementId="2"', 'elementId="9"', "line 7: road 1: its successor, road '9', is not in"),
         ('elementType="road"', 'elementType="junction"', "junction '2', is not in the file"),
         ('junction="-1" name', 'junction="5" name', "line 7: road 1: junction '5' is not in"),
+        ('lane id="0"', 'lane id="1"', "line 15: road 1, <laneSection>: the center must be one"),
+        ('lane id="-1"', 'lane id="-2"', "lanes on the right must count from -1, got [-2]"),
+        ('lane id="-1"', 'lane id="1"', "lanes on the right must count from -1, got [1]"),
         ('max="30"', 'max="fast"', "max must be a finite number, got 'fast'"),
         ('unit="mph"', 'unit="knots"', "unit must be one of m/s, km/h, mph, got 'knots'"),
         ('<center><lane id="0" type="none"/></center>', "", "<center/lane> is required, got right"),
@@ -185,7 +188,7 @@ def test_not_a_road_network(text: bytes, said: str) -> None:
         ),
         (
             "</OpenDRIVE>",
-            '<junction id="5" type="virtual"/></OpenDRIVE>',
+            '<junction id="5" type="virtual"><connection id="0"/></junction></OpenDRIVE>',
             "line 39: junction 5: type 'virtual' is not supported",
         ),
     ],

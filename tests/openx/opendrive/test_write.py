@@ -67,7 +67,20 @@ def record(cls: type) -> st.SearchStrategy[Any]:
             "predecessor": st.none(),
             "successor": st.none(),
         }
+    if cls is model.LaneSection:
+        return st.builds(cls, **given_fields).map(renumbered)
     return st.builds(cls, **given_fields)
+
+
+def renumbered(section: model.LaneSection) -> model.LaneSection:
+    """Give the lanes the ids that their places ask for."""
+    left, right = section.left, section.right
+    return dataclasses.replace(
+        section,
+        left=tuple(dataclasses.replace(one, id=len(left) - k) for k, one in enumerate(left)),
+        center=(dataclasses.replace(section.center[0], id=0),),
+        right=tuple(dataclasses.replace(one, id=-1 - k) for k, one in enumerate(right)),
+    )
 
 
 @given(

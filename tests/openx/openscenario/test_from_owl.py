@@ -178,8 +178,8 @@ def test_a_bound_place_stays_bound(individuals, town):
         for start in (10.0, 30.0)
     }
     assert bv[10.0] == osc.ParameterRef("$bv_start")
-    assert bv[30.0] == Expr("${($bv_start)-21.697}")
-    reverse = only_start(convert(individuals("crossroads-s3", site=town(), bv_start=2.0)))
+    assert bv[23.0] == Expr("${($bv_start)-21.697}")
+    reverse = only_start(convert(individuals("crossroads-s3", site=town(), bv_start=7.0)))
     assert reverse == Expr("${54.907-($bv_start)}")
 
 
@@ -361,7 +361,7 @@ def test_a_scenario_without_weather_or_events(individuals, edited):
         ([("leg_C", "has_continuation", "leg_C")], "must not continue itself"),
         ([("leg_C", "has_road_id")], "must have has_road_id"),
         ([("ego_init_speed", "has_target_speed", 3.0)], "ego_speed [m/s] must be 4.9 to 8.9"),
-        ([("bv_start", "has_distance_to_junction", 40.1)], "bv_start [m] must be 2.0 to 40.0"),
+        ([("bv_start", "has_distance_to_junction", 40.1)], "bv_start [m] must be 7.0 to 25.0"),
         ([("p_bv_start", "binds_property", "has_length")], "bv_start must have a value"),
         ([("bv_init_speed", "has_parameter", "p_ego_speed")], "must have one value, got 0.0 on"),
         ([("p_ego_speed", "has_axis", "static")], "bound to a dynamic parameter"),

@@ -142,7 +142,7 @@ def reference_line(road: Road, s: Float) -> Curve:
 
 
 def stretch(geometry: Geometry) -> float:
-    """Return the metres of reference line per metre of s: 1, but for a paramPoly3 of wrong length."""
+    """Return the metres of line per metre of s: 1, but for a paramPoly3 of inexact length."""
     return _table(geometry).scale if isinstance(geometry.shape, ParamPoly3) else 1.0
 
 

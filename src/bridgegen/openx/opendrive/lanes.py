@@ -165,6 +165,8 @@ def borders(road: Road, index: int, s: Float) -> dict[int, Float]:
         s: ``(P,)`` float64 [m along the road], within the section.
     """
     section = road.sections[index]
+    # At the section's very end its own records hold, not those that begin there.
+    s = np.minimum(s, np.nextafter(section_end(road, index), 0.0))
     offset = values(road.lane_offsets, s)
     found = {0: offset}
     for side, lanes in ((1.0, section.left), (-1.0, section.right)):

@@ -258,7 +258,7 @@ def sample(pieces: Sequence[Piece], length: float, ds: float) -> LanePath:
         raise InputError(
             f"{length / MOST_SAMPLES:g} <= ds [m] must hold on a route of {length:g} m, got {ds:g}"
         )
-    s: Float = np.arange(math.ceil(length / ds - 1e-9) + 1) * ds
+    s = np.arange(math.ceil(length / ds - 1e-9) + 1, dtype=np.float64) * np.float64(ds)
     starts = np.array([piece.station for piece in pieces])
     which = np.maximum(np.searchsorted(starts, s, side="right") - 1, 0)
     table = np.array(

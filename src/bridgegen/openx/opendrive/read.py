@@ -11,9 +11,9 @@ from lxml import etree
 from bridgegen.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.opendrive.declaration import ID, Field, plan
 from bridgegen.openx.opendrive.geometry import impossible_shape
-from bridgegen.openx.opendrive.model import Connection, Junction, OpenDrive, Road
+from bridgegen.openx.opendrive.model import Connection, Junction, LaneSection, OpenDrive, Road
 from bridgegen.openx.opendrive.plan_view import Geometry
-from bridgegen.openx.opendrive.references import broken_references
+from bridgegen.openx.opendrive.references import broken_references, misnumbered
 from bridgegen.openx.xml import parse_xml
 
 NUMBER_LIMIT = 1e9
@@ -120,14 +120,14 @@ class _Reader:
 
     def _look_at(self, record: object, element: etree._Element) -> None:
         if isinstance(record, Geometry):
-            problem = impossible_shape(record)
-            if problem:
+            impossible = impossible_shape(record)
+            if impossible:
+                self._note(element, impossible)
+        elif isinstance(record, LaneSection):
+            for problem in misnumbered(record):
                 self._note(element, problem)
         elif isinstance(record, Road | Junction | Connection):
             self.lines[id(record)] = _line(element)
-            kind = element.get("type", "default")
-            if isinstance(record, Junction) and kind != "default":
-                self.beyond.append((_line(element), f"junction {record.id}: type '{kind}'"))
 
     def _collect(self, element: etree._Element, tree: _Tree, found: dict[str, list[Any]]) -> None:
         for item in element:
@@ -147,6 +147,9 @@ class _Reader:
             return (item.text or "").strip()
         if role == "ids":
             return self._value(ID, str(item.get("id", "")), item)
+        if one.types[0] is Junction and item.get("type", "default") != "default":
+            self.beyond.append((_line(item), f"{_where(item)}: type '{item.get('type')}'"))
+            return None
         return self.record(one.tags[_tag(item)] if role == "choice" else one.types[0], item)
 
     def _value(self, one: Field, raw: str, element: etree._Element) -> Any:

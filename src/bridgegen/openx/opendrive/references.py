@@ -1,10 +1,28 @@
-"""Ids that occur twice, and links to what is not there: what no reader of a map can get over."""
+"""Ids that occur twice or out of turn, and links to what is not there: what no reader gets over."""
 
 from collections.abc import Iterator
 
-from bridgegen.openx.opendrive.model import CONTACTS, Connection, Junction, OpenDrive, Road
+from bridgegen.openx.opendrive.model import (
+    CONTACTS,
+    Connection,
+    Junction,
+    LaneSection,
+    OpenDrive,
+    Road,
+)
 
 Owner = Road | Junction | Connection
+
+
+def misnumbered(section: LaneSection) -> Iterator[str]:
+    """Yield what is wrong with the lane ids of a section: each side counts from the centre."""
+    for side, name, lanes in ((1, "left", section.left), (-1, "right", section.right)):
+        ids = sorted((lane.id for lane in lanes), key=abs)
+        if ids != [side * k for k in range(1, len(ids) + 1)]:
+            yield f"lanes on the {name} must count from {side}, got {ids}"
+    if [lane.id for lane in section.center] != [0]:
+        got = ", ".join(str(lane.id) for lane in section.center) or "none"
+        yield f"the center must be one lane 0, got {got}"
 
 
 def broken_references(model: OpenDrive) -> Iterator[tuple[Owner, str]]:

@@ -19,7 +19,8 @@ from bridgegen.openx.opendrive.model import (
     OpenDrive,
     Road,
 )
-from bridgegen.openx.opendrive.references import broken_references
+from bridgegen.openx.opendrive.plan_view import Spiral
+from bridgegen.openx.opendrive.references import broken_references, misnumbered
 
 GAP = 0.05
 """How far two ends that should meet may be apart [m]."""
@@ -71,6 +72,12 @@ def _reference_line(road: Road) -> Iterator[str]:
         if abs(geometry.s - s) > SLACK:
             yield f"road {road.id}: geometry {index} must start at {s:.6g} m, got {geometry.s:.6g}"
         s = geometry.s + geometry.length
+        shape = geometry.shape
+        if isinstance(shape, Spiral) and shape.curv_start == shape.curv_end:
+            yield (
+                f"road {road.id}: geometry {index}: a spiral's curvatures must differ, got "
+                f"{shape.curv_start:g} for both (other readers divide by the difference)"
+            )
     if abs(road.length - s) > SLACK:
         got = f"got {road.length:.6g}"
         yield f"road {road.id}: length must be that of its geometry, {s:.6g} m, {got}"
@@ -99,13 +106,7 @@ def _sections(road: Road) -> Iterator[str]:
         )
     for index, section in enumerate(road.sections):
         where = f"road {road.id}, laneSection at s={section.s:.6g} m"
-        if [lane.id for lane in section.center] != [0]:
-            got = ", ".join(str(lane.id) for lane in section.center)
-            yield f"{where}: the center must be one lane 0, got {got}"
-        for side, name, lanes in ((1, "left", section.left), (-1, "right", section.right)):
-            ids = sorted((lane.id for lane in lanes), key=abs)
-            if ids != [side * k for k in range(1, len(ids) + 1)]:
-                yield f"{where}: lanes on the {name} must count from {side}, got {ids}"
+        yield from (f"{where}: {problem}" for problem in misnumbered(section))
         length = section_end(road, index) - section.s
         for lane in section.lanes:
             yield from _widths(f"{where}, lane {lane.id}", lane, length)

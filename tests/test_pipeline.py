@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from bridgegen import pipeline as module
+from bridgegen.errors import UnknownNameError
+from bridgegen.odd.scenario import load
+from bridgegen.pipeline import Pipeline
+
+ALL_AXES = ("static", "participants", "weather")
+
+
+def made(axes=None, ego="route-follower", name="crossroads-s4") -> Pipeline:
+    scenario = load(name)
+    pipeline = Pipeline(scenario, scenario.space(axes), ego=ego)
+    pipeline.choose_objective()
+    return pipeline
+
+
+def rows(pipeline: Pipeline, n: int, seed: int = 0) -> np.ndarray:
+    return pipeline.space.decode(np.random.default_rng(seed).random((n, pipeline.space.n_var)))
+
+
+@pytest.mark.parametrize("axes", [None, ALL_AXES])
+@pytest.mark.parametrize("ego", ["route-follower", "reference"])
+def test_a_row_s_result_is_the_same_in_any_batch_and_order(axes, ego, monkeypatch):
+    pipeline = made(axes, ego)
+    X = rows(pipeline, 24)
+    whole = pipeline.evaluate(X)
+    monkeypatch.setattr(module, "CHUNK", 5)
+    order = np.random.default_rng(1).permutation(24)
+    other = pipeline.evaluate(X[order])
+    alone = pipeline.evaluate(X[7:8])
+    for name in ("metrics", "F", "critical", "status"):
+        assert np.array_equal(getattr(other, name), getattr(whole, name)[order], equal_nan=True)
+        assert np.array_equal(getattr(alone, name), getattr(whole, name)[7:8], equal_nan=True)
+
+
+def test_static_parameters_change_the_roads_and_nothing_else_does():
+    pipeline = made(ALL_AXES)
+    x = rows(pipeline, 1)
+    wide = x.copy()
+    wide[:, pipeline.space.index("intersection_size")] = 44.0
+    small = pipeline.rollout(x)
+    large = pipeline.rollout(wide)
+    # Both start 40 m before their stop lines, which are further apart.
+    apart = (44.0 - x[0, pipeline.space.index("intersection_size")]) / 2
+    assert large.y[0, 0, 0] - small.y[0, 0, 0] == pytest.approx(apart)
+    same = pipeline.rollout(x)
+    assert np.array_equal(same.x, small.x)
+
+
+def test_a_fixed_road_gives_what_the_searched_one_gives():
+    searched, fixed = made(ALL_AXES), made()
+    X = rows(fixed, 10)
+    a, b = searched.evaluate(X), fixed.evaluate(X)
+    assert np.array_equal(a.metrics, b.metrics, equal_nan=True)
+
+
+def test_no_rows_no_results():
+    pipeline = made()
+    empty = pipeline.evaluate(np.empty((0, len(pipeline.space.names))))
+    assert empty.metrics.shape == (0, len(pipeline.metrics))
+    assert empty.critical.shape == (0,)
+
+
+def test_weather_acts_through_friction_alone_for_now():
+    pipeline = made()
+    x = np.repeat(rows(pipeline, 1), 2, axis=0)
+    x[:, pipeline.space.index("ego_speed")] = 8.9
+    x[1, pipeline.space.index("friction")] = 0.35
+    offset = np.abs(pipeline.rollout(x).offset[:, 0]).max(axis=1)
+    assert offset[1] > offset[0]
+
+
+@pytest.mark.parametrize(
+    "name", ["crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4"]
+)
+def test_the_reference_driver_comes_through_the_nominal_scenario(name):
+    pipeline = made(ego="reference", name=name)
+    nominal = pipeline.space.row({})[None, :]
+    metrics = dict(zip(pipeline.metrics, pipeline.evaluate(nominal).metrics[0], strict=True))
+    assert metrics["n_collision"] == 0
+    assert metrics["l_offset"] < 0.5
+
+
+def test_an_unknown_driver_is_named():
+    scenario = load("crossroads-s4")
+    with pytest.raises(UnknownNameError, match="did you mean 'reference'"):
+        Pipeline(scenario, scenario.space(), ego="refrence")
