@@ -86,11 +86,11 @@ class Pipeline:
         self.scenario = scenario
         self.space = space
         self.driver = egos.get(ego)
-        self.road_map = road_map
-        self.metrics = tuple(measures.METRICS)
         self.static_names = tuple(
             name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC
         )
+        self.road_map = road_map
+        self.metrics = tuple(measures.METRICS)
         searches_roads = not road_map and bool({*self.static_names} & {*space.variables})
         nominal = space.values(space.decode(np.full((1, space.n_var), 0.5))[0])
         individuals = self.individuals(nominal)
@@ -139,6 +139,15 @@ class Pipeline:
         F, ok = self.objective.F(metrics, self.metrics)
         critical = self.objective.critical(metrics, self.metrics)
         return Evaluation(metrics, F, critical & ok, status)
+
+    def facts(self, x: Float) -> dict[str, float]:
+        """Return the parameters of one row that its scenario depends on, by name.
+
+        On a map, the road network is the map's.
+        """
+        values = self.space.values(x)
+        ours = () if self.road_map is None else self.static_names
+        return {name: value for name, value in values.items() if name not in ours}
 
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""

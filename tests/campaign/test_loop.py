@@ -326,7 +326,10 @@ with store:
 
 
 def logged(path):
-    return [] if not path.exists() else np.fromfile(path).reshape(-1, 3).tolist()
+    if not path.exists():
+        return []
+    numbers = np.fromfile(path)  # a kill may have cut its last row short
+    return numbers[: len(numbers) // 3 * 3].reshape(-1, 3).tolist()
 
 
 @pytest.mark.parametrize("name", ["random", "pso"])

@@ -301,9 +301,9 @@ MISTAKES = [
         None,
     ),
     (
-        "point: P3, distance: bv_start}",
-        "point: P5, distance: bv_start}",
-        "ego and bv start 0 m apart at P5, at least 5.0 m is needed",
+        "point: P5, distance: 40.0",
+        "point: P3, distance: 7.0",
+        "ego and bv start 0 m apart at P3, at least 5.0 m is needed",
         None,
     ),
     (

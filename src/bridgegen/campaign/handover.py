@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -137,16 +137,17 @@ def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> lis
 
 def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:
     """Return one scenario's parameters and metrics as JSON; what is infinite or NaN is null."""
-    space = pipeline.space
+    units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
     facts = {
         "name": name,
         "evaluation": int(rows.id[i]),
         "scenario": pipeline.scenario.name,
         "ego": pipeline.driver.name,
         "critical": bool(rows.critical[i]),
-        "parameters": _named(space.names, space.units, rows.X[i].tolist()),
+        "parameters": _named(pipeline.facts(rows.X[i]), units),
         "metrics": _named(
-            pipeline.metrics, [METRICS[m].unit for m in pipeline.metrics], rows.metrics[i].tolist()
+            dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),
+            {name: METRICS[name].unit for name in pipeline.metrics},
         ),
         "F": rows.F[i].tolist(),
     }
@@ -154,9 +155,9 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:
 
 
 def _named(
-    names: Sequence[str], units: Sequence[str], values: Sequence[float]
+    values: Mapping[str, float], units: Mapping[str, str]
 ) -> dict[str, dict[str, float | str | None]]:
     return {
-        name: {"value": value if np.isfinite(value) else None, "unit": unit}
-        for name, unit, value in zip(names, units, values, strict=True)
+        name: {"value": value if np.isfinite(value) else None, "unit": units[name]}
+        for name, value in values.items()
     }

@@ -80,4 +80,3 @@ class Settings:
         if self.map:
             words += ["--map", self.map, "--junction", str(self.junction)]
         return shlex.join([*words, "--out", str(folder)])
-

@@ -1,7 +1,6 @@
 """The individuals of a scenario, one method each; `individuals` puts them together."""
 
 from collections.abc import Mapping
-from functools import cache
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
@@ -254,7 +253,7 @@ class Builder:
 
     def position(self, name: str, waypoint: "Waypoint", site: Site) -> ox.NamedNode:
         """Add the position of a waypoint: on the inner lane, as the paper's points are."""
-        leg_name, direction = _point(waypoint.point)
+        leg_name, direction = waypoint.leg, waypoint.direction
         leg = next((leg for leg in site.legs if leg.name == leg_name), None)
         if leg is None:
             raise OntologyError(f"{site.name}: {waypoint.point} needs leg {leg_name}, got none")
@@ -309,13 +308,6 @@ class Builder:
                 for name in names:
                     self.quantity(part, f"has_{name}", name)
         return node
-
-
-@cache
-def _point(point: str) -> tuple[str, str]:
-    """Return leg and direction of a point of the paper's crossroads: odd numbers lead in."""
-    number = int(point.removeprefix("P"))
-    return "ABCD"[(number - 1) // 2], "in" if number % 2 else "out"
 
 
 def _road_name(leg: Leg, index: int) -> str:

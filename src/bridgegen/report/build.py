@@ -91,7 +91,9 @@ def _rule(limits: Thresholds) -> str:
     """Return what counts as critical, in words."""
     many = limits.n_collision_above
     contact = "a collision" if many == 0 else f"more than {many:g} collisions"
-    close = f"d_min below {limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
+    close = (
+        f"d_min below {limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
+    )
     return f"{contact}, or {close}"
 
 
@@ -109,6 +111,7 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
             name in space.variables,
         )
         for i, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
+        if pipeline.road_map is None or name not in pipeline.static_names
     )
     metrics = tuple(
         Column(name, measures.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
@@ -144,7 +147,7 @@ def _playbacks(
                 name=name,
                 rank=k + 1,
                 evaluation=evaluation,
-                parameters=values,
+                parameters=pipeline.facts(rows.X[evaluation]),
                 metrics=dict(zip(pipeline.metrics, rows.metrics[evaluation].tolist(), strict=True)),
                 critical=bool(rows.critical[evaluation]),
                 time_step=rollout.time_step,

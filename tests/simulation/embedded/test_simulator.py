@@ -202,9 +202,7 @@ def test_motion_does_not_depend_on_where_north_is(speed, other):
         text = scenario(
             ("ego", "bv"),
             start("ego", lane(first, 1, 40), speed, lane(first, 1, 40), lane(third, -1, 90))
-            + start(
-                "bv", lane(second, 1, 20), other, lane(second, 1, 20), lane(third, -1, 90)
-            ),
+            + start("bv", lane(second, 1, 20), other, lane(second, 1, 20), lane(third, -1, 90)),
         )
         gaps.append(run(text).distance[0, 1])
     np.testing.assert_allclose(gaps[1], gaps[0], atol=1e-6)
