@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from bridgegen.campaign.loop import run_loop
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.search import get

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.campaign.handover import write_scenario
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.read import read as read_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.search import get, names

@@ -3,7 +3,7 @@ import pytest
 
 from bridgegen import pipeline as module
 from bridgegen.errors import UnknownNameError
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 
 ALL_AXES = ("static", "participants", "weather")

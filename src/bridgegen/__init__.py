@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, resume, run_search
-    from bridgegen.odd.scenario import load
+    from bridgegen.odd.reader import load
     from bridgegen.pipeline import simulate_file
 
 __all__ = ["Run", "load", "resume", "run_search", "simulate_file"]
 
 _HOMES = {
     "Run": "bridgegen.campaign",
-    "load": "bridgegen.odd.scenario",
+    "load": "bridgegen.odd.reader",
     "resume": "bridgegen.campaign",
     "run_search": "bridgegen.campaign",
     "simulate_file": "bridgegen.pipeline",

@@ -166,7 +166,7 @@ def validate(
 @listing.command("scenarios")
 def list_scenarios(as_json: Json = False) -> None:
     """The logical scenarios that ship."""
-    from bridgegen.odd.scenario import load, names
+    from bridgegen.odd.reader import load, names
     from bridgegen.screen import print_table
 
     rows = [(name, load(name).title) for name in names()]
@@ -200,7 +200,7 @@ def list_parameters(
     as_json: Json = False,
 ) -> None:
     """The parameters of a scenario, with ranges and constraints."""
-    from bridgegen.odd.scenario import load
+    from bridgegen.odd.reader import load
     from bridgegen.screen import print_parameters
 
     print_parameters(load(scenario).table(), as_json=as_json)

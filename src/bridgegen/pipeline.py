@@ -129,6 +129,13 @@ class Pipeline:
         self.objective = objective
         return objective
 
+    def warm_up(self) -> None:
+        """Roll out the nominal row once, so that the kernels are compiled before time counts.
+
+        In this thread: Ctrl-C ends a compilation at once.
+        """
+        self._measure_chunk(self.space.row({})[np.newaxis])
+
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
 

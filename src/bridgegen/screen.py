@@ -52,8 +52,8 @@ class Screen:
 
         if stage == "compile" and not is_compiled():
             self._console.print(
-                "First run on this machine: compiling the simulator, about half a minute; "
-                "later runs start at once."
+                "First run: compiling the simulator, some ten to thirty seconds; later runs start "
+                "at once."
             )
         label = {"compile": "compiling", "search": "searching"}.get(stage, _STAGES.get(stage))
         self._progress.update(self._task, description=label or stage)

@@ -5,13 +5,13 @@ import pytest
 
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import (
     LogicalScenario,
     ObjectiveSpec,
     Participant,
     Term,
     Waypoint,
-    load,
 )
 
 BuildScenario = Callable[..., LogicalScenario]

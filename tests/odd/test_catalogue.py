@@ -7,7 +7,8 @@ import pytest
 
 from bridgegen.errors import UnknownNameError
 from bridgegen.odd.parameters import Axis
-from bridgegen.odd.scenario import ConditionSpec, EventSpec, Waypoint, load, names
+from bridgegen.odd.reader import load, names
+from bridgegen.odd.scenario import ConditionSpec, EventSpec, Waypoint
 
 NAMES = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 

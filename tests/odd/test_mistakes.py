@@ -7,7 +7,7 @@ line that it names (``None``: the file is named, no line).
 import pytest
 
 from bridgegen.errors import ScenarioError
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 
 MISTAKES = [
     (

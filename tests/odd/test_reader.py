@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.odd.parameters import Axis
-from bridgegen.odd.scenario import Critical, load
+from bridgegen.odd.reader import load
+from bridgegen.odd.scenario import Critical
 
 
 @pytest.fixture

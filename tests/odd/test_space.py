@@ -8,7 +8,7 @@ from hypothesis.extra import numpy as hnp
 
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.parameters import TOLERANCE, Axis
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 
 EVERY = tuple(Axis)
 _unit = st.one_of(st.sampled_from([0.0, 1.0, 0.5]), st.floats(0.0, 1.0))

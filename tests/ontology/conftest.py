@@ -1,6 +1,7 @@
 import pytest
 
-from bridgegen.odd.scenario import LogicalScenario, load
+from bridgegen.odd.reader import load
+from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build

@@ -12,7 +12,7 @@ import rdflib
 
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import TOLERANCE, Axis, Bound, Derived, Parameter, slack
-from bridgegen.odd.scenario import load, names
+from bridgegen.odd.reader import load, names
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import from_bytes, to_bytes
 from bridgegen.ontology.graph import Individuals

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Axis, Derived, Parameter
-from bridgegen.odd.scenario import Waypoint, names
-from bridgegen.odd.scenario import load as load_scenario
+from bridgegen.odd.reader import load as load_scenario
+from bridgegen.odd.reader import names
+from bridgegen.odd.scenario import Waypoint
 from bridgegen.ontology.builder import STATIC_BINDINGS
 from bridgegen.ontology.individuals import build, build_static
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane

@@ -12,7 +12,8 @@ from bridgegen.campaign.run import REPORT, Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
-from bridgegen.odd.scenario import ObjectiveSpec, Term, load
+from bridgegen.odd.reader import load
+from bridgegen.odd.scenario import ObjectiveSpec, Term
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.report.build import build_report
@@ -98,6 +99,7 @@ def run_search(
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     pipeline = Pipeline(logical, space, ego=ego, road_map=roads)
     watch.stage("compile")
+    pipeline.warm_up()
     chosen = pipeline.choose_objective(seed=seed)
     is_file = Path(scenario).suffix in (".yaml", ".yml")
     settings = Settings(
@@ -153,6 +155,7 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
         space = logical.space(settings.axes, settings.fixed)
         pipeline = Pipeline(logical, space, ego=settings.ego, road_map=roads)
         watch.stage("compile")
+        pipeline.warm_up()
         pipeline.choose_objective(Objective.from_dict(settings.objective))
         return _go(pipeline, store, settings, watch)
 

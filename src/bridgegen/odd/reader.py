@@ -25,7 +25,7 @@ from bridgegen.odd.schema import (
 from bridgegen.odd.storyboard import Storyboard
 
 
-def catalogue_names(kind: str = "scenario") -> tuple[str, ...]:
+def names(kind: str = "scenario") -> tuple[str, ...]:
     """Return the names of the scenarios (or, as ``kind``, the fragments) that ship."""
     folder = resources.files("bridgegen.catalogue")
     return tuple(
@@ -38,16 +38,25 @@ def catalogue_names(kind: str = "scenario") -> tuple[str, ...]:
     )
 
 
-def read_scenario(name_or_path: str | Path) -> LogicalScenario:
-    """Read a logical scenario; see ``scenario.load``."""
+def load(name_or_path: str | Path) -> LogicalScenario:
+    """Read a logical scenario.
+
+    Args:
+        name_or_path: a name of the catalogue, or the path of a file (ends in .yaml or .yml).
+
+    Raises:
+        UnknownNameError: no such name in the catalogue.
+        FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
+        ScenarioError: what it says breaks a rule; all that does, with file and line.
+    """
     text = str(name_or_path)
     path = Path(text)
     if isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
         document, folder = _read_file(path), path.parent
-    elif text in catalogue_names():
+    elif text in names():
         document, folder = _read_catalogue(text), None
     else:
-        raise UnknownNameError("scenario", text, catalogue_names())
+        raise UnknownNameError("scenario", text, names())
     return _build(document, folder)
 
 
@@ -89,8 +98,8 @@ class _Declarations:
 
     def include(self, document: Document, folder: Path | None) -> None:
         """Take in the fragments that a scenario names."""
-        names = document.data.get("include") if isinstance(document.data, dict) else None
-        for number, name in enumerate(names if isinstance(names, list) else ()):
+        given = document.data.get("include") if isinstance(document.data, dict) else None
+        for number, name in enumerate(given if isinstance(given, list) else ()):
             try:
                 fragment = _read_fragment(str(name), folder)
             except InputError as error:
@@ -151,7 +160,7 @@ def _formula(given: float | str) -> str:
 def _read_fragment(name: str, folder: Path | None) -> Document:
     """Read a fragment of the catalogue, or one beside a user's own scenario."""
     if not name.endswith((".yaml", ".yml")):
-        known = catalogue_names("fragment")
+        known = names("fragment")
         if name not in known:
             raise UnknownNameError("fragment", name, known)
         return _read_catalogue(name)

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from pathlib import Path
 from typing import Literal
 
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
@@ -252,26 +251,3 @@ class LogicalScenario:
             for d in self.derived
         ]
         return tuple(lines)
-
-
-def load(name_or_path: str | Path) -> LogicalScenario:
-    """Read a logical scenario.
-
-    Args:
-        name_or_path: a name of the catalogue, or the path of a file (ends in .yaml or .yml).
-
-    Raises:
-        UnknownNameError: no such name in the catalogue.
-        FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
-        ScenarioError: what it says breaks a rule; all that does, with file and line.
-    """
-    from bridgegen.odd.reader import read_scenario  # it builds the types of this module
-
-    return read_scenario(name_or_path)
-
-
-def names() -> tuple[str, ...]:
-    """Return the names of the scenarios that ship."""
-    from bridgegen.odd.reader import catalogue_names
-
-    return catalogue_names()

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
-from bridgegen.odd.scenario import load as load_scenario
-from bridgegen.odd.scenario import names as scenario_names
+from bridgegen.odd.reader import load as load_scenario
+from bridgegen.odd.reader import names as scenario_names
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load
 from bridgegen.ontology.graph import Individuals

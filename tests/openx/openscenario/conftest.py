@@ -4,7 +4,7 @@ import numpy as np
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane

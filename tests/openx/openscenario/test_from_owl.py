@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.odd.expression import parse
-from bridgegen.odd.scenario import load
+from bridgegen.odd.reader import load
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import owl_weather as weather
