@@ -30,8 +30,8 @@ from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.network import Network, compile_network
-from bridgegen.simulation.embedded.program import compile_storyboard
 from bridgegen.simulation.embedded.simulator import simulate
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 

@@ -7,8 +7,9 @@ from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.read import read
+from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.network import compile_network
-from bridgegen.simulation.embedded.program import Program, compile_storyboard
+from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.simulator import simulate
 from bridgegen.simulation.rollout import Rollout
 

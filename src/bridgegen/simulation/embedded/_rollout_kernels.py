@@ -16,7 +16,6 @@ from bridgegen.ego._route_follower_kernels import hold_speed, steer
 
 GRAVITY = 9.81  # m/s²
 DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground Vehicles, table 1.3
-MAX_STEER = 0.61  # rad, 35°, front wheels of a passenger car at full lock
 
 OK, NOT_FINITE, OFF_ROUTE = 0, 1, 2
 SIMULATION_TIME, RELATIVE_DISTANCE, REACH_POSITION = 0, 1, 2
@@ -87,15 +86,15 @@ def fires(trigger, triggers, groups, conditions, history, k):
 
 
 @kernel
-def bicycle(x, y, h, v, demanded, curvature, wheelbase, limits, friction_limit, dt):
+def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, dt):
     """Return (x, y, h, v, a) one step on, and the acceleration that the tyres gave.
 
-    Kinematic bicycle at the rear axle. ``limits`` are (speed, acceleration, deceleration). Inside
-    the friction circle the demand is met; outside, both its parts shrink to the circle.
+    Kinematic bicycle at the rear axle. ``limits`` are those of speed, acceleration, deceleration,
+    and curvature (full lock). Inside the friction circle the demand is met; outside, both its
+    parts shrink to the circle.
     """
     a = min(max(demanded, -limits[2]), limits[1])
-    sharpest = math.tan(MAX_STEER) / wheelbase
-    bend = min(max(curvature, -sharpest), sharpest)
+    bend = min(max(curvature, -limits[3]), limits[3])
     total = math.hypot(a, v * v * bend)
     if total > friction_limit:
         a *= friction_limit / total
@@ -141,7 +140,7 @@ def simulate_one(
             offset[:] = 0.0
             return 1, OFF_ROUTE
         x[e, 0], y[e, 0], h[e, 0] = pose(paths[e], path_n[e], path_ds[e], station[e])
-        command[e] = target[e] = v[e, 0] = min(slots[init[e]], bodies[e, 4])
+        command[e] = target[e] = v[e, 0] = min(slots[init[e]], bodies[e, 3])
         offset[e, 0] = 0.0
     ego_end = (path_n[0] - 1) * path_ds[0]
     last = n_steps - 1
@@ -160,7 +159,7 @@ def simulate_one(
             if fires(events[i, 1], triggers, groups, conditions, history, k):
                 event_done[i] = True
                 e = events[i, 2]
-                target[e] = min(slots[events[i, 4]], bodies[e, 4])
+                target[e] = min(slots[events[i, 4]], bodies[e, 3])
                 if events[i, 3] == STEP:
                     rate[e] = math.inf
                 elif events[i, 3] == LINEAR_RATE:
@@ -178,7 +177,7 @@ def simulate_one(
                 paths[0], n0, ds0, v[0, k], command[0], friction_limit, bodies, station, v, k, zones
             )
         nx, ny, nh, nv, given = bicycle(
-            x[0, k], y[0, k], h[0, k], v[0, k], demanded, bend, bodies[0, 3], bodies[0, 4:7],
+            x[0, k], y[0, k], h[0, k], v[0, k], demanded, bend, bodies[0, 3:7],
             friction_limit, dt,
         )  # fmt: skip
         a[0, k] = given

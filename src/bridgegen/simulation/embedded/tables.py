@@ -1,0 +1,86 @@
+"""What all parts of the compiler share: the slots, the entities' numbers, and the complaints."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bridgegen.arrays import Int
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.parameters import numbers
+from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.simulation.embedded.program import LanePoint
+
+
+class Tables:
+    """Numbers for what a scenario file calls by name.
+
+    Attributes:
+        place: the file, for messages.
+        objects: its entities, the ego first.
+        names: their names.
+        parameters: the numeric parameters with their declared values.
+        problems: what the rollout cannot do, a sentence each.
+    """
+
+    def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
+        self.place = place
+        objects = scenario.entities.scenario_objects
+        self.objects = sorted(objects, key=lambda one: str(one.name).lower() != "ego")
+        self.names = tuple(str(one.name) for one in self.objects)
+        self.parameters = numbers(scenario)
+        self.problems: list[str] = []
+        self._slots: dict[tuple[type, Value], int] = {}
+
+    @property
+    def slots(self) -> tuple[Value, ...]:
+        """The distinct values so far, in the order of their numbers."""
+        return tuple(value for _, value in self._slots)
+
+    def slot(self, value: Value) -> int:
+        """Return the number of a value's slot, a new one if it is new."""
+        key = value if isinstance(value, osc.ParameterRef | Expr) else float(value)
+        return self._slots.setdefault((type(key), key), len(self._slots))
+
+    def entity(self, name: object) -> int:
+        """Return an entity's number."""
+        return self.names.index(str(name))
+
+    def unsupported(self, element: Element, what: str) -> None:
+        """Take down what cannot be run, with its line."""
+        line = f", line {element.line}" if element.line else ""
+        self.problems.append(f"{self.place}{line}: {what} is not supported")
+
+    def literal(self, element: Element, name: str, value: Value) -> float:
+        """Return a number that rows may not vary."""
+        if isinstance(value, osc.ParameterRef | Expr):
+            if isinstance(value, osc.ParameterRef) and value.name in self.parameters:
+                return self.parameters[value.name]
+            self.unsupported(element, f'{name}="{value}" (a number is needed)')
+            return 0.0
+        return float(value)
+
+    def lane_point(self, position: osc.Position) -> LanePoint | None:
+        """Return a position that is a plain point on a lane; others are not supported."""
+        where = position.position
+        if not isinstance(where, osc.LanePosition):
+            self.unsupported(where, f"{type(where).__name__} here")
+            return None
+        if where.offset is not None and where.offset != 0.0:
+            self.unsupported(where, f'offset="{where.offset}" (other than 0)')
+        turned = where.orientation
+        if turned is not None and any(
+            value not in (None, 0.0) for value in (turned.h, turned.p, turned.r)
+        ):
+            self.unsupported(turned, "an Orientation other than the lane's")
+        try:
+            lane = int(str(where.lane_id))
+        except ValueError:
+            self.unsupported(where, f'laneId="{where.lane_id}" (a whole number is needed)')
+            return None
+        return LanePoint(str(where.road_id), lane, where.s, where.line)
+
+
+def table(rows: Sequence[tuple[int, ...]], width: int) -> Int:
+    """Return rows of numbers as an array, also if there are none."""
+    return np.array(rows, dtype=np.int64).reshape(len(rows), width)
