@@ -214,7 +214,9 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     OpenSCENARIO file is on one road, whatever its parameter's value.
     """
     moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
-    return scenario.measured(road_map.site.measures([start.leg for start in moving]))
+    static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
+    measures = road_map.site.measures([start.leg for start in moving])
+    return scenario.measured({one.name: measures.get(one.name, one.default) for one in static})
 
 
 @dataclass(frozen=True)

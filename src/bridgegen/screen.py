@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from bridgegen.pipeline import FileResult
 
 _STAGES = {
+    "compile": "compiling",
+    "search": "",  # the bar says it; a terminal has but 80 columns
     "hand over": "writing the critical scenarios",
     "report": "writing the report",
 }
@@ -30,7 +32,7 @@ class Screen:
         self._console = Console(stderr=True)
         self._progress = Progress(
             TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
+            BarColumn(bar_width=14),
             MofNCompleteColumn(),
             TextColumn("{task.fields[facts]}"),
             TimeRemainingColumn(compact=True),
@@ -55,8 +57,7 @@ class Screen:
                 "First run: compiling the simulator, some ten to thirty seconds; later runs start "
                 "at once."
             )
-        label = {"compile": "compiling", "search": "searching"}.get(stage, _STAGES.get(stage))
-        self._progress.update(self._task, description=label or stage)
+        self._progress.update(self._task, description=_STAGES[stage])
 
     def _batch(self, progress: "LoopProgress") -> None:
         from bridgegen.metrics import METRICS

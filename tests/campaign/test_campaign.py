@@ -192,6 +192,21 @@ def test_a_changed_scenario_is_not_gone_on_with(tmp_path):
         bg.resume(run.folder)
 
 
+@pytest.mark.skipif(not TOWN05.exists(), reason="needs Town05.xodr")
+def test_on_a_map_the_roads_are_the_map_s(tmp_path):
+    with pytest.raises(InputError, match="nothing to search"):
+        bg.run_search("crossroads-s4", road_map=TOWN05, axes=["static"], out=tmp_path / "none")
+    run = bg.run_search(
+        "crossroads-s2", road_map=TOWN05, algorithm="random", budget=80, keep=1, out=tmp_path / "r"
+    )
+    frame = run.frame()
+    assert (frame["lane_width"] == 3.5).all()
+    # Road 18, where the BV starts on leg A, is 21.7 m long; the whole of the BV is on it.
+    assert frame["bv_start"].max() < 21.7 - 3.0
+    facts = json.loads(run.scenarios[0].with_suffix(".json").read_text("utf-8"))
+    assert "lane_width" not in facts["parameters"]
+
+
 def test_the_results_are_a_data_frame(tmp_path):
     run = bg.run_search("crossroads-s4", budget=80, out=tmp_path / "run", keep=0)
     frame = run.frame()
