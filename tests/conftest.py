@@ -1,10 +1,35 @@
-"""Settings for the whole suite."""
+"""Settings for the whole suite, and the strangers that judge our files."""
 
+import importlib.util
 import os
+import sys
+from pathlib import Path
+from typing import Any
 
+import pytest
 from hypothesis import settings
+
+CHECKERS = "BRIDGEGEN_CHECKERS"
 
 # No deadline: the first example may compile a kernel, and shared machines stall.
 settings.register_profile("default", deadline=None, max_examples=60)
 settings.register_profile("ci", deadline=None, max_examples=60, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
+
+
+@pytest.fixture(scope="session")
+def checkers() -> Any:
+    """The ASAM quality checkers and SUMO, in the venv that the environment variable names."""
+    venv = os.environ.get(CHECKERS)
+    if not venv:
+        pytest.skip(f"{CHECKERS} is not set")
+    assert (Path(venv) / "bin/python").exists(), f"{CHECKERS}={venv} is not a virtual environment"
+    # Test modules are imported by path (importmode=importlib), so this one must be, too.
+    path = Path(__file__).with_name("checkers.py")
+    spec = importlib.util.spec_from_file_location("checkers", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module.Checkers(Path(venv))

@@ -51,7 +51,7 @@ def test_search_prints_the_run_s_figures(cli, tmp_path):
         "50th critical after",
         "d_min",
         "v_d",
-        "search time",
+        "wall time",
     ):
         assert label in out
     assert str(tmp_path / "r" / "report.html") in out

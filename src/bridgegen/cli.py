@@ -40,6 +40,10 @@ def main() -> None:
 def search(
     scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
     algorithm: Annotated[str, typer.Option(help="See 'bridgegen list algorithms'.")] = "pso",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A setting of the algorithm, NAME=VALUE; may be repeated."),
+    ] = None,
     budget: Annotated[int, typer.Option(help="Evaluations, exactly.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
     ego: Annotated[str, typer.Option(help="Who drives: route-follower or reference.")] = (
@@ -80,6 +84,7 @@ def search(
         run = campaign.run_search(
             scenario,
             algorithm=algorithm,
+            settings=_settings(settings or []),
             budget=budget,
             seed=seed,
             ego=ego,
@@ -94,7 +99,7 @@ def search(
             scale=scale,
             watch=screen.watch,
         )
-    print_summary(run)
+    print_summary(run, screen.seconds)
 
 
 @app.command()
@@ -105,7 +110,7 @@ def resume(folder: Annotated[Path, typer.Argument(help="The folder of a run.")])
 
     with Screen() as screen:
         run = campaign.resume(folder, watch=screen.watch)
-    print_summary(run)
+    print_summary(run, screen.seconds)
 
 
 @app.command()
@@ -179,9 +184,11 @@ def list_algorithms(as_json: Json = False) -> None:
     from bridgegen import search as toolkit
     from bridgegen.screen import print_table
 
-    found = [toolkit.get(name) for name in toolkit.names()]
-    rows = [(one.name, one.description, one.source) for one in found]
-    print_table(("algorithm", "description", "source"), rows, as_json=as_json)
+    rows = []
+    for one in (toolkit.get(name) for name in toolkit.names()):
+        settings = ", ".join(f"{name}={json.dumps(s.default)}" for name, s in one.settings.items())
+        rows.append((one.name, one.description, settings, one.source))
+    print_table(("algorithm", "description", "settings", "source"), rows, as_json=as_json)
 
 
 @listing.command("metrics")
@@ -211,6 +218,21 @@ def _terms(text: str) -> dict[str, float | None]:
     pairs = [pair.strip() for pair in text.split(",")]
     weighted = _numbers([pair for pair in pairs if "=" in pair], "--objective")
     return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
+
+
+def _settings(pairs: list[str]) -> dict[str, bool | int | float | str]:
+    """Read ``name=value`` pairs; a value is a number, true, false, or a text."""
+    values: dict[str, bool | int | float | str] = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise InputError(f"--set must read NAME=VALUE, got '{pair}'")
+        try:
+            value = json.loads(text)
+        except json.JSONDecodeError:
+            value = text
+        values[name] = value if isinstance(value, bool | int | float | str) else text
+    return values
 
 
 def _numbers(pairs: list[str], option: str = "--fix") -> dict[str, float]:

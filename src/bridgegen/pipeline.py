@@ -30,10 +30,10 @@ from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read as read_scenario
-from bridgegen.simulation.embedded.compiler import compile_storyboard
-from bridgegen.simulation.embedded.network import Network, compile_network
-from bridgegen.simulation.embedded.simulator import simulate
+from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+from bridgegen.simulation.simulator import Simulator
 
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
@@ -70,7 +70,7 @@ class Pipeline:
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded.
         static_names: the parameters that the road network depends on.
-        program: the compiled storyboard.
+        simulator: holds the scenario's storyboard.
     """
 
     objective: Objective
@@ -92,13 +92,13 @@ class Pipeline:
         self.road_map = road_map
         self.metrics = tuple(measures.METRICS)
         searches_roads = not road_map and bool({*self.static_names} & {*space.variables})
-        nominal = space.values(space.decode(np.full((1, space.n_var), 0.5))[0])
+        nominal = space.values(space.row({}))
         individuals = self.individuals(nominal)
         storyboard = openscenario_from_owl(individuals, "nominal.xodr")
-        self.program = compile_storyboard(storyboard, scenario.name)
-        self._network: Network | None = None
+        self.simulator: Simulator[Network] = EmbeddedSimulator(storyboard, scenario.name)
+        self._roads: Network | None = None
         if not searches_roads:
-            self._network = compile_network(self.program, [self.roads(individuals)])
+            self._roads = self.simulator.roads([self.roads(individuals)])
         self._threads = ThreadPoolExecutor(os.cpu_count() or 1, "rollout")
 
     def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
@@ -159,8 +159,8 @@ class Pipeline:
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
-        network, rows = self._roads_of(X)
-        return simulate(self.program, network, columns, rows)
+        roads, rows = self._roads_of(X)
+        return self.simulator.run(roads, rows, columns)
 
     def individuals(self, values: Mapping[str, float], road_file: str = "") -> Individuals:
         """Return one concrete scenario's individuals.
@@ -194,8 +194,8 @@ class Pipeline:
 
     def _roads_of(self, X: Float) -> tuple[Network, Int]:
         """Return the compiled road networks of some rows, and which row has which."""
-        if self._network is not None:
-            return self._network, np.zeros(len(X), dtype=np.int64)
+        if self._roads is not None:
+            return self._roads, np.zeros(len(X), dtype=np.int64)
         columns = [self.space.index(name) for name in self.static_names]
         static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
         models = [
@@ -204,7 +204,7 @@ class Pipeline:
             )
             for row in static
         ]
-        return compile_network(self.program, models), rows.reshape(-1).astype(np.int64)
+        return self.simulator.roads(models), rows.reshape(-1).astype(np.int64)
 
 
 def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
@@ -215,8 +215,8 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     """
     moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
     static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
-    measures = road_map.site.measures([start.leg for start in moving])
-    return scenario.measured({one.name: measures.get(one.name, one.default) for one in static})
+    found = road_map.site.measures([start.leg for start in moving])
+    return scenario.measured({one.name: found.get(one.name, one.default) for one in static})
 
 
 @dataclass(frozen=True)
@@ -262,15 +262,14 @@ def simulate_file(
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    program = compile_storyboard(scenario, str(path), driver=driver)
-    network = compile_network(program, [roads])
-    rollout = simulate(program, network, {}, np.zeros(1, dtype=np.int64))
+    simulator = EmbeddedSimulator(scenario, str(path), driver=driver)
+    rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = measures.evaluate(rollout, names)[0]
     return FileResult(
-        driver=program.driver.name,
+        driver=simulator.driver,
         status=STATUS_MESSAGES[int(rollout.status[0])],
         seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
-        parameters=program.parameters,
+        parameters=simulator.parameters,
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
     )

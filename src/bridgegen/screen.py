@@ -1,6 +1,7 @@
 """What a person sees in the terminal: the progress bar and the tables."""
 
 import json
+import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -41,6 +42,12 @@ class Screen:
         )
         self._task = self._progress.add_task("starting", total=budget, facts="")
         self._critical, self._best = 0, float("inf")
+        self._began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        """Since it was made [s]."""
+        return time.perf_counter() - self._began
 
     @property
     def watch(self) -> "Watch":
@@ -87,8 +94,8 @@ class Screen:
         self._progress.stop()
 
 
-def print_summary(run: "Run") -> None:
-    """Print a run's figures and where its files are."""
+def print_summary(run: "Run", seconds: float) -> None:
+    """Print a run's figures, the whole job's time [s], and where its files are."""
     s, settings = run.summary, run.settings
     rows = [
         ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
@@ -99,7 +106,7 @@ def print_summary(run: "Run") -> None:
         ("50th critical after", _count(s.fiftieth)),
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
-        ("search time", f"{s.seconds:.2f} s"),
+        ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
         ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}"),
         ("report", str(run.report)),
     ]

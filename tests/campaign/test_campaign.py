@@ -68,6 +68,24 @@ def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, 
             assert one["value"] in (result.metrics[name], None)
 
 
+@pytest.mark.checkers
+@pytest.mark.parametrize("name", ["crossroads-s1", "crossroads-s2", "crossroads-s3"])
+def test_strangers_accept_what_is_handed_over(tmp_path, name, checkers):
+    run = bg.run_search(
+        name, axes=["static", "participants", "weather"], budget=120, keep=3, out=tmp_path / "run"
+    )
+    assert len(run.scenarios) == 3
+    roads = [path.with_suffix(".xodr") for path in run.scenarios]
+    reports = [*checkers.qc_openscenario(*run.scenarios), *checkers.qc_opendrive(*roads)]
+    assert len(reports) == 6
+    for report in reports:
+        assert report.clean, report
+    assert checkers.netconvert(roads[0]).returncode == 0
+    carla = pytest.importorskip("carla")
+    for path in roads:
+        assert carla.Map("handed_over", path.read_text("utf-8")).get_topology()
+
+
 def test_most_critical_are_distinct_critical_and_in_order():
     rng = np.random.default_rng(3)
     U, F, critical = rng.random((300, 4)), rng.normal(size=(300, 1)), rng.random(300) < 0.5
@@ -90,7 +108,7 @@ def test_near_copies_do_not_crowd_out_what_is_different():
 
 def test_the_recorded_command_makes_the_same_run(tmp_path, monkeypatch):
     first = bg.run_search(
-        "crossroads-s4", budget=60, seed=5, algorithm="random", out=tmp_path / "a", keep=1,
+        "crossroads-s4", budget=60, seed=5, settings={"population": 15}, out=tmp_path / "a", keep=1,
         fixed={"fog_density": 25.0}, weights="entropy",
     )  # fmt: skip
     words = shlex.split(first.settings.command(tmp_path / "b"))
@@ -239,6 +257,8 @@ def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
         ({"seed": -1}, "0 <= seed"),
         ({"keep": -1}, "0 <= keep"),
         ({"fixed": {"fog_density": 180.0}}, "fog_density"),
+        ({"settings": {"population": 0}}, "population"),
+        ({"settings": {"popuation": 10}}, "did you mean 'population'"),
         ({"fixed": {"fog_densty": 1.0}}, "did you mean 'fog_density'"),
         ({"road_map": Path("nowhere.xodr")}, "nowhere.xodr"),
     ],

@@ -21,10 +21,6 @@ CAR = {"length": 4.6, "width": 1.9, "center_ahead": 1.4}
 STEP = 0.05
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "browser: needs chromium and playwright")
-
-
 def crossroads() -> tuple[Outline, ...]:
     """Four legs of 60 m, two lanes of 3.5 m per direction, stop lines 26 m apart."""
     side, areas, lines = LANE * LANES, [], []

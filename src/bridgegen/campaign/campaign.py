@@ -18,6 +18,7 @@ from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
+from bridgegen.search.algorithm import Value, resolve
 from bridgegen.store import Store
 from bridgegen.store.summary import summarise
 
@@ -43,6 +44,7 @@ def run_search(
     scenario: str | Path,
     *,
     algorithm: str = "pso",
+    settings: Mapping[str, Value] | None = None,
     budget: int = 1000,
     seed: int = 0,
     ego: str = "route-follower",
@@ -62,6 +64,7 @@ def run_search(
     Args:
         scenario: a name of the catalogue, or the path of a YAML file.
         algorithm: a name of ``bridgegen list algorithms``.
+        settings: of the algorithm, where they are not to be its defaults.
         budget: evaluations, exactly.
         seed: the same seed gives the same result.
         ego: a name of the ego's drivers.
@@ -102,10 +105,11 @@ def run_search(
     pipeline.warm_up()
     chosen = pipeline.choose_objective(seed=seed)
     is_file = Path(scenario).suffix in (".yaml", ".yml")
-    settings = Settings(
+    made_with = Settings(
         scenario=str(Path(scenario).resolve()) if is_file else str(scenario),
         fingerprint=catalogue.fingerprint,
         algorithm=method.name,
+        algorithm_settings=resolve(method, space.n_var, chosen.n_obj, seed, settings or {}),
         budget=budget,
         seed=seed,
         ego=ego,
@@ -119,10 +123,10 @@ def run_search(
         chosen={"objective": objective, "weights": weights, "scale": scale},
     )
     with Store.create(
-        folder, settings.to_dict(), space.names, pipeline.metrics,
+        folder, made_with.to_dict(), space.names, pipeline.metrics,
         n_var=space.n_var, n_obj=chosen.n_obj,
     ) as store:  # fmt: skip
-        return _go(pipeline, store, settings, watch)
+        return _go(pipeline, store, made_with, watch)
 
 
 def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
@@ -163,7 +167,8 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
 def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> Run:
     """Search up to the budget, then hand over and report."""
     space, chosen = pipeline.space, pipeline.objective
-    algorithm = toolkit.get(settings.algorithm)(space.n_var, chosen.n_obj, settings.seed)
+    method = toolkit.get(settings.algorithm)
+    algorithm = method(space.n_var, chosen.n_obj, settings.seed, **settings.algorithm_settings)
     watch.stage("search")
     result = run_loop(
         algorithm, space.decode, pipeline.evaluate, store, settings.budget, watch.batch

@@ -1,5 +1,6 @@
 """What a run was made with: all that it takes to make it again, as JSON in its store."""
 
+import json
 import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
@@ -17,6 +18,7 @@ class Settings:
         scenario: a name of the catalogue, or the absolute path of a YAML file.
         fingerprint: digest of what the scenario said when the run began.
         algorithm: the search algorithm.
+        algorithm_settings: every setting of it.
         budget: evaluations.
         seed: of the whole run.
         ego: the ego's driver.
@@ -34,6 +36,7 @@ class Settings:
     scenario: str
     fingerprint: str
     algorithm: str
+    algorithm_settings: Mapping[str, Any]
     budget: int
     seed: int
     ego: str
@@ -69,6 +72,8 @@ class Settings:
         words = ["bridgegen", "search", self.scenario, "--algorithm", self.algorithm]
         words += ["--budget", str(self.budget), "--seed", str(self.seed), "--ego", self.ego]
         words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
+        for name, value in self.algorithm_settings.items():
+            words += ["--set", f"{name}={json.dumps(value)}"]
         for name, value in self.fixed.items():
             words += ["--fix", f"{name}={value!r}"]
         if self.chosen["objective"]:

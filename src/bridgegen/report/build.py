@@ -81,7 +81,7 @@ def build_report(
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             "weights of the objective": weights,
-            "simulated": f"{scenario.duration:g} s at {pipeline.program.time_step:g} s",
+            "simulated": f"{scenario.duration:g} s at {pipeline.simulator.time_step:g} s",
         },
     )
     return ReportData(head, _evaluations(pipeline, rows), _playbacks(pipeline, rows, kept))

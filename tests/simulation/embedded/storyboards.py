@@ -7,10 +7,7 @@ from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.read import read
-from bridgegen.simulation.embedded.compiler import compile_storyboard
-from bridgegen.simulation.embedded.network import compile_network
-from bridgegen.simulation.embedded.program import Program
-from bridgegen.simulation.embedded.simulator import simulate
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
 
 STATIC = {
@@ -115,8 +112,8 @@ def friction(factor: float | str) -> str:
 frictionScaleFactor="{factor}"/></Environment></EnvironmentAction></GlobalAction>"""
 
 
-def compiled(text: str, ego: str = "route-follower") -> Program:
-    return compile_storyboard(read(text.encode(), "test.xosc"), "test.xosc", driver=DRIVERS[ego])
+def simulator(text: str, ego: str = "route-follower") -> EmbeddedSimulator:
+    return EmbeddedSimulator(read(text.encode(), "test.xosc"), "test.xosc", driver=DRIVERS[ego])
 
 
 def run(
@@ -125,7 +122,6 @@ def run(
     roads: OpenDrive | None = None,
     **values: list[float],
 ) -> Rollout:
-    program = compiled(text, ego)
-    network = compile_network(program, [roads or crossroads()])
+    made = simulator(text, ego)
     n = len(next(iter(values.values()))) if values else 1
-    return simulate(program, network, values, np.zeros(n, dtype=np.int64))
+    return made.run(made.roads([roads or crossroads()]), np.zeros(n, dtype=np.int64), values)

@@ -15,7 +15,6 @@ from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 from .storyboards import (
     after,
-    compiled,
     crossroads,
     event,
     friction,
@@ -24,6 +23,7 @@ from .storyboards import (
     reaches,
     run,
     scenario,
+    simulator,
     speed_action,
     start,
 )
@@ -217,7 +217,7 @@ def test_what_cannot_be_run_is_refused_by_name_and_line_all_at_once():
         + event("bv", speed_action(5.0, "linear distance 2"), after(1.0)),
     )
     with pytest.raises(UnsupportedError) as error:
-        compiled(text)
+        simulator(text)
     assert len(error.value.problems) == 2
     assert "test.xosc, line " in error.value.problems[0]
     assert "sinusoidal" in error.value.problems[0]
@@ -225,7 +225,7 @@ def test_what_cannot_be_run_is_refused_by_name_and_line_all_at_once():
 
 def test_an_entity_needs_a_start():
     with pytest.raises(InputError, match="'bv' needs an initial TeleportAction"):
-        compiled(scenario(("ego", "bv"), SOUTHBOUND))
+        simulator(scenario(("ego", "bv"), SOUTHBOUND))
 
 
 def test_a_route_that_no_lane_leads_along_is_named():

@@ -1,0 +1,48 @@
+"""What every simulator does: take a storyboard and roads once, then rows by the thousand."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol, TypeVar
+
+import numpy.typing as npt
+
+from bridgegen.arrays import Int
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.simulation.rollout import Rollout
+
+Roads = TypeVar("Roads")
+
+
+class Simulator(Protocol[Roads]):
+    """A simulator that holds one storyboard; its rollouts depend on nothing else."""
+
+    @property
+    def driver(self) -> str:
+        """Who drives the ego."""
+
+    @property
+    def time_step(self) -> float:
+        """Between two recorded instants [s]."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The storyboard's numeric parameters with their declared values."""
+
+    def roads(self, models: Sequence[OpenDrive]) -> Roads:
+        """Make P road networks ready for this storyboard.
+
+        Raises:
+            InputError: a position that is not on a road, or a route that no lane leads along.
+        """
+
+    def run(self, roads: Roads, rows: Int, values: Mapping[str, npt.ArrayLike]) -> Rollout:
+        """Roll N scenarios out; the result of a row depends on that row alone.
+
+        Args:
+            roads: P road networks, made ready by this simulator.
+            rows: ``(N,)`` int64 in 0..P-1, the road network of each row.
+            values: ``(N,)`` float64 per parameter, in the parameter's unit; missing ones keep
+                the value that the file declares, others than the file's are not looked at.
+
+        Raises:
+            InputError: a road network that is not there, or a value that is not finite.
+        """
