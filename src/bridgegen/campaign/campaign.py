@@ -19,7 +19,7 @@ from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
 from bridgegen.search.algorithm import Value, resolve
-from bridgegen.store import Store
+from bridgegen.store import Store, refuse_used
 from bridgegen.store.summary import summarise
 
 MAX_BUDGET = 10_000_000
@@ -99,7 +99,9 @@ def run_search(
     space = logical.space(axes, fixed)
     if space.n_var == 0:
         raise InputError(f"{logical.name}: nothing to search, every parameter is fixed")
+    values = resolve(method, space.n_var, 1, seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
+    refuse_used(folder)
     pipeline = Pipeline(logical, space, ego=ego, road_map=roads)
     watch.stage("compile")
     pipeline.warm_up()
@@ -109,7 +111,7 @@ def run_search(
         scenario=str(Path(scenario).resolve()) if is_file else str(scenario),
         fingerprint=catalogue.fingerprint,
         algorithm=method.name,
-        algorithm_settings=resolve(method, space.n_var, chosen.n_obj, seed, settings or {}),
+        algorithm_settings=values,
         budget=budget,
         seed=seed,
         ego=ego,

@@ -4,6 +4,7 @@
 """
 
 from bridgegen.store.rows import Evaluated, Rows
+from bridgegen.store.run_file import refuse_used
 from bridgegen.store.store import Store
 
-__all__ = ["Evaluated", "Rows", "Store"]
+__all__ = ["Evaluated", "Rows", "Store", "refuse_used"]
