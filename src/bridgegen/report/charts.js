@@ -132,7 +132,7 @@ function scatterFigure() {
   const [nameX, nameY] = [$("axis-x").value, $("axis-y").value];
   const [x, y] = [valuesOf(nameX), valuesOf(nameY)];
   const shown = hits.length + others.length;
-  $("space-note").textContent = shown < rows.critical.length ? `${number(shown)} of ${number(rows.critical.length)} evaluations drawn` : "";
+  $("space-note").textContent = shown < rows.n - rows.n_failed ? `${number(shown)} of ${number(rows.n - rows.n_failed)} evaluations drawn` : "";
   const hover = `${plain(titled(nameX))} %{x}<br>${plain(titled(nameY))} %{y}<br>evaluation %{customdata}<extra></extra>`;
   const trace = (part, name, marker) => ({
     type: gl ? "scattergl" : "scatter", mode: "markers", name: `${name} (${number(part.length)})`, marker, hovertemplate: hover,

@@ -20,6 +20,9 @@ MILLIMETRE = 3
 ANGLE = 5
 """Decimals of headings: 1e-5 rad moves a car's front by 0.05 mm."""
 
+ROWS = 20_000
+"""Rows of a longer run that the page holds, evenly spread; the iterations show all of it."""
+
 TRENDS = {"d_min": False, "v_d": True}
 """The metrics shown over iterations, and whether a larger one is worse."""
 
@@ -59,19 +62,25 @@ def payload(data: ReportData) -> dict[str, Any]:
             "command": s.command,
             "critical_distance": _number(s.critical_distance),
         },
-        "rows": _rows(data.evaluations),
+        "rows": _rows(data.evaluations, [playback.evaluation for playback in data.kept]),
         "batches": _batches(data.evaluations),
         "roads": roads,
         "kept": kept,
     }
 
 
-def _rows(e: Evaluations) -> dict[str, Any]:
+def _rows(e: Evaluations, kept: list[int]) -> dict[str, Any]:
     ok = e.status == 0
+    n_failed = int(np.count_nonzero(~ok))
+    if ok.size > ROWS:
+        some = np.zeros(ok.size, dtype=np.bool_)
+        some[np.linspace(0, ok.size - 1, ROWS).round().astype(np.int64)] = True
+        some[kept] = True
+        ok &= some
     groups = [("parameter", e.parameters), ("metric", e.metrics), ("objective", e.objectives)]
     return {
         "n": int(e.status.size),
-        "n_failed": int(np.count_nonzero(~ok)),
+        "n_failed": n_failed,
         "evaluation": np.flatnonzero(ok).tolist(),
         "iteration": (e.iteration[ok] + 1).tolist(),
         "critical": e.critical[ok].astype(np.int64).tolist(),

@@ -63,6 +63,11 @@ class Rows:
     def __len__(self) -> int:
         return len(self.id)
 
+    @classmethod
+    def join(cls, parts: Sequence["Rows"]) -> "Rows":
+        """Return the rows of several parts, at least one, in their order."""
+        return cls(*(np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(cls)))
+
     def take(self, at: Int) -> "Rows":
         """Return the rows at some positions, in that order."""
         return Rows(*(getattr(self, one.name)[at] for one in fields(self)))

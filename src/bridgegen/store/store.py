@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+CHUNK = 4096
+"""Rows that are read from SQL at a time."""
+
+
 class Store:
     """A run's settings and its evaluations, in the order of recording; nothing is ever changed.
 
@@ -246,6 +250,9 @@ class Store:
         """
         n = len(self)
         stop = n if stop is None else min(stop, n)
+        if stop - start > CHUNK:
+            # SQL's rows are Python objects, ten times the size of the arrays.
+            return Rows.join(list(self.rows(start, stop)))
         names = ", ".join(map(quoted, self.columns.all))
         sql = f"SELECT {names} FROM evaluations WHERE id >= ? AND id < ? ORDER BY id"
         with self._reading():
@@ -258,7 +265,7 @@ class Store:
             raise self._damaged(f"evaluations between {start} and {stop - 1} are missing")
         return rows
 
-    def rows(self, start: int = 0, stop: int | None = None, chunk: int = 4096) -> Iterator[Rows]:
+    def rows(self, start: int = 0, stop: int | None = None, chunk: int = CHUNK) -> Iterator[Rows]:
         """Yield the evaluations with ``start <= id < stop``, ``chunk`` at a time.
 
         Memory stays bounded however long the run, and the run may grow meanwhile.
