@@ -133,8 +133,12 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_jso
         return
     table = Table(*head, box=None, pad_edge=False, header_style="bold")
     for row in rows:
-        table.add_row(*("" if value is None else str(value) for value in row))
-    Console().print(table)
+        table.add_row(*("" if value is None else _shown(value) for value in row))
+    Console(markup=False, emoji=False).print(table)
+
+
+def _shown(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None:
