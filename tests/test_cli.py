@@ -77,6 +77,37 @@ def test_simulate_with_another_driver(cli, finished):
     assert json.loads(out)["metrics"]["n_collision"] == 0.0
 
 
+def test_ask(cli, finished):
+    owl = finished.scenarios[0].with_suffix(".owl")
+    code, out, _ = cli("ask", owl, "driver", "--json")
+    assert (code, json.loads(out)) == (0, [{"participant": "ego", "driver": "route-follower"}])
+    code, out, _ = cli("ask", owl)
+    assert code == 0
+    assert "What is the weather?" in out
+    refused(cli("ask", owl, "wether"), "did you mean 'weather'?")
+    refused(cli("ask", owl, "--sparql", owl.with_suffix(".rq")), "cannot be read: no such file")
+
+
+def test_ask_prints_brackets_as_they_are(cli, finished, tmp_path):
+    own = tmp_path / "own.rq"
+    own.write_text('SELECT ?a ?b { BIND("[red]x[/y] :car:" AS ?a) BIND(1.5e0 AS ?b) }', "utf-8")
+    code, out, _ = cli("ask", finished.scenarios[0].with_suffix(".owl"), "--sparql", own)
+    assert code == 0
+    assert out.splitlines()[1].split() == ["[red]x[/y]", ":car:", "1.5"]
+
+
+def test_validate_with_the_reasoner(cli, finished, monkeypatch):
+    from bridgegen.ontology import reasoner
+
+    owl = finished.scenarios[0].with_suffix(".owl")
+    monkeypatch.setattr(reasoner, "find_spec", lambda name: None)
+    refused(cli("validate", "--reason", owl), "pip install 'bridgegen[reasoner]'")
+    monkeypatch.setattr(reasoner, "require", lambda: None)
+    said = reasoner.Reasoned(False, ("bv is a Car", "bv is a Lane"), (), {})
+    monkeypatch.setattr(reasoner, "reason", lambda path: said)
+    refused(cli("validate", "--reason", owl), str(owl), "bv is a Car; bv is a Lane")
+
+
 def test_every_handed_over_file_is_valid(cli, finished):
     files = [p for p in sorted((finished.folder / "critical").iterdir()) if p.suffix != ".json"]
     code, out, _ = cli("validate", *files)

@@ -154,18 +154,41 @@ def convert(
 @app.command()
 def validate(
     files: Annotated[list[Path], typer.Argument(help="Files: .owl, .xodr, .xosc or .yaml.")],
+    reason: Annotated[
+        bool,
+        typer.Option("--reason", help="Ask the reasoner HermiT about .owl files, too (extra)."),
+    ] = False,
 ) -> None:
     """Check files against their rules; exit status 2 if one breaks any."""
     from bridgegen.openx.convert import validate_file
 
     broken: list[str] = []
     for file in files:
-        problems = validate_file(file)
+        problems = validate_file(file, reason=reason)
         broken += problems
         if not problems:
             print(f"{file}: valid")
     if broken:
         raise InputError(*broken)
+
+
+@app.command()
+def ask(
+    file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
+    question: Annotated[
+        str | None, typer.Argument(help="Its name; without one, the questions are listed.")
+    ] = None,
+    sparql: Annotated[
+        Path | None, typer.Option(help="A file with a SPARQL SELECT of your own, instead.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Answer a question about a scenario's individuals."""
+    from bridgegen.ontology.questions import ask_file
+    from bridgegen.screen import print_table
+
+    answer = ask_file(file, question, sparql)
+    print_table(answer.columns, answer.rows, as_json=as_json)
 
 
 @listing.command("scenarios")

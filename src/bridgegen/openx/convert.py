@@ -5,6 +5,7 @@ from pathlib import Path
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.odd.reader import names as scenario_names
+from bridgegen.ontology import reasoner
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load
 from bridgegen.ontology.graph import Individuals
@@ -61,15 +62,21 @@ def road_bytes(individuals: Individuals, beside: Path) -> bytes:
     return read_bytes(beside / map_file)
 
 
-def validate_file(path: Path) -> list[str]:
+def validate_file(path: Path, *, reason: bool = False) -> list[str]:
     """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
 
     An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names.
 
+    Args:
+        path: the file.
+        reason: ask the reasoner about an ``.owl``, too: can the individuals be at all?
+
     Raises:
-        InputError: a file of another kind.
+        InputError: a file of another kind, or a reasoner is asked for that is not installed.
     """
+    if reason:
+        reasoner.require()
     kinds = {
         ".owl": _ontology,
         ".xodr": _roads,
@@ -80,7 +87,10 @@ def validate_file(path: Path) -> list[str]:
     if path.suffix.lower() not in kinds:
         raise InputError(f"{path}: the file's name must end in {', '.join(kinds)}")
     try:
-        return [_placed(path, problem) for problem in kinds[path.suffix.lower()](path)]
+        found = kinds[path.suffix.lower()](path)
+        if reason and path.suffix.lower() == ".owl":
+            found += reasoner.reason(path).problems
+        return [_placed(path, problem) for problem in found]
     except BridgeGenError as error:
         return [_placed(path, problem) for problem in error.problems]
 
