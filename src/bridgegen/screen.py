@@ -131,7 +131,9 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_jso
     if as_json:
         print(json.dumps([dict(zip(head, row, strict=True)) for row in rows], indent=2))
         return
-    table = Table(*head, box=None, pad_edge=False, header_style="bold")
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in head:
+        table.add_column(name, overflow="fold")  # nothing is lost in a narrow terminal
     for row in rows:
         table.add_row(*("" if value is None else _shown(value) for value in row))
     Console(markup=False, emoji=False).print(table)
