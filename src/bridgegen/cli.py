@@ -151,6 +151,19 @@ def convert(
         print(f"bridgegen: warning: {violation}", file=sys.stderr)
 
 
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(help="An OpenDRIVE map (.xodr).")],
+    out: Annotated[
+        Path | None, typer.Option(help="The .owl file, new; beside the map by default.")
+    ] = None,
+) -> None:
+    """Turn a whole map into individuals: roads, lanes, junctions, lights and signs."""
+    from bridgegen.openx.convert import import_file
+
+    print(import_file(file, out))
+
+
 @app.command()
 def validate(
     files: Annotated[list[Path], typer.Argument(help="Files: .owl, .xodr, .xosc or .yaml.")],

@@ -247,7 +247,7 @@ def double(text):
         ("leg_A", "has_inbound_lanes", ox.Literal(1.5),
          "has_inbound_lanes of A (Road) must be a whole number (xsd:integer), got '1.5'"),
         ("leg_A", "has_junction_end", ox.Literal("middle"),
-         "has_junction_end of A (Road) must be one of start, end, got 'middle'"),
+         "has_junction_end of A (Road) must be one of start, end, both, none, got 'middle'"),
         ("ego", "has_wheelbase", ox.Literal(0.0),
          "has_wheelbase [m] of ego (Car) must be above 0, got '0.0'"),
         ("ego", "has_route", ox.NamedNode(f"{SCENARIOS}crossroads-s4#leg_A"),

@@ -1,5 +1,6 @@
-"""Files in, files out: a scenario's ontology to OpenDRIVE and OpenSCENARIO, and checks of any."""
+"""Files in, files out: ontologies to OpenDRIVE and OpenSCENARIO, maps to ontologies, checks."""
 
+import os
 from pathlib import Path
 
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
@@ -7,13 +8,14 @@ from bridgegen.odd.reader import load as load_scenario
 from bridgegen.odd.reader import names as scenario_names
 from bridgegen.ontology import reasoner
 from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load
+from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.openx.opendrive import write as opendrive_write
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario import write as openscenario_write
@@ -62,6 +64,30 @@ def road_bytes(individuals: Individuals, beside: Path) -> bytes:
     return read_bytes(beside / map_file)
 
 
+def import_file(road_map: Path, out: Path | None = None) -> Path:
+    """Write a whole OpenDRIVE map as the static part of an ontology.
+
+    Args:
+        road_map: the map.
+        out: the file to write, new; beside the map by default.
+
+    Returns:
+        The file written.
+
+    Raises:
+        FileFormatError: not a map that can be read.
+        UnsupportedError: it uses what this version cannot represent.
+        StorageError: the file exists, or cannot be written.
+    """
+    model = opendrive_read.read(road_map)
+    out = out or road_map.with_suffix(".owl")
+    if out.exists():
+        raise StorageError(f"{out}: exists already, and is not overwritten")
+    map_file = Path(os.path.relpath(road_map, out.parent)).as_posix()
+    save(individuals_from_opendrive(model, map_file), out)
+    return out
+
+
 def validate_file(path: Path, *, reason: bool = False) -> list[str]:
     """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
 
@@ -101,9 +127,19 @@ def _placed(path: Path, problem: str) -> str:
 
 def _ontology(path: Path) -> list[str]:
     individuals = load(path)
+    if _is_map(individuals):
+        return [str(one) for one in check(individuals)]
     name = individuals.text(individuals.one("Scenario"), "has_name")
     scenario = load_scenario(name) if name in scenario_names() else None
     return [str(one) for one in check(individuals, scenario)]
+
+
+def _is_map(individuals: Individuals) -> bool:
+    """Say whether these are a map and no scenario: what `import_file` writes."""
+    return not individuals.of_class("Scenario") and any(
+        individuals.optional_text(network, "has_map_file") is not None
+        for network in individuals.of_class("RoadNetwork")
+    )
 
 
 def _roads(path: Path) -> list[str]:
