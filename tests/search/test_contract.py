@@ -84,9 +84,10 @@ def test_it_describes_itself(algorithm: Kind):
 @pytest.mark.parametrize("ok", [1.0, 0.5, 0.0])
 def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: float):
     n_obj = n_obj_of(algorithm)
-    U = drive(algorithm(n_var, n_obj, 0), 12, n_obj, ok)
+    search = algorithm(n_var, n_obj, 0)
+    U = drive(search, 12, n_obj, ok)
     assert in_cube(U, n_var)
-    assert len(U) >= 12
+    assert len(U) >= 12 or len(search.ask()) == 0
 
 
 @given(
@@ -186,9 +187,12 @@ def test_constant_objective(algorithm: Kind):
 @pytest.mark.parametrize("budget", [1, 39, 40, 137])
 def test_the_budget_is_exact(algorithm: Kind, budget: int, tmp_path):
     result, rows = run(tmp_path / "run", algorithm, budget)
-    assert result.reason is Reason.BUDGET
-    assert len(rows) == budget
-    assert len(np.unique(rows.X, axis=0)) == budget
+    if result.reason is Reason.EXHAUSTED:  # a design of its own size
+        assert len(rows) < budget
+    else:
+        assert result.reason is Reason.BUDGET
+        assert len(rows) == budget
+    assert len(np.unique(rows.X, axis=0)) == len(rows)
     assert in_cube(rows.U, 4)
 
 
@@ -200,8 +204,11 @@ def test_resumed_anywhere_the_result_is_the_same(algorithm: Kind, stops: list[in
         left = iter([False] * (n + before // 40) + [True])
         run(tmp_path / "parts", algorithm, 210, stop=lambda left=left: next(left))
     result, parts = run(tmp_path / "parts", algorithm, 210)
-    assert result.reason is Reason.BUDGET
-    assert 0 < result.simulated < 210
+    if result.reason is Reason.EXHAUSTED:
+        assert len(whole) < 210
+    else:
+        assert result.reason is Reason.BUDGET
+        assert 0 < result.simulated < 210
     for name in ("id", "U", "X", "metrics", "F", "status", "critical"):
         assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes(), name
 

@@ -4,15 +4,20 @@ from typing import TYPE_CHECKING
 
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.search.algorithm import Algorithm
+from bridgegen.search.grid import Grid
+from bridgegen.search.pairwise import Pairwise
 from bridgegen.search.pso import PSO
 from bridgegen.search.random import Random
+from bridgegen.search.sobol import Sobol
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 GROUP = "bridgegen.algorithms"
 
-ALGORITHMS: dict[str, type[Algorithm]] = {cls.name: cls for cls in (Random, PSO)}
+ALGORITHMS: dict[str, type[Algorithm]] = {
+    cls.name: cls for cls in (Random, Sobol, Grid, Pairwise, PSO)
+}
 
 
 def names() -> list[str]:

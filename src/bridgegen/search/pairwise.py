@@ -1,0 +1,57 @@
+"""Pairwise covering array: every pair of levels of every two parameters, in few rows."""
+
+from collections.abc import Mapping
+from itertools import islice
+from typing import Any, ClassVar
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import Setting, Value, resolve
+
+BATCH = 40
+"""Rows that are asked for at a time; the results do not depend on it."""
+
+
+class Pairwise:
+    """A covering array of strength two, allpairspy's; then there are no more rows.
+
+    For any two parameters and any level of each, some row has both. Levels are at the centres of
+    equal bins: (k + ½) / levels. The library's array is always the same one; the seed permutes
+    its columns and the levels within each, which keeps what it covers. Its order is kept: it is
+    greedy, so that a budget smaller than the array still covers many pairs. Where constraints
+    narrow a parameter's interval, levels are shares of what they leave.
+
+    Source: Czerwonka (2006), "Pairwise testing in the real world".
+    """
+
+    name: ClassVar[str] = "pairwise"
+    description: ClassVar[str] = "covering array of all pairs of levels (allpairspy)"
+    source: ClassVar[str] = 'Czerwonka (2006), "Pairwise testing in the real world", PNSQC'
+    settings: ClassVar[Mapping[str, Setting]] = {
+        "levels": Setting(5, "values per parameter, at the centres of equal bins", 2, 100),
+    }
+    many_objective: ClassVar[bool] = True
+
+    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+        self._levels: int = resolve(Pairwise, n_var, n_obj, seed, settings)["levels"]
+        rng = np.random.Generator(np.random.PCG64(seed))
+        self._columns = rng.permutation(n_var)
+        self._names = rng.permuted(np.tile(np.arange(self._levels), (n_var, 1)), axis=1)
+        self._array: Any
+        if n_var == 1:
+            self._array = ([level] for level in range(self._levels))
+        else:
+            from allpairspy import AllPairs
+
+            self._array = AllPairs([range(self._levels)] * n_var)
+
+    def ask(self) -> Float:
+        """Return the next rows of the array, none after the last."""
+        rows = np.array(list(islice(self._array, BATCH)), np.int64).reshape(-1, len(self._columns))
+        renamed = self._names[np.arange(len(self._columns)), rows[:, self._columns]]
+        U: Float = (renamed + 0.5) / self._levels
+        return U
+
+    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+        """Take no notice: the array is fixed by its levels and the seed."""
