@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bridgegen as bg
@@ -30,6 +31,17 @@ def cli(monkeypatch, capsys):
 def finished(tmp_path_factory) -> "bg.Run":
     folder = tmp_path_factory.mktemp("runs") / "s4"
     return bg.run_search("crossroads-s4", budget=120, keep=2, out=folder)
+
+
+@pytest.fixture
+def s4_file(tmp_path) -> Path:
+    """A scenario file of the user's own."""
+    import bridgegen.catalogue as catalogue
+
+    folder = Path(catalogue.__file__).parent
+    for path in folder.glob("*.yaml"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    return tmp_path / "crossroads-s4.yaml"
 
 
 def refused(result: tuple[int, str, str], *parts: str) -> None:
@@ -124,6 +136,17 @@ def test_convert_gives_back_the_handed_over_files(cli, finished, tmp_path):
         assert (tmp_path / f"0001{kind}").read_bytes() == owl.with_suffix(kind).read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--bins", 0], "1 <= bins <= 1000 must hold, got 0"),
+        (["--strength", 4], "1 <= strength <= 3 must hold, got 4"),
+    ],
+)
+def test_coverage_has_its_limits(cli, finished, option, message):
+    refused(cli("coverage", finished.folder, *option), message)
+
+
 def test_an_edited_ontology_converts_to_an_edited_scenario(cli, finished, tmp_path):
     """As after a change in Protégé: the individual's value is the file's value."""
     owl = finished.scenarios[0].with_suffix(".owl")
@@ -157,6 +180,33 @@ def test_lists(cli, what, expected):
     assert expected in cli("list", *what)[1]
 
 
+def test_coverage_counts_what_the_store_holds(cli, finished):
+    code, out, _ = cli("coverage", finished.folder, "--bins", 4, "--strength", 2, "--json")
+    facts = json.loads(out)
+    frame = finished.frame()
+    assert code == 0
+    assert (facts["evaluations"], facts["critical"]) == (120, int(frame.critical.sum()))
+    assert [way["strength"] for way in facts["ways"]] == [1, 2]
+    assert facts["ways"][1]["total"] == 45 * 16
+    (speed,) = [one for one in facts["parameters"] if one["name"] == "ego_speed"]
+    counts, _ = np.histogram(frame.ego_speed, speed["edges"])
+    assert speed["evaluated"] == counts.tolist()
+    assert sum(speed["critical"]) == facts["critical"]
+    code, out, _ = cli("coverage", finished.folder, "--bins", 4, "--strength", 2)
+    assert code == 0
+    for text in ("of feasible", "720", "ego_speed", "participants, 4.9 to 8.9 m/s"):
+        assert text in out
+    assert f"{counts[0]}/{speed['critical'][0]}" in out
+
+
+def test_coverage_of_a_changed_scenario_is_refused(cli, tmp_path, s4_file):
+    folder = tmp_path / "run"
+    bg.run_search(s4_file, algorithm="random", budget=10, keep=0, out=folder)
+    assert cli("coverage", folder)[0] == 0
+    s4_file.write_text(s4_file.read_text("utf-8").replace("title: ", "title: Not "), "utf-8")
+    refused(cli("coverage", folder), "is not what it was")
+
+
 def test_a_run_folder_is_never_overwritten(cli, finished):
     result = cli("search", "crossroads-s4", "--out", finished.folder)
     refused(result, str(finished.folder), "bridgegen resume")
@@ -178,6 +228,7 @@ def test_a_run_folder_is_never_overwritten(cli, finished):
         (["validate", "nowhere.xodr"], ["nowhere.xodr"]),
         (["validate", "pyproject.toml"], ["pyproject.toml", ".owl"]),
         (["resume", "nowhere"], ["nowhere"]),
+        (["coverage", "nowhere"], ["nowhere"]),
         (["list", "parameters", "crossroads-s9"], ["unknown scenario"]),
     ],
 )

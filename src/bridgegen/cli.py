@@ -114,6 +114,25 @@ def resume(folder: Annotated[Path, typer.Argument(help="The folder of a run.")])
 
 
 @app.command()
+def coverage(
+    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    bins: Annotated[
+        int, typer.Option(help="Equal bins per parameter; whole numbers have one each.")
+    ] = 5,
+    strength: Annotated[
+        int, typer.Option(help="Count combinations of up to so many parameters' bins: 1, 2, 3.")
+    ] = 3,
+    as_json: Json = False,
+) -> None:
+    """Show which bins, and combinations of bins, a run evaluated and where it was critical."""
+    from bridgegen.campaign.coverage import coverage_of
+    from bridgegen.screen import print_coverage
+
+    settings, found = coverage_of(run, bins=bins, strength=strength)
+    print_coverage(run, settings, found, as_json=as_json)
+
+
+@app.command()
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[

@@ -14,6 +14,7 @@ from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import ObjectiveSpec, Term
+from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.pipeline import Pipeline, on_map
 from bridgegen.report.build import build_report
@@ -144,26 +145,36 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
     watch = watch or Watch()
     with Store.open(folder, write=True) as store:
         settings = Settings.from_dict(store.settings, store.folder)
-        logical = load(settings.scenario)
-        if logical.fingerprint != settings.fingerprint:
-            raise StorageError(
-                f"{folder}: scenario {settings.scenario} is not what it was when the run began; "
-                "its results can still be read"
-            )
-        roads: RoadMap | None = None
-        if settings.map:
-            roads = load_map(Path(settings.map), settings.junction)
-            if hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
-                raise StorageError(
-                    f"{folder}: map {settings.map} is not what it was when the run began"
-                )
-            logical = on_map(logical, roads)
-        space = logical.space(settings.axes, settings.fixed)
-        pipeline = Pipeline(logical, space, ego=settings.ego, road_map=roads)
+        space, roads = searched(settings, Path(folder))
+        pipeline = Pipeline(space.scenario, space, ego=settings.ego, road_map=roads)
         watch.stage("compile")
         pipeline.warm_up()
         pipeline.choose_objective(Objective.from_dict(settings.objective))
         return _go(pipeline, store, settings, watch)
+
+
+def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | None]:
+    """Return the search space that a run was made with, and its map if it has one.
+
+    Raises:
+        StorageError: the scenario or the map is not what it was.
+        InputError: the scenario or the map is missing.
+    """
+    logical = load(settings.scenario)
+    if logical.fingerprint != settings.fingerprint:
+        raise StorageError(
+            f"{folder}: scenario {settings.scenario} is not what it was when the run began; "
+            "its results can still be read"
+        )
+    roads: RoadMap | None = None
+    if settings.map:
+        roads = load_map(Path(settings.map), settings.junction)
+        if hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
+            raise StorageError(
+                f"{folder}: map {settings.map} is not what it was when the run began"
+            )
+        logical = on_map(logical, roads)
+    return logical.space(settings.axes, settings.fixed), roads
 
 
 def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> Run:

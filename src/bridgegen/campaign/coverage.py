@@ -1,0 +1,33 @@
+"""What a run on disk has covered of its search space."""
+
+from pathlib import Path
+
+from bridgegen.campaign.campaign import searched
+from bridgegen.campaign.settings import Settings
+from bridgegen.odd.coverage import MAX_STRENGTH, Coverage, coverage
+from bridgegen.store import Store
+
+
+def coverage_of(
+    folder: Path | str, *, bins: int = 5, strength: int = MAX_STRENGTH
+) -> tuple[Settings, Coverage]:
+    """Return how a run was made, and the bins and t-way combinations that it evaluated.
+
+    A row whose simulation failed has shown nothing and covers nothing.
+
+    Args:
+        folder: of a run, finished or not.
+        bins: equal bins per parameter; whole numbers have one each.
+        strength: the largest t.
+
+    Raises:
+        StorageError: not a run, or its scenario or map is not what it was.
+        InputError: the scenario or the map is missing; bins or strength out of range.
+    """
+    with Store.open(folder) as store:
+        settings = Settings.from_dict(store.settings, store.folder)
+        rows = store.read()
+    space = searched(settings, Path(folder))[0]
+    ok = rows.status == 0
+    found = coverage(space, rows.X[ok], rows.critical[ok], bins=bins, strength=strength)
+    return settings, found

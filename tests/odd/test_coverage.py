@@ -1,0 +1,165 @@
+"""Coverage of bins and of their combinations, against hand-worked cases and plain counting."""
+
+from itertools import combinations, product
+from math import comb
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridgegen.errors import InputError
+from bridgegen.odd import coverage as module
+from bridgegen.odd.coverage import coverage
+from bridgegen.search.pairwise import Pairwise
+
+
+def none(X):
+    return np.zeros(len(X), bool)
+
+
+def test_two_parameters_by_hand(build, make_parameter):
+    space = build([make_parameter("a"), make_parameter("b", -1.0, 1.0)]).space()
+    X = np.array([[0.0, -1.0], [4.9, 0.9], [5.0, 0.0], [10.0, 1.0]])
+    found = coverage(space, X, np.array([False, True, False, False]), bins=2)
+    a, b = found.parameters
+    assert a.edges.tolist() == [0.0, 5.0, 10.0]
+    assert (a.name, a.axis, a.unit, a.integer) == ("a", "extension", "1", False)
+    assert (a.evaluated.tolist(), a.critical.tolist()) == ([2, 2], [1, 0])
+    # 0 is on b's inner edge and belongs to the upper bin; the ends belong to the outer ones.
+    assert (b.evaluated.tolist(), b.critical.tolist()) == ([1, 3], [0, 1])
+    one, two = found.ways  # two parameters have no triples
+    assert (one.total, one.feasible, one.evaluated, one.critical) == (4, 4, 4, 2)
+    # (low, low), (low, high), (high, high) twice; (high, low) is missing.
+    assert (two.total, two.feasible, two.evaluated, two.critical) == (4, 4, 3, 1)
+    assert two.share == 0.75
+
+
+def test_whole_numbers_have_a_bin_each(build, make_parameter):
+    space = build([make_parameter("n", 2.0, 4.0, kind="integer")]).space()
+    found = coverage(space, np.array([[2.0], [4.0], [4.0]]), none([0] * 3), bins=50)
+    (n,) = found.parameters
+    assert n.integer
+    assert n.edges.tolist() == [1.5, 2.5, 3.5, 4.5]
+    assert n.evaluated.tolist() == [1, 0, 2]
+    assert [(w.strength, w.total, w.evaluated) for w in found.ways] == [(1, 3, 2)]
+
+
+def test_what_constraints_exclude_is_not_feasible(build, make_parameter):
+    """b <= a leaves, of the 5 × 5 pairs, the diagonal and what is below it."""
+    space = build([make_parameter("a"), make_parameter("b")], bounds=[("b", None, "a")]).space()
+    found = coverage(space, np.empty((0, 2)), none([]))
+    assert found.ways[1].total == 25
+    assert found.ways[1].feasible == 15
+    assert found.ways[1].evaluated == 0
+    assert found.parameters[1].feasible.all()
+
+
+def test_what_was_evaluated_is_feasible(build, make_parameter):
+    """Even what is too rare for the sample: here there is no sample at all."""
+    space = build([make_parameter("a"), make_parameter("b")]).space()
+    found = coverage(space, np.array([[1.0, 9.0]]), np.array([True]), sample=0)
+    assert found.ways[1] == module.Ways(2, 25, 1, 1, 1)
+    assert coverage(space, np.empty((0, 2)), none([]), sample=0).ways[0].share == 0.0
+
+
+def test_only_searched_parameters_count(build, make_parameter):
+    scenario = build([make_parameter("a"), make_parameter("b"), make_parameter("c")])
+    space = scenario.space(fixed={"b": 3.0})
+    found = coverage(space, np.array([[1.0, 3.0, 9.0]]), none([0]), sample=100)
+    assert [one.name for one in found.parameters] == ["a", "c"]
+    assert [one.evaluated.tolist() for one in found.parameters] == [
+        [1, 0, 0, 0, 0],
+        [0, 0, 0, 0, 1],
+    ]
+
+
+def counted(bins_of, shape, t):
+    """Plain Python: the distinct combinations of bins of rows."""
+    return sum(
+        len({tuple(row[list(chosen)]) for row in bins_of})
+        for chosen in combinations(range(len(shape)), t)
+    )
+
+
+@given(st.data())
+@settings(max_examples=40)
+@pytest.mark.parametrize("cells", [1 << 24, 1])
+def test_as_counted_one_by_one(build, make_parameter, cells, data):
+    sizes = data.draw(st.lists(st.integers(2, 5), min_size=1, max_size=5), "sizes")
+    bins = data.draw(st.integers(1, 4), "bins")
+    floats = data.draw(st.lists(st.booleans(), min_size=len(sizes), max_size=len(sizes)))
+    shape = [bins if real else size for real, size in zip(floats, sizes, strict=True)]
+    space = build(
+        make_parameter(f"p{k}", 0.0, 1.0)
+        if real
+        else make_parameter(f"p{k}", 1.0, float(size), kind="integer")
+        for k, (real, size) in enumerate(zip(floats, sizes, strict=True))
+    ).space()
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
+    X = space.decode(rng.random((data.draw(st.integers(0, 40)), space.n_var)))
+    hit = rng.random(len(X)) < 0.3
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_CELLS", cells)
+        found = coverage(space, X, hit, bins=bins, sample=50)
+    which = np.array(
+        [
+            np.minimum(column * bins, bins - 1).astype(int) if real else column.astype(int) - 1
+            for column, real in zip(X.T, floats, strict=True)
+        ]
+    ).T
+    sample = coverage(space, X[:0], hit[:0], bins=bins, sample=50)
+    for way, alone in zip(found.ways, sample.ways, strict=True):
+        t = way.strength
+        chosen = combinations(shape, t)
+        assert way.total == sum(len(list(product(*map(range, one)))) for one in chosen)
+        assert way.evaluated == counted(which, shape, t)
+        assert way.critical == counted(which[hit], shape, t)
+        assert max(way.evaluated, alone.feasible) <= way.feasible <= way.total
+        assert way.feasible <= way.evaluated + alone.feasible
+    for number, one in enumerate(found.parameters):
+        assert (
+            one.evaluated.tolist()
+            == np.bincount(which[:, number], minlength=shape[number]).tolist()
+        )
+        assert one.critical.sum() == hit.sum()
+
+
+def test_a_covering_array_covers_all_pairs(build, make_parameter):
+    space = build(make_parameter(f"p{k}") for k in range(8)).space()
+    search = Pairwise(8, 1, 0)
+    U = np.concatenate([search.ask() for _ in range(3)])
+    found = coverage(space, space.decode(U), none(U))
+    pairs = found.ways[1]
+    assert (pairs.total, pairs.feasible, pairs.evaluated) == (comb(8, 2) * 25,) * 3
+
+
+def test_the_catalogue_s_constraints_leave_most_pairs(s4):
+    """Rain needs cloud: the pair (most rain, least cloud) is in no scenario."""
+    found = coverage(s4.space(), np.empty((0, len(s4.space().names))), none([]), strength=2)
+    assert [w.total for w in found.ways] == [50, 45 * 25]
+    assert found.ways[0].feasible == 50
+    assert 1000 < found.ways[1].feasible < 1125
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"bins": 0}, "1 <= bins <= 1000 must hold, got 0"),
+        ({"bins": 1001}, "got 1001"),
+        ({"strength": 0}, "1 <= strength <= 3 must hold, got 0"),
+        ({"strength": 4}, "got 4"),
+    ],
+)
+def test_limits(build, make_parameter, more, message):
+    space = build([make_parameter("a")]).space()
+    with pytest.raises(InputError, match=message):
+        coverage(space, np.empty((0, 1)), none([]), **more)
+
+
+def test_wrong_shapes(build, make_parameter):
+    space = build([make_parameter("a")]).space()
+    with pytest.raises(ValueError, match="X must have shape"):
+        coverage(space, np.empty((0, 2)), none([]))
+    with pytest.raises(ValueError, match="critical must have shape"):
+        coverage(space, np.zeros((3, 1)), none([0]))
