@@ -24,7 +24,7 @@ class Grid:
     pair of indices of the first and the second half of the parameters. Each round adds a hash of
     one half to the other, which can be undone, so that no point is left out or comes twice.
 
-    Source: paper, Section IV-E (brute force); the network is Luby and Rackoff's (1988).
+    Source: what the paper, Section I, sets out to avoid; the network is Luby and Rackoff's (1988).
     """
 
     name: ClassVar[str] = "grid"
