@@ -18,6 +18,9 @@ from bridgegen.store import Store
 pytestmark = pytest.mark.parametrize("algorithm", ALGORITHMS.values(), ids=ALGORITHMS)
 Kind = type[Algorithm]
 
+DESIGNS = ("grid", "pairwise")
+"""The algorithms that have a size of their own, and end with it."""
+
 
 def sphere(U: Float, n_obj: int = 1) -> Float:
     centres = np.linspace(0.3, 0.7, n_obj)
@@ -87,7 +90,7 @@ def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: f
     search = algorithm(n_var, n_obj, 0)
     U = drive(search, 12, n_obj, ok)
     assert in_cube(U, n_var)
-    assert len(U) >= 12 or len(search.ask()) == 0
+    assert len(U) >= 12 or (algorithm.name in DESIGNS and len(search.ask()) == 0)
 
 
 @given(
@@ -187,7 +190,7 @@ def test_constant_objective(algorithm: Kind):
 @pytest.mark.parametrize("budget", [1, 39, 40, 137])
 def test_the_budget_is_exact(algorithm: Kind, budget: int, tmp_path):
     result, rows = run(tmp_path / "run", algorithm, budget)
-    if result.reason is Reason.EXHAUSTED:  # a design of its own size
+    if algorithm.name in DESIGNS and result.reason is Reason.EXHAUSTED:
         assert len(rows) < budget
     else:
         assert result.reason is Reason.BUDGET
@@ -204,7 +207,7 @@ def test_resumed_anywhere_the_result_is_the_same(algorithm: Kind, stops: list[in
         left = iter([False] * (n + before // 40) + [True])
         run(tmp_path / "parts", algorithm, 210, stop=lambda left=left: next(left))
     result, parts = run(tmp_path / "parts", algorithm, 210)
-    if result.reason is Reason.EXHAUSTED:
+    if algorithm.name in DESIGNS and result.reason is Reason.EXHAUSTED:
         assert len(whole) < 210
     else:
         assert result.reason is Reason.BUDGET
