@@ -46,9 +46,12 @@ def search(
     ] = None,
     budget: Annotated[int, typer.Option(help="Evaluations, exactly.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
-    ego: Annotated[str, typer.Option(help="Who drives: route-follower or reference.")] = (
-        "route-follower"
-    ),
+    ego: Annotated[
+        str | None,
+        typer.Option(
+            help="Who drives: route-follower or reference.", show_default="the scenario's choice"
+        ),
+    ] = None,
     axes: Annotated[
         str | None,
         typer.Option(help="What to search, e.g. static,participants,weather."),

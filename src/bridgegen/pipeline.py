@@ -80,12 +80,12 @@ class Pipeline:
         scenario: LogicalScenario,
         space: SearchSpace,
         *,
-        ego: str = "route-follower",
+        ego: str | None = None,
         road_map: RoadMap | None = None,
     ) -> None:
         self.scenario = scenario
         self.space = space
-        self.driver = egos.get(ego)
+        self.driver = egos.get(ego or scenario.driver)
         self.static_names = tuple(
             name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC
         )
@@ -200,7 +200,9 @@ class Pipeline:
         static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
         models = [
             opendrive_from_owl(
-                build_static(dict(zip(self.static_names, row.tolist(), strict=True)))
+                build_static(
+                    dict(zip(self.static_names, row.tolist(), strict=True)), self.scenario.roads
+                )
             )
             for row in static
         ]

@@ -6,13 +6,9 @@ import pytest
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import (
-    LogicalScenario,
-    ObjectiveSpec,
-    Participant,
-    Term,
-    Waypoint,
-)
+from bridgegen.odd.roads import usual
+from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, Term
+from bridgegen.odd.story import Participant, Story, Waypoint
 
 BuildScenario = Callable[..., LogicalScenario]
 
@@ -32,9 +28,16 @@ def build_scenario(
         place="",
         duration=20.0,
         time_step=0.05,
-        template="crossroads",
-        participants=(Participant("ego", "car", Waypoint("P1", 40.0), Waypoint("P6", 40.0), 6.9),),
-        events=(),
+        roads=usual("crossroads"),
+        story=Story(
+            (
+                Participant(
+                    "ego", "car", Waypoint.at_point("P1", 40.0), Waypoint.at_point("P6", 40.0), 6.9
+                ),
+            )
+        ),
+        driver="route-follower",
+        effects=(),
         axes=axes,
         parameters={one.name: one for one in parameters},
         bounds=tuple(

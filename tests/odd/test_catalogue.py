@@ -8,7 +8,7 @@ import pytest
 from bridgegen.errors import UnknownNameError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load, names
-from bridgegen.odd.scenario import ConditionSpec, EventSpec, Waypoint
+from bridgegen.odd.story import Change, ConditionSpec, EventSpec, SpeedChange, Waypoint
 
 NAMES = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 
@@ -44,12 +44,12 @@ def test_scenario_is_the_papers(name):
     ego, bv = scenario.participants
     assert scenario.ego is ego
     assert (ego.name, ego.start, ego.end) == (
-        "ego", Waypoint(ego_start, 40.0), Waypoint(ego_end, after)
+        "ego", Waypoint.at_point(ego_start, 40.0), Waypoint.at_point(ego_end, after)
     )  # fmt: skip
     assert (bv.name, bv.start, bv.end) == (
         "bv",
-        Waypoint(bv_start, "bv_start"),
-        Waypoint(bv_end, 40.0),
+        Waypoint.at_point(bv_start, "bv_start"),
+        Waypoint.at_point(bv_end, 40.0),
     )
     assert (ego.speed, bv.speed) == ("ego_speed", 0.0)
     speed = scenario.parameters["ego_speed"]
@@ -60,10 +60,10 @@ def test_scenario_is_the_papers(name):
     assert (speed.default, speed.low, speed.high) == (bv_speed, 0.5, pytest.approx(2 * bv_speed))
     assert scenario.events == (
         EventSpec(
-            "bv_sets_off", "bv", "bv_speed", 3.0,
+            "bv_sets_off", "bv", (SpeedChange("bv_speed", Change(rate=3.0)),),
             (
-                ConditionSpec("time", "bv_trigger_time"),
-                ConditionSpec("distance", "bv_trigger_distance", "ego"),
+                (ConditionSpec("time", "bv_trigger_time"),),
+                (ConditionSpec("distance", "bv_trigger_distance", "ego"),),
             ),
         ),
     )  # fmt: skip
@@ -120,16 +120,14 @@ WORKED = [  # quantity, what it follows from, its value: worked by hand from spe
     (("sun_altitude_angle", "hi"), {"cloudiness": 100, "fog_density": 100}, 7.5),
     (("bv_start", "hi"), {"arm_length": 45}, 42.0),
     (("intersection_size", "lo"), {"lanes_per_direction": 2, "lane_width": 3.5}, 20.0),
+    ("speed_factor", {"precipitation": 0, "fog_density": 0, "sun_altitude_angle": 0}, 1.0),
     (
-        ("ego_speed", "hi"),
-        {"precipitation": 0, "fog_density": 0, "sun_altitude_angle": 0},
-        13.9,
-    ),
-    (
-        ("bv_speed", "hi"),
+        "speed_factor",
         {"precipitation": 100, "fog_density": 100, "sun_altitude_angle": -1},
-        13.9 * 0.84 * 0.88 * 0.95,
+        0.84 * 0.88 * 0.95,
     ),
+    (("ego_speed", "hi"), {"speed_factor": 0.5}, 6.95),
+    (("bv_speed", "hi"), {"speed_factor": 1.0}, 13.9),
 ]
 
 
@@ -148,8 +146,8 @@ DOWN = [
     ("fog_distance", "fog_density", {}),
     (("sun_altitude_angle", "hi"), "cloudiness", {"fog_density": 30}),
     (("sun_altitude_angle", "hi"), "fog_density", {"cloudiness": 30}),
-    (("ego_speed", "hi"), "precipitation", {"fog_density": 0, "sun_altitude_angle": 40}),
-    (("ego_speed", "hi"), "fog_density", {"precipitation": 0, "sun_altitude_angle": 40}),
+    ("speed_factor", "precipitation", {"fog_density": 0, "sun_altitude_angle": 40}),
+    ("speed_factor", "fog_density", {"precipitation": 0, "sun_altitude_angle": 40}),
 ]
 
 

@@ -98,7 +98,7 @@ MISTAKES = [
     (
         "speed: ego_speed",
         "speed: wetness",
-        "participants.ego.speed must be a number or a parameter, 'wetness' is derived",
+        "participants.ego.speed needs a parameter in m/s, 'wetness' is in %",
         "speed: wetness",
     ),
     (
@@ -163,9 +163,9 @@ MISTAKES = [
     ),
     (
         "template: crossroads",
-        "template: roundabout",
-        "template must be 'crossroads', got 'roundabout'",
-        "template: roundabout",
+        "template: crossroad",
+        "template must be 'crossroads', 't-junction', ",
+        "template: crossroad",
     ),
     (
         "scenario: crossroads-s4",
@@ -206,8 +206,8 @@ MISTAKES = [
     (
         "kind: time,",
         "kind: tim,",
-        "events.bv_sets_off.when.0.kind must be 'time' or 'distance', got 'tim'; did you "
-        "mean 'time'?",
+        "events.bv_sets_off.when.0.kind must be 'time', 'distance', 'ttc', 'headway', 'speed', "
+        "'travelled', 'standstill' or 'after', got 'tim'; did you mean 'time'?",
         "kind: tim,",
     ),
     (
@@ -273,19 +273,19 @@ MISTAKES = [
     (
         "point: P8",
         "point: P9",
-        "participants.ego.end.point must be 'P1', 'P2', ",
+        "a place lies on one of the legs A, B, C, D (P1, P2, P3, P4, P5, P6, P7, P8), got 'P9'",
         "point: P9",
     ),
     (
         "point: P8",
         "point: P7",
-        "a route ends where an outbound lane does: P2, P4, P6 or P8, got P7",
+        "a route ends where an outbound lane does: P2, P4, P6, P8, got P7",
         "point: P7",
     ),
     (
         "point: P5",
         "point: P6",
-        "a route starts where an inbound lane does: P1, P3, P5 or P7, got P6",
+        "a route starts where an inbound lane does: P1, P3, P5, P7, got P6",
         "point: P6",
     ),
     (
@@ -297,19 +297,19 @@ MISTAKES = [
     (
         "distance: 40.0} # m behind",
         "distance: 46.0} # m behind",
-        "ego must stay on the leg of P8: distance <= arm_length [m], '46.0' can lie 1 m beyond",
+        "ego must stay on leg D: distance <= arm_length [m], '46.0' can lie 1 m beyond",
         None,
     ),
     (
         "point: P5, distance: 40.0",
         "point: P3, distance: 7.0",
-        "ego and bv start 0 m apart at P3, at least 5.0 m is needed",
+        "ego and bv start 0 m apart on leg B in, lane 1, at least 5 m is needed",
         None,
     ),
     (
         "type: car",
         "type: lorry",
-        "participants.ego.type must be 'car', got 'lorry'",
+        "participants.ego.type must be 'car', 'van', 'truck', ",
         "type: lorry",
     ),
     (

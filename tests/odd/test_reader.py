@@ -11,6 +11,7 @@ from bridgegen.errors import FileFormatError, InputError, ScenarioError, Unknown
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import Critical
+from bridgegen.odd.story import Change, SpeedChange
 
 
 @pytest.fixture
@@ -151,7 +152,8 @@ def test_a_rate_must_stay_above_zero(refuse, write, s4_text):
     assert problem.startswith(
         "events.bv_sets_off.rate [m/s²] must be greater than 0, 'bv_rate' goes down to 0 ("
     )
-    assert load(write(text.replace("low: 0,", "low: 0.1,"))).events[0].rate == "bv_rate"
+    (action,) = load(write(text.replace("low: 0,", "low: 0.1,"))).events[0].actions
+    assert action == SpeedChange("bv_speed", Change(rate="bv_rate"))
 
 
 def test_what_road_and_weather_need_has_its_axis_unit_and_kind(write, refuse, s4_text):
@@ -163,8 +165,8 @@ def test_what_road_and_weather_need_has_its_axis_unit_and_kind(write, refuse, s4
     write(own, "own.yaml")
     problems = refuse(s4_text.replace("[crossroads,", "[own.yaml,"))
     assert [problem.split(" (")[0] for problem in problems] == [
-        "lane_width belongs to the axis static in m, got static in s",
-        "lanes_per_direction [count] must be of kind integer",
+        "lane_width needs a parameter in m, 'lane_width' is in s",
+        "lanes_per_direction needs a parameter of kind integer, 'lanes_per_direction' is none",
     ]
 
 

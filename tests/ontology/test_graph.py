@@ -236,7 +236,7 @@ def test_answers_depend_on_no_iri(individuals, salt):
                 for leg in legs
             ],
             which.text(which.link(ego, "has_controller"), "has_driver"),
-            which.number(start, "has_distance_to_junction"),
+            which.number(start, "has_distance"),
             sorted(
                 (which.text(p, "has_name"), which.optional_number(p, "has_low"))
                 for p in which.of_class("Parameter")

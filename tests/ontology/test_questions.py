@@ -7,6 +7,7 @@ import pytest
 
 from bridgegen.errors import FileFormatError, InputError, UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.odd.story import Waypoint
 from bridgegen.ontology import questions as module
 from bridgegen.ontology.files import from_bytes, save, to_bytes
 from bridgegen.ontology.graph import Individuals
@@ -76,8 +77,12 @@ def test_conflicts_of_an_ego_that_goes_north(other, rows):
     scenario, values, _ = concrete("crossroads-s3")
     start, end = other
     ego, bv = scenario.participants
-    bv = replace(bv, start=replace(bv.start, point=start), end=replace(bv.end, point=end))
-    changed = replace(scenario, participants=(ego, bv))
+    bv = replace(
+        bv,
+        start=Waypoint.at_point(start, bv.start.distance),
+        end=Waypoint.at_point(end, bv.end.distance),
+    )
+    changed = replace(scenario, story=replace(scenario.story, participants=(ego, bv)))
     found = ask(build(changed, values, driver="reference"), "conflicts").rows
     assert found == tuple(("ego", *row) for row in rows)
 

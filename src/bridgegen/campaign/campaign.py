@@ -48,7 +48,7 @@ def run_search(
     settings: Mapping[str, Value] | None = None,
     budget: int = 1000,
     seed: int = 0,
-    ego: str = "route-follower",
+    ego: str | None = None,
     axes: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
     road_map: Path | str | None = None,
@@ -68,7 +68,7 @@ def run_search(
         settings: of the algorithm, where they are not to be its defaults.
         budget: evaluations, exactly.
         seed: the same seed gives the same result.
-        ego: a name of the ego's drivers.
+        ego: a name of the ego's drivers; the scenario's own choice by default.
         axes: the axes of the search space; the scenario's own by default.
         fixed: parameters to hold at a value, by name.
         road_map: an OpenDRIVE map; by default a crossroads is generated.
@@ -115,7 +115,7 @@ def run_search(
         algorithm_settings=values,
         budget=budget,
         seed=seed,
-        ego=ego,
+        ego=pipeline.driver.name,
         axes=tuple(str(axis) for axis in space.axes),
         fixed=dict(fixed or {}),
         map=str(roads.path.resolve()) if roads else None,

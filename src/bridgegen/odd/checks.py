@@ -1,6 +1,7 @@
 """What a logical scenario must have as a whole: what it needs, nothing idle, all of it feasible."""
 
-from collections.abc import Iterable, Mapping, Set
+import math
+from collections.abc import Iterable, Iterator, Mapping, Set
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -8,38 +9,40 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import ScenarioError
+from bridgegen.odd.bodies import BODIES
+from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, slack
+from bridgegen.odd.plain_yaml import Document
+from bridgegen.odd.roads import Quantity
+from bridgegen.odd.rules import cap, speeds_of
 from bridgegen.odd.space import SearchSpace, probes
 
 if TYPE_CHECKING:
-    from bridgegen.odd.scenario import LogicalScenario, Waypoint
+    from bridgegen.odd.scenario import LogicalScenario
 
-# What the road network and the weather are built from: every scenario has these, in these units.
+MAX_STEPS = 100_000
+
+# What the weather is made of: every scenario has these, in these units.
 NEEDED = {
-    Axis.STATIC: {
-        "lane_width": "m",
-        "lanes_per_direction": "count",
-        "arm_length": "m",
-        "intersection_size": "m",
-    },
-    Axis.WEATHER: {
-        "precipitation": "%",
-        "precipitation_deposits": "%",
-        "cloudiness": "%",
-        "wind_intensity": "%",
-        "fog_density": "%",
-        "fog_distance": "m",
-        "fog_falloff": "1",
-        "sun_altitude_angle": "deg",
-        "sun_azimuth_angle": "deg",
-        "wetness": "%",
-        "friction": "1",
-    },
+    "precipitation": "%",
+    "precipitation_deposits": "%",
+    "cloudiness": "%",
+    "wind_intensity": "%",
+    "fog_density": "%",
+    "fog_distance": "m",
+    "fog_falloff": "1",
+    "sun_altitude_angle": "deg",
+    "sun_azimuth_angle": "deg",
+    "wetness": "%",
+    "friction": "1",
+    "speed_factor": "1",
 }
-INCLUDED_BY = {Axis.STATIC: "crossroads", Axis.WEATHER: "weather"}
 
-# Between the reference points of two that start in one lane [m]: a car's length and a bit.
-_CLEARANCE = 5.0
+_CLEARANCE = 0.4
+"""Between the boxes of two that start in one lane [m]."""
+
+_ASIDE = 2.0
+"""Two that start this far beside each other in one lane [m] are not in each other's way."""
 
 
 def use_problems(
@@ -59,26 +62,22 @@ def use_problems(
         place: the scenario's file.
     """
     problems = []
-    for axis, units in NEEDED.items():
-        missing = [f"{name} [{unit}]" for name, unit in units.items() if name not in names]
-        if missing:
+    missing = [f"{name} [{unit}]" for name, unit in NEEDED.items() if name not in names]
+    if missing:
+        problems.append(
+            f"a scenario needs {', '.join(missing)} on the axis weather; "
+            f"include 'weather' declares all that it needs there ({place})"
+        )
+    for name, unit in NEEDED.items():
+        found = declared.get(name)
+        if found is not None and (found.axis, found.unit) != (Axis.WEATHER, unit):
             problems.append(
-                f"a scenario needs {', '.join(missing)} on the axis {axis}; "
-                f"include '{INCLUDED_BY[axis]}' declares all that it needs there ({place})"
+                f"{name} belongs to the axis weather in {unit}, "
+                f"got {found.axis} in {found.unit}{at(found.place)}"
             )
-        for name, unit in units.items():
-            found = declared.get(name)
-            if found is None:
-                continue
-            if (found.axis, found.unit) != (axis, unit):
-                problems.append(
-                    f"{name} belongs to the axis {axis} in {unit}, "
-                    f"got {found.axis} in {found.unit}{at(found.place)}"
-                )
-            elif isinstance(found, Parameter) and (found.kind == "integer") != (unit == "count"):
-                kind = "integer" if unit == "count" else "float"
-                problems.append(f"{name} [{unit}] must be of kind {kind}{at(found.place)}")
-    needed = {name for units in NEEDED.values() for name in units}
+        elif isinstance(found, Parameter) and found.kind == "integer":
+            problems.append(f"{name} [{unit}] must be of kind float{at(found.place)}")
+    needed = set(NEEDED)
     rules: list[Bound | Derived] = [*bounds]
     rules += (one for one in declared.values() if isinstance(one, Derived))
     read = set(used).union(*(rule.names for rule in rules))
@@ -89,6 +88,25 @@ def use_problems(
                 f"{nearest(name, needed - declared.keys())}{at(one.place)}"
             )
     return problems
+
+
+def time_problems(document: Document) -> list[str]:
+    """Return what is wrong with a file's duration and time step."""
+    data = document.data if isinstance(document.data, dict) else {}
+    duration, step = data.get("duration"), data.get("time_step")
+    if not isinstance(duration, int | float) or not isinstance(step, int | float):
+        return []  # the shape says so already
+    for key, value in (("duration", duration), ("time_step", step)):
+        if not 0.0 < value < math.inf:
+            where = document.at((key,))
+            return [f"{key} [s] must be greater than 0 and finite, got {value} ({where})"]
+    steps = duration / step
+    if 1 <= steps <= MAX_STEPS and abs(steps - round(steps)) <= 1e-6 * steps:
+        return []
+    return [
+        f"duration must be a whole number of time steps, 1 to {MAX_STEPS}, got {duration} s / "
+        f"{step} s = {steps:.6g} ({document.at(('duration',))})"
+    ]
 
 
 def try_out(scenario: "LogicalScenario") -> None:
@@ -111,25 +129,76 @@ def try_out(scenario: "LogicalScenario") -> None:
         raise ScenarioError(*(f"{problem}, {where}" for problem in error.problems)) from None
     X = whole.decode(probes(whole.n_var))
     columns = {name: X[:, whole.index(name)] for name in whole.names}
-    problems = []
-    for one in scenario.participants:
-        for end in (one.start, one.end):
-            beyond = _metres(end, columns) - columns["arm_length"]
-            if beyond.max() > slack(0.0):
-                problems.append(
-                    f"{one.name} must stay on the leg of {end.point}: distance <= arm_length [m], "
-                    f"'{end.distance}' can lie {beyond.max():.3g} m beyond ({scenario.place})"
-                )
-    for one, other in combinations(scenario.participants, 2):
-        gap = np.abs(_metres(one.start, columns) - _metres(other.start, columns))
-        if one.start.point == other.start.point and gap.min() < _CLEARANCE:
-            problems.append(
-                f"{one.name} and {other.name} start {gap.min():.3g} m apart at {one.start.point}, "
-                f"at least {_CLEARANCE} m is needed ({scenario.place})"
-            )
+    problems = [*_places(scenario, columns), *_fast(scenario, columns)]
     if problems:
         raise ScenarioError(*problems)
 
 
-def _metres(end: "Waypoint", columns: dict[str, Float]) -> Float:
-    return columns[end.distance] if isinstance(end.distance, str) else np.array([end.distance])
+def _places(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterator[str]:
+    """Yield who may come off a leg, or start inside another."""
+    for one in scenario.participants:
+        ends = [(one.start, 0.0), *((point, 0.0) for point in one.path[1:])]
+        for end, least in [*ends, *([(one.end, 0.0)] if one.end else [])]:
+            length = scenario.roads.length(end.leg)
+            at_ = _metres(end.distance, columns)
+            if at_.min() < least - slack(0.0):
+                yield (
+                    f"{one.name} must stay on leg {end.leg}: distance >= 0 [m], "
+                    f"'{end.distance}' can be {at_.min():.3g} m ({scenario.place})"
+                )
+            if length is None:
+                beyond = at_ - _segments_length(scenario, columns)
+            else:
+                beyond = at_ - _metres(length, columns)
+            if beyond.max() > slack(0.0):
+                limit = length if isinstance(length, str) else "its length"
+                yield (
+                    f"{one.name} must stay on leg {end.leg}: distance <= {limit} [m], "
+                    f"'{end.distance}' can lie {beyond.max():.3g} m beyond ({scenario.place})"
+                )
+    on_lanes = [one for one in scenario.participants if not one.path]
+    for one, other in combinations(on_lanes, 2):
+        a, b = one.start, other.start
+        if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):
+            continue
+        gap = np.abs(_metres(a.distance, columns) - _metres(b.distance, columns))
+        lengths = BODIES[one.type].length + BODIES[other.type].length
+        aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
+        near = gap[np.broadcast_to(aside < _ASIDE, gap.shape)] if gap.size > 1 else gap
+        clearance = 0.5 * lengths + _CLEARANCE
+        if near.size and aside.min() < _ASIDE and near.min() < clearance:
+            yield (
+                f"{one.name} and {other.name} start {near.min():.3g} m apart on {a}, "
+                f"at least {clearance:g} m is needed ({scenario.place})"
+            )
+
+
+def _fast(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterator[str]:
+    """Yield who may be faster than road, weather or legs allow; parameters have their bounds."""
+    prefixes = sorted(
+        name.removesuffix("speed_factor") for name in columns if name.endswith("speed_factor")
+    )
+    limit = parse(cap(scenario.roads, prefixes)).evaluate(columns)
+    for one in scenario.participants:
+        for value in speeds_of(one, scenario.story):
+            speed = _metres(value, columns)
+            allowed = np.asarray(BODIES[one.type].max_speed)
+            why = f"a {one.type} can do"
+            if one.kind == "vehicle" and value != 0.0:
+                allowed = np.minimum(limit, allowed)
+                why = "road and weather allow"
+            over = speed - allowed
+            if over.max() > slack(float(np.max(allowed))):
+                yield (
+                    f"{one.name} may be no faster than {why}, '{value}' [m/s] can be "
+                    f"{over.max():.3g} m/s faster ({scenario.place})"
+                )
+
+
+def _segments_length(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Float:
+    parts = [_metres(one.length, columns) for one in scenario.roads.segments]
+    return np.asarray(sum(parts[1:], parts[0]))
+
+
+def _metres(value: Quantity, columns: Mapping[str, Float]) -> Float:
+    return columns[value] if isinstance(value, str) else np.array([value])

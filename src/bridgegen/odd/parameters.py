@@ -32,6 +32,7 @@ UNITS = {
     "kg": "mass",
     "lx": "illuminance",
     "°C": "temperature",
+    "1/m": "curvature",
     "count": "number of things",
     "1": "dimensionless",
 }

@@ -6,23 +6,32 @@ from importlib import resources
 from pathlib import Path
 
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
-from bridgegen.odd.checks import try_out, use_problems
+from bridgegen.odd.changes import TemporaryChanges, jam_members
+from bridgegen.odd.checks import time_problems, try_out, use_problems
 from bridgegen.odd.constraints import problems_of
 from bridgegen.odd.expression import parse
+from bridgegen.odd.objectives import read_objective
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, read_axes
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
+from bridgegen.odd.quantities import Quantities
+from bridgegen.odd.roads import KNOBS, RoadsSpec
+from bridgegen.odd.roads_reader import read_roads
+from bridgegen.odd.rules import bounds_between_layers
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.schema import (
     BoundSection,
     DerivedSection,
     FragmentFile,
+    ObjectiveSection,
     ParameterSection,
+    RoadsSection,
     ScenarioFile,
-    Section,
-    section,
-    shape_problems,
 )
+from bridgegen.odd.shape import Section, section, shape_problems
+from bridgegen.odd.story import Story
 from bridgegen.odd.storyboard import Storyboard
+
+_PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
 
 
 def names(kind: str = "scenario") -> tuple[str, ...]:
@@ -86,6 +95,7 @@ class _Declarations:
         names: all that are declared, rightly or wrongly.
         problems: why the others do not.
         complete: whether every file to include could be read.
+        prefixes: under which a fragment was included again ("weather as later_").
     """
 
     def __init__(self) -> None:
@@ -95,20 +105,45 @@ class _Declarations:
         self.names: set[str] = set()
         self.problems: list[str] = []
         self.complete = True
+        self.prefixes: tuple[str, ...] = ()
+        self._prefix = ""
+        self._renamed: re.Pattern[str] | None = None
 
     def include(self, document: Document, folder: Path | None) -> None:
         """Take in the fragments that a scenario names."""
         given = document.data.get("include") if isinstance(document.data, dict) else None
         for number, name in enumerate(given if isinstance(given, list) else ()):
+            place = at(document.at(("include", number)))
+            file, said, prefix = str(name).partition(" as ")
+            if said and not (_PREFIX.fullmatch(prefix) and prefix not in self.prefixes):
+                self.problems.append(
+                    "a fragment is included again as 'NAME as PREFIX', a prefix of its own of "
+                    f"lower case letters that ends in '_', got '{name}'{place}"
+                )
+                self.complete = False
+                continue
             try:
-                fragment = _read_fragment(str(name), folder)
+                fragment = _read_fragment(file, folder)
             except InputError as error:
-                place = at(document.at(("include", number)))
                 self.problems += [problem + place for problem in error.problems]
                 self.complete = False
                 continue
             self.problems += shape_problems(FragmentFile, fragment)
+            self._again(fragment, prefix)
             self.take(fragment)
+            self._again(fragment, "")
+
+    def _again(self, fragment: Document, prefix: str) -> None:
+        """Take a fragment's own names with a prefix from now on; an empty one ends it."""
+        self._prefix, self._renamed = prefix, None
+        if prefix:
+            self.prefixes += (prefix,)
+            own = [name for key in ("parameters", "derived") for name, _ in entries(fragment, key)]
+            self._renamed = re.compile(rf"\b({'|'.join(re.escape(str(name)) for name in own)})\b")
+
+    def _formula(self, given: float | str) -> str:
+        text = given if isinstance(given, str) else repr(given)
+        return self._renamed.sub(rf"{self._prefix}\1", text) if self._renamed else text
 
     def take(self, document: Document) -> None:
         """Take in what a file declares, as far as it has the right shape."""
@@ -125,7 +160,7 @@ class _Declarations:
     ) -> None:
         for name, data in entries(document, key):
             if isinstance(name, str):
-                self.names.add(name)
+                self.names.add(self._prefix + name)
             given = section(model, data)
             if given is not None:
                 try:
@@ -135,26 +170,25 @@ class _Declarations:
 
     def _parameter(self, name: str, given: ParameterSection, place: str) -> None:
         values = given.model_dump(exclude={"axis"})
+        name = self._prefix + name
         self.parameters.append(Parameter(name, Axis(given.axis), **values, place=place))
 
     def _bound(self, _: str, given: BoundSection, place: str) -> None:
         lo, hi = (
-            None if side is None else parse(_formula(side), place) for side in (given.lo, given.hi)
+            None if side is None else parse(self._formula(side), place)
+            for side in (given.lo, given.hi)
         )
-        self.bounds.append(Bound(given.target, lo, hi, given.why, given.source, place))
+        target = self._formula(given.target)
+        self.bounds.append(Bound(target, lo, hi, given.why, given.source, place))
 
     def _derived(self, name: str, given: DerivedSection, place: str) -> None:
-        value = parse(_formula(given.value), place)
+        value = parse(self._formula(given.value), place)
         self.derived.append(
             Derived(
-                name, Axis(given.axis), given.unit, value,
+                self._prefix + name, Axis(given.axis), given.unit, value,
                 given.why, given.source, given.description, place,
             )
         )  # fmt: skip
-
-
-def _formula(given: float | str) -> str:
-    return given if isinstance(given, str) else repr(given)
 
 
 def _read_fragment(name: str, folder: Path | None) -> Document:
@@ -179,12 +213,29 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     parameters = {one.name: one for one in said.parameters}
     derived = {one.name: one for one in said.derived}
     declared: dict[str, Parameter | Derived] = {**derived, **parameters}
-    story = Storyboard(document, parameters, derived, said.names)
-    problems += said.problems + story.problems
+    quantities = Quantities(document, parameters, derived, said.names)
+    roads = _roads(document, quantities)
+    if roads is None:
+        raise ScenarioError(*problems, *said.problems)  # no place can be checked without them
+    board = Storyboard(quantities, roads, said.prefixes, jam_members(quantities))
+    changes = TemporaryChanges(quantities, roads, board)
+    story = Story(
+        (*board.participants, *changes.participants), board.events, changes.jams, changes.works
+    )
+    raw = section(ObjectiveSection, document.data.get("objective"))
+    objective = None if raw is None else read_objective(raw, quantities.say)
+    said.derived += changes.derived
+    derived |= {one.name: one for one in changes.derived}
+    between = bounds_between_layers(roads, story, parameters, said.prefixes, document.place)
+    if not quantities.problems:
+        said.bounds += between
+    used = quantities.used | roads.parameters
+    problems += said.problems + quantities.problems
     problems += problems_of(said.parameters, said.bounds, said.derived, said.names)
-    problems += use_problems(declared, said.bounds, said.names, story.used, document.place)
+    problems += use_problems(declared | derived, said.bounds, said.names, used, document.place)
+    problems += time_problems(document)
     given = section(ScenarioFile, document.data)
-    if problems or given is None or story.objective is None:
+    if problems or given is None or objective is None:
         raise ScenarioError(*problems)
     scenario = LogicalScenario(
         name=given.scenario,
@@ -194,14 +245,29 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         place=document.place,
         duration=given.duration,
         time_step=given.time_step,
-        template=given.template,
-        participants=story.participants,
-        events=story.events,
+        roads=roads,
+        story=story,
+        driver=given.driver,
+        effects=tuple(one.function for one in given.effects),
         axes=read_axes(given.axes),
         parameters=parameters,
         bounds=tuple(said.bounds),
         derived=tuple(said.derived),
-        objective=story.objective,
+        objective=objective,
     )
     try_out(scenario)
     return scenario
+
+
+def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
+    """Return what the file says of its roads; None if that is not of the right shape."""
+    data = document.data if isinstance(document.data, dict) else {}
+    template = data.get("template")
+    kind = next((one for one in KNOBS if one == template), None)
+    given = section(RoadsSection, data.get("roads", {}))
+    if kind is None or given is None:
+        return None
+    return read_roads(
+        kind, given, quantities.parameters, quantities.derived, quantities.declared,
+        quantities.say,
+    )  # fmt: skip

@@ -6,86 +6,9 @@ from hashlib import sha256
 from typing import Literal
 
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.odd.roads import RoadsSpec
 from bridgegen.odd.space import SearchSpace
-
-
-@dataclass(frozen=True)
-class Waypoint:
-    """Where a route starts or ends.
-
-    Attributes:
-        point: "P1" to "P8": legs A (south), B (west), C (north), D (east) have an odd point, where
-            their inner inbound lane starts, and an even one, where their inner outbound lane ends.
-        distance: [m] along the leg between the vehicle's reference point and the junction (the
-            stop line, for a start); a parameter's name or a constant.
-    """
-
-    point: str
-    distance: str | float
-
-    @property
-    def leg(self) -> str:
-        """The leg, "A" to "D"."""
-        return "ABCD"[(int(self.point[1:]) - 1) // 2]
-
-    @property
-    def direction(self) -> Literal["in", "out"]:
-        """Whether it is on a lane that leads to the junction or away from it."""
-        return "in" if int(self.point[1:]) % 2 else "out"
-
-
-@dataclass(frozen=True)
-class Participant:
-    """A road user.
-
-    Attributes:
-        name: "ego" for the system under test.
-        type: what it is.
-        start: where it stands at time 0.
-        end: where its route ends.
-        speed: [m/s] at time 0; of the ego also its target. A parameter's name or a constant.
-    """
-
-    name: str
-    type: Literal["car"]
-    start: Waypoint
-    end: Waypoint
-    speed: str | float
-
-
-@dataclass(frozen=True)
-class ConditionSpec:
-    """When an event starts.
-
-    Attributes:
-        kind: "time": simulation time has reached ``value``; "distance": the participant's
-            reference point is ``value`` or less from the one of ``to``, as the crow flies.
-        value: [s] or [m]; a parameter's name or a constant.
-        to: the other participant, for a distance.
-    """
-
-    kind: Literal["time", "distance"]
-    value: str | float
-    to: str | None = None
-
-
-@dataclass(frozen=True)
-class EventSpec:
-    """A participant's change of speed.
-
-    Attributes:
-        name: of the event.
-        participant: who changes.
-        speed: [m/s] that it changes to; a parameter's name or a constant.
-        rate: [m/s²] at which; a parameter's name or a constant, > 0.
-        when: alternatives: the first to hold starts the event.
-    """
-
-    name: str
-    participant: str
-    speed: str | float
-    rate: str | float
-    when: tuple[ConditionSpec, ...]
+from bridgegen.odd.story import EventSpec, Participant, Story
 
 
 @dataclass(frozen=True)
@@ -161,9 +84,11 @@ class LogicalScenario:
         place: the file that it was read from.
         duration: [s] of simulated time.
         time_step: [s].
-        template: the road network's construction.
-        participants: the ego and the others.
-        events: what the others do.
+        roads: the road network.
+        story: who takes part, and what happens.
+        driver: who drives the ego unless the user says otherwise.
+        effects: the user's functions that add to each scenario, as ``module:function`` or
+            ``file.py:function``.
         axes: what is searched unless the user says otherwise.
         parameters: what may vary, by name.
         bounds: what limits it.
@@ -178,9 +103,10 @@ class LogicalScenario:
     place: str = field(compare=False, repr=False)
     duration: float
     time_step: float
-    template: Literal["crossroads"]
-    participants: tuple[Participant, ...]
-    events: tuple[EventSpec, ...]
+    roads: RoadsSpec
+    story: Story
+    driver: str
+    effects: tuple[str, ...]
     axes: tuple[Axis, ...]
     parameters: dict[str, Parameter]
     bounds: tuple[Bound, ...]
@@ -191,6 +117,16 @@ class LogicalScenario:
     def fingerprint(self) -> str:
         """A digest of all that it says: the same for the same scenario on any machine."""
         return sha256(repr(self).encode()).hexdigest()
+
+    @property
+    def participants(self) -> tuple[Participant, ...]:
+        """The ego and the others."""
+        return self.story.participants
+
+    @property
+    def events(self) -> tuple[EventSpec, ...]:
+        """What happens."""
+        return self.story.events
 
     @property
     def ego(self) -> Participant:

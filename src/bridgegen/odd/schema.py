@@ -1,137 +1,221 @@
 """The shape of a scenario file: which keys there are and what type each takes.
 
-Rules about values are kept by the types that the file becomes (``parameters``, ``scenario``).
+Rules about values are kept by the types that the file becomes (``parameters``, ``story``, …).
 """
 
-import re
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic import Field
 
-from bridgegen.odd.parameters import nearest
-from bridgegen.odd.plain_yaml import Document, Path
-
-
-def _number_or(what: str, pattern: str) -> PlainValidator:
-    def read(value: object) -> float | str:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            return float(value)
-        if isinstance(value, str) and re.fullmatch(pattern, value, re.DOTALL):
-            return value
-        raise PydanticCustomError("number_or", f"must be a number or {what}")
-
-    return PlainValidator(read)
+from bridgegen.odd.shape import (
+    AxisName,
+    Formula,
+    LaneField,
+    Number,
+    QuantityField,
+    ShapedSection,
+    Text,
+    Word,
+)
 
 
-# Strict, so that "3" is no number and true no 1; an integer is a number, as everywhere.
-_Number = Annotated[float, Field(strict=True)]
-_Text = Annotated[str, Field(strict=True, min_length=1, max_length=20_000)]
-_Word = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
-_Quantity = Annotated[
-    float | str, _number_or("the name of a parameter", "[A-Za-z][A-Za-z0-9_]{0,63}")
-]
-_Formula = Annotated[float | str, _number_or("a formula", ".+")]
-_AxisName = Literal["static", "temporary", "participants", "weather", "extension"]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class ParameterSection(_Section):
+class ParameterSection(ShapedSection):
     """One entry of ``parameters``."""
 
-    axis: _AxisName
-    unit: _Text
-    low: _Number
-    high: _Number
-    default: _Number
+    axis: AxisName
+    unit: Text
+    low: Number
+    high: Number
+    default: Number
     kind: Literal["float", "integer"] = "float"
-    description: _Text
-    source: _Text
+    description: Text
+    source: Text
 
 
-class BoundSection(_Section):
+class BoundSection(ShapedSection):
     """One entry of ``bounds``."""
 
-    target: _Text
-    lo: _Formula | None = None
-    hi: _Formula | None = None
-    why: _Text
-    source: _Text
+    target: Text
+    lo: Formula | None = None
+    hi: Formula | None = None
+    why: Text
+    source: Text
 
 
-class DerivedSection(_Section):
+class DerivedSection(ShapedSection):
     """One entry of ``derived``."""
 
-    axis: _AxisName
-    unit: _Text
-    value: _Formula
-    why: _Text
-    source: _Text
-    description: _Text
+    axis: AxisName
+    unit: Text
+    value: Formula
+    why: Text
+    source: Text
+    description: Text
 
 
-class FragmentFile(_Section):
+class FragmentFile(ShapedSection):
     """A file that scenarios include: parameters and their constraints."""
 
-    fragment: _Word
-    description: _Text
+    fragment: Word
+    description: Text
     parameters: dict[str, ParameterSection] = {}
     bounds: list[BoundSection] = []
     derived: dict[str, DerivedSection] = {}
 
 
-class WaypointSection(_Section):
-    """Start or end of a route."""
+class LegSection(ShapedSection):
+    """One leg of ``roads.legs``."""
 
-    point: Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7", "P8"]
-    distance: _Quantity
+    heading: Number | None = None
+    lanes_in: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
+    lanes_out: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
+    turns: list[list[Literal["left", "straight", "right"]]] = []
+    sign: Literal["stop", "yield"] | None = None
+    crosswalk: Annotated[bool, Field(strict=True)] | None = None
 
 
-class ParticipantSection(_Section):
+class SegmentSection(ShapedSection):
+    """One stretch of ``roads.segments``."""
+
+    length: QuantityField
+    curvature: QuantityField = 0.0
+    end_curvature: QuantityField | None = None
+
+
+class RoadsSection(ShapedSection):
+    """The road network: what is said of its legs, and its knobs (see ``roads.KNOBS``)."""
+
+    legs: dict[str, LegSection] = {}
+    segments: list[SegmentSection] = []
+    crosswalk_at: Number | None = None
+    crosswalks: Annotated[bool, Field(strict=True)] = False
+    signals: Literal["none", "two-phase"] = "none"
+    road_type: Literal["town", "rural", "motorway"] | None = None
+    lane_width: QuantityField | None = None
+    speed_limit: QuantityField | None = None
+    sidewalk_width: QuantityField | None = None
+    shoulder_width: QuantityField | None = None
+    crosswalk_width: QuantityField | None = None
+    closing_fog_density: QuantityField | None = None
+    closing_precipitation: QuantityField | None = None
+    lanes_per_direction: QuantityField | None = None
+    arm_length: QuantityField | None = None
+    intersection_size: QuantityField | None = None
+    green_time: QuantityField | None = None
+    yellow_time: QuantityField | None = None
+    all_red_time: QuantityField | None = None
+    signal_offset: QuantityField | None = None
+    radius: QuantityField | None = None
+    ring_lane_width: QuantityField | None = None
+    lanes: QuantityField | None = None
+    lanes_against: QuantityField | None = None
+    length: QuantityField | None = None
+    merge_length: QuantityField | None = None
+    taper_length: QuantityField | None = None
+    after_length: QuantityField | None = None
+
+
+class WaypointSection(ShapedSection):
+    """A place on a leg."""
+
+    point: Annotated[str, Field(strict=True, pattern=r"^P([1-9]|10)$")] | None = None
+    leg: Word | None = None
+    way: Literal["in", "out"] | None = None
+    distance: QuantityField
+    lane: LaneField = 1
+    offset: QuantityField = 0.0
+
+
+class ParticipantSection(ShapedSection):
     """One entry of ``participants``."""
 
-    type: Literal["car"]
-    start: WaypointSection
-    end: WaypointSection
-    speed: _Quantity
+    type: Literal[
+        "car", "van", "truck", "bus", "motorcycle", "emergency",
+        "bicycle", "pedestrian", "animal", "obstacle",
+    ]  # fmt: skip
+    start: WaypointSection | None = None
+    end: WaypointSection | None = None
+    path: list[WaypointSection] = []
+    speed: QuantityField = 0.0
 
 
-class ConditionSection(_Section):
-    """One alternative of an event's ``when``."""
+class ConditionSection(ShapedSection):
+    """One alternative of an event's ``when``; or several conditions that must hold together."""
 
-    kind: Literal["time", "distance"]
-    value: _Quantity
-    to: _Word | None = None
+    kind: (
+        Literal["time", "distance", "ttc", "headway", "speed", "travelled", "standstill", "after"]
+        | None
+    ) = None
+    value: QuantityField = 0.0
+    to: Word | None = None
+    of: Word | None = None
+    event: Word | None = None
+    all: "list[ConditionSection]" = []
 
 
-class EventSection(_Section):
+class LaneChangeSection(ShapedSection):
+    """A lane change of an event."""
+
+    lanes: Annotated[Number, Field(ge=-5, le=5, multiple_of=1)]
+    time: QuantityField | None = None
+    distance: QuantityField | None = None
+    shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
+
+
+class EventSection(ShapedSection):
     """One entry of ``events``."""
 
-    participant: _Word
-    speed: _Quantity
-    rate: _Quantity
+    participant: Word | None = None
+    speed: QuantityField | None = None
+    rate: QuantityField | None = None
+    time: QuantityField | None = None
+    distance: QuantityField | None = None
+    shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
+    lane_change: LaneChangeSection | None = None
+    weather: Word | None = None
     when: Annotated[list[ConditionSection], Field(min_length=1)]
 
 
-class TermSection(_Section):
+class JamSection(ShapedSection):
+    """One entry of ``jams``: a queue of standing vehicles."""
+
+    tail: WaypointSection
+    vehicles: Annotated[list[Literal["car", "van", "truck", "bus"]], Field(min_length=1)]
+    gap: QuantityField = 3.0
+
+
+class WorksSection(ShapedSection):
+    """One entry of ``road_works``: a lane that is closed by cones."""
+
+    start: WaypointSection
+    length: Number
+    taper: Number
+    spacing: Number = 5.0
+    sign_before: Number = 40.0
+
+
+class EffectSection(ShapedSection):
+    """One entry of ``effects``: a function of the user's that adds to each scenario."""
+
+    function: Text
+
+
+class TermSection(ShapedSection):
     """One metric of the objective."""
 
-    metric: _Word
-    weight: _Number | None = None
+    metric: Word
+    weight: Number | None = None
 
 
-class CriticalSection(_Section):
+class CriticalSection(ShapedSection):
     """What makes a scenario critical."""
 
-    n_collision_above: _Number = 0.0
-    d_min_below: _Number = 2.0
-    v_d_at_least: _Number = 1.0
+    n_collision_above: Number = 0.0
+    d_min_below: Number = 2.0
+    v_d_at_least: Number = 1.0
 
 
-class ObjectiveSection(_Section):
+class ObjectiveSection(ShapedSection):
     """What is optimised."""
 
     terms: Annotated[list[TermSection], Field(min_length=1)]
@@ -140,86 +224,26 @@ class ObjectiveSection(_Section):
     critical: CriticalSection = CriticalSection()
 
 
-class ScenarioFile(_Section):
+class ScenarioFile(ShapedSection):
     """A logical scenario."""
 
-    scenario: _Word
-    title: _Text
-    description: _Text
-    source: _Text
-    template: Literal["crossroads"]
-    duration: _Number
-    time_step: _Number
-    axes: Annotated[list[_AxisName], Field(min_length=1)]
-    include: list[_Text] = []
+    scenario: Word
+    title: Text
+    description: Text
+    source: Text
+    template: Literal["crossroads", "t-junction", "roundabout", "merge", "road"]
+    roads: RoadsSection = RoadsSection()
+    driver: Word = "route-follower"
+    duration: Number
+    time_step: Number
+    axes: Annotated[list[AxisName], Field(min_length=1)]
+    include: list[Text] = []
     participants: dict[str, ParticipantSection]
     events: dict[str, EventSection] = {}
+    jams: dict[str, JamSection] = {}
+    road_works: dict[str, WorksSection] = {}
+    effects: list[EffectSection] = []
     parameters: dict[str, ParameterSection] = {}
     bounds: list[BoundSection] = []
     derived: dict[str, DerivedSection] = {}
     objective: ObjectiveSection
-
-
-Section = TypeVar("Section", bound=_Section)
-
-_MESSAGES = {
-    "dict_type": "must be a mapping",
-    "float_type": "must be a number",
-    "list_type": "must be a list",
-    "model_type": "must be a mapping",
-    "string_pattern_mismatch": "must be a word of letters, digits, '_' and '-'",
-    "string_too_short": "must not be empty",
-    "string_type": "must be a text",
-    "too_short": "must not be empty",
-}
-
-
-def section(model: type[Section], data: object) -> Section | None:
-    """Return data as a section of a file, or ``None`` if it is not of that shape."""
-    try:
-        return model.model_validate(data)
-    except ValidationError:
-        return None
-
-
-def shape_problems(model: type[_Section], document: Document) -> list[str]:
-    """Return every way in which a file is not of the shape of ``model``, with its line."""
-    try:
-        model.model_validate(document.data)
-    except ValidationError as error:
-        return [_describe(model, document, one) for one in error.errors(include_url=False)]
-    return []
-
-
-def _describe(model: type[_Section], document: Document, error: ErrorDetails) -> str:
-    path: Path = error["loc"]
-    where = document.at(path)
-    *parents, last = path or ("the file",)
-    inside = ".".join(str(part) for part in parents)
-    name = ".".join(str(part) for part in path) or "the file"
-    if error["type"] == "missing":
-        return f"{inside or 'the file'} must have the key '{last}' ({where})"
-    if error["type"] == "extra_forbidden":
-        keys = list(_model_at(model, tuple(parents)).model_fields)
-        hint = nearest(str(last), keys) or f"; known: {', '.join(keys)}"
-        return f"unknown key '{last}'{f' in {inside}' if inside else ''}{hint} ({where})"
-    got = repr(error["input"])
-    got = got if len(got) <= 60 else got[:57] + "..."
-    if error["type"] == "literal_error":
-        choices = error["ctx"]["expected"]
-        hint = nearest(str(error["input"]), re.findall("'([^']*)'", choices))
-        return f"{name} must be {choices}, got {got}{hint} ({where})"
-    return f"{name} {_MESSAGES.get(error['type'], error['msg'])}, got {got} ({where})"
-
-
-def _model_at(model: type[BaseModel], path: Path) -> type[BaseModel]:
-    """Return the model of the section at ``path``: for the keys it may have."""
-    kind: Any = model
-    for part in path:
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            kind = kind.model_fields[str(part)].annotation
-        else:  # list[Section] or dict[str, Section]
-            kind = get_args(kind)[-1]
-    assert isinstance(kind, type)
-    assert issubclass(kind, BaseModel)
-    return kind

@@ -1,217 +1,359 @@
-"""Participants, events and objective of a scenario file: built, with the rules they must keep."""
+"""Participants and events of a scenario file: built, with the rules they must keep."""
 
 import math
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator
+from itertools import pairwise
 
-from bridgegen.odd.parameters import Axis, Derived, Parameter, nearest
-from bridgegen.odd.plain_yaml import Document, Path, entries
-from bridgegen.odd.scenario import (
-    ConditionSpec,
-    Critical,
-    EventSpec,
-    ObjectiveSpec,
-    Participant,
-    Term,
-    Waypoint,
-)
+from bridgegen.odd.parameters import nearest
+from bridgegen.odd.plain_yaml import Path, entries
+from bridgegen.odd.quantities import Quantities
+from bridgegen.odd.roads import LETTERS, Quantity, RoadsSpec
 from bridgegen.odd.schema import (
     ConditionSection,
     EventSection,
-    ObjectiveSection,
     ParticipantSection,
     WaypointSection,
-    section,
+)
+from bridgegen.odd.shape import section
+from bridgegen.odd.story import (
+    CONDITIONS,
+    TYPES,
+    Action,
+    Change,
+    ConditionSpec,
+    EventSpec,
+    LaneChange,
+    Participant,
+    SpeedChange,
+    Waypoint,
+    WeatherChange,
 )
 
-MAX_STEPS = 100_000
 EGO = "ego"
+
+_WALKERS = ("pedestrian", "animal", "bicycle")
 
 
 class Storyboard:
-    """What a file says beyond its parameters, built as far as it has the right shape.
+    """What a file says of its participants and events, as far as it has the right shape.
 
     Attributes:
-        problems: the rules that it breaks, with their lines.
-        used: the parameters that it refers to.
         participants: as ``LogicalScenario`` holds them.
-        events: as ``LogicalScenario`` holds them.
-        objective: as ``LogicalScenario`` holds it; ``None`` if it is not of the right shape.
+        events: likewise.
+        known: the participants' names, also of those that are described wrongly.
 
     Args:
-        document: the scenario file.
-        parameters: what it may refer to.
-        derived: what it may not refer to, for the message.
-        declared: all names, also of what is declared wrongly: no reason to call it unknown.
+        quantities: of the file; takes down what is wrong.
+        roads: what waypoints may lie on.
+        prefixes: of the weathers that an event may change to.
+        more: names of participants that other parts of the file bring.
     """
 
     def __init__(
         self,
-        document: Document,
-        parameters: Mapping[str, Parameter],
-        derived: Mapping[str, Derived],
-        declared: Set[str],
+        quantities: Quantities,
+        roads: RoadsSpec,
+        prefixes: tuple[str, ...] = (),
+        more: tuple[str, ...] = (),
     ) -> None:
-        self._document = document
-        self._parameters, self._derived, self._declared = parameters, derived, declared
-        self.problems: list[str] = []
-        self.used: set[str] = set()
-        self._check_time()
-        self._known = [str(name) for name, _ in entries(self._document, "participants")]
+        self._quantities, self._roads, self._prefixes = quantities, roads, prefixes
+        self._say, self._check = quantities.say, quantities.check
+        document = quantities.document
+        self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
+        self._event_names = [str(name) for name, _ in entries(document, "events")]
         self.participants = tuple(self._participants())
+        self._acting = {one.name: one for one in self.participants}
         self.events = tuple(self._events())
-        self.objective = self._objective()
 
-    def _say(self, problem: str, path: Path) -> None:
-        self.problems.append(f"{problem} ({self._document.at(path)})")
+    # -- where ---------------------------------------------------------------------------------
 
-    def _check_time(self) -> None:
-        data = self._document.data if isinstance(self._document.data, dict) else {}
-        duration, step = data.get("duration"), data.get("time_step")
-        if not isinstance(duration, int | float) or not isinstance(step, int | float):
-            return  # the shape says so already
-        for key, value in (("duration", duration), ("time_step", step)):
-            if not 0.0 < value < math.inf:
-                self._say(f"{key} [s] must be greater than 0 and finite, got {value}", (key,))
-                return
-        steps = duration / step
-        if not 1 <= steps <= MAX_STEPS or abs(steps - round(steps)) > 1e-6 * steps:
-            self._say(
-                f"duration must be a whole number of time steps, 1 to {MAX_STEPS}, "
-                f"got {duration} s / {step} s = {steps:.6g}",
-                ("duration",),
-            )
+    def waypoint(self, given: WaypointSection, path: Path, *, above: bool = False) -> Waypoint:
+        """Return a place on a leg, and say what is wrong with it."""
+        self._check(given.distance, "m", (*path, "distance"), above=above)
+        self._check(given.offset, "m", (*path, "offset"), low=-math.inf)
+        roads = self._roads
+        leg, way = given.leg, given.way
+        if given.point is not None:
+            if leg is not None or way is not None:
+                self._say("a place has a point, or a leg and a way, not both", path)
+            at = Waypoint.at_point(given.point, given.distance)
+            leg, way = at.leg, at.way
+        elif roads.template == "road":
+            leg, way = leg or "main", way or "out"
+        elif leg is None or way is None:
+            self._say("a place must have a point, or a leg and a way", path)
+            leg, way = leg or roads.leg_names[0], way or "in"
+        if leg not in roads.leg_names:
+            points = [f"P{2 * LETTERS.index(n) + k}" for n in roads.legs for k in (1, 2)]
+            known = ", ".join(roads.leg_names) + (f" ({', '.join(points)})" if points else "")
+            got = given.point or leg
+            self._say(f"a place lies on one of the legs {known}, got '{got}'", path)
+        elif isinstance(given.lane, int):
+            self._check_lane(leg, way, given.lane, path)
+        else:
+            self._check_strip(leg, given.lane, path)
+        return Waypoint(leg, way, given.distance, given.lane, given.offset)  # type: ignore[arg-type]
 
-    def _quantity(
-        self, value: str | float, unit: str, path: Path, *, positive: bool = False
-    ) -> None:
-        """Check a constant, or a reference to a parameter, that must be ≥ 0 or > 0 in ``unit``."""
-        label = ".".join(str(part) for part in path)
-        rule = f"{label} [{unit}] must be {'greater than' if positive else 'at least'} 0"
+    def _check_lane(self, leg: str, way: str, lane: int, path: Path) -> None:
+        count = self._roads.lanes(leg, way)
+        if isinstance(count, str):
+            parameter = self._quantities.parameters.get(count)
+            least = parameter.low if parameter else lane
+            if lane > least:
+                self._say(
+                    f"lane {lane} of leg {leg} must always be there, '{count}' goes down to "
+                    f"{least:g}",
+                    path,
+                )
+        elif lane > count:
+            self._say(f"leg {leg} has {count:g} lanes {way}, got lane {lane}", path)
+
+    def _check_strip(self, leg: str, strip: str, path: Path) -> None:
+        width = self._roads.knobs[f"{strip}_width"]
+        if width == 0.0:
+            self._say(f"leg {leg} has no {strip}: {strip}_width must be greater than 0 m", path)
+        for way in ("in", "out"):
+            count = self._roads.lanes(leg, way)
+            if isinstance(count, str):
+                self._say(
+                    f"a place on a {strip} needs a fixed number of lanes, '{count}' varies: "
+                    "one storyboard serves every road network",
+                    path,
+                )
+
+    def _range(self, value: Quantity) -> tuple[float, float]:
+        """Return the least and the greatest value that a constant or a parameter has."""
         if not isinstance(value, str):
-            if not (value > 0.0 if positive else value >= 0.0) or math.isinf(value):
-                self._say(f"{rule} and finite, got {value}", path)
-            return
-        self.used.add(value)
-        if value in self._derived:
-            self._say(f"{label} must be a number or a parameter, '{value}' is derived", path)
-            return
-        if value not in self._declared:
-            hint = nearest(value, self._parameters)
-            self._say(f"{label} names the unknown parameter '{value}'{hint}", path)
-        if value not in self._parameters:
-            return
-        one = self._parameters[value]
-        if one.unit != unit:
-            self._say(f"{label} needs a parameter in {unit}, '{value}' is in {one.unit}", path)
-        elif one.low < 0.0 or (positive and one.low == 0.0):
-            self._say(f"{rule}, '{value}' goes down to {one.low:g}", path)
-        if one.axis is Axis.STATIC:
-            self._say(
-                f"{label} must not depend on the static axis, '{value}' does: "
-                "one storyboard serves every road network",
-                path,
-            )
+            return value, value
+        one = self._quantities.parameters.get(value)
+        return (one.low, one.high) if one else (-math.inf, math.inf)
+
+    # -- who -----------------------------------------------------------------------------------
 
     def _participants(self) -> Iterator[Participant]:
-        if EGO not in self._known:
+        if EGO not in self.known:
             self._say("participants must hold 'ego', the system under test", ("participants",))
-        elif len(self._known) < 2:
+        elif len(self.known) < 2:
             self._say("participants must hold somebody besides the ego", ("participants",))
-        for key, data in entries(self._document, "participants"):
+        for key, data in entries(self._quantities.document, "participants"):
             name, path = str(key), ("participants", key)
             given = section(ParticipantSection, data)
             if given is None:
                 continue
             if not name.isidentifier() or not name.isascii():
                 self._say(f"a participant's name is a word, got '{name}'", path)
-            self._quantity(given.speed, "m/s", (*path, "speed"))
-            self._quantity(given.start.distance, "m", (*path, "start", "distance"))
-            self._quantity(given.end.distance, "m", (*path, "end", "distance"), positive=True)
-            start, end = int(given.start.point[1:]), int(given.end.point[1:])
-            if start % 2 == 0:
-                self._say(
-                    f"a route starts where an inbound lane does: P1, P3, P5 or P7, got P{start}",
-                    (*path, "start"),
-                )
-            if end % 2 == 1:
-                self._say(
-                    f"a route ends where an outbound lane does: P2, P4, P6 or P8, got P{end}",
-                    (*path, "end"),
-                )
-            if end == start + 1:
-                self._say(f"a route must not turn back: P{start} to P{end} is one leg", path)
-            yield Participant(
-                name, given.type, _waypoint(given.start), _waypoint(given.end), given.speed
+            self._check(given.speed, "m/s", (*path, "speed"))
+            if given.path:
+                yield self._walker(name, given, path)
+            elif given.start is None:
+                self._say(f"{name} must have a start or a path", path)
+            else:
+                yield self._driver(name, given, given.start, path)
+
+    def _walker(self, name: str, given: ParticipantSection, path: Path) -> Participant:
+        """Return a participant with a path of its own."""
+        points = tuple(
+            self.waypoint(one, (*path, "path", number)) for number, one in enumerate(given.path)
+        )
+        if given.start is not None or given.end is not None:
+            self._say(f"{name} must have a path, or a start and an end, not both", path)
+        if len(points) < 2:
+            self._say(f"a path leads through two points at least, {name} has one", path)
+        if given.type not in _WALKERS:
+            kinds = ", ".join(_WALKERS)
+            self._say(f"a {given.type} keeps to lanes; a path is for {kinds}", path)
+        if given.type == "pedestrian":
+            self._check_crossing(name, points, path)
+        return Participant(name, given.type, points[0], None, given.speed, points)
+
+    def _check_crossing(self, name: str, points: tuple[Waypoint, ...], path: Path) -> None:
+        """Say where a pedestrian leaves the sidewalks and crosswalks (paper, Section III-B)."""
+        roads = self._roads
+        half = roads.knobs["crosswalk_width"]
+        reach = 0.5 * (half if isinstance(half, float) else 0.0)
+        for one, other in pairwise(points):
+            if one.lane == other.lane == "sidewalk" and (one.leg, one.way) == (
+                other.leg, other.way
+            ):  # fmt: skip
+                continue
+            at = roads.crosswalk(one.leg)
+            rule = "pedestrians cross on crosswalks only"
+            if at is None or one.leg != other.leg:
+                self._say(f"{rule}: there is none where {name} crosses leg {one.leg}", path)
+                return
+            for point in (one, other):
+                low, high = self._range(point.distance)
+                if low < at - reach - 1e-9 or high > at + reach + 1e-9:
+                    got = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+                    self._say(
+                        f"{rule}: distance of {name} must be {at - reach:g} to {at + reach:g} m "
+                        f"on leg {point.leg}, got {got}",
+                        path,
+                    )
+
+    def _driver(
+        self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
+    ) -> Participant:
+        """Return a participant that keeps to lanes."""
+        start = self.waypoint(place, (*path, "start"))
+        end = None
+        if given.end is not None:
+            end = self.waypoint(given.end, (*path, "end"), above=True)
+            self._check_route(name, start, end, given, path)
+        elif name == EGO:
+            self._say("the ego's route must have an end", path)
+        stands = TYPES[given.type] in ("obstacle", "pedestrian", "animal")
+        if stands and (given.speed != 0.0 or end is not None):
+            self._say(f"{name} without a path stands: no speed, no end", path)
+        if given.type == "pedestrian" and start.lane != "sidewalk":
+            self._say(f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path)
+        if TYPES[given.type] == "vehicle" and start.lane == "sidewalk":
+            self._say(f"{name} must stand on a lane: vehicles are on roads only", path)
+        return Participant(name, given.type, start, end, given.speed)
+
+    def _check_route(
+        self,
+        name: str,
+        start: Waypoint,
+        end: Waypoint,
+        given: ParticipantSection,
+        path: Path,
+    ) -> None:
+        by_points = given.start is not None and given.start.point is not None
+        if self._roads.template == "road":
+            if (start.leg, start.way, start.lane) != (end.leg, end.way, end.lane):
+                self._say(f"a route changes no lane: {name} goes from {start} to {end}", path)
+            return
+        if start.way != "in":
+            got = f"P{_point(start)}" if by_points else str(start)
+            which = ", ".join(f"P{2 * LETTERS.index(leg) + 1}" for leg in self._roads.legs)
+            self._say(
+                f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
+            )
+        if end.way != "out":
+            got = f"P{_point(end)}" if by_points else str(end)
+            which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
+            self._say(
+                f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
+            )
+        back = start.leg == end.leg and start.way == "in" and end.way == "out"
+        if back and self._roads.template != "roundabout":
+            self._say(
+                f"a route must not turn back: P{_point(start)} to P{_point(end)} is one leg", path
             )
 
+    # -- what and when -------------------------------------------------------------------------
+
     def _events(self) -> Iterator[EventSpec]:
-        for key, data in entries(self._document, "events"):
+        for key, data in entries(self._quantities.document, "events"):
             name, path = str(key), ("events", key)
             given = section(EventSection, data)
             if given is None:
                 continue
             if not name.isidentifier() or not name.isascii():
                 self._say(f"an event's name is a word, got '{name}'", path)
-            self._check_participant(given.participant, (*path, "participant"))
-            if given.participant == EGO:
-                self._say("events move the others; the ego's driver is under test", path)
-            self._quantity(given.speed, "m/s", (*path, "speed"))
-            self._quantity(given.rate, "m/s²", (*path, "rate"), positive=True)
-            for number, condition in enumerate(given.when):
-                self._check_condition(given, condition, (*path, "when", number))
-            yield EventSpec(
-                name,
-                given.participant,
-                given.speed,
-                given.rate,
-                tuple(ConditionSpec(one.kind, one.value, one.to) for one in given.when),
+            actions = tuple(self._actions(name, given, path))
+            if not actions:
+                self._say(f"{name} must change a speed, a lane or the weather", path)
+            if given.participant is not None:
+                self._check_participant(given.participant, (*path, "participant"))
+                if given.participant == EGO:
+                    self._say("events move the others; the ego's driver is under test", path)
+            when = tuple(
+                tuple(self._conditions(given, one, (*path, "when", number)))
+                for number, one in enumerate(given.when)
             )
+            yield EventSpec(name, given.participant, actions, when)
 
-    def _check_condition(self, event: EventSection, one: ConditionSection, path: Path) -> None:
-        self._quantity(one.value, "s" if one.kind == "time" else "m", (*path, "value"))
-        if one.kind == "time":
-            if one.to is not None:
-                self._say(f"a time condition has no 'to', got '{one.to}'", path)
-        elif one.to is None:
-            self._say("a distance condition needs 'to', the other participant", path)
-        else:
-            self._check_participant(one.to, (*path, "to"))
-            if one.to == event.participant:
-                self._say(f"a distance is to another participant, got '{one.to}' twice", path)
-
-    def _check_participant(self, name: str, path: Path) -> None:
-        if name not in self._known:
-            self._say(f"unknown participant '{name}'{nearest(name, self._known)}", path)
-
-    def _objective(self) -> ObjectiveSpec | None:
-        data = self._document.data
-        raw = data.get("objective") if isinstance(data, dict) else None
-        given = section(ObjectiveSection, raw)
-        if given is None:
-            return None
-        seen: set[str] = set()
-        for number, term in enumerate(given.terms):
-            path: Path = ("objective", "terms", number)
-            if term.metric in seen:
-                self._say(f"the metric '{term.metric}' occurs twice", path)
-            seen.add(term.metric)
-            if given.weights == "entropy" and term.weight is not None:
-                self._say(f"weights by entropy leave no weight to {term.metric}", path)
-            elif given.weights == "fixed" and not 0.0 < (term.weight or 0.0) < math.inf:
+    def _actions(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
+        if given.weather is not None:
+            if given.weather not in self._prefixes:
+                known = ", ".join(self._prefixes) or "none"
                 self._say(
-                    f"fixed weights need one greater than 0 for {term.metric}, got {term.weight}",
+                    f"{name} changes the weather to one that is included with a prefix "
+                    f"('weather as {given.weather}'); there are: {known}",
                     path,
                 )
-        limits = given.critical.model_dump()
-        for key, value in limits.items():
-            if not 0.0 <= value < math.inf:
-                self._say(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
-        terms = tuple(Term(one.metric, one.weight) for one in given.terms)
-        return ObjectiveSpec(terms, given.weights, given.scale, Critical(**limits))
+            if given.participant is not None:
+                self._say(f"{name}: the weather is nobody's, it has no participant", path)
+            yield WeatherChange(given.weather)
+        elif given.participant is None:
+            self._say(f"{name} must have a participant", path)
+        if given.speed is not None:
+            self._check(given.speed, "m/s", (*path, "speed"))
+            yield SpeedChange(
+                given.speed,
+                self._change(given.rate, given.time, given.distance, given.shape, path),
+            )
+        elif any(one is not None for one in (given.rate, given.time, given.distance)):
+            self._say(f"{name} says how fast a speed changes, but not to what (speed)", path)
+        if given.lane_change is not None:
+            one = given.lane_change
+            if one.lanes == 0.0:
+                self._say("a lane change by 0 lanes is none", (*path, "lane_change"))
+            if one.time is None and one.distance is None:
+                self._say("a lane change takes a time or a distance", (*path, "lane_change"))
+            change = self._change(None, one.time, one.distance, one.shape, (*path, "lane_change"))
+            actor = {one.name: one for one in self.participants}.get(str(given.participant))
+            if actor is not None and (actor.end is not None or actor.path):
+                self._say(f"{actor.name} changes lane, so it has no end and no path", path)
+            yield LaneChange(int(one.lanes), change)
+
+    def _change(
+        self,
+        rate: Quantity | None,
+        time: Quantity | None,
+        distance: Quantity | None,
+        shape: str,
+        path: Path,
+    ) -> Change:
+        given = {"rate": (rate, "m/s²"), "time": (time, "s"), "distance": (distance, "m")}
+        for key, (value, unit) in given.items():
+            if value is not None:
+                self._check(value, unit, (*path, key), above=True)
+        if sum(value is not None for value, _ in given.values()) > 1:
+            self._say("a change takes a rate, a time or a distance, one of them", path)
+        return Change(rate, time, distance, shape)  # type: ignore[arg-type]
+
+    def _conditions(
+        self, event: EventSection, one: ConditionSection, path: Path
+    ) -> Iterator[ConditionSpec]:
+        """Yield the conditions of one alternative."""
+        if one.all:
+            if one.kind is not None:
+                self._say("an alternative is a condition, or 'all' of several, not both", path)
+            for number, each in enumerate(one.all):
+                yield from self._conditions(event, each, (*path, "all", number))
+            return
+        if one.kind is None:
+            self._say(f"a condition must have a kind: {', '.join(CONDITIONS)}", path)
+            return
+        kind, subject = CONDITIONS[one.kind], one.of or event.participant
+        self._check(one.value, kind.unit, (*path, "value"))
+        if not kind.pair and one.to is not None:
+            self._say(f"a {one.kind} condition has no 'to', got '{one.to}'", path)
+        if kind.pair and one.to is None:
+            self._say(f"a {one.kind} condition needs 'to', the other participant", path)
+        elif kind.pair:
+            self._check_participant(str(one.to), (*path, "to"))
+            if one.to == subject:
+                self._say(f"a {one.kind} is to another participant, got '{one.to}' twice", path)
+        if one.of is not None:
+            self._check_participant(one.of, (*path, "of"))
+        elif subject is None and one.kind not in ("time", "after"):
+            self._say(f"a {one.kind} condition needs 'of', whose it is", path)
+        if (one.kind == "after") != (one.event is not None):
+            self._say("an 'after' condition, and no other, names an event", path)
+        elif one.event is not None and one.event not in self._event_names:
+            hint = nearest(one.event, self._event_names)
+            self._say(f"unknown event '{one.event}'{hint}", path)
+        yield ConditionSpec(one.kind, one.value, one.to, one.of, one.event)
+
+    def _check_participant(self, name: str, path: Path) -> None:
+        if name not in self.known:
+            self._say(f"unknown participant '{name}'{nearest(name, self.known)}", path)
 
 
-_CRITICAL: Path = ("objective", "critical")
-
-
-def _waypoint(given: WaypointSection) -> Waypoint:
-    return Waypoint(given.point, given.distance)
+def _point(place: Waypoint) -> int:
+    """Return the number of a place's point in the paper's counting."""
+    return 2 * LETTERS.index(place.leg) + (1 if place.way == "in" else 2)

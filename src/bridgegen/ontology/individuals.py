@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING
 
 from bridgegen.errors import OntologyError
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.odd.roads import RoadsSpec
 from bridgegen.ontology.builder import Builder
+from bridgegen.ontology.effects import load_effect
 from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.roads import add_road_network
 from bridgegen.ontology.site import Site
+from bridgegen.ontology.story import add_event, add_jam, add_participant, add_weather, add_works
+from bridgegen.ontology.templates import crossroads, site_of
 
 if TYPE_CHECKING:
     from bridgegen.odd.scenario import LogicalScenario
@@ -48,18 +53,23 @@ def build(
         raise OntologyError(*(f"{scenario.name}: {name} must have a value" for name in missing))
     builder = Builder(scenario.name, values)
     top = builder.scenario(scenario)
-    place = site or Site.generated(values, scenario.template)
-    builder.put(top, "has_road_network", builder.road_network(place))
-    if site is None:
-        builder.bind_static(place, declared)
-    for participant in scenario.participants:
-        builder.put(top, "has_participant", builder.participant(participant, place, driver))
-    for event in scenario.events:
-        builder.put(top, "has_event", builder.event(event))
-    if weather := builder.weather(declared):
-        builder.put(top, "has_weather", weather)
+    put, story = builder.put, scenario.story
+    place = site or site_of(scenario.roads, values)
+    put(top, "has_road_network", add_road_network(builder, place))
+    for participant in story.participants:
+        put(top, "has_participant", add_participant(builder, participant, place, driver))
+    for event in story.events:
+        put(top, "has_event", add_event(builder, event, declared))
+    for jam in story.jams:
+        put(top, "has_event", add_jam(builder, jam, place))
+    for works in story.works:
+        put(top, "has_event", add_works(builder, works, place))
+    if weather := add_weather(builder, declared):
+        put(top, "has_weather", weather)
+    for effect in scenario.effects:
+        load_effect(effect, scenario.place)(builder, values)
     for name, parameter in declared.items():
-        builder.put(top, "has_parameter_declaration", builder.parameter(name, parameter))
+        put(top, "has_parameter_declaration", builder.parameter(name, parameter))
     constraints: list[Bound | Derived] = [*scenario.bounds, *scenario.derived]
     for rule in constraints:
         target = rule.target if isinstance(rule, Bound) else rule.name
@@ -68,15 +78,19 @@ def build(
     return Individuals(builder.quads)
 
 
-def build_static(static: Mapping[str, float] | Site) -> Individuals:
+def build_static(static: Mapping[str, float] | Site, roads: RoadsSpec | None = None) -> Individuals:
     """Return the individuals of a road network alone: all that OWL2OpenDRIVE needs.
 
     Args:
-        static: the static parameters by name (`Site.generated`), or a site.
+        static: the static parameters by name, or a site.
+        roads: the template that they belong to; the paper's crossroads by default.
     """
-    site = static if isinstance(static, Site) else Site.generated(static)
+    if isinstance(static, Site):
+        site = static
+    else:
+        site = crossroads(static) if roads is None else site_of(roads, static)
     builder = Builder(site.name, {})
-    builder.road_network(site)
+    add_road_network(builder, site)
     return Individuals(builder.quads)
 
 

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 from bridgegen.odd.expression import Expression
 from bridgegen.odd.parameters import TOLERANCE, Axis
-from bridgegen.ontology.builder import WEATHER
 from bridgegen.ontology.individuals import reason
 from bridgegen.ontology.sparql import binds, literal, variable
+from bridgegen.ontology.story import WEATHER
 from bridgegen.ontology.vocabulary import BG, ONTOLOGY, XSD, tbox
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _general_rules() -> Iterator[Rule]:
         "on-its-road", "", "LanePosition",
         "a lane position lies on the road of its lane", None, "",
         "SELECT $this ?value WHERE { $this bg:on_lane/^bg:has_lane ?road ; "
-        "bg:has_distance_to_junction ?value . ?road bg:has_length ?length . "
+        "bg:has_distance ?value . ?road bg:has_length ?length . "
         "OPTIONAL { ?nearer bg:has_continuation+ ?road ; bg:has_length ?before } } "
         "GROUP BY $this ?value ?length HAVING("
         f"xsd:double(?value) < SUM(COALESCE(?before, 0.0e0)) - {literal(TOLERANCE)} || "

@@ -1,39 +1,60 @@
-"""The intersection that a scenario takes place at: what a storyboard needs to know of the roads.
+"""The road network that a scenario takes place on: what the individuals say of layers 1 and 2.
 
-The same description comes from the static parameters (`Site.generated`) or from a map that was
-made elsewhere (`bridgegen.openx.opendrive.site.find_site`).
+The same description comes from a scenario's template (`bridgegen.ontology.templates`) or from a
+map that was made elsewhere (`bridgegen.openx.opendrive.site.find_site`).
 """
 
-import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
-from bridgegen.errors import OntologyError
-from bridgegen.odd.parameters import TOLERANCE
+Direction = Literal["in", "out"]
+LaneType = Literal["driving", "shoulder", "sidewalk"]
 
-SPEED_LIMIT = 13.9
-"""Speed limit of generated legs [m/s]: 50 km/h, the usual limit in towns."""
 
-HEADINGS = {"A": 270.0, "B": 180.0, "C": 90.0, "D": 0.0}
-"""Outward heading [deg] of the legs of the paper's crossroads, counter-clockwise from +x (east)."""
+class Searched(float):
+    """A measure [unit of its parameter] that a parameter of the scenario gives."""
 
-JUNCTION_ID = "100"
+    parameter: str
+
+    def __new__(cls, value: float, parameter: str) -> "Searched":
+        """Return the value that a parameter has now."""
+        made = super().__new__(cls, value)
+        made.parameter = parameter
+        return made
+
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
+        """Return what a copy is made of."""
+        return float(self), self.parameter
 
 
 @dataclass(frozen=True, slots=True)
 class SiteLane:
-    """A driving lane of an arm.
+    """A lane of an arm, or a strip beside its lanes.
 
     Attributes:
         lane_id: OpenDRIVE's id, never 0.
-        direction: ``"in"`` leads to the junction, ``"out"`` away from it.
+        direction: ``"in"`` leads to the junction, ``"out"`` away from it; of a strip, its side.
         width: [m].
+        type: OpenDRIVE's.
+        turns: where it leads across the junction; empty: by rule.
     """
 
     lane_id: int
-    direction: Literal["in", "out"]
+    direction: Direction
     width: float
+    type: LaneType = "driving"
+    turns: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SiteSegment:
+    """A stretch of an arm's reference line [m, 1/m]: its curvature changes evenly."""
+
+    length: float
+    start_curvature: float
+    end_curvature: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,21 +64,39 @@ class ArmRoad:
     Attributes:
         road_id: OpenDRIVE's id.
         length: [m].
-        junction_end: the end of the reference line that is nearer to the junction.
-        lanes: its driving lanes.
+        junction_end: the end of the reference line that is nearer to the junction; "none" of a
+            road without one, which counts from its start.
+        lanes: its lanes, strips among them.
         speed_limit: [m/s], where known.
+        road_type: town, rural or motorway, where known.
+        segments: of its reference line; empty: straight.
+        counts: number of lanes in and out, where a parameter gives it.
+        closes: weather parameters beyond which it is closed, with the limits [%].
     """
 
     road_id: str
     length: float
-    junction_end: Literal["start", "end"]
+    junction_end: Literal["start", "end", "none"]
     lanes: tuple[SiteLane, ...]
     speed_limit: float | None = None
+    road_type: str | None = None
+    segments: tuple[SiteSegment, ...] = ()
+    counts: Mapping[Direction, float] = field(default_factory=lambda: MappingProxyType({}))
+    closes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
-    def along(self, direction: Literal["in", "out"]) -> tuple[SiteLane, ...]:
-        """Return the lanes of one direction, the innermost (nearest to the centre line) first."""
-        lanes = [lane for lane in self.lanes if lane.direction == direction]
+    def along(self, direction: Direction) -> tuple[SiteLane, ...]:
+        """Return the driving lanes of a direction, the innermost (nearest to the centre) first."""
+        lanes = [one for one in self.lanes if one.direction == direction and one.type == "driving"]
         return tuple(sorted(lanes, key=lambda lane: abs(lane.lane_id)))
+
+    @property
+    def strips(self) -> tuple[SiteLane, ...]:
+        """What lies beside the driving lanes."""
+        return tuple(lane for lane in self.lanes if lane.type != "driving")
+
+    def width(self, direction: Direction) -> float:
+        """Return how wide the road is on the side of a direction, strips included [m]."""
+        return sum(lane.width for lane in self.lanes if lane.direction == direction)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +104,8 @@ class Leg:
     """One leg of the intersection.
 
     Attributes:
-        name: ``"A"`` (south), ``"B"`` (west), ``"C"`` (north), ``"D"`` (east).
+        name: ``"A"`` (south), ``"B"`` (west), ``"C"`` (north), ``"D"`` (east), …; or what the
+            template calls it.
         heading_deg: direction in which it leaves the junction [deg], counter-clockwise from +x.
         roads: the road that touches the junction, then its continuations, outwards.
     """
@@ -93,15 +133,53 @@ class Leg:
 
 
 @dataclass(frozen=True, slots=True)
+class Facility:
+    """Something of layer 2 (or a crosswalk) on or beside the first road of a leg.
+
+    Attributes:
+        cls: its class in the ontology.
+        leg: the leg's name.
+        distance: [m] along the leg, from the junction's edge (or the road's start).
+        t: [m] from the reference line, left of its direction positive; None where it lies across.
+        width: [m] along the road, of a crosswalk.
+        governs: directions whose lanes it governs (of a stop line: those that it marks).
+        speed_limit: [m/s], of a speed limit sign.
+    """
+
+    cls: str
+    leg: str
+    distance: float
+    t: float | None = None
+    width: float | None = None
+    governs: tuple[Direction, ...] = ()
+    speed_limit: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A phase of traffic lights: its duration [s], and whose lights are green or yellow."""
+
+    name: str
+    duration: float
+    green: tuple[str, ...] = ()
+    yellow: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Site:
-    """An intersection with its legs.
+    """A road network with its legs.
 
     Attributes:
         name: of the road network.
         map_file: the OpenDRIVE file it is part of; None where it is generated.
         junction_id: OpenDRIVE's id.
-        size: stop line to the opposite stop line [m], where it is one number.
+        size: from a leg's end to the opposite leg's [m], where it is one number.
         legs: in the order of their names.
+        kind: the class of the area in which the legs meet; None of a road without one.
+        measures_of: further data properties of that area.
+        facilities: what stands and lies on the legs.
+        phases: of the traffic lights, in their order; empty: none.
+        signal_offset: time of the signals' cycle that has passed at time 0 [s].
     """
 
     name: str
@@ -109,6 +187,15 @@ class Site:
     junction_id: str
     size: float | None
     legs: tuple[Leg, ...]
+    kind: str | None = "Intersection"
+    measures_of: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    facilities: tuple[Facility, ...] = ()
+    phases: tuple[Phase, ...] = ()
+    signal_offset: float = 0.0
+
+    def leg(self, name: str) -> Leg | None:
+        """Return a leg by name, or None."""
+        return next((leg for leg in self.legs if leg.name == name), None)
 
     def measures(self, legs: Iterable[str]) -> dict[str, float]:
         """Return the static parameters as this site has them.
@@ -118,8 +205,9 @@ class Site:
                 shortest of their roads at the junction, for a start must not leave its road.
         """
         roads = {leg.name: leg.roads[0] for leg in self.legs}
-        lanes = [lane for road in roads.values() for lane in road.lanes]
-        counts = [len(road.along(way)) for road in roads.values() for way in ("in", "out")]
+        lanes = [lane for road in roads.values() for lane in road.lanes if lane.type == "driving"]
+        ways: tuple[Direction, ...] = ("in", "out")
+        counts = [len(road.along(way)) for road in roads.values() for way in ways]
         starts = [roads[name] for name in legs if name in roads] or list(roads.values())
         found = {
             "lane_width": min(lane.width for lane in lanes),
@@ -127,37 +215,3 @@ class Site:
             "arm_length": min(road.length for road in starts),
         }
         return found if self.size is None else found | {"intersection_size": self.size}
-
-    @classmethod
-    def generated(cls, values: Mapping[str, float], name: str = "crossroads") -> "Site":
-        """Return the crossroads of four equal legs at right angles.
-
-        Each leg's reference line runs outwards, so inbound lanes have positive ids.
-
-        Args:
-            values: ``lane_width`` [m], ``lanes_per_direction``, ``arm_length`` [m],
-                ``intersection_size`` [m]; others are ignored.
-            name: of the road network.
-
-        Raises:
-            OntologyError: ``lanes_per_direction`` is no whole number.
-        """
-        width = float(values["lane_width"])
-        lanes_each_way = float(values["lanes_per_direction"])
-        count = round(lanes_each_way) if math.isfinite(lanes_each_way) else 0
-        if not abs(lanes_each_way - count) <= TOLERANCE:
-            raise OntologyError(f"lanes_per_direction must be a whole number, got {lanes_each_way}")
-        lanes = tuple(SiteLane(k, "in", width) for k in range(1, count + 1)) + tuple(
-            SiteLane(-k, "out", width) for k in range(1, count + 1)
-        )
-        length = float(values["arm_length"])
-        return cls(
-            name=name,
-            map_file=None,
-            junction_id=JUNCTION_ID,
-            size=float(values["intersection_size"]),
-            legs=tuple(
-                Leg(leg, heading, (ArmRoad(str(number), length, "start", lanes, SPEED_LIMIT),))
-                for number, (leg, heading) in enumerate(HEADINGS.items(), start=1)
-            ),
-        )

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyoxigraph as ox
 
-from bridgegen.ontology.builder import WEATHER
 from bridgegen.ontology.graph import Individuals, local_value
 from bridgegen.ontology.shapes import WEATHER_PATHS, Rule
+from bridgegen.ontology.story import WEATHER
 from bridgegen.ontology.vocabulary import Subject, local_name, tbox
 
 if TYPE_CHECKING:
@@ -225,7 +225,7 @@ def _outside_declared(individuals: Individuals, parameter: Subject) -> Iterator[
 
 def _beside_its_road(individuals: Individuals, position: Subject) -> Violation:
     who = individuals.describe(position)
-    name = "has_distance_to_junction"
+    name = "has_distance"
     got = ", ".join(_values(individuals, position, name))
     lane = ", ".join(map(local_value, individuals.values(position, "on_lane")))
     message = f"{name} [m] of {who} must lie on the road of its lane ({lane}), got {got}"

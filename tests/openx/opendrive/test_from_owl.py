@@ -17,6 +17,7 @@ from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
+from bridgegen.ontology.templates import crossroads
 from bridgegen.ontology.vocabulary import bg
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose
@@ -308,7 +309,7 @@ def test_three_legs_are_not_supported() -> None:
 
 
 def test_map_that_exists() -> None:
-    place = dataclasses.replace(Site.generated(DEFAULT), map_file="Town05.xodr")
+    place = dataclasses.replace(crossroads(DEFAULT), map_file="Town05.xodr")
     with pytest.raises(InputError, match=r"is the file 'Town05\.xodr'"):
         opendrive_from_owl(build_static(place))
 

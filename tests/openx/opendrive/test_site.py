@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.site import Site
+from bridgegen.ontology.templates import crossroads
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
@@ -69,7 +70,7 @@ def test_arms_of_town05_hang_together(town05: OpenDrive) -> None:
 
 @given(data=st.data())
 def test_generated_crossroads_is_found_again(data: st.DataObject, static: Any) -> None:
-    wanted = Site.generated(data.draw(static))
+    wanted = crossroads(data.draw(static))
     found = find_site(opendrive_from_owl(build_static(wanted)), map_name="crossroads")
     assert found == dataclasses.replace(wanted, map_file="crossroads", size=None)
 
@@ -77,7 +78,7 @@ def test_generated_crossroads_is_found_again(data: st.DataObject, static: Any) -
 @given(data=st.data(), turn=st.floats(-180.0, 180.0))
 def test_names_follow_the_compass(data: st.DataObject, static: Any, turn: float) -> None:
     """Turn the crossroads as you like: A is the leg nearest to the south, B to D clockwise."""
-    straight = Site.generated(data.draw(static))
+    straight = crossroads(data.draw(static))
     legs = tuple(
         dataclasses.replace(leg, heading_deg=math.remainder(leg.heading_deg + turn, 360.0))
         for leg in straight.legs

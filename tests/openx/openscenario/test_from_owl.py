@@ -59,7 +59,7 @@ def test_every_dynamic_parameter_is_declared_and_used(individuals, scenario_name
     static = set(logical.space(axes=["static"]).variables)
     values = parameters.values(scenario)
     texts = {weather.CLOUD_COVER, weather.ROAD_WETNESS, weather.TIME_OF_DAY}
-    assert values.keys() - texts == set(space.names) - static
+    assert values.keys() - texts == set(space.names) - static - {"speed_factor"}  # only limits
     assert references(scenario) == values.keys()
 
 
@@ -190,10 +190,10 @@ def only_start(scenario):
 
 def test_an_edited_distance_moves_on_to_the_road_that_holds_it(individuals, town, edited):
     source = individuals("crossroads-s1", site=town())
-    near = edited(source, "ego_start", "has_distance_to_junction", 5.0)  # still on road 47's lane
+    near = edited(source, "ego_start", "has_distance", 5.0)  # still on road 47's lane
     assert positions(convert(near))["ego"] == ("17", "-1", pytest.approx(6.614, abs=1e-9))
     lane = edited(near, "ego_start", "on_lane", "leg_C_in_2")
-    far = edited(lane, "ego_start", "has_distance_to_junction", 11.614 + 54.414)
+    far = edited(lane, "ego_start", "has_distance", 11.614 + 54.414)
     assert positions(convert(far))["ego"] == ("47", "-2", 0.0)
 
 
@@ -354,14 +354,14 @@ def test_a_scenario_without_weather_or_events(individuals, edited):
     [
         ([("ego_start", "on_lane")], "must have on_lane, and has none"),
         ([("ego_start", "on_lane", "scenario")], "must be a lane of one of the intersection's"),
-        ([("ego_start", "has_distance_to_junction", 60.1)], "must lie on its leg, 0 to 60.0"),
-        ([("ego_start", "has_distance_to_junction", -1.0)], "must lie on its leg"),
-        ([("ego_start", "has_distance_to_junction", "far")], "finite number"),
+        ([("ego_start", "has_distance", 60.1)], "must lie on its leg, 0 to 60.0"),
+        ([("ego_start", "has_distance", -1.0)], "must lie on its leg"),
+        ([("ego_start", "has_distance", "far")], "finite number"),
         ([("leg_C", "has_junction_end", "middle")], "must be 'start' or 'end', got 'middle'"),
         ([("leg_C", "has_continuation", "leg_C")], "must not continue itself"),
         ([("leg_C", "has_road_id")], "must have has_road_id"),
         ([("ego_init_speed", "has_target_speed", 3.0)], "ego_speed [m/s] must be 4.9 to 8.9"),
-        ([("bv_start", "has_distance_to_junction", 40.1)], "bv_start [m] must be 7.0 to 25.0"),
+        ([("bv_start", "has_distance", 40.1)], "bv_start [m] must be 7.0 to 25.0"),
         ([("p_bv_start", "binds_property", "has_length")], "bv_start must have a value"),
         ([("bv_init_speed", "has_parameter", "p_ego_speed")], "must have one value, got 0.0 on"),
         ([("p_ego_speed", "has_axis", "static")], "bound to a dynamic parameter"),
@@ -424,6 +424,6 @@ def test_two_events_need_two_names(individuals, edited):
 def test_lanes_must_go_on_along_the_leg(individuals, town, road, edited):
     narrow = town(C=(road("17", 11.614, "end", lanes=1), road("47", 54.414, "end")))
     source = individuals("crossroads-s1", site=narrow)
-    near = edited(source, "ego_start", "has_distance_to_junction", 5.0)
+    near = edited(source, "ego_start", "has_distance", 5.0)
     with pytest.raises(OntologyError, match="must continue on road 17, which has 1 lanes"):
         convert(near)

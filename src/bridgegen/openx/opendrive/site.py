@@ -59,7 +59,14 @@ def find_site(
         Leg(leg, _heading(road, end), tuple(_arm(model, road, end)))
         for leg, (road, end) in zip(LEG_NAMES, ends, strict=True)
     )
-    return Site(name=stem, map_file=map_name, junction_id=junction.id, size=None, legs=legs)
+    return Site(
+        name=stem,
+        map_file=map_name,
+        junction_id=junction.id,
+        size=None,
+        legs=legs,
+        kind="Crossroads",
+    )
 
 
 def _default_junction(model: OpenDrive, stem: str) -> str:
@@ -132,12 +139,14 @@ def _arm_road(road: Road, end: str, ids: list[int], inbound: set[int]) -> ArmRoa
         for lane_id in sorted(ids, key=lambda one: (one not in inbound, abs(one)))
     ]
     speeds = [kind.speed for kind in road.types if kind.speed is not None]
+    kinds = [kind.type for kind in road.types if kind.type in ("town", "rural", "motorway")]
     return ArmRoad(
         road_id=road.id,
         length=road.length,
         junction_end="start" if end == "start" else "end",
         lanes=tuple(lanes),
         speed_limit=speeds[0].metres_per_second if speeds else None,
+        road_type=kinds[0] if kinds else None,
     )
 
 

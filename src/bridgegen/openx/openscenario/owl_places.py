@@ -68,7 +68,7 @@ class Places:
                 f"on_lane of {individuals.describe(node)} must be a lane of one of the "
                 f"intersection's legs, got {individuals.describe(lane)}"
             ) from None
-        distance = self._quantities.get(node, "has_distance_to_junction")
+        distance = self._quantities.get(node, "has_distance")
         at = self._holds(node, roads, self._quantities.value(distance))
         lane = self._same_lane(lane, roads[index], roads[at])
         position = osc.LanePosition(
@@ -105,7 +105,7 @@ class Places:
             if 0.0 <= distance <= end:
                 return index
         raise OntologyError(
-            f"has_distance_to_junction [m] of {self._individuals.describe(node)} must lie on its "
+            f"has_distance [m] of {self._individuals.describe(node)} must lie on its "
             f"leg, 0 to {end!r}, got {distance!r}"
         )
 

@@ -45,6 +45,10 @@ class Quantities:
         for parameter in individuals.links(scenario, "has_parameter_declaration"):
             if individuals.text(parameter, "has_axis") == Axis.STATIC:
                 continue
+            if individuals.is_a(parameter, "DerivedParameter") and parameter in bearers.get(
+                parameter, []
+            ):
+                continue  # it only limits others; nothing in the storyboard carries it
             name = individuals.text(parameter, "has_name")
             if not _NAME.fullmatch(name) or name in RESERVED or iskeyword(name):
                 raise OntologyError(

@@ -1,0 +1,38 @@
+"""The ``objective`` of a scenario file: built, with the rules that it must keep."""
+
+import math
+from collections.abc import Callable
+
+from bridgegen.odd.plain_yaml import Path
+from bridgegen.odd.scenario import Critical, ObjectiveSpec, Term
+from bridgegen.odd.schema import ObjectiveSection
+
+_CRITICAL: Path = ("objective", "critical")
+
+
+def read_objective(given: ObjectiveSection, say: Callable[[str, Path], None]) -> ObjectiveSpec:
+    """Return what a scenario optimises, and say what is wrong with it.
+
+    Args:
+        given: what the file says.
+        say: takes a problem and where it is.
+    """
+    seen: set[str] = set()
+    for number, term in enumerate(given.terms):
+        path: Path = ("objective", "terms", number)
+        if term.metric in seen:
+            say(f"the metric '{term.metric}' occurs twice", path)
+        seen.add(term.metric)
+        if given.weights == "entropy" and term.weight is not None:
+            say(f"weights by entropy leave no weight to {term.metric}", path)
+        elif given.weights == "fixed" and not 0.0 < (term.weight or 0.0) < math.inf:
+            say(
+                f"fixed weights need one greater than 0 for {term.metric}, got {term.weight}",
+                path,
+            )
+    limits = given.critical.model_dump()
+    for key, value in limits.items():
+        if not 0.0 <= value < math.inf:
+            say(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
+    terms = tuple(Term(one.metric, one.weight) for one in given.terms)
+    return ObjectiveSpec(terms, given.weights, given.scale, Critical(**limits))

@@ -1,0 +1,122 @@
+"""Does a part of a file have its shape? The types of keys, and in words what does not fit."""
+
+import re
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from bridgegen.odd.parameters import nearest
+from bridgegen.odd.plain_yaml import Document, Path
+from bridgegen.odd.story import STRIPS
+
+
+def _number_or(what: str, pattern: str) -> PlainValidator:
+    def read(value: object) -> float | str:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return float(value)
+        if isinstance(value, str) and re.fullmatch(pattern, value, re.DOTALL):
+            return value
+        raise PydanticCustomError("number_or", f"must be a number or {what}")
+
+    return PlainValidator(read)
+
+
+def _lane() -> PlainValidator:
+    def read(value: object) -> int | str:
+        if isinstance(value, int | float) and not isinstance(value, bool) and 1 <= value <= 9:
+            if value == int(value):
+                return int(value)
+        elif isinstance(value, str) and value in STRIPS:
+            return value
+        raise PydanticCustomError(
+            "lane", f"must be a lane's number from the inside, 1 to 9, or {' or '.join(STRIPS)}"
+        )
+
+    return PlainValidator(read)
+
+
+# Strict, so that "3" is no number and true no 1; an integer is a number, as everywhere.
+Number = Annotated[float, Field(strict=True)]
+Text = Annotated[str, Field(strict=True, min_length=1, max_length=20_000)]
+Word = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
+QuantityField = Annotated[
+    float | str, _number_or("the name of a parameter", "[A-Za-z][A-Za-z0-9_]{0,63}")
+]
+LaneField = Annotated[int | str, _lane()]
+Formula = Annotated[float | str, _number_or("a formula", ".+")]
+AxisName = Literal["static", "temporary", "participants", "weather", "extension"]
+
+
+class ShapedSection(BaseModel):
+    """A mapping of a file with the keys that it may have, and no others."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+Section = TypeVar("Section", bound=ShapedSection)
+
+_MESSAGES = {
+    "dict_type": "must be a mapping",
+    "float_type": "must be a number",
+    "list_type": "must be a list",
+    "model_type": "must be a mapping",
+    "string_pattern_mismatch": "must be a word of letters, digits, '_' and '-'",
+    "string_too_short": "must not be empty",
+    "string_type": "must be a text",
+    "too_short": "must not be empty",
+}
+
+
+def section(model: type[Section], data: object) -> Section | None:
+    """Return data as a section of a file, or ``None`` if it is not of that shape."""
+    try:
+        return model.model_validate(data)
+    except ValidationError:
+        return None
+
+
+def shape_problems(model: type[ShapedSection], document: Document) -> list[str]:
+    """Return every way in which a file is not of the shape of ``model``, with its line."""
+    try:
+        model.model_validate(document.data)
+    except ValidationError as error:
+        return [_describe(model, document, one) for one in error.errors(include_url=False)]
+    return []
+
+
+def _describe(model: type[ShapedSection], document: Document, error: ErrorDetails) -> str:
+    path: Path = error["loc"]
+    where = document.at(path)
+    *parents, last = path or ("the file",)
+    inside = ".".join(str(part) for part in parents)
+    name = ".".join(str(part) for part in path) or "the file"
+    if error["type"] == "missing":
+        return f"{inside or 'the file'} must have the key '{last}' ({where})"
+    if error["type"] == "extra_forbidden":
+        keys = list(_model_at(model, tuple(parents)).model_fields)
+        hint = nearest(str(last), keys) or f"; known: {', '.join(keys)}"
+        return f"unknown key '{last}'{f' in {inside}' if inside else ''}{hint} ({where})"
+    got = repr(error["input"])
+    got = got if len(got) <= 60 else got[:57] + "..."
+    if error["type"] == "literal_error":
+        choices = error["ctx"]["expected"]
+        hint = nearest(str(error["input"]), re.findall("'([^']*)'", choices))
+        return f"{name} must be {choices}, got {got}{hint} ({where})"
+    return f"{name} {_MESSAGES.get(error['type'], error['msg'])}, got {got} ({where})"
+
+
+def _model_at(model: type[BaseModel], path: Path) -> type[BaseModel]:
+    """Return the model of the section at ``path``: for the keys it may have."""
+    kind: Any = model
+    for part in path:
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            kind = kind.model_fields[str(part)].annotation
+            if isinstance(kind, UnionType):  # Section | None
+                kind = get_args(kind)[0]
+        else:  # list[Section] or dict[str, Section]
+            kind = get_args(kind)[-1]
+    assert isinstance(kind, type)
+    assert issubclass(kind, BaseModel)
+    return kind

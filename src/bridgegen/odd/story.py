@@ -1,0 +1,247 @@
+"""Who takes part in a logical scenario, where, and what happens: layers 3 and 4."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+from bridgegen.odd.roads import LETTERS, Quantity
+
+Way = Literal["in", "out"]
+Kind = Literal["vehicle", "bicycle", "pedestrian", "animal", "obstacle"]
+
+TYPES: Mapping[str, Kind] = MappingProxyType(
+    {
+        "car": "vehicle",
+        "van": "vehicle",
+        "truck": "vehicle",
+        "bus": "vehicle",
+        "motorcycle": "vehicle",
+        "emergency": "vehicle",
+        "bicycle": "bicycle",
+        "pedestrian": "pedestrian",
+        "animal": "animal",
+        "obstacle": "obstacle",
+    }
+)
+"""What a participant may be, and of what kind that is."""
+
+STRIPS = ("sidewalk", "shoulder")
+"""What a waypoint may lie on besides driving lanes."""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place on a leg.
+
+    Attributes:
+        leg: its name; of a road without a junction, "main".
+        way: "in" on a lane that leads to the junction, "out" on one that leads away from it; on a
+            road without a junction "out" is along the road.
+        distance: [m] along the leg from the junction's edge (or the road's start).
+        lane: 1 is the innermost of its direction; or a strip beside the lanes.
+        offset: [m] from the lane's centre, left of its direction of travel.
+    """
+
+    leg: str
+    way: Way
+    distance: Quantity
+    lane: int | Literal["sidewalk", "shoulder"] = 1
+    offset: Quantity = 0.0
+
+    @classmethod
+    def at_point(cls, point: str, distance: Quantity) -> "Waypoint":
+        """Return a place by the paper's points (Section V-A): P1 in and P2 out are leg A's, …."""
+        number = int(point[1:])
+        return cls(LETTERS[(number - 1) // 2], "in" if number % 2 else "out", distance)
+
+    def __str__(self) -> str:
+        """Return the lane that it lies on, for messages."""
+        lane = f"lane {self.lane}" if isinstance(self.lane, int) else self.lane
+        return f"leg {self.leg} {self.way}, {lane}"
+
+
+@dataclass(frozen=True)
+class Participant:
+    """A road user.
+
+    Attributes:
+        name: "ego" for the system under test.
+        type: what it is, one of ``TYPES``.
+        start: where it stands at time 0.
+        end: where its route ends; None: it goes on along its lane, or along its path.
+        speed: [m/s] at time 0; of the ego also its target.
+        path: the points of its own way, ``start`` first; empty: it keeps to lanes.
+    """
+
+    name: str
+    type: str
+    start: Waypoint
+    end: Waypoint | None
+    speed: Quantity
+    path: tuple[Waypoint, ...] = ()
+
+    @property
+    def kind(self) -> Kind:
+        """What kind of participant its type is."""
+        return TYPES[self.type]
+
+
+@dataclass(frozen=True)
+class Change:
+    """How something changes: one of the three says how long it takes; none, at once.
+
+    Attributes:
+        rate: [m/s²] (of a speed only).
+        time: [s].
+        distance: [m] travelled meanwhile.
+        shape: of the value over time (or distance).
+    """
+
+    rate: Quantity | None = None
+    time: Quantity | None = None
+    distance: Quantity | None = None
+    shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
+
+
+@dataclass(frozen=True)
+class SpeedChange:
+    """A participant takes up a speed [m/s]."""
+
+    speed: Quantity
+    change: Change
+
+
+@dataclass(frozen=True)
+class LaneChange:
+    """A participant changes lane: how many lanes, left of its direction of travel positive."""
+
+    lanes: int
+    change: Change
+
+
+@dataclass(frozen=True)
+class WeatherChange:
+    """The weather becomes that of other parameters.
+
+    Attributes:
+        prefix: those are named so, and then as the weather's own (``later_fog_density``).
+    """
+
+    prefix: str
+
+
+Action = SpeedChange | LaneChange | WeatherChange
+
+
+@dataclass(frozen=True)
+class ConditionSpec:
+    """When an event starts.
+
+    Attributes:
+        kind: what is compared with ``value``; see ``CONDITIONS``.
+        value: a parameter's name or a constant, in the kind's unit.
+        to: the other participant, where the kind needs one.
+        of: whose state is looked at; the event's own participant by default.
+        event: the event that must have ended, for "after".
+    """
+
+    kind: str
+    value: Quantity
+    to: str | None = None
+    of: str | None = None
+    event: str | None = None
+
+
+@dataclass(frozen=True)
+class ConditionKind:
+    """A kind of condition: its unit, the rule it holds by, and whether it is about two."""
+
+    unit: str
+    rule: str
+    pair: bool
+    meaning: str
+
+
+CONDITIONS: Mapping[str, ConditionKind] = MappingProxyType(
+    {
+        "time": ConditionKind("s", "≥", False, "time since the start"),
+        "distance": ConditionKind("m", "≤", True, "between reference points, as the crow flies"),
+        "ttc": ConditionKind("s", "≤", True, "time to collision at present speeds"),
+        "headway": ConditionKind("s", "≤", True, "time until it is where the other is now"),
+        "speed": ConditionKind("m/s", "≥", False, "its speed"),
+        "travelled": ConditionKind("m", "≥", False, "distance since the start"),
+        "standstill": ConditionKind("s", "≥", False, "time for which it has stood"),
+        "after": ConditionKind("s", "≥", False, "time since another event ended"),
+    }
+)
+"""What an event may wait for."""
+
+
+@dataclass(frozen=True)
+class EventSpec:
+    """Something that happens.
+
+    Attributes:
+        name: of the event.
+        participant: who acts; None where it is the weather.
+        actions: what changes.
+        when: alternatives, the first to hold starts the event; each is conditions that must hold
+            together.
+    """
+
+    name: str
+    participant: str | None
+    actions: tuple[Action, ...]
+    when: tuple[tuple[ConditionSpec, ...], ...]
+
+
+@dataclass(frozen=True)
+class Jam:
+    """A queue of standing vehicles (layer 3).
+
+    Attributes:
+        name: of the jam.
+        tail: where the last of them stands.
+        participants: their names, the last first.
+    """
+
+    name: str
+    tail: Waypoint
+    participants: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RoadWorks:
+    """A lane that is closed for work, by a row of cones and a sign (layer 3).
+
+    Attributes:
+        name: of the works.
+        start: where the first cone stands.
+        length: [m] of the closed stretch, the taper's included.
+        cones: each cone's place, in the direction of travel.
+        sign: the place of the sign before them.
+    """
+
+    name: str
+    start: Waypoint
+    length: float
+    cones: tuple[Waypoint, ...]
+    sign: Waypoint
+
+
+@dataclass(frozen=True)
+class Story:
+    """Layers 3 and 4 of a logical scenario.
+
+    Attributes:
+        participants: the ego and the others.
+        events: what happens.
+        jams: queues; their vehicles are among the participants.
+        works: closed lanes.
+    """
+
+    participants: tuple[Participant, ...] = ()
+    events: tuple[EventSpec, ...] = ()
+    jams: tuple[Jam, ...] = field(default=())
+    works: tuple[RoadWorks, ...] = field(default=())

@@ -1,0 +1,300 @@
+"""Layers 3 to 5 as individuals: participants, what happens, temporary changes, weather."""
+
+from collections.abc import Iterable, Mapping
+
+import pyoxigraph as ox
+
+from bridgegen.errors import OntologyError
+from bridgegen.odd.bodies import BODIES
+from bridgegen.odd.story import (
+    Action,
+    Change,
+    ConditionSpec,
+    EventSpec,
+    Jam,
+    LaneChange,
+    Participant,
+    RoadWorks,
+    SpeedChange,
+    Waypoint,
+)
+from bridgegen.ontology.builder import Builder
+from bridgegen.ontology.roads import lane_name, road_name
+from bridgegen.ontology.site import Site
+
+WEATHER = (
+    ("has_rain", "Rain", ("precipitation", "precipitation_deposits")),
+    ("has_cloud", "Cloud", ("cloudiness",)),
+    ("has_wind", "Wind", ("wind_intensity",)),
+    ("has_fog", "Fog", ("fog_density", "fog_distance", "fog_falloff")),
+    ("hasSun", "Sun", ("sun_altitude_angle", "sun_azimuth_angle")),
+    ("has_road_state", "RoadState", ("wetness", "friction")),
+)
+"""The parts of the weather; each parameter's data property is ``has_`` and its name."""
+
+CLASSES = {
+    "car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus", "motorcycle": "Motorcycle",
+    "emergency": "EmergencyVehicle", "bicycle": "Bicycle", "pedestrian": "Pedestrian",
+    "animal": "Animal", "obstacle": "Misc", "cone": "RoadCone", "sign": "ConstructionCard",
+}  # fmt: skip
+"""The class of each type of participant, and of what stands at road works."""
+
+CONDITIONS = {
+    "time": "SimulationTimeCondition",
+    "distance": "RelativeDistanceCondition",
+    "ttc": "TimeToCollisionCondition",
+    "headway": "TimeHeadwayCondition",
+    "speed": "SpeedCondition",
+    "travelled": "TraveledDistanceCondition",
+    "standstill": "StandStillCondition",
+    "after": "StoryboardElementStateCondition",
+}
+"""The class of each kind of condition."""
+
+EGO = "ego"
+"""The name of the participant under test."""
+
+
+# -- layer 4 ---------------------------------------------------------------------------------------
+
+
+def add_participant(builder: Builder, one: Participant, site: Site, driver: str) -> ox.NamedNode:
+    """Add a participant with its body, route and init actions; the ego with its driver."""
+    put, name = builder.put, one.name
+    node = builder.node(name, CLASSES[one.type])
+    put(node, "has_name", name)
+    _add_body(builder, node, one.type)
+    if name == EGO:
+        controller = builder.node(f"{name}_controller", "Controller")
+        put(controller, "has_name", f"{name}_driver")
+        put(controller, "has_driver", driver)
+        put(node, "has_controller", controller)
+    start = add_position(builder, f"{name}_start", one.start, site)
+    teleport = builder.node(f"{name}_teleport", "TeleportAction")
+    put(teleport, "has_position", start)
+    put(node, "has_init_action", teleport)
+    if one.kind != "obstacle":
+        speed = builder.node(f"{name}_init_speed", "SpeedAction")
+        builder.quantity(speed, "has_target_speed", one.speed)
+        put(node, "has_init_action", speed)
+    if one.path:
+        put(node, "has_init_action", _add_trajectory(builder, one, start, site))
+    if one.end is not None:
+        route = builder.node(f"{name}_route", "Route")
+        put(route, "has_start", start)
+        put(route, "has_destination", add_position(builder, f"{name}_destination", one.end, site))
+        put(node, "has_route", route)
+    return node
+
+
+def _add_body(builder: Builder, node: ox.NamedNode, kind: str) -> None:
+    body = BODIES[kind]
+    values = {
+        "has_box_length": body.length, "has_box_width": body.width, "has_box_height": body.height,
+        "has_center_ahead": body.center_ahead,
+    }  # fmt: skip
+    if body.wheelbase:
+        values |= {
+            "has_wheelbase": body.wheelbase,
+            "has_max_acceleration": body.max_acceleration,
+            "has_max_deceleration": body.max_deceleration,
+        }
+    else:
+        values["has_mass"] = body.mass
+    if body.max_speed:
+        values["has_max_speed"] = body.max_speed
+    for name, value in values.items():
+        builder.put(node, name, value)
+
+
+def _add_trajectory(
+    builder: Builder, one: Participant, start: ox.NamedNode, site: Site
+) -> ox.NamedNode:
+    """Add the following of a participant's own path, at the speed that it has at each time."""
+    put, name = builder.put, one.name
+    action = builder.node(f"{name}_follow", "FollowTrajectoryAction")
+    trajectory = builder.node(f"{name}_path", "Trajectory")
+    put(action, "has_trajectory", trajectory)
+    put(trajectory, "has_name", f"{name}_path")
+    for number, point in enumerate(one.path, start=1):
+        vertex = builder.node(f"{name}_vertex_{number}", "Vertex")
+        put(trajectory, "has_vertex", vertex)
+        put(vertex, "has_index", number)
+        place = start
+        if number > 1:
+            place = add_position(builder, f"{name}_point_{number}", point, site)
+        put(vertex, "has_position", place)
+    return action
+
+
+def add_position(builder: Builder, name: str, waypoint: Waypoint, site: Site) -> ox.NamedNode:
+    """Add the position of a waypoint.
+
+    Raises:
+        OntologyError: the road network has no such leg or lane.
+    """
+    leg = site.leg(waypoint.leg)
+    if leg is None:
+        raise OntologyError(f"{site.name}: {waypoint} needs leg {waypoint.leg}, got none")
+    distance = waypoint.distance
+    at = float(builder.values[distance] if isinstance(distance, str) else distance)
+    index = leg.road_at(at)
+    road = leg.roads[index]
+    there = (
+        waypoint.lane <= len(road.along(waypoint.way))
+        if isinstance(waypoint.lane, int)
+        else any((s.type, s.direction) == (waypoint.lane, waypoint.way) for s in road.strips)
+    )
+    if not there:
+        raise OntologyError(f"{site.name}: there is no {waypoint} on road {road.road_id}")
+    node = builder.node(name, "LanePosition")
+    lane = lane_name(leg, index, waypoint.way, waypoint.lane)
+    builder.put(node, "on_lane", builder.iri(lane))
+    builder.quantity(node, "has_distance", distance)
+    if waypoint.offset != 0.0:
+        builder.quantity(node, "has_lateral_offset", waypoint.offset)
+    return node
+
+
+# -- events ----------------------------------------------------------------------------------------
+
+
+def add_event(builder: Builder, event: EventSpec, declared: Mapping[str, object]) -> ox.NamedNode:
+    """Add an event: who does what, when."""
+    put = builder.put
+    kind = "EnvironmentChangeEvent" if event.participant is None else "StoryboardEvent"
+    node = builder.node(event.name, kind)
+    put(node, "has_name", event.name)
+    if event.participant is not None:
+        put(node, "has_who", builder.iri(event.participant))
+    for number, action in enumerate(event.actions, start=1):
+        suffix = "" if number == 1 else f"_{number}"
+        name = f"{event.name}_action{suffix}"
+        put(node, "has_what", _add_action(builder, name, action, declared))
+    trigger = builder.node(f"{event.name}_trigger", "Trigger")
+    for number, conditions in enumerate(event.when, start=1):
+        name = f"{event.name}_condition_{number}"
+        put(trigger, "has_condition", _add_alternative(builder, name, conditions))
+    put(node, "has_when", trigger)
+    return node
+
+
+def _add_action(
+    builder: Builder, name: str, action: Action, declared: Mapping[str, object]
+) -> ox.NamedNode:
+    if isinstance(action, SpeedChange):
+        node = builder.node(name, "SpeedAction")
+        builder.quantity(node, "has_target_speed", action.speed)
+        _add_change(builder, node, action.change)
+    elif isinstance(action, LaneChange):
+        node = builder.node(name, "LaneChangeAction")
+        builder.put(node, "has_lane_count", action.lanes)
+        _add_change(builder, node, action.change)
+    else:
+        node = builder.node(name, "EnvironmentAction")
+        weather = add_weather(builder, declared, action.prefix)
+        if weather is not None:
+            builder.put(node, "has_weather", weather)
+    return node
+
+
+def _add_change(builder: Builder, node: ox.NamedNode, change: Change) -> None:
+    for name, value in (
+        ("has_rate", change.rate),
+        ("has_transition_time", change.time),
+        ("has_transition_distance", change.distance),
+    ):
+        if value is not None:
+            builder.quantity(node, name, value)
+    if change.shape != "linear":
+        builder.put(node, "has_dynamics_shape", change.shape)
+
+
+def _add_alternative(
+    builder: Builder, name: str, conditions: tuple[ConditionSpec, ...]
+) -> ox.NamedNode:
+    if len(conditions) == 1:
+        return _add_condition(builder, name, conditions[0])
+    group = builder.node(name, "ConditionGroup")
+    for number, condition in enumerate(conditions, start=1):
+        node = _add_condition(builder, f"{name}_{number}", condition)
+        builder.put(group, "has_condition", node)
+    return group
+
+
+def _add_condition(builder: Builder, name: str, condition: ConditionSpec) -> ox.NamedNode:
+    node = builder.node(name, CONDITIONS[condition.kind])
+    for link, target in (
+        ("has_entity_ref", condition.to),
+        ("has_subject", condition.of),
+        ("has_event_ref", condition.event),
+    ):
+        if target is not None:
+            builder.put(node, link, builder.iri(target))
+    builder.quantity(node, "has_value", condition.value)
+    return node
+
+
+# -- layer 3 ---------------------------------------------------------------------------------------
+
+
+def add_jam(builder: Builder, jam: Jam, site: Site) -> ox.NamedNode:
+    """Add a queue of standing vehicles, which are participants already."""
+    node = builder.node(jam.name, "TrafficJam")
+    builder.put(node, "has_name", jam.name)
+    for name in jam.participants:
+        builder.put(node, "has_who", builder.iri(name))
+    leg = site.leg(jam.tail.leg)
+    assert leg is not None  # its vehicles stand there
+    lane = lane_name(leg, 0, jam.tail.way, jam.tail.lane)
+    builder.put(node, "on_lane", builder.iri(lane))
+    return node
+
+
+def add_works(builder: Builder, works: RoadWorks, site: Site) -> ox.NamedNode:
+    """Add a closed lane with its cones and its sign."""
+    put, name = builder.put, works.name
+    node = builder.node(name, "RoadWorks")
+    put(node, "has_name", name)
+    leg = site.leg(works.start.leg)
+    if leg is None:
+        raise OntologyError(f"{site.name}: {name} needs leg {works.start.leg}, got none")
+    put(node, "on_road", builder.iri(road_name(leg, 0)))
+    lane = lane_name(leg, 0, works.start.way, works.start.lane)
+    put(node, "closes_lane", builder.iri(lane))
+    elements = [(f"{name}_cone_{k}", "cone", at) for k, at in enumerate(works.cones, start=1)]
+    for element, kind, place in [*elements, (f"{name}_sign", "sign", works.sign)]:
+        part = builder.node(element, CLASSES[kind])
+        put(node, "has_element", part)
+        put(part, "has_name", element)
+        _add_body(builder, part, kind)
+        put(part, "has_position", add_position(builder, f"{element}_place", place, site))
+    return node
+
+
+# -- layer 5 ---------------------------------------------------------------------------------------
+
+
+def add_weather(
+    builder: Builder, declared: Mapping[str, object], prefix: str = ""
+) -> ox.NamedNode | None:
+    """Add the weather, with the parts that the declared parameters describe; None if none.
+
+    Args:
+        builder: where to.
+        declared: parameters and derived quantities by name.
+        prefix: of the parameters' names, and of the individuals'.
+    """
+    parts: Iterable[tuple[str, str, list[str]]] = [
+        (link, cls, [n for n in names if prefix + n in declared]) for link, cls, names in WEATHER
+    ]
+    if not any(names for _, _, names in parts):
+        return None
+    node = builder.node(f"{prefix}weather", "Weather")
+    for link, cls, names in parts:
+        if names:
+            part = builder.node(f"{prefix}weather_{cls.lower()}", cls)
+            builder.put(node, link, part)
+            for name in names:
+                builder.quantity(part, f"has_{name}", prefix + name)
+    return node
