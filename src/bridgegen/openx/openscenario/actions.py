@@ -3,15 +3,17 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import Element, Range, Tag
+from bridgegen.openx.openscenario.element import ENTITY, Element, Range, Tag
 from bridgegen.openx.openscenario.enumerations import (
     DynamicsDimension,
     DynamicsShape,
     FollowingMode,
+    SpeedTargetValueType,
 )
 from bridgegen.openx.openscenario.environment import Environment
 from bridgegen.openx.openscenario.positions import Position, Route
-from bridgegen.openx.openscenario.values import Double, ParameterRef, String
+from bridgegen.openx.openscenario.trajectories import FollowTrajectoryAction
+from bridgegen.openx.openscenario.values import Boolean, Double, Int, ParameterRef, String
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,20 @@ class AbsoluteTargetSpeed(Element):
 
 
 @dataclass(frozen=True)
+class RelativeTargetSpeed(Element):
+    """A speed to reach, by another entity's: so much more [m/s], or so many times."""
+
+    entity_ref: Annotated[String, ENTITY]
+    value: Double
+    speed_target_value_type: SpeedTargetValueType | ParameterRef
+    continuous: Boolean
+
+
+@dataclass(frozen=True)
 class SpeedActionTarget(Element):
     """The speed to reach."""
 
-    target: AbsoluteTargetSpeed
+    target: AbsoluteTargetSpeed | RelativeTargetSpeed
 
 
 @dataclass(frozen=True)
@@ -51,6 +63,44 @@ class LongitudinalAction(Element):
     """One of the actions along the road."""
 
     action: SpeedAction
+
+
+@dataclass(frozen=True)
+class AbsoluteTargetLane(Element):
+    """A lane of the present road by its id."""
+
+    value: String
+
+
+@dataclass(frozen=True)
+class RelativeTargetLane(Element):
+    """A lane by how many lanes it lies to the left of an entity's, in that one's direction."""
+
+    entity_ref: Annotated[String, ENTITY]
+    value: Int
+
+
+@dataclass(frozen=True)
+class LaneChangeTarget(Element):
+    """The lane to change to."""
+
+    target: AbsoluteTargetLane | RelativeTargetLane
+
+
+@dataclass(frozen=True)
+class LaneChangeAction(Element):
+    """A change of lane."""
+
+    dynamics: Annotated[TransitionDynamics, Tag("LaneChangeActionDynamics")]
+    lane_change_target: LaneChangeTarget
+    target_lane_offset: Double | None = None
+
+
+@dataclass(frozen=True)
+class LateralAction(Element):
+    """One of the actions across the road."""
+
+    action: LaneChangeAction
 
 
 @dataclass(frozen=True)
@@ -71,14 +121,14 @@ class AssignRouteAction(Element):
 class RoutingAction(Element):
     """One of the actions that say where to go."""
 
-    action: AssignRouteAction
+    action: AssignRouteAction | FollowTrajectoryAction
 
 
 @dataclass(frozen=True)
 class PrivateAction(Element):
     """One of the actions of an entity."""
 
-    action: LongitudinalAction | TeleportAction | RoutingAction
+    action: LongitudinalAction | LateralAction | TeleportAction | RoutingAction
 
 
 @dataclass(frozen=True)
@@ -89,10 +139,40 @@ class EnvironmentAction(Element):
 
 
 @dataclass(frozen=True)
+class TrafficSignalStateAction(Element):
+    """A traffic light takes up a state, one word for each lamp, top to bottom."""
+
+    name: String
+    state: String
+
+
+@dataclass(frozen=True)
+class TrafficSignalControllerAction(Element):
+    """A controller of traffic lights takes up a phase."""
+
+    traffic_signal_controller_ref: String
+    phase: String
+
+
+@dataclass(frozen=True)
+class TrafficSignalAction(Element):
+    """One of the actions of traffic lights."""
+
+    action: TrafficSignalStateAction | TrafficSignalControllerAction
+
+
+@dataclass(frozen=True)
+class InfrastructureAction(Element):
+    """One of the actions of what stands beside the road."""
+
+    traffic_signal_action: TrafficSignalAction
+
+
+@dataclass(frozen=True)
 class GlobalAction(Element):
     """One of the actions that concern all."""
 
-    action: EnvironmentAction
+    action: EnvironmentAction | InfrastructureAction
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,15 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range
-from bridgegen.openx.openscenario.entities import TriggeringEntities
+from bridgegen.openx.openscenario.entities import EntityRef, TriggeringEntities
 from bridgegen.openx.openscenario.enumerations import (
     ConditionEdge,
     CoordinateSystem,
     RelativeDistanceType,
     RoutingAlgorithm,
     Rule,
+    StoryboardElementState,
+    StoryboardElementType,
 )
 from bridgegen.openx.openscenario.positions import Position
 from bridgegen.openx.openscenario.values import Boolean, Double, ParameterRef, String
@@ -25,10 +27,27 @@ class SimulationTimeCondition(Element):
 
 
 @dataclass(frozen=True)
+class StoryboardElementStateCondition(Element):
+    """True while (or at the instant when) a part of the storyboard is in a state."""
+
+    storyboard_element_type: StoryboardElementType | ParameterRef
+    storyboard_element_ref: String
+    state: StoryboardElementState | ParameterRef
+
+
+@dataclass(frozen=True)
+class TrafficSignalCondition(Element):
+    """True while a traffic light is in a state."""
+
+    name: String
+    state: String
+
+
+@dataclass(frozen=True)
 class ByValueCondition(Element):
     """One of the conditions on a value."""
 
-    condition: SimulationTimeCondition
+    condition: SimulationTimeCondition | StoryboardElementStateCondition | TrafficSignalCondition
 
 
 @dataclass(frozen=True)
@@ -53,10 +72,81 @@ class ReachPositionCondition(Element):
 
 
 @dataclass(frozen=True)
+class TimeHeadwayCondition(Element):
+    """Compares the time [s] that the entity needs to where another one is now."""
+
+    entity_ref: Annotated[String, ENTITY]
+    freespace: Boolean
+    rule: Rule | ParameterRef
+    value: Double
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+    relative_distance_type: RelativeDistanceType | ParameterRef | None = None
+    routing_algorithm: RoutingAlgorithm | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class TimeToCollisionConditionTarget(Element):
+    """With whom, or where."""
+
+    target: EntityRef | Position
+
+
+@dataclass(frozen=True)
+class TimeToCollisionCondition(Element):
+    """Compares the time [s] until a contact at present speeds."""
+
+    target: TimeToCollisionConditionTarget
+    freespace: Boolean
+    rule: Rule | ParameterRef
+    value: Double
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+    relative_distance_type: RelativeDistanceType | ParameterRef | None = None
+    routing_algorithm: RoutingAlgorithm | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class SpeedCondition(Element):
+    """Compares the entity's speed [m/s]."""
+
+    rule: Rule | ParameterRef
+    value: Double
+
+
+@dataclass(frozen=True)
+class TraveledDistanceCondition(Element):
+    """True once the entity has travelled so far [m]."""
+
+    value: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class StandStillCondition(Element):
+    """True once the entity has stood for so long [s]."""
+
+    duration: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class CollisionCondition(Element):
+    """True while the entity touches another."""
+
+    target: EntityRef
+
+
+@dataclass(frozen=True)
 class EntityCondition(Element):
     """One of the conditions on an entity."""
 
-    condition: RelativeDistanceCondition | ReachPositionCondition
+    condition: (
+        TimeHeadwayCondition
+        | TimeToCollisionCondition
+        | SpeedCondition
+        | TraveledDistanceCondition
+        | StandStillCondition
+        | CollisionCondition
+        | RelativeDistanceCondition
+        | ReachPositionCondition
+    )
 
 
 @dataclass(frozen=True)

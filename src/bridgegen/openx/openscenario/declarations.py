@@ -5,7 +5,13 @@ from typing import Annotated
 
 from bridgegen.openx.openscenario.element import TEXT, AtLeast, Element, Tag
 from bridgegen.openx.openscenario.enumerations import ParameterType, Rule
-from bridgegen.openx.openscenario.values import DateTime, LiteralString, String, UnsignedShort
+from bridgegen.openx.openscenario.values import (
+    DateTime,
+    Double,
+    LiteralString,
+    String,
+    UnsignedShort,
+)
 
 
 @dataclass(frozen=True)
@@ -104,10 +110,45 @@ class CatalogLocations(Element):
 
 
 @dataclass(frozen=True)
+class TrafficSignalState(Element):
+    """A traffic light's state during a phase, one word for each lamp, top to bottom."""
+
+    traffic_signal_id: String
+    state: String
+
+
+@dataclass(frozen=True)
+class Phase(Element):
+    """A phase of a controller [s]."""
+
+    name: String
+    duration: Double
+    traffic_signal_states: Annotated[tuple[TrafficSignalState, ...], Tag("TrafficSignalState")] = ()
+
+
+@dataclass(frozen=True)
+class TrafficSignalController(Element):
+    """Traffic lights that go through phases together, again and again."""
+
+    name: String
+    phases: tuple[Phase, ...] = ()
+    delay: Double | None = None
+    reference: String | None = None
+
+
+@dataclass(frozen=True)
+class TrafficSignals(Element):
+    """The controllers of a road network's traffic lights."""
+
+    controllers: Annotated[tuple[TrafficSignalController, ...], Tag("TrafficSignalController")] = ()
+
+
+@dataclass(frozen=True)
 class RoadNetwork(Element):
-    """The OpenDRIVE file, and what to draw it with."""
+    """The OpenDRIVE file, what to draw it with, and how its lights change."""
 
     logic_file: Annotated[File | None, Tag("LogicFile")] = None
     scene_graph_file: Annotated[File | None, Tag("SceneGraphFile")] = field(
         default=None, kw_only=True
     )
+    traffic_signals: TrafficSignals | None = field(default=None, kw_only=True)

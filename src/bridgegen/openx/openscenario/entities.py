@@ -7,6 +7,8 @@ from bridgegen.openx.openscenario.declarations import Properties
 from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range, Tag
 from bridgegen.openx.openscenario.enumerations import (
     ControllerType,
+    MiscObjectCategory,
+    PedestrianCategory,
     Role,
     TriggeringEntitiesRule,
     VehicleCategory,
@@ -89,6 +91,31 @@ class Vehicle(Element):
 
 
 @dataclass(frozen=True)
+class Pedestrian(Element):
+    """Somebody on foot, or an animal; the reference point is the middle, on the ground."""
+
+    name: String
+    pedestrian_category: PedestrianCategory | ParameterRef
+    mass: Annotated[Double, _NOT_NEGATIVE]
+    bounding_box: BoundingBox
+    properties: Properties | None = None
+    model: String | None = None
+    model3d: String | None = None
+
+
+@dataclass(frozen=True)
+class MiscObject(Element):
+    """Anything else that stands somewhere."""
+
+    name: String
+    misc_object_category: MiscObjectCategory | ParameterRef
+    mass: Annotated[Double, _NOT_NEGATIVE]
+    bounding_box: BoundingBox
+    properties: Properties | None = None
+    model3d: String | None = None
+
+
+@dataclass(frozen=True)
 class Controller(Element):
     """Who drives; the properties say how."""
 
@@ -110,7 +137,7 @@ class ScenarioObject(Element):
     """A participant by its name."""
 
     name: String
-    entity_object: Vehicle
+    entity_object: Vehicle | Pedestrian | MiscObject
     object_controllers: tuple[ObjectController, ...] = ()
 
 

@@ -202,3 +202,63 @@ class Wetness(StrEnum):
     WET_WITH_PUDDLES = "wetWithPuddles"
     LOW_FLOODED = "lowFlooded"
     HIGH_FLOODED = "highFlooded"
+
+
+class PedestrianCategory(StrEnum):
+    """What kind of pedestrian it is."""
+
+    ANIMAL = "animal"
+    PEDESTRIAN = "pedestrian"
+    WHEELCHAIR = "wheelchair"
+
+
+class MiscObjectCategory(StrEnum):
+    """What kind of object it is."""
+
+    BARRIER = "barrier"
+    BUILDING = "building"
+    CROSSWALK = "crosswalk"
+    GANTRY = "gantry"
+    NONE = "none"
+    OBSTACLE = "obstacle"
+    PARKING_SPACE = "parkingSpace"
+    PATCH = "patch"
+    POLE = "pole"
+    RAILING = "railing"
+    ROAD_MARK = "roadMark"
+    SOUND_BARRIER = "soundBarrier"
+    STREET_LAMP = "streetLamp"
+    TRAFFIC_ISLAND = "trafficIsland"
+    TREE = "tree"
+    VEGETATION = "vegetation"
+    WIND = "wind"
+
+
+class SpeedTargetValueType(StrEnum):
+    """What a relative speed is to the other's: a difference or a factor."""
+
+    DELTA = "delta"
+    FACTOR = "factor"
+
+
+class StoryboardElementState(StrEnum):
+    """States and transitions of a part of the storyboard."""
+
+    COMPLETE_STATE = "completeState"
+    END_TRANSITION = "endTransition"
+    RUNNING_STATE = "runningState"
+    SKIP_TRANSITION = "skipTransition"
+    STANDBY_STATE = "standbyState"
+    START_TRANSITION = "startTransition"
+    STOP_TRANSITION = "stopTransition"
+
+
+class StoryboardElementType(StrEnum):
+    """Kinds of parts of the storyboard."""
+
+    ACT = "act"
+    ACTION = "action"
+    EVENT = "event"
+    MANEUVER = "maneuver"
+    MANEUVER_GROUP = "maneuverGroup"
+    STORY = "story"
