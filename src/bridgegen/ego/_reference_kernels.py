@@ -150,16 +150,22 @@ def stop_for(distance, v):
 
 
 @kernel
-def drive(path, n, ds, v, target, friction_limit, bodies, station, speed, k, zones):
+def drive(path, n, ds, v, target, friction_limit, bodies, station, speed, k, zones, on, to, foot):
     """Return the acceleration [m/s²] demanded at instant k.
 
-    ``station`` ``(E,)`` [m] and ``speed`` ``(E, T)`` [m/s] are those of all, the ego's first.
+    ``station`` ``(E,)`` [m] and ``speed`` ``(E, T)`` [m/s] are those of all, the ego's first;
+    ``zones`` has a row per path. Who is between two paths (``to`` ≥ 0, at the station ``foot`` of
+    the other one) counts on both.
     """
     s = station[0]
     planned = plan_speed(path, n, ds, s, v, target, friction_limit)
     demanded = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
     for e in range(1, len(station)):
-        if zones[e, 0] < math.inf:
-            asked = react(s, v, bodies[0], station[e], speed[e, k], bodies[e], zones[e])
+        p, q = on[e], to[e]
+        if zones[p, 0] < math.inf:
+            asked = react(s, v, bodies[0], station[e], speed[e, k], bodies[e], zones[p])
+            demanded = min(demanded, asked)
+        if q >= 0 and zones[q, 0] < math.inf:
+            asked = react(s, v, bodies[0], foot[e], speed[e, k], bodies[e], zones[q])
             demanded = min(demanded, asked)
     return demanded

@@ -12,6 +12,7 @@ STATUS_MESSAGES = {
     0: "ok",
     1: "a state became NaN or infinite",
     2: "a parameter value puts an entity off its route",
+    3: "a lane change where there is no such lane",
 }
 
 

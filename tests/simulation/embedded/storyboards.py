@@ -22,7 +22,14 @@ def crossroads(**static: float) -> OpenDrive:
     return opendrive_from_owl(build_static(STATIC | static))
 
 
+WALKER = """<ScenarioObject name="{name}"><Pedestrian name="p" pedestrianCategory="pedestrian"
+mass="80"><BoundingBox><Center x="0" y="0" z="0.9"/><Dimensions width="0.6" length="0.4"
+height="1.8"/></BoundingBox></Pedestrian></ScenarioObject>"""
+
+
 def vehicle(name: str) -> str:
+    if name.startswith("walker"):
+        return WALKER.format(name=name)
     return f"""<ScenarioObject name="{name}"><Vehicle name="car" vehicleCategory="car">
 <BoundingBox><Center x="1.4" y="0" z="0.75"/>
 <Dimensions width="2.0" length="4.0" height="1.5"/></BoundingBox>
@@ -76,6 +83,42 @@ def reaches(entity: str, place: str, tolerance: float) -> str:
 <TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="{entity}"/>
 </TriggeringEntities><EntityCondition><ReachPositionCondition tolerance="{tolerance}">{place}
 </ReachPositionCondition></EntityCondition></ByEntityCondition></Condition>"""
+
+
+def lateral(lanes: int, dynamics: str, actor: str = "bv") -> str:
+    shape, dimension, value = dynamics.split()
+    return f"""<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="{shape}"
+dynamicsDimension="{dimension}" value="{value}"/><LaneChangeTarget>
+<RelativeTargetLane entityRef="{actor}" value="{lanes}"/></LaneChangeTarget></LaneChangeAction>
+</LateralAction>"""
+
+
+def condition(entity: str, text: str) -> str:
+    return f"""<Condition name="c" delay="0" conditionEdge="none"><ByEntityCondition>
+<TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="{entity}"/>
+</TriggeringEntities><EntityCondition>{text}</EntityCondition></ByEntityCondition></Condition>"""
+
+
+def ended(name: str, delay: float = 0.0) -> str:
+    return f"""<Condition name="c" delay="{delay}" conditionEdge="none"><ByValueCondition>
+<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="{name}"
+state="completeState"/></ByValueCondition></Condition>"""
+
+
+def events(*rows: tuple[str, str, str, str]) -> str:
+    """Events of (name, actor, private action, condition)."""
+    return "".join(
+        f"""<ManeuverGroup name="g{name}" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="{actor}"/></Actors>
+<Maneuver name="m"><Event name="{name}" priority="override" maximumExecutionCount="1">
+<Action name="a"><PrivateAction>{action}</PrivateAction></Action><StartTrigger><ConditionGroup>
+{when}</ConditionGroup></StartTrigger></Event></Maneuver></ManeuverGroup>"""
+        for name, actor, action, when in rows
+    )
+
+
+def speeding(speed: float | str, dynamics: str) -> str:
+    return f"<LongitudinalAction>{speed_action(speed, dynamics)}</LongitudinalAction>"
 
 
 def event(actor: str, action: str, *groups: str) -> str:

@@ -1,4 +1,4 @@
-"""The rollout of one scenario: triggers, speed commands, the ego's driver and its bicycle.
+"""The rollout of one scenario: triggers, the storyboard's changes, the ego's driver and bicycle.
 
 One instant: record, stop trigger, acts, events, drivers, then integrate to the next. All numbers
 that may vary by row are read from ``slots``; the integer tables are the compiled storyboard
@@ -13,119 +13,60 @@ from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.ego._reference_kernels import drive
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
+from bridgegen.simulation.embedded._condition_kernels import (
+    EVENT_ENDED,
+    REACH_POSITION,
+    SIMULATION_TIME,
+    SPEED,
+    fires,
+    observe_one,
+    observe_pair,
+)
+from bridgegen.simulation.embedded._motion_kernels import (
+    DISTANCE,
+    LINEAR,
+    STEP,
+    between,
+    bicycle,
+    duration,
+    nearest,
+    progress,
+    ramped,
+)
 
 GRAVITY = 9.81  # m/s²
 DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground Vehicles, table 1.3
+REACH = 8.0  # m, a lane that is farther from a body than this is not the one beside its own
 
-OK, NOT_FINITE, OFF_ROUTE = 0, 1, 2
-SIMULATION_TIME, RELATIVE_DISTANCE, REACH_POSITION = 0, 1, 2
-GREATER, LESS, EQUAL, GREATER_EQUAL, LESS_EQUAL, NOT_EQUAL = 0, 1, 2, 3, 4, 5
-NONE, RISING, FALLING, RISING_OR_FALLING = 0, 1, 2, 3
-STEP, LINEAR_RATE, LINEAR_TIME = 0, 1, 2
-
-
-@kernel
-def compare(value, rule, limit):
-    """Apply an OpenSCENARIO Rule."""
-    if rule == GREATER:
-        return value > limit
-    if rule == LESS:
-        return value < limit
-    if rule == GREATER_EQUAL:
-        return value >= limit
-    if rule == LESS_EQUAL:
-        return value <= limit
-    if rule == EQUAL:
-        return value == limit
-    return value != limit
-
-
-@kernel
-def observe(c, conditions, points, slots, now, x, y, k):
-    """Return whether the condition's rule holds at instant k, before edge and delay."""
-    kind, a, b, rule = conditions[c, 0], conditions[c, 1], conditions[c, 2], conditions[c, 3]
-    limit = slots[conditions[c, 4]]
-    if kind == SIMULATION_TIME:
-        return compare(now, rule, limit)
-    if kind == RELATIVE_DISTANCE:
-        gap = math.hypot(x[a, k] - x[b, k], y[a, k] - y[b, k])
-        return compare(gap, rule, limit)
-    return math.hypot(x[a, k] - points[c, 0], y[a, k] - points[c, 1]) <= limit
-
-
-@kernel
-def holds(c, conditions, history, k):
-    """Return whether the condition, with its edge and delay, is met at instant k.
-
-    An edge needs an earlier observation, so none is seen at the first instant.
-    """
-    edge, j = conditions[c, 5], k - conditions[c, 6]
-    if j < 0:
-        return False
-    if edge == NONE:
-        return history[c, j]
-    if j == 0:
-        return False
-    rises = history[c, j] and not history[c, j - 1]
-    falls = history[c, j - 1] and not history[c, j]
-    return (edge != FALLING and rises) or (edge != RISING and falls)
-
-
-@kernel
-def fires(trigger, triggers, groups, conditions, history, k):
-    """Return whether any condition group of a trigger is met as a whole."""
-    for g in range(triggers[trigger, 0], triggers[trigger, 1]):
-        met = groups[g, 1] > groups[g, 0]
-        for c in range(groups[g, 0], groups[g, 1]):
-            if not holds(c, conditions, history, k):
-                met = False
-                break
-        if met:
-            return True
-    return False
-
-
-@kernel
-def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, dt):
-    """Return (x, y, h, v, a) one step on, and the acceleration that the tyres gave.
-
-    Kinematic bicycle at the rear axle. ``limits`` are those of speed, acceleration, deceleration,
-    and curvature (full lock). Inside the friction circle the demand is met; outside, both its
-    parts shrink to the circle.
-    """
-    a = min(max(demanded, -limits[2]), limits[1])
-    bend = min(max(curvature, -limits[3]), limits[3])
-    total = math.hypot(a, v * v * bend)
-    if total > friction_limit:
-        a *= friction_limit / total
-        bend *= friction_limit / total
-    end = min(max(v + a * dt, 0.0), limits[0])
-    a = (end - v) / dt
-    travelled = 0.5 * (v + end) * dt
-    middle = h + 0.5 * travelled * bend
-    return (
-        x + travelled * math.cos(middle),
-        y + travelled * math.sin(middle),
-        h + travelled * bend,
-        end,
-        a,
-    )
+OK, NOT_FINITE, OFF_ROUTE, NO_LANE = 0, 1, 2, 3
+SPEED_CHANGE, LANE_CHANGE, FRICTION = 0, 1, 2
 
 
 @kernel
 def simulate_one(
     paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
-    conditions, acts, events, friction_slot, driver, dt, x, y, h, v, a, offset,
+    conditions, acts, events, actions, friction_slot, driver, dt, x, y, h, v, a, offset,
 ):  # fmt: skip
     """Fill one scenario's ``(E, T)`` arrays; return (n_steps, status)."""
     n_entities, n_steps = x.shape
     history = np.zeros((conditions.shape[0], n_steps), dtype=np.bool_)
     act_runs = np.zeros(acts.shape[0], dtype=np.bool_)
     event_done = np.zeros(events.shape[0], dtype=np.bool_)
+    event_ended = np.zeros(events.shape[0], dtype=np.bool_)
+    action_ended = np.zeros(actions.shape[0], dtype=np.bool_)
+    travelled = np.zeros(n_entities)
+    stood = np.zeros(n_entities)
     station = station0.copy()
+    on = np.arange(n_entities)  # the path that a body is on …
+    to = np.full(n_entities, -1)  # … the one that it changes to, if any …
+    foot = np.zeros(n_entities)  # … and its station there
     command = np.empty(n_entities)  # the speed that the storyboard asks for now …
     target = np.empty(n_entities)  # … the one it is on its way to …
     rate = np.full(n_entities, math.inf)  # … and how fast
+    speeding = np.full(n_entities, -1)  # the action that changes its speed, its start and time
+    origin, speed_began, speed_lasts = np.zeros((3, n_entities))
+    lane_began, lane_lasts, lane_from = np.zeros((3, n_entities))
+    lane_action = np.full(n_entities, -1)
     friction_limit = DRY_FRICTION * GRAVITY
     if friction_slot >= 0:
         friction_limit *= slots[friction_slot]
@@ -148,58 +89,141 @@ def simulate_one(
     for k in range(n_steps):
         now = k * dt
         for c in range(conditions.shape[0]):
-            history[c, k] = observe(c, conditions, points, slots, now, x, y, k)
+            kind, e, other = conditions[c, 0], conditions[c, 1], conditions[c, 2]
+            limit = slots[conditions[c, 4]]
+            if kind == REACH_POSITION:
+                gap = math.hypot(x[e, k] - points[c, 0], y[e, k] - points[c, 1])
+                history[c, k] = gap <= limit
+            elif kind < SPEED and kind != SIMULATION_TIME:
+                history[c, k] = observe_pair(
+                    kind, conditions[c, 3], limit, x[other, k] - x[e, k], y[other, k] - y[e, k],
+                    v[e, k], h[e, k], v[other, k], h[other, k],
+                )  # fmt: skip
+            else:
+                ended = kind == EVENT_ENDED and event_ended[other]
+                history[c, k] = observe_one(
+                    kind, conditions[c, 3], limit, now, v[e, k], travelled[e], stood[e], ended
+                )
         stop = fires(0, triggers, groups, conditions, history, k) or station[0] >= ego_end
         for i in range(acts.shape[0]):
             if not act_runs[i] and fires(acts[i], triggers, groups, conditions, history, k):
                 act_runs[i] = True
         for i in range(events.shape[0]):
-            if event_done[i] or not act_runs[events[i, 0]]:
+            if event_done[i]:
+                if not event_ended[i]:
+                    ended = True
+                    for j in range(events[i, 2], events[i, 3]):
+                        ended = ended and action_ended[j]
+                    event_ended[i] = ended
                 continue
-            if fires(events[i, 1], triggers, groups, conditions, history, k):
-                event_done[i] = True
-                e = events[i, 2]
-                target[e] = min(slots[events[i, 4]], bodies[e, 3])
-                if events[i, 3] == STEP:
+            if not act_runs[events[i, 0]]:
+                continue
+            if not fires(events[i, 1], triggers, groups, conditions, history, k):
+                continue
+            event_done[i] = True
+            for j in range(events[i, 2], events[i, 3]):
+                e, kind, shape, dimension = (
+                    actions[j, 0], actions[j, 1], actions[j, 2], actions[j, 3],
+                )  # fmt: skip
+                value = slots[actions[j, 5]]
+                if kind == FRICTION:
+                    friction_limit = DRY_FRICTION * GRAVITY * slots[actions[j, 4]]
+                    action_ended[j] = True
+                elif kind == SPEED_CHANGE:
+                    if speeding[e] >= 0:
+                        action_ended[speeding[e]] = True
+                    speeding[e] = j
+                    target[e] = min(slots[actions[j, 4]], bodies[e, 3])
+                    origin[e], speed_began[e] = command[e], now
                     rate[e] = math.inf
-                elif events[i, 3] == LINEAR_RATE:
-                    rate[e] = abs(slots[events[i, 5]])
+                    if shape == LINEAR and dimension == 0:
+                        rate[e] = abs(value)
+                    elif shape != STEP:
+                        lasts = duration(shape, dimension, value, command[e], target[e])
+                        speed_lasts[e] = max(lasts, 1e-9)
+                        if shape == LINEAR:
+                            rate[e] = abs(target[e] - command[e]) / speed_lasts[e]
                 else:
-                    rate[e] = abs(target[e] - command[e]) / slots[events[i, 5]]
+                    q = actions[j, 6]
+                    if to[e] >= 0:  # it goes on from where it is: on the way to the other lane
+                        action_ended[lane_action[e]] = True
+                        on[e], station[e] = to[e], foot[e]
+                    to[e] = q
+                    foot[e] = nearest(paths[q], path_n[q], path_ds[q], x[e, k], y[e, k])
+                    fx, fy, _ = pose(paths[q], path_n[q], path_ds[q], foot[e])
+                    if math.hypot(fx - x[e, k], fy - y[e, k]) > REACH:
+                        status = NO_LANE
+                        stop = True
+                    lane_action[e] = j
+                    lane_lasts[e] = max(value, 1e-9)
+                    lane_began[e], lane_from[e] = now, travelled[e]
+        for e in range(n_entities):
+            j = speeding[e]
+            if j >= 0 and actions[j, 2] > LINEAR:
+                share = progress(actions[j, 2], (now + dt - speed_began[e]) / speed_lasts[e])[0]
+                command[e] = origin[e] + share * (target[e] - origin[e])
+            else:
+                command[e] = ramped(command[e], target[e], rate[e] * dt)
+            if j >= 0 and command[e] == target[e]:
+                action_ended[j] = True
+                speeding[e] = -1
         # The ego: its driver demands, its tyres give.
         s0, n0, ds0 = station[0], path_n[0], path_ds[0]
-        ramp(command, target, rate, 0, dt)
         bend = steer(paths[0], n0, ds0, s0, x[0, k], y[0, k], h[0, k], v[0, k])
         if driver == 0:
             demanded = hold_speed(v[0, k], command[0])
         else:
             demanded = drive(
-                paths[0], n0, ds0, v[0, k], command[0], friction_limit, bodies, station, v, k, zones
-            )
+                paths[0], n0, ds0, v[0, k], command[0], friction_limit, bodies, station, v, k,
+                zones, on, to, foot,
+            )  # fmt: skip
         nx, ny, nh, nv, given = bicycle(
             x[0, k], y[0, k], h[0, k], v[0, k], demanded, bend, bodies[0, 3:7],
             friction_limit, dt,
         )  # fmt: skip
         a[0, k] = given
+        travelled[0] += 0.5 * (v[0, k] + nv) * dt
+        stood[0] = stood[0] + dt if nv == 0.0 else 0.0
         if k < last:
             x[0, k + 1], y[0, k + 1], h[0, k + 1], v[0, k + 1] = nx, ny, nh, nv
             ahead = s0 + 0.5 * (v[0, k] + nv) * dt
             station[0], offset[0, k + 1] = project(paths[0], n0, ds0, ahead, nx, ny)
-        # The others: on their route, at the speed the storyboard asks for.
+        # The others: on their paths, at the speed the storyboard asks for.
         for e in range(1, n_entities):
             before = v[e, k]
-            ramp(command, target, rate, e, dt)
-            length = (path_n[e] - 1) * path_ds[e]
+            p = on[e]
+            length = (path_n[p] - 1) * path_ds[p]
             ahead = station[e] + 0.5 * (before + command[e]) * dt
             if ahead >= length:
                 ahead = length
                 command[e] = target[e] = 0.0
+            step = 0.5 * (before + command[e]) * dt
+            travelled[e] += step
+            stood[e] = stood[e] + dt if command[e] == 0.0 else 0.0
             a[e, k] = (command[e] - before) / dt
-            if k < last:
-                station[e] = ahead
-                v[e, k + 1] = command[e]
-                x[e, k + 1], y[e, k + 1], h[e, k + 1] = pose(paths[e], path_n[e], path_ds[e], ahead)
-                offset[e, k + 1] = 0.0
+            if k == last:
+                continue
+            station[e] = ahead
+            v[e, k + 1] = command[e]
+            offset[e, k + 1] = 0.0
+            q = to[e]
+            if q < 0:
+                x[e, k + 1], y[e, k + 1], h[e, k + 1] = pose(paths[p], path_n[p], path_ds[p], ahead)
+                continue
+            j = lane_action[e]
+            if actions[j, 3] == DISTANCE:
+                u = (travelled[e] - lane_from[e]) / lane_lasts[e]
+                per_metre = 1.0 / lane_lasts[e]
+            else:
+                u = (now + dt - lane_began[e]) / lane_lasts[e]
+                per_metre = 1.0 / (lane_lasts[e] * command[e]) if command[e] > 0.1 else 0.0
+            x[e, k + 1], y[e, k + 1], h[e, k + 1], foot[e] = between(
+                paths[p], path_n[p], path_ds[p], ahead, paths[q], path_n[q], path_ds[q],
+                foot[e] + step, actions[j, 2], u, per_metre,
+            )  # fmt: skip
+            if u >= 1.0:
+                on[e], station[e], to[e] = q, foot[e], -1
+                action_ended[j] = True
         if not (math.isfinite(nx) and math.isfinite(ny) and math.isfinite(nh)):
             status = NOT_FINITE
             stop = True
@@ -214,23 +238,16 @@ def simulate_one(
 
 
 @kernel
-def ramp(command, target, rate, e, dt):
-    """Move one entity's commanded speed towards its target by one step."""
-    change = target[e] - command[e]
-    most = rate[e] * dt
-    command[e] += min(max(change, -most), most)
-
-
-@kernel
 def simulate_rows(
     network, paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
-    conditions, acts, events, friction_slot, driver, dt, x, y, h, v, a, offset, n_steps, status,
+    conditions, acts, events, actions, friction_slot, driver, dt, x, y, h, v, a, offset, n_steps,
+    status,
 ):  # fmt: skip
     """Fill the batch's ``(N, E, T)`` arrays, row by row; ``network`` tells each row's roads."""
     for i in range(slots.shape[0]):
         p = network[i]
         n_steps[i], status[i] = simulate_one(
             paths[p], path_n[p], path_ds[p], zones[p], station0[i], points[p], slots[i], bodies,
-            init, triggers, groups, conditions, acts, events, friction_slot, driver, dt,
+            init, triggers, groups, conditions, acts, events, actions, friction_slot, driver, dt,
             x[i], y[i], h[i], v[i], a[i], offset[i],
         )  # fmt: skip

@@ -8,7 +8,15 @@ from bridgegen.ego import DRIVERS, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl import TIME_STEP
-from bridgegen.simulation.embedded.program import LanePoint, Program
+from bridgegen.simulation.embedded.program import (
+    AlongLanes,
+    AlongTrajectory,
+    BesideLanes,
+    LanePoint,
+    PathSpec,
+    Point,
+    Program,
+)
 from bridgegen.simulation.embedded.tables import Tables, table
 from bridgegen.simulation.embedded.triggers import Triggers
 
@@ -16,7 +24,15 @@ DEFAULT_TIME_STEP = 0.05  # s
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 MAX_STEPS = 100_000
 
-_STEP, _LINEAR_RATE, _LINEAR_TIME = 0, 1, 2
+_SPEED_CHANGE, _LANE_CHANGE, _FRICTION = 0, 1, 2
+_SHAPES = {
+    osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
+    osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
+}  # fmt: skip
+_DIMENSIONS = {
+    osc.DynamicsDimension.RATE: 0, osc.DynamicsDimension.TIME: 1,
+    osc.DynamicsDimension.DISTANCE: 2,
+}  # fmt: skip
 
 
 def compile_storyboard(
@@ -46,18 +62,24 @@ class _Compiler:
         self.scenario = scenario
         self.place = place
         self.tables = Tables(scenario, place)
+        self.paths: list[PathSpec] = []
+        self.actions: list[tuple[int, ...]] = []
+        self.lane_paths: dict[int, int] = {}
 
     def compile(self, driver: Driver | None, time_step: float | None) -> Program:
         if not self.tables.objects:
             raise InputError(f"{self.place}: a scenario needs at least one entity, got none")
         step = time_step or self._declared_time_step()
-        self.triggers = Triggers(self.tables, step)
+        storyboard = self.scenario.storyboard
+        self.triggers = Triggers(self.tables, step, [str(one.name) for one in _events(storyboard)])
         bodies = np.array([self._body(one.entity_object) for one in self.tables.objects])
-        init, starts, routes, friction = self._init()
+        init, friction = self._init()
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
-        start_slots = [self.tables.slot(one.s) for one in starts]
-        storyboard = self.scenario.storyboard
+        start_slots = [
+            self.tables.slot(path.start.s) if isinstance(path, AlongLanes) else -1
+            for path in self.paths
+        ]
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
         acts, events = self._stories(storyboard)
@@ -76,15 +98,15 @@ class _Compiler:
             parameters=self.tables.parameters,
             slots=self.tables.slots,
             init=np.array(init, dtype=np.int64),
-            starts=tuple(starts),
+            paths=tuple(self.paths),
             start_slots=np.array(start_slots, dtype=np.int64),
-            routes=tuple(routes),
             triggers=table(self.triggers.triggers, 2),
             groups=table(self.triggers.groups, 2),
             conditions=table(self.triggers.conditions, 7),
             points=tuple(self.triggers.points),
             acts=np.array(acts, dtype=np.int64),
-            events=table(events, 6),
+            events=table(events, 4),
+            actions=table(self.actions, 7),
             friction_slot=friction,
             driver=driver or self._declared_driver(),
             time_step=step,
@@ -119,8 +141,16 @@ class _Compiler:
                 return DRIVERS[str(name)]
         return DRIVERS["route-follower"]
 
-    def _body(self, vehicle: osc.Vehicle) -> tuple[float, ...]:
-        box, limits, axles = vehicle.bounding_box, vehicle.performance, vehicle.axles
+    def _body(self, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> tuple[float, ...]:
+        box = body.bounding_box
+        measures = (
+            self.tables.literal(box.dimensions, "length", box.dimensions.length),
+            self.tables.literal(box.dimensions, "width", box.dimensions.width),
+            self.tables.literal(box.center, "x", box.center.x),
+        )
+        if not isinstance(body, osc.Vehicle):
+            return (*measures, math.inf, math.inf, math.inf, math.inf)
+        limits, axles = body.performance, body.axles
         rear = self.tables.literal(axles.rear, "positionX", axles.rear.position_x)
         front = axles.front or axles.rear
         wheelbase = self.tables.literal(front, "positionX", front.position_x) - rear
@@ -128,40 +158,45 @@ class _Compiler:
         if wheelbase <= 0.0:
             self.tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
         return (
-            self.tables.literal(box.dimensions, "length", box.dimensions.length),
-            self.tables.literal(box.dimensions, "width", box.dimensions.width),
-            self.tables.literal(box.center, "x", box.center.x),
+            *measures,
             self.tables.literal(limits, "maxSpeed", limits.max_speed),
             self.tables.literal(limits, "maxAcceleration", limits.max_acceleration),
             self.tables.literal(limits, "maxDeceleration", limits.max_deceleration),
             math.tan(min(lock, 1.5)) / max(wheelbase, 0.1),
         )
 
-    def _init(
-        self,
-    ) -> tuple[list[int], list[LanePoint], list[tuple[LanePoint, ...]], int]:
+    def _init(self) -> tuple[list[int], int]:
+        """Compile the start; return the slots of the entities' speeds, and of the friction."""
         actions = self.scenario.storyboard.init.actions
         friction = -1
         for one in actions.global_actions:
+            if not isinstance(one.action, osc.EnvironmentAction):
+                self.tables.unsupported(one.action, f"{type(one.action).__name__} at the start")
+                continue
             road = one.action.environment.road_condition
             if road is not None:
                 friction = self.tables.slot(road.friction_scale_factor)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
-        starts: dict[str, LanePoint] = {}
+        starts: dict[str, tuple[Point, float]] = {}
         routes: dict[str, tuple[LanePoint, ...]] = dict.fromkeys(self.tables.names, ())
+        tracks: dict[str, AlongTrajectory] = {}
         for private in actions.privates:
             name = str(private.entity_ref)
             for wrapped in private.private_actions:
                 action = wrapped.action
                 if isinstance(action, osc.TeleportAction):
-                    point = self.tables.lane_point(action.position)
+                    point, aside = self.tables.point(action.position)
                     if point is not None:
-                        starts[name] = point
+                        starts[name] = point, aside
                 elif isinstance(action, osc.LongitudinalAction):
                     dynamics = action.action.dynamics
                     if dynamics.dynamics_shape is not osc.DynamicsShape.STEP:
                         self.tables.unsupported(dynamics, "an initial SpeedAction other than step")
-                    init[name] = self.tables.slot(action.action.speed_action_target.target.value)
+                    init[name] = self._speed(action.action.speed_action_target)
+                elif isinstance(action, osc.LateralAction):
+                    self.tables.unsupported(action.action, "an initial LaneChangeAction")
+                elif isinstance(action.action, osc.FollowTrajectoryAction):
+                    tracks[name] = self._trajectory(action.action)
                 else:
                     points = [
                         self.tables.lane_point(w.position) for w in action.action.route.waypoints
@@ -175,12 +210,45 @@ class _Compiler:
                     for name in missing
                 )
             )
-        return (
-            [init[name] for name in self.tables.names],
-            [starts[name] for name in self.tables.names if name in starts],
-            [routes[name] for name in self.tables.names],
-            friction,
-        )
+        for name in self.tables.names:
+            if name not in starts:
+                continue
+            point, aside = starts[name]
+            if name in tracks:
+                self.paths.append(tracks[name])
+            elif isinstance(point, LanePoint):
+                self.paths.append(AlongLanes(point, routes[name], aside))
+            else:
+                self.tables.problems.append(
+                    f"{self.place}, line {point.line}: a WorldPosition is supported for an entity "
+                    "that follows a trajectory, and for no other"
+                )
+        return [init[name] for name in self.tables.names], friction
+
+    def _trajectory(self, action: osc.FollowTrajectoryAction) -> AlongTrajectory:
+        """Return the path of a trajectory that is followed at the entity's own speed."""
+        if not isinstance(action.time_reference.reference, osc.NoTime):
+            self.tables.unsupported(action.time_reference, "a trajectory with times")
+        mode = action.trajectory_following_mode.following_mode
+        if mode is not osc.FollowingMode.POSITION:
+            self.tables.unsupported(action.trajectory_following_mode, f'followingMode="{mode}"')
+        trajectory = action.trajectory_ref.trajectory
+        if trajectory.closed is not False:
+            self.tables.unsupported(trajectory, 'a Trajectory with closed="true"')
+        points: list[Point] = []
+        for vertex in trajectory.shape.shape.vertices:
+            point, aside = self.tables.point(vertex.position)
+            if isinstance(point, LanePoint):
+                point = LanePoint(point.road, point.lane, point.s, point.line, aside)
+            if point is not None:
+                points.append(point)
+        return AlongTrajectory(tuple(points), action.line)
+
+    def _speed(self, target: osc.SpeedActionTarget) -> int:
+        if isinstance(target.target, osc.RelativeTargetSpeed):
+            self.tables.unsupported(target.target, "RelativeTargetSpeed")
+            return self.tables.slot(0.0)
+        return self.tables.slot(target.target.value)
 
     def _stories(self, storyboard: osc.Storyboard) -> tuple[list[int], list[tuple[int, ...]]]:
         acts: list[int] = []
@@ -192,10 +260,10 @@ class _Compiler:
             for group in act.maneuver_groups:
                 for maneuver in group.maneuvers:
                     for event in maneuver.events:
-                        events += self._event(event, group, len(acts) - 1)
+                        events.append(self._event(event, group, len(acts) - 1))
         return acts, events
 
-    def _event(self, event: osc.Event, group: osc.ManeuverGroup, act: int) -> list[tuple[int, ...]]:
+    def _event(self, event: osc.Event, group: osc.ManeuverGroup, act: int) -> tuple[int, ...]:
         if event.maximum_execution_count not in (None, 1):
             self.tables.unsupported(
                 event, f'maximumExecutionCount="{event.maximum_execution_count}"'
@@ -207,37 +275,81 @@ class _Compiler:
         if event.priority is osc.Priority.SKIP or isinstance(event.priority, osc.ParameterRef):
             self.tables.unsupported(event, f'priority="{event.priority}"')
         trigger = self.triggers.add(event.start_trigger, always=True)
-        rows: list[tuple[int, ...]] = []
+        first = len(self.actions)
         for one in event.actions:
-            private = one.action
-            if not isinstance(private, osc.PrivateAction):
-                self.tables.unsupported(private, "a GlobalAction in an Event")
+            if isinstance(one.action, osc.GlobalAction):
+                self._global(one.action)
                 continue
-            action = private.action
-            if not isinstance(action, osc.LongitudinalAction):
-                self.tables.unsupported(action, f"{type(action).__name__} in an Event")
-                continue
-            shape, dynamics = self._dynamics(action.action.dynamics)
-            target = self.tables.slot(action.action.speed_action_target.target.value)
             if not group.actors.entity_refs:
                 self.tables.unsupported(group.actors, "Actors without an EntityRef")
             for actor in group.actors.entity_refs:
-                rows.append(
-                    (act, trigger, self.tables.entity(actor.entity_ref), shape, target, dynamics)
-                )
-        return rows
+                self._private(one.action, self.tables.entity(actor.entity_ref))
+        return act, trigger, first, len(self.actions)
 
-    def _dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int]:
-        slot = self.tables.slot(dynamics.value)
-        if dynamics.dynamics_shape is osc.DynamicsShape.STEP:
-            return _STEP, slot
-        if dynamics.dynamics_shape is osc.DynamicsShape.LINEAR:
-            if dynamics.dynamics_dimension is osc.DynamicsDimension.RATE:
-                return _LINEAR_RATE, slot
-            if dynamics.dynamics_dimension is osc.DynamicsDimension.TIME:
-                return _LINEAR_TIME, slot
-        self.tables.unsupported(
-            dynamics,
-            f"a SpeedAction of shape {dynamics.dynamics_shape} over {dynamics.dynamics_dimension}",
+    def _global(self, wrapped: osc.GlobalAction) -> None:
+        action = wrapped.action
+        if not isinstance(action, osc.EnvironmentAction):
+            self.tables.unsupported(action, f"{type(action).__name__} in an Event")
+            return
+        road = action.environment.road_condition
+        if road is not None:
+            slot = self.tables.slot(road.friction_scale_factor)
+            self.actions.append((0, _FRICTION, 0, 0, slot, slot, 0))
+
+    def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
+        action = wrapped.action
+        if isinstance(action, osc.LongitudinalAction):
+            shape, dimension, value = self._dynamics(action.action.dynamics)
+            target = self._speed(action.action.speed_action_target)
+            self.actions.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))
+        elif isinstance(action, osc.LateralAction):
+            self._lane_change(action.action, entity)
+        else:
+            self.tables.unsupported(action, f"{type(action).__name__} in an Event")
+
+    def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
+        shape, dimension, value = self._dynamics(action.dynamics)
+        if dimension == 0 and shape != 0:
+            self.tables.unsupported(action.dynamics, "a LaneChangeAction by a rate")
+        if entity == 0:
+            self.tables.unsupported(action, "a LaneChangeAction of the ego")
+        if action.target_lane_offset not in (None, 0.0):
+            self.tables.unsupported(action, f'targetLaneOffset="{action.target_lane_offset}"')
+        target = action.lane_change_target.target
+        lanes = lane = None
+        if isinstance(target, osc.RelativeTargetLane):
+            if self.tables.entity(target.entity_ref) != entity:
+                self.tables.unsupported(target, "a RelativeTargetLane of another entity")
+            lanes = int(self.tables.literal(target, "value", target.value))
+        else:
+            try:
+                lane = int(str(target.value))
+            except ValueError:
+                self.tables.unsupported(target, f'value="{target.value}" (a lane id is needed)')
+        before = self.lane_paths.get(entity, entity)
+        self.lane_paths[entity] = len(self.paths)
+        self.paths.append(BesideLanes(before, lanes, lane, action.line))
+        slot = self.tables.slot(0.0) if shape == 0 else value
+        self.actions.append(
+            (entity, _LANE_CHANGE, shape, dimension, slot, slot, len(self.paths) - 1)
         )
-        return _STEP, slot
+
+    def _dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int, int]:
+        slot = self.tables.slot(dynamics.value)
+        shape, dimension = dynamics.dynamics_shape, dynamics.dynamics_dimension
+        if isinstance(shape, osc.ParameterRef) or isinstance(dimension, osc.ParameterRef):
+            self.tables.unsupported(dynamics, f'"{shape}" over "{dimension}"')
+            return 0, 0, slot
+        return _SHAPES[shape], _DIMENSIONS[dimension], slot
+
+
+def _events(storyboard: osc.Storyboard) -> list[osc.Event]:
+    """Return all events in the order in which they are compiled."""
+    return [
+        event
+        for story in storyboard.stories
+        for act in story.acts
+        for group in act.maneuver_groups
+        for maneuver in group.maneuvers
+        for event in maneuver.events
+    ]

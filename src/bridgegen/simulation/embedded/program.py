@@ -21,12 +21,68 @@ from bridgegen.openx.openscenario.values import Expr, Value
 
 @dataclass(frozen=True)
 class LanePoint:
-    """A point on a lane: OpenDRIVE road id, lane id, and a slot or a number for s [m]."""
+    """A point on a lane: OpenDRIVE road id, lane id, s [m], metres left of the lane's centre."""
 
     road: str
     lane: int
     s: Value
     line: int
+    aside: float = 0.0
+
+
+@dataclass(frozen=True)
+class WorldPoint:
+    """A point of the world [m] that rows may not vary."""
+
+    x: float
+    y: float
+    line: int
+
+
+Point = LanePoint | WorldPoint
+
+
+@dataclass(frozen=True)
+class AlongLanes:
+    """A path along lanes.
+
+    Attributes:
+        start: where on the first lane.
+        via: the waypoints of the route; empty: on along the lane, while there is one way only.
+        aside: of the lanes' centre, left positive [m].
+    """
+
+    start: LanePoint
+    via: tuple[LanePoint, ...]
+    aside: float = 0.0
+
+
+@dataclass(frozen=True)
+class AlongTrajectory:
+    """A path from point to point in straight lines."""
+
+    points: tuple[Point, ...]
+    line: int
+
+
+@dataclass(frozen=True)
+class BesideLanes:
+    """A path along the lanes beside those of another path.
+
+    Attributes:
+        of: the number of that path.
+        lanes: how many lanes to the left of the direction of travel; or None.
+        lane: the lane's id, where that is given instead.
+        line: of the action that leads there.
+    """
+
+    of: int
+    lanes: int | None
+    lane: int | None
+    line: int
+
+
+PathSpec = AlongLanes | AlongTrajectory | BesideLanes
 
 
 @dataclass(frozen=True)
@@ -41,15 +97,16 @@ class Program:
         parameters: the numeric parameters with their declared values.
         slots: S distinct values.
         init: ``(E,)`` slot of each entity's initial speed.
-        starts: where each entity starts.
-        start_slots: ``(E,)`` slot of each start's s.
-        routes: the waypoints of each entity's route; empty: straight on from its start.
+        paths: K ≥ E ways: entity e starts on path e; the others are where lane changes lead.
+        start_slots: ``(E,)`` slot of each start's s; -1 where the path starts with the entity.
         triggers: ``(·, 2)`` first and past-the-last group; trigger 0 stops the scenario.
         groups: ``(·, 2)`` first and past-the-last condition.
         conditions: ``(C, 7)`` kind, entity, other entity, rule, slot, edge, delay in steps.
         points: per condition the position to be reached, or None.
         acts: ``(A,)`` start trigger.
-        events: ``(·, 6)`` act, trigger, entity, shape, slot of the target, slot of its dynamics.
+        events: ``(·, 4)`` act, trigger, first and past-the-last action.
+        actions: ``(·, 7)`` entity, kind, shape, dimension, slot of the target, slot of its
+            dynamics, path; see ``_rollout_kernels`` and ``_motion_kernels``.
         friction_slot: of the road's friction scale factor, -1 if the file has none.
         driver: who drives the ego.
         time_step: [s].
@@ -62,15 +119,15 @@ class Program:
     parameters: Mapping[str, float]
     slots: tuple[Value, ...]
     init: Int
-    starts: tuple[LanePoint, ...]
+    paths: tuple[PathSpec, ...]
     start_slots: Int
-    routes: tuple[tuple[LanePoint, ...], ...]
     triggers: Int
     groups: Int
     conditions: Int
     points: tuple[LanePoint | None, ...]
     acts: Int
     events: Int
+    actions: Int
     friction_slot: int
     driver: Driver
     time_step: float

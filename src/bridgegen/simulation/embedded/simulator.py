@@ -64,16 +64,17 @@ class EmbeddedSimulator:
             raise InputError(f"rows must name one of {roads.n_networks} road networks")
         slots = program.fill(values, n)
         a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
-        station = np.ascontiguousarray(a + b * slots[:, program.start_slots])
+        at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
+        station = np.ascontiguousarray(a + b * at)
         shape = (n, len(program.names), program.n_steps)
         x, y, h, v, acceleration, offset = (np.empty(shape) for _ in range(6))
         n_steps, status = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int8)
         simulate_rows(
             rows, roads.paths, roads.counts, roads.steps, roads.zones, station, roads.points,
             slots, program.bodies, program.init, program.triggers, program.groups,
-            program.conditions, program.acts, program.events, program.friction_slot,
-            program.driver.code, program.time_step, x, y, h, v, acceleration, offset, n_steps,
-            status,
+            program.conditions, program.acts, program.events, program.actions,
+            program.friction_slot, program.driver.code, program.time_step, x, y, h, v,
+            acceleration, offset, n_steps, status,
         )  # fmt: skip
         return Rollout(
             time_step=program.time_step,

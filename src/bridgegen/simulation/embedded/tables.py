@@ -9,7 +9,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.parameters import numbers
 from bridgegen.openx.openscenario.values import Expr, Value
-from bridgegen.simulation.embedded.program import LanePoint
+from bridgegen.simulation.embedded.program import LanePoint, Point, WorldPoint
 
 
 class Tables:
@@ -60,6 +60,14 @@ class Tables:
             return 0.0
         return float(value)
 
+    def point(self, position: osc.Position) -> tuple[Point | None, float]:
+        """Return a position and how far it is aside of its lane's centre [m]."""
+        where = position.position
+        if isinstance(where, osc.WorldPosition):
+            x, y = (self.literal(where, name, getattr(where, name)) for name in ("x", "y"))
+            return WorldPoint(x, y, where.line), 0.0
+        return self._on_lane(where), self.literal(where, "offset", where.offset or 0.0)
+
     def lane_point(self, position: osc.Position) -> LanePoint | None:
         """Return a position that is a plain point on a lane; others are not supported."""
         where = position.position
@@ -68,6 +76,9 @@ class Tables:
             return None
         if where.offset is not None and where.offset != 0.0:
             self.unsupported(where, f'offset="{where.offset}" (other than 0)')
+        return self._on_lane(where)
+
+    def _on_lane(self, where: osc.LanePosition) -> LanePoint | None:
         turned = where.orientation
         if turned is not None and any(
             value not in (None, 0.0) for value in (turned.h, turned.p, turned.r)

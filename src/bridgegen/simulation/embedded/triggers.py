@@ -1,5 +1,7 @@
 """Triggers as tables: which groups a trigger has, which conditions a group."""
 
+from collections.abc import Sequence
+
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Expr, Value
@@ -14,7 +16,9 @@ _EDGES = {
     osc.ConditionEdge.NONE: 0, osc.ConditionEdge.RISING: 1,
     osc.ConditionEdge.FALLING: 2, osc.ConditionEdge.RISING_OR_FALLING: 3,
 }  # fmt: skip
-_SIMULATION_TIME, _RELATIVE_DISTANCE, _REACH_POSITION = 0, 1, 2
+_SIMULATION_TIME, _RELATIVE_DISTANCE, _REACH_POSITION, _TIME_TO_COLLISION, _TIME_HEADWAY = range(5)
+_SPEED, _TRAVELED_DISTANCE, _STAND_STILL, _EVENT_ENDED = range(5, 9)
+_ENDED = (osc.StoryboardElementState.COMPLETE_STATE, osc.StoryboardElementState.END_TRANSITION)
 
 
 class Triggers:
@@ -28,7 +32,8 @@ class Triggers:
         stop_time: latest simulation time [s] that the first trigger, the scenario's end, names.
     """
 
-    def __init__(self, tables: Tables, time_step: float) -> None:
+    def __init__(self, tables: Tables, time_step: float, event_names: Sequence[str] = ()) -> None:
+        self._event_names = list(event_names)
         self.triggers: list[tuple[int, int]] = []
         self.groups: list[tuple[int, int]] = []
         self.conditions: list[tuple[int, ...]] = []
@@ -68,6 +73,12 @@ class Triggers:
         kind = condition.condition
         if isinstance(kind, osc.ByValueCondition):
             clock = kind.condition
+            if isinstance(clock, osc.StoryboardElementStateCondition):
+                self._element_state(clock, edge, delay)
+                return
+            if not isinstance(clock, osc.SimulationTimeCondition):
+                self._tables.unsupported(clock, type(clock).__name__)
+                return
             self._append(
                 _SIMULATION_TIME, 0, 0, self._rule(clock, clock.rule), clock.value, edge, delay
             )
@@ -90,7 +101,39 @@ class Triggers:
                 self._tables.unsupported(inner, f's="{point.s}" of a position to be reached')
             self._append(_REACH_POSITION, entity, 0, 0, inner.tolerance, edge, delay, point)
             return
-        other = self._tables.entity(inner.entity_ref)
+        if isinstance(inner, osc.SpeedCondition):
+            rule = self._rule(inner, inner.rule)
+            self._append(_SPEED, entity, 0, rule, inner.value, edge, delay)
+        elif isinstance(inner, osc.TraveledDistanceCondition):
+            self._append(_TRAVELED_DISTANCE, entity, 0, 0, inner.value, edge, delay)
+        elif isinstance(inner, osc.StandStillCondition):
+            self._append(_STAND_STILL, entity, 0, 0, inner.duration, edge, delay)
+        elif isinstance(inner, osc.CollisionCondition):
+            self._tables.unsupported(inner, "CollisionCondition")
+        else:
+            self._pair(inner, entity, edge, delay)
+
+    def _pair(
+        self,
+        inner: osc.RelativeDistanceCondition
+        | osc.TimeHeadwayCondition
+        | osc.TimeToCollisionCondition,
+        entity: int,
+        edge: int,
+        delay: int,
+    ) -> None:
+        """Append a condition on two entities: reference points, as the crow flies."""
+        if isinstance(inner, osc.TimeToCollisionCondition):
+            target = inner.target.target
+            if not isinstance(target, osc.EntityRef):
+                self._tables.unsupported(target, "TimeToCollisionConditionTarget with a Position")
+                return
+            other, kind = self._tables.entity(target.entity_ref), _TIME_TO_COLLISION
+        else:
+            other = self._tables.entity(inner.entity_ref)
+            kind = _RELATIVE_DISTANCE
+            if isinstance(inner, osc.TimeHeadwayCondition):
+                kind = _TIME_HEADWAY
         kinds = osc.RelativeDistanceType
         euclidian = (kinds.EUCLIDIAN_DISTANCE, kinds.CARTESIAN_DISTANCE)
         if inner.relative_distance_type not in euclidian:
@@ -100,7 +143,22 @@ class Triggers:
         if inner.freespace is not False:
             self._tables.unsupported(inner, f'freespace="{str(inner.freespace).lower()}"')
         rule = self._rule(inner, inner.rule)
-        self._append(_RELATIVE_DISTANCE, entity, other, rule, inner.value, edge, delay)
+        self._append(kind, entity, other, rule, inner.value, edge, delay)
+
+    def _element_state(
+        self, inner: osc.StoryboardElementStateCondition, edge: int, delay: int
+    ) -> None:
+        """Append a condition on the end of an event."""
+        name = str(inner.storyboard_element_ref)
+        is_event = inner.storyboard_element_type is osc.StoryboardElementType.EVENT
+        if not is_event or inner.state not in _ENDED:
+            self._tables.unsupported(
+                inner, "a StoryboardElementStateCondition other than on the end of an event"
+            )
+        elif name not in self._event_names:
+            self._tables.unsupported(inner, f'storyboardElementRef="{name}" (no such event)')
+        else:
+            self._append(_EVENT_ENDED, 0, self._event_names.index(name), 0, 0.0, edge, delay)
 
     def _rule(self, element: Element, rule: osc.Rule | osc.ParameterRef) -> int:
         if isinstance(rule, osc.ParameterRef):

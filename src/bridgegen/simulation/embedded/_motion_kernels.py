@@ -1,0 +1,105 @@
+"""How bodies move: the bicycle of the ego, and speeds and lanes that change by a shape."""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._path_kernels import X, Y, pose, project
+
+STEP, LINEAR, CUBIC, SINUSOIDAL = 0, 1, 2, 3
+RATE, TIME, DISTANCE = 0, 1, 2
+SEARCH_STEP = 5.0  # m, between the points at which a foot on another path is first looked for
+
+
+@kernel
+def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, dt):
+    """Return (x, y, h, v, a) one step on, and the acceleration that the tyres gave.
+
+    Kinematic bicycle at the rear axle. ``limits`` are those of speed, acceleration, deceleration,
+    and curvature (full lock). Inside the friction circle the demand is met; outside, both its
+    parts shrink to the circle.
+    """
+    a = min(max(demanded, -limits[2]), limits[1])
+    bend = min(max(curvature, -limits[3]), limits[3])
+    total = math.hypot(a, v * v * bend)
+    if total > friction_limit:
+        a *= friction_limit / total
+        bend *= friction_limit / total
+    end = min(max(v + a * dt, 0.0), limits[0])
+    a = (end - v) / dt
+    travelled = 0.5 * (v + end) * dt
+    middle = h + 0.5 * travelled * bend
+    return (
+        x + travelled * math.cos(middle),
+        y + travelled * math.sin(middle),
+        h + travelled * bend,
+        end,
+        a,
+    )
+
+
+@kernel
+def ramped(value, target, most):
+    """Return a value moved towards its target by no more than so much."""
+    return value + min(max(target - value, -most), most)
+
+
+@kernel
+def progress(shape, u):
+    """Return (share of the change, its derivative) at the share u of its time or distance."""
+    if u >= 1.0:
+        return 1.0, 0.0
+    if shape == SINUSOIDAL:
+        return 0.5 - 0.5 * math.cos(math.pi * u), 0.5 * math.pi * math.sin(math.pi * u)
+    if shape == CUBIC:
+        return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u)
+    return u, 1.0
+
+
+@kernel
+def duration(shape, dimension, value, before, after):
+    """Return how long [s] a change of speed takes.
+
+    By a rate [m/s²], the steepest of the shape; a time [s]; or a distance [m], over which the
+    mean speed of every shape is the mean of both ends.
+    """
+    if dimension == TIME:
+        return value
+    if dimension == DISTANCE:
+        return 2.0 * value / max(before + after, 1e-9)
+    steepest = 1.0
+    if shape == CUBIC:
+        steepest = 1.5
+    elif shape == SINUSOIDAL:
+        steepest = 0.5 * math.pi
+    return steepest * abs(after - before) / abs(value)
+
+
+@kernel
+def nearest(path, n, ds, x, y):
+    """Return the station of a point's foot on a path, looked for all along it."""
+    stride = max(int(SEARCH_STEP / ds), 1)
+    best, at = math.inf, 0
+    for i in range(0, n, stride):
+        gap = (path[i, X] - x) ** 2 + (path[i, Y] - y) ** 2
+        if gap < best:
+            best, at = gap, i
+    s, _ = project(path, n, ds, at * ds, x, y)
+    s, _ = project(path, n, ds, s, x, y)
+    return s
+
+
+@kernel
+def between(path, n, ds, s, other, other_n, other_ds, guess, shape, u, rate):
+    """Return (x, y, h, station on the other path) of a body on its way between two paths.
+
+    It leaves ``path``, where it is at station ``s``, for ``other``, where its foot is near
+    ``guess``; ``u`` is the share of the change's time or distance that has passed, ``rate`` how
+    much of it passes per metre travelled [1/m], 0 at standstill.
+    """
+    px, py, ph = pose(path, n, ds, s)
+    foot, d = project(other, other_n, other_ds, guess, px, py)
+    qx, qy, qh = pose(other, other_n, other_ds, foot)
+    share, slope = progress(shape, u)
+    turn = qh - ph - 2.0 * math.pi * round((qh - ph) / (2.0 * math.pi))
+    h = ph + share * turn + math.atan(-d * slope * rate)
+    return px + share * (qx - px), py + share * (qy - py), h, foot
