@@ -20,6 +20,9 @@ from bridgegen.openx.opendrive.references import contacts
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.write import to_xml
 
+from .kinds import KINDS
+from .kinds import model as kind
+
 carla = pytest.importorskip("carla")
 
 
@@ -108,6 +111,15 @@ def test_any_four_legs(data: st.DataObject, sites: Any) -> None:
     place = data.draw(sites)
     lanes = sum(len(leg.roads[0].along("in")) for leg in place.legs)
     assert check(opendrive_from_owl(build_static(place))) == lanes
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind(name: str) -> None:
+    model = kind(name)
+    theirs = load(model)
+    assert compare(model, theirs, list(model.roads)) > 0
+    for junction in model.junctions:
+        assert check_branches(model, theirs, junction.id) > 0
 
 
 def test_town05(town05_path: Any, town05: OpenDrive) -> None:

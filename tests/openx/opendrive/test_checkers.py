@@ -18,6 +18,9 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.write import to_xml
 
+from .kinds import KINDS
+from .kinds import model as kind
+
 pytestmark = pytest.mark.checkers
 
 
@@ -54,6 +57,7 @@ def files(
         width, lanes = pick.uniform(2.75, 4.0), pick.randint(1, 3)
         size = pick.uniform(max(16.0, 2 * lanes * width + 6.0), 44.0)
         models.append(crossroads(width, lanes, pick.uniform(45.0, 100.0), size))
+    models += [kind(name) for name in KINDS]
     models.append(skewed())
     folder = tmp_path_factory.mktemp("xodr")
     paths = [folder / f"{number:02}.xodr" for number in range(len(models))]
@@ -88,9 +92,19 @@ def test_schema(checkers: Any, files: list[Path]) -> None:
         assert schema.validate(etree.parse(path)), (path, schema.error_log)
 
 
+@pytest.mark.parametrize("name", KINDS)
+def test_netconvert_takes_every_kind(checkers: Any, tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"{name}.xodr"
+    path.write_bytes(to_xml(kind(name)))
+    done = checkers.netconvert(path)
+    assert done.returncode == 0, done.stderr
+    assert "Error" not in done.stderr
+    assert etree.parse(path.with_suffix(".net.xml")).findall("edge")
+
+
 def test_netconvert(checkers: Any, files: list[Path]) -> None:
     """SUMO takes every file, and finds every way across."""
-    for path in files[::4] + files[-1:]:
+    for path in [*files[: -len(KINDS) - 1 : 4], files[-1]]:
         done = checkers.netconvert(path)
         assert done.returncode == 0, (path, done.stderr)
         assert "Error" not in done.stderr

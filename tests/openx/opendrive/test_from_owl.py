@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import BridgeGenError, InputError, OntologyError, UnsupportedError
+from bridgegen.errors import BridgeGenError, InputError, OntologyError
 from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build_static
@@ -245,7 +245,7 @@ def changed(node: str, name: str, value: Any) -> Individuals:
         ("leg_A", "has_speed_limit", 0.0, "has_speed_limit [m/s] must be 0.1 … 200, got 0"),
         ("leg_A", "has_lane_width", 3.2, "must be the leg's has_lane_width, 3.2, got 3.5"),
         ("leg_A", "has_inbound_lanes", 3, "has_inbound_lanes must be its number of lanes, 2"),
-        ("leg_A", "has_junction_end", "middle", "has_junction_end must be start or end"),
+        ("leg_A", "has_junction_end", "middle", "has_junction_end must be start, end or none"),
         ("leg_A", "has_junction_end", "end", "has_lane_id must be < 0 for direction 'in'"),
         ("leg_A_in_1", "has_width", 0.1, "has_width [m] must be 0.5 … 20, got 0.1"),
         ("leg_A_in_1", "has_lane_id", 5, "lanes 'in' must be numbered from 1, got [2, 5]"),
@@ -291,20 +291,29 @@ def test_turn_that_no_car_can_drive() -> None:
 def test_lane_that_leads_nowhere() -> None:
     legs = [
         leg("A", "1", 270.0, (3.5, 3.5), ()),
-        leg("B", "2", 180.0, (), (3.5,)),
+        leg("B", "2", 180.0, (), ()),
         leg("C", "3", 90.0, (), ()),
         leg("D", "4", 0.0, (), ()),
     ]
     with pytest.raises(OntologyError) as caught:
         opendrive_from_owl(build_static(site(*legs)))
     assert caught.value.problems == (
+        "every lane in must lead across, but lane 1 of leg A has no leg to go to",
         "every lane in must lead across, but lane 2 of leg A has no leg to go to",
     )
 
 
-def test_three_legs_are_not_supported() -> None:
-    legs = [leg(name, str(k), 90.0 * k, (3.5,), (3.5,)) for k, name in enumerate("ABC", start=1)]
-    with pytest.raises(UnsupportedError, match=r"must have 4 legs .* got 3"):
+@pytest.mark.parametrize("count", [1, 6])
+def test_two_to_five_legs(count: int) -> None:
+    legs = [leg("ABCDEF"[k], str(k + 1), 60.0 * k, (3.5,), (3.5,)) for k in range(count)]
+    with pytest.raises(OntologyError, match=rf"must have 2 to 5 legs .* got {count}"):
+        opendrive_from_owl(build_static(site(*legs)))
+
+
+def test_legs_too_close_together() -> None:
+    legs = [leg(n, str(k + 1), h, (3.5,), (3.5,)) for k, (n, h) in
+            enumerate((("A", 270.0), ("B", 230.0), ("D", 0.0)))]  # fmt: skip
+    with pytest.raises(OntologyError, match="legs must be 45° apart at least, B and A are 40°"):
         opendrive_from_owl(build_static(site(*legs)))
 
 

@@ -3,33 +3,38 @@
 Only the individuals count: a file that somebody edited in Protégé converts like one of ours.
 """
 
-import math
 from collections import Counter
-from typing import Literal
+from collections.abc import Sequence
+from itertools import pairwise
 
 from bridgegen.errors import InputError, OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
-from bridgegen.openx.opendrive.crossroads import Arm, build, dead_ends
+from bridgegen.openx.opendrive import intersection, lone_road, merge, roundabout
+from bridgegen.openx.opendrive.arms import Arm
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.owl_furniture import controllers_of
+from bridgegen.openx.opendrive.owl_legs import corner, read_arm, read_id, refuse
 
-LEGS = 4
+MOST_LEGS = 5
 _SLACK = 1e-9
-_LEAST_ANGLE = math.radians(1.0)
+_LEAST_GAP = 45.0
+"""Between two legs of an intersection [deg]."""
 
 
 def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
-    """Return the road network that the individuals describe: a crossroads of four legs.
+    """Return the road network that the individuals describe.
 
-    Legs may have any headings, lengths, lane widths, and numbers of lanes. Connecting roads get
-    the ids after the largest one that an individual has.
+    An intersection of two to five legs, a roundabout, a merge, or one road that meets none. Legs
+    may have any headings, lengths, lane widths, and numbers of lanes. Connecting roads get the
+    ids after the largest one that an individual has.
 
     Args:
-        individuals: at least one RoadNetwork with its Intersection; no Scenario is needed.
+        individuals: at least one RoadNetwork with its areas; no Scenario is needed.
 
     Raises:
         OntologyError: the individuals contradict each other or describe what cannot be built.
-        UnsupportedError: the intersection has not exactly four legs.
+        UnsupportedError: several junctions, or none and several roads.
         InputError: the road network is a map that exists already.
     """
     network = individuals.one("RoadNetwork")
@@ -37,124 +42,155 @@ def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
     existing = individuals.optional_text(network, "has_map_file")
     if existing is not None:
         raise InputError(f"road network {name} is the file '{existing}': there is none to make")
-    intersection = individuals.one("Intersection")
-    legs = individuals.links(intersection, "has_leg")
-    if len(legs) != LEGS:
+    crossings = individuals.of_class("Intersection")
+    if not crossings:
+        return _lone_road(individuals, name)
+    if len(crossings) > 1:
         raise UnsupportedError(
-            f"an intersection must have {LEGS} legs (has_leg) in this version, got {len(legs)}"
+            f"a road network is made with one intersection in this version, got {len(crossings)}"
         )
+    (crossing,) = crossings
     problems: list[str] = []
-    junction_id = _id(individuals, intersection, "has_junction_id", problems)
-    size = _size(individuals, intersection, problems)
+    junction_id = read_id(individuals, crossing, "has_junction_id", problems)
     arms: list[Arm] = []
-    for leg in legs:
+    for leg in individuals.links(crossing, "has_leg"):
         try:
-            arms.append(_arm(individuals, leg, problems))
+            arms.append(read_arm(individuals, leg, problems))
         except OntologyError as error:
             problems += error.problems
+    if any(arm.junction_end == "none" for arm in arms):
+        problems.append("has_junction_end of an intersection's leg must be start or end, got none")
     if not problems:
-        problems += _together(junction_id, size, arms)
-    if problems:
-        raise OntologyError(*problems)
-    return build(name, junction_id, size, tuple(arms))
+        problems += _ids(junction_id, arms)
+    refuse(problems)
+    if individuals.is_a(crossing, "Merge"):
+        return _merge(individuals, crossing, name, junction_id, arms)
+    if individuals.is_a(crossing, "Roundabout"):
+        return _roundabout(individuals, crossing, name, junction_id, arms)
+    size = _measure(individuals, crossing, "has_size", problems)
+    refuse(problems or _together(size, arms))
+    return intersection.build(name, junction_id, size, tuple(arms), controllers_of(individuals))
 
 
-def _arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm:
-    what = individuals.describe(leg)
-    if individuals.links(leg, "has_continuation"):
-        problems.append(f"{what}: a generated leg must be one road, got has_continuation")
-    end = individuals.text(leg, "has_junction_end")
-    if end not in ("start", "end"):
-        problems.append(f"{what}: has_junction_end must be start or end, got '{end}'")
-    junction_end: Literal["start", "end"] = "end" if end == "end" else "start"
-    limit = individuals.optional_number(leg, "has_speed_limit")
-    if limit is not None and not 0.1 <= limit <= 200.0:
-        problems.append(f"{what}: has_speed_limit [m/s] must be 0.1 … 200, got {limit:g}")
-    heading = individuals.number(leg, "has_heading")
-    if not -360.0 <= heading <= 360.0:
-        problems.append(f"{what}: has_heading [deg] must be -360 … 360, got {heading:g}")
-    length = individuals.number(leg, "has_length")
-    if not 1.0 <= length <= 10_000.0:
-        problems.append(f"{what}: has_length [m] must be 1 … 10000, got {length:g}")
-    widths: dict[str, dict[int, float]] = {"in": {}, "out": {}}
-    usual = individuals.optional_number(leg, "has_lane_width")
-    lanes = individuals.links(leg, "has_lane")
-    for lane in lanes:
-        direction = individuals.text(lane, "has_direction")
-        lane_id = individuals.integer(lane, "has_lane_id")
-        width = individuals.number(lane, "has_width")
-        name = f"{what}, lane {lane_id}"
-        if direction not in widths:
-            problems.append(f"{name}: has_direction must be in or out, got '{direction}'")
-            continue
-        if lane_id == 0 or (lane_id > 0) != ((direction == "in") == (junction_end == "start")):
-            side = "> 0" if (direction == "in") == (junction_end == "start") else "< 0"
-            problems.append(
-                f"{name}: has_lane_id must be {side} for direction '{direction}' where the "
-                f"junction is at the road's {junction_end} (right-hand traffic)"
-            )
-        if not 0.5 <= width <= 20.0:
-            problems.append(f"{name}: has_width [m] must be 0.5 … 20, got {width:g}")
-        if usual is not None and abs(usual - width) > _SLACK:
-            problems.append(
-                f"{name}: has_width [m] must be the leg's has_lane_width, {usual:g}, got {width:g}"
-            )
-        if abs(lane_id) in widths[direction]:
-            problems.append(f"{name}: has_lane_id must be unique on its road")
-        widths[direction][abs(lane_id)] = width
-    for direction, count in (("in", "has_inbound_lanes"), ("out", "has_outbound_lanes")):
-        ids = sorted(widths[direction])
-        if ids != list(range(1, len(ids) + 1)):
-            problems.append(f"{what}: lanes '{direction}' must be numbered from 1, got {ids}")
-        said = individuals.optional_integer(leg, count)
-        if said is not None and said != len(ids):
-            problems.append(f"{what}: {count} must be its number of lanes, {len(ids)}, got {said}")
-    return Arm(
-        name=individuals.text(leg, "has_name"),
-        road_id=_id(individuals, leg, "has_road_id", problems),
-        heading_deg=heading,
-        length=length,
-        junction_end=junction_end,
-        speed_limit=limit,
-        inbound=tuple(widths["in"][key] for key in sorted(widths["in"])),
-        outbound=tuple(widths["out"][key] for key in sorted(widths["out"])),
+def _lone_road(individuals: Individuals, name: str) -> OpenDrive:
+    roads = individuals.of_class("Road")
+    if len(roads) != 1:
+        raise UnsupportedError(
+            f"a road network without an intersection must be one road, got {len(roads)}"
+        )
+    problems: list[str] = []
+    arm = read_arm(individuals, roads[0], problems)
+    segments = sorted(
+        individuals.links(roads[0], "has_segment"),
+        key=lambda node: individuals.integer(node, "has_index"),
+    )
+    bends = tuple(
+        (
+            individuals.number(node, "has_length"),
+            individuals.number(node, "has_start_curvature"),
+            individuals.number(node, "has_end_curvature"),
+        )
+        for node in segments
+    )
+    total = sum(length for length, _, _ in bends)
+    if bends and abs(total - arm.length) > 1e-6 * total:
+        problems.append(
+            f"has_length [m] of {individuals.describe(roads[0])} must be that of its segments, "
+            f"{total:g}, got {arm.length:g}"
+        )
+    if arm.junction_end != "none":
+        problems.append(
+            f"has_junction_end of {individuals.describe(roads[0])} must be none: there is no "
+            f"intersection, got '{arm.junction_end}'"
+        )
+    refuse(problems)
+    return lone_road.build(name, arm, bends)
+
+
+def _merge(
+    individuals: Individuals, node: Subject, name: str, junction_id: str, arms: Sequence[Arm]
+) -> OpenDrive:
+    problems: list[str] = []
+    length = _measure(individuals, node, "has_merge_length", problems)
+    taper = _measure(individuals, node, "has_taper_length", problems)
+    by_name = {arm.name: arm for arm in arms}
+    if sorted(by_name) != ["after", "main", "ramp"]:
+        problems.append(
+            f"a merge has the legs main, ramp and after, got {', '.join(sorted(by_name))}"
+        )
+    refuse(problems)
+    return merge.build(
+        name, junction_id, by_name["main"], by_name["ramp"], by_name["after"], length, taper
     )
 
 
-def _size(individuals: Individuals, node: Subject, problems: list[str]) -> float:
-    size = individuals.number(node, "has_size")
-    if not 1.0 <= size <= 1000.0:
-        what = individuals.describe(node)
-        problems.append(f"{what}: has_size [m] must be 1 … 1000, got {size:g}")
-    return size
+def _roundabout(
+    individuals: Individuals, node: Subject, name: str, junction_id: str, arms: Sequence[Arm]
+) -> OpenDrive:
+    problems: list[str] = []
+    radius = _measure(individuals, node, "has_radius", problems)
+    width = individuals.optional_number(node, "has_ring_lane_width") or 5.0
+    if not 3 <= len(arms) <= MOST_LEGS:
+        problems.append(f"a roundabout must have 3 to {MOST_LEGS} legs, got {len(arms)}")
+    problems += _headings(arms)
+    taken = {str(int(junction_id) + k) for k in range(len(arms))}
+    problems += [
+        f"has_road_id of leg {arm.name} must not be among the junctions' ids "
+        f"{', '.join(sorted(taken))}, got {arm.road_id}"
+        for arm in arms
+        if arm.road_id in taken
+    ]
+    if radius < width:
+        problems.append(
+            f"has_radius [m] must be at least the ring lane's width, {width:g}, got {radius:g}"
+        )
+    refuse(problems)
+    return roundabout.build(name, junction_id, radius, width, tuple(arms))
 
 
-def _id(individuals: Individuals, node: Subject, name: str, problems: list[str]) -> str:
-    """Return an id; CARLA and SUMO read whole numbers only."""
-    value = individuals.text(node, name)
-    if not (value.isascii() and value.isdigit() and len(value) <= 9 and str(int(value)) == value):
+def _measure(individuals: Individuals, node: Subject, name: str, problems: list[str]) -> float:
+    value = individuals.number(node, name)
+    if not 1.0 <= value <= 1000.0:
         what = individuals.describe(node)
-        problems.append(f"{what}: {name} must be a whole number of up to 9 digits, got '{value}'")
+        problems.append(f"{what}: {name} [m] must be 1 … 1000, got {value:g}")
     return value
 
 
-def _together(junction_id: str, size: float, arms: list[Arm]) -> list[str]:
-    """Return what is wrong between the legs: ids that collide, arms that overlap."""
+def _ids(junction_id: str, arms: Sequence[Arm]) -> list[str]:
+    """Return ids that collide: CARLA finds no way into a junction that is called like a road."""
     counts = Counter([junction_id, *(arm.road_id for arm in arms)])
-    problems = [
+    things = Counter(one.id for arm in arms for one in arm.objects)
+    things += Counter(one.id for arm in arms for one in arm.signals)
+    return [
         f"road and junction ids must differ from each other, got '{value}' {count} times"
         for value, count in counts.items()
         if count > 1
+    ] + [
+        f"has_object_id must be unique, got '{value}' {count} times"
+        for value, count in things.items()
+        if count > 1
     ]
-    for arm, lane in dead_ends(tuple(arms)):
+
+
+def _together(size: float, arms: list[Arm]) -> list[str]:
+    """Return what is wrong between the legs of an intersection: dead ends, arms that overlap."""
+    problems = []
+    if not 2 <= len(arms) <= MOST_LEGS:
         problems.append(
-            f"every lane in must lead across, but lane {lane} of leg {arm.name} has no leg to go to"
+            f"an intersection must have 2 to {MOST_LEGS} legs (has_leg), got {len(arms)}"
         )
+        return problems
+    problems += [
+        f"every lane in must lead across, but lane {lane} of leg {arm.name} has no leg to go to"
+        for arm, lane in intersection.dead_ends(tuple(arms))
+    ]
     if not any(arm.inbound for arm in arms):
         problems.append("an intersection must have a lane in, got none")
+    if len(arms) != len(intersection.TURNS) + 1:
+        problems += _headings(arms)
     around = sorted(arms, key=lambda arm: arm.heading_deg % 360.0)
     for arm, following in zip(around, around[1:] + around[:1], strict=True):
-        need = 2.0 * _corner(arm, following)
+        need = 2.0 * corner(arm, following)
         if size < need - _SLACK:
             problems.append(
                 f"has_size [m] must be ≥ {need:.4g}, or legs {arm.name} and {following.name} "
@@ -163,17 +199,12 @@ def _together(junction_id: str, size: float, arms: list[Arm]) -> list[str]:
     return problems
 
 
-def _corner(arm: Arm, following: Arm) -> float:
-    """Return how far from the centre two neighbouring legs stop overlapping [m].
-
-    The left edge of one leg, seen outwards, and the right edge of the next one cross at a point;
-    the legs overlap as long as both begin before it.
-    """
-    angle = math.radians((following.heading_deg - arm.heading_deg) % 360.0)
-    left, right = sum(arm.inbound), sum(following.outbound)
-    if angle < _LEAST_ANGLE:
-        return math.inf
-    if angle > math.pi - _LEAST_ANGLE:
-        return 0.0
-    cos, sin = math.cos(angle), math.sin(angle)
-    return min((right + left * cos) / sin, (left + right * cos) / sin)
+def _headings(arms: Sequence[Arm]) -> list[str]:
+    """Return legs that are too close to each other."""
+    around = sorted((arm.heading_deg % 360.0, arm.name) for arm in arms)
+    around.append((around[0][0] + 360.0, around[0][1]))
+    return [
+        f"legs must be {_LEAST_GAP:g}° apart at least, {name} and {other} are {b - a:.4g}°"
+        for (a, name), (b, other) in pairwise(around)
+        if b - a < _LEAST_GAP - 1e-6
+    ]

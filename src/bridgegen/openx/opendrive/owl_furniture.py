@@ -1,0 +1,164 @@
+"""OWL2OpenDRIVE, its layer 2: crosswalks, stop lines, lights and signs on and beside a road."""
+
+from collections.abc import Iterator
+
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import Subject
+from bridgegen.openx.opendrive.furniture import (
+    Control,
+    Controller,
+    CornerRoad,
+    Object,
+    Outline,
+    Signal,
+    Validity,
+)
+
+Reach = tuple[tuple[float, float], ...]
+"""How far a road reaches to its left and to its right [m]: its driving lanes, all of it."""
+
+SIGNS = {"StopSign": "206", "YieldSign": "205", "SpeedLimitSign": "274", "ConstructionCard": "123"}
+"""Types of signs in the German catalogue (VzKat), which readers know best."""
+
+LIGHT = "1000001"
+"""The type of a traffic light with three lamps, in OpenDRIVE's own catalogue."""
+
+STOP_LINE_WIDTH = 0.5
+"""Along the road [m]; source: RMS-1, 50 cm."""
+
+_HEIGHT = {"light": 5.0, "sign": 2.2}  # m, of the lower edge or the middle; ours
+_SLACK = 1e-6
+
+
+def objects_on(
+    individuals: Individuals, road: Subject, reach: Reach, length: float, problems: list[str]
+) -> Iterator[Object]:
+    """Yield the crosswalks and stop lines of a road."""
+    left, right = reach[0][0], reach[1][0]
+    for node in _on(individuals, "Crosswalk", road):
+        at, width = individuals.number(node, "has_distance"), individuals.number(node, "has_width")
+        what = individuals.describe(node)
+        if not 0.5 * width <= at <= length - 0.5 * width:
+            problems.append(
+                f"has_distance [m] of {what} must keep it on its road, {0.5 * width:g} to "
+                f"{length - 0.5 * width:g}, got {at:g}"
+            )
+            continue
+        name = individuals.optional_text(node, "has_name")
+        yield _area(_id(individuals, node), name, "crosswalk", at, width, -right, left)
+    for node in _on(individuals, "StopLine", road):
+        at = individuals.number(node, "has_distance")
+        ids = [individuals.integer(n, "has_lane_id") for n in individuals.links(node, "marks_lane")]
+        if not ids or not 0.0 <= at <= length:
+            problems.append(
+                f"{individuals.describe(node)} must mark a lane of its road (marks_lane) and lie "
+                f"on it, 0 to {length:g} m, got {at:g} m and {len(ids)} lanes"
+            )
+            continue
+        # A line lies just before the place where vehicles stop, seen from the junction.
+        middle = min(at + 0.5 * STOP_LINE_WIDTH, length)
+        low, high = (0.0, left) if max(ids) > 0 else (-right, 0.0)
+        name = individuals.optional_text(node, "has_name")
+        yield _area(
+            _id(individuals, node), name, "roadMark", middle, STOP_LINE_WIDTH, low, high, "stopLine"
+        )
+
+
+def signals_on(
+    individuals: Individuals, road: Subject, reach: Reach, junction_end: str, problems: list[str]
+) -> Iterator[Signal]:
+    """Yield the lights and signs beside a road."""
+    for cls in ("TrafficLight", "Signage"):
+        for node in _on(individuals, cls, road):
+            what = individuals.describe(node)
+            s, t = individuals.number(node, "has_distance"), individuals.number(node, "has_t")
+            edge = reach[0][1] if t > 0.0 else reach[1][1]
+            if abs(t) < edge - _SLACK:
+                problems.append(
+                    f"{what} must stand beside the road, has_t [m] beyond ±{edge:g}, got {t:g}"
+                )
+            if cls == "TrafficLight" and junction_end == "none":
+                problems.append(
+                    f"{what} must stand at an intersection, but its road meets none: traffic "
+                    "lights are at intersections only"
+                )
+            lanes = individuals.links(node, "governs_lane")
+            ids = sorted(individuals.integer(lane, "has_lane_id") for lane in lanes)
+            light = cls == "TrafficLight"
+            kind = LIGHT
+            if not light:
+                kind = next((k for n, k in SIGNS.items() if individuals.is_a(node, n)), "-1")
+            limit = individuals.optional_number(node, "has_speed_limit")
+            yield Signal(
+                id=_id(individuals, node),
+                s=s,
+                t=t,
+                dynamic="yes" if light else "no",
+                orientation="-" if ids and ids[0] > 0 else "+",
+                type=kind,
+                subtype="-1",
+                z_offset=_HEIGHT["light" if light else "sign"],
+                name=individuals.optional_text(node, "has_name"),
+                country="OpenDRIVE" if light else "DE",
+                value=None if limit is None else round(limit * 3.6, 6),
+                unit=None if limit is None else "km/h",
+                height=0.9,
+                width=0.3 if light else 0.6,
+                validity=(Validity(ids[0], ids[-1]),) if ids else (),
+            )
+
+
+def controllers_of(individuals: Individuals) -> tuple[Controller, ...]:
+    """Return the controllers of the lights: one for all that change together."""
+    found: list[Controller] = []
+    for controller in individuals.of_class("SignalController"):
+        groups: dict[tuple[tuple[int, str], ...], list[str]] = {}
+        phases = individuals.links(controller, "has_phase")
+        for light in individuals.links(controller, "has_light"):
+            shown = sorted(
+                (individuals.integer(phase, "has_index"), link)
+                for phase in phases
+                for link in ("gives_green_to", "gives_yellow_to", "gives_red_yellow_to")
+                if light in individuals.links(phase, link)
+            )
+            groups.setdefault(tuple(shown), []).append(_id(individuals, light))
+        for lights in groups.values():
+            number = str(len(found) + 1)
+            controls = tuple(Control(one, "0") for one in sorted(lights))
+            found.append(Controller(number, f"signals {number}", len(found), controls))
+    return tuple(found)
+
+
+def _on(individuals: Individuals, cls: str, road: Subject) -> Iterator[Subject]:
+    for node in individuals.of_class(cls):
+        if individuals.optional_link(node, "on_road") == road:
+            yield node
+
+
+def _id(individuals: Individuals, node: Subject) -> str:
+    return individuals.text(node, "has_object_id")
+
+
+def _area(
+    object_id: str, name: str | None, kind: str, at: float, width: float, low: float, high: float,
+    subtype: str | None = None,
+) -> Object:  # fmt: skip
+    """Return a rectangle across a road: ``at`` along it, from t = ``low`` to ``high`` [m]."""
+    first, last = max(at - 0.5 * width, 0.0), at + 0.5 * width
+    corners = ((first, low), (first, high), (last, high), (last, low), (first, low))
+    outline = Outline(
+        corners_road=tuple(CornerRoad(s, t, 0.0, 0.0) for s, t in corners),
+    )
+    return Object(
+        id=object_id,
+        s=at,
+        t=0.0,
+        type=kind,
+        subtype=subtype,
+        name=name,
+        orientation="none",
+        hdg=0.0,
+        length=width,
+        width=high - low,
+        outline=outline,
+    )
