@@ -1,6 +1,6 @@
 """What a simulator hands on: the recorded motion of every entity of every scenario of a batch."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -39,6 +39,8 @@ class Rollout:
         n_steps: ``(N,)`` int64, in 1..T, the recorded instants before the stop trigger fired.
         status: ``(N,)`` int8, a key of ``STATUS_MESSAGES``; 0 is success. Arrays of a failed
             scenario are finite but meaningless.
+        light_names: S ids of the traffic lights that change.
+        lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
     """
 
     time_step: float
@@ -52,6 +54,8 @@ class Rollout:
     offset: Float
     n_steps: Int
     status: npt.NDArray[np.int8]
+    light_names: tuple[str, ...] = ()
+    lights: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
 
     @property
     def shape(self) -> tuple[int, int, int]:

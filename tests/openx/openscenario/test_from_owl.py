@@ -357,7 +357,10 @@ def test_a_scenario_without_weather_or_events(individuals, edited):
         ([("ego_start", "has_distance", 60.1)], "must lie on its leg, 0 to 60.0"),
         ([("ego_start", "has_distance", -1.0)], "must lie on its leg"),
         ([("ego_start", "has_distance", "far")], "finite number"),
-        ([("leg_C", "has_junction_end", "middle")], "must be 'start' or 'end', got 'middle'"),
+        (
+            [("leg_C", "has_junction_end", "middle")],
+            "must be 'start' or 'end', or 'none' of a road that meets no junction, got 'middle'",
+        ),
         ([("leg_C", "has_continuation", "leg_C")], "must not continue itself"),
         ([("leg_C", "has_road_id")], "must have has_road_id"),
         ([("ego_init_speed", "has_target_speed", 3.0)], "ego_speed [m/s] must be 4.9 to 8.9"),
@@ -399,9 +402,9 @@ def test_contradictions_are_named(individuals, edited, edits, text):
 @pytest.mark.parametrize(
     ("node", "cls", "text"),
     [
-        ("bv", "Pedestrian", "bv (Pedestrian) must be one of Car"),
-        ("bv_sets_off_action", "LaneChangeAction", "must be a SpeedAction"),
-        ("bv_sets_off_condition_1", "Condition", "SimulationTimeCondition or a"),
+        ("bv", "TrafficParticipant", "bv (TrafficParticipant) must be one of Car, Van, "),
+        ("bv_sets_off_action", "SynchronizeAction", "must be one of SpeedAction, LaneChangeAction"),
+        ("bv_sets_off_condition_1", "Condition", "must be a condition that can be written"),
     ],
 )
 def test_what_cannot_be_written_yet_is_named(individuals, retyped, node, cls, text):

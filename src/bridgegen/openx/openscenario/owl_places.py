@@ -4,6 +4,7 @@ An individual says on which lane of a leg, and how far from the junction. A leg 
 roads, and a road's reference line may run towards the junction or away from it.
 """
 
+import math
 from dataclasses import dataclass
 
 from bridgegen.errors import OntologyError
@@ -37,15 +38,22 @@ class Places:
         self._individuals = individuals
         self._quantities = quantities
         self._of_lane: dict[Subject, tuple[tuple[_Road, ...], int]] = {}
-        for junction in individuals.of_class("Intersection"):
-            for leg in individuals.links(junction, "has_leg"):
-                roads = self._chain(leg)
-                for index, road in enumerate(roads):
-                    for lane in individuals.links(road.node, "has_lane"):
+        legs = [
+            leg
+            for junction in individuals.of_class("Intersection")
+            for leg in individuals.links(junction, "has_leg")
+        ]
+        if not legs:  # one road that meets no junction
+            legs = individuals.of_class("Road")
+        for leg in legs:
+            roads = self._chain(leg)
+            for index, road in enumerate(roads):
+                for name in ("has_lane", "has_strip"):
+                    for lane in individuals.links(road.node, name):
                         self._of_lane[lane] = roads, index
 
     def position(self, node: Subject, *, oriented: bool) -> osc.Position:
-        """Return where an individual of class LanePosition is.
+        """Return where an individual of class LanePosition or WorldPosition is.
 
         A distance that is bound to a parameter becomes an expression on the road that holds its
         present value.
@@ -60,6 +68,11 @@ class Places:
                 beyond the leg's end.
         """
         individuals = self._individuals
+        if individuals.is_a(node, "WorldPosition"):
+            x, y = (self._quantities.get(node, f"has_world_{one}") for one in ("x", "y"))
+            yaw = individuals.optional_number(node, "has_world_yaw")
+            heading = None if yaw is None else math.radians(yaw)
+            return osc.Position(osc.WorldPosition(x, y, h=heading))
         lane = individuals.link(node, "on_lane")
         try:
             roads, index = self._of_lane[lane]
@@ -71,13 +84,22 @@ class Places:
         distance = self._quantities.get(node, "has_distance")
         at = self._holds(node, roads, self._quantities.value(distance))
         lane = self._same_lane(lane, roads[index], roads[at])
+        lane_id = individuals.integer(lane, "has_lane_id")
         position = osc.LanePosition(
             road_id=roads[at].road_id,
-            lane_id=str(individuals.integer(lane, "has_lane_id")),
+            lane_id=str(lane_id),
             s=self._station(roads[at], sum(road.length for road in roads[:at]), distance),
+            offset=self._offset(node, lane_id),
             orientation=_ALONG_LANE if oriented else None,
         )
         return osc.Position(position)
+
+    def _offset(self, node: Subject, lane_id: int) -> Double | None:
+        """Return how far a place is from its lane's centre, left of the road's direction."""
+        if self._individuals.optional_number(node, "has_lateral_offset") is None:
+            return None
+        offset = self._quantities.get(node, "has_lateral_offset")
+        return offset if lane_id < 0 else self._quantities.apply("-x", offset)
 
     def _chain(self, leg: Subject) -> tuple[_Road, ...]:
         individuals = self._individuals
@@ -87,10 +109,10 @@ class Places:
             if any(road.node == node for road in roads):
                 raise OntologyError(f"{individuals.describe(node)} must not continue itself")
             near = individuals.text(node, "has_junction_end")
-            if near not in ("start", "end"):
+            if near not in ("start", "end", "none"):
                 raise OntologyError(
                     f"has_junction_end of {individuals.describe(node)} must be 'start' or 'end', "
-                    f"got '{near}'"
+                    f"or 'none' of a road that meets no junction, got '{near}'"
                 )
             road_id = individuals.text(node, "has_road_id")
             roads.append(_Road(node, road_id, individuals.number(node, "has_length"), near))
@@ -133,9 +155,9 @@ class Places:
 
     def _station(self, road: _Road, before: float, distance: Quantity) -> Double:
         """Return s on a road that begins ``before`` metres from the junction."""
-        if road.near == "start" and before == 0.0:
+        if road.near != "end" and before == 0.0:
             return distance
-        if road.near == "start":
+        if road.near != "end":
             formula = f"x-{format_double(before)}"
         else:
             formula = f"{format_double(before + road.length)}-x"

@@ -56,9 +56,15 @@ _WET = 40.0  # [%], where the paper's friction formula turns from moist to wet
 
 
 def environment(
-    individuals: Individuals, weather: Subject, quantities: Quantities
+    individuals: Individuals, weather: Subject, quantities: Quantities, name: str = ""
 ) -> tuple[osc.Environment, list[osc.ParameterDeclaration]]:
     """Return the environment of a weather individual, and the text parameters that it refers to.
+
+    Args:
+        individuals: one scenario.
+        weather: a Weather.
+        quantities: the scenario's numbers.
+        name: of the event that brings it; empty for the scenario's own.
 
     Raises:
         OntologyError: a part of the weather lacks a property.
@@ -67,15 +73,16 @@ def environment(
     for link, names in PROPERTIES:
         part = individuals.optional_link(weather, link)
         if part is not None:
-            found |= {name.removeprefix("has_"): quantities.get(part, name) for name in names}
+            found |= {one.removeprefix("has_"): quantities.get(part, one) for one in names}
     texts: list[osc.ParameterDeclaration] = []
 
-    def declare(name: str, value: str) -> osc.ParameterRef:
-        texts.append(osc.ParameterDeclaration(name, osc.ParameterType.STRING, value))
-        return osc.ParameterRef(f"${name}")
+    def declare(text: str, value: str) -> osc.ParameterRef:
+        own = f"{name}_{text}" if name else text
+        texts.append(osc.ParameterDeclaration(own, osc.ParameterType.STRING, value))
+        return osc.ParameterRef(f"${own}")
 
-    def now(name: str) -> float:
-        return quantities.value(found[name])
+    def now(part: str) -> float:
+        return quantities.value(found[part])
 
     cover = wetness = time = None
     if "cloudiness" in found:
@@ -86,14 +93,14 @@ def environment(
         # A string, not a dateTime: esmini supports no parameters of that type.
         time = declare(TIME_OF_DAY, time_of_day(now("sun_altitude_angle")))
     result = osc.Environment(
-        name="environment",
+        name=f"{name}_environment" if name else "environment",
         time_of_day=None if time is None else osc.TimeOfDay(animation=False, date_time=time),
         weather=_weather(found, cover, quantities),
         road_condition=osc.RoadCondition(
             friction_scale_factor=found.get("friction", 1.0),
             wetness=wetness,
             properties=osc.Properties(
-                tuple(osc.Property(name, _text(value)) for name, value in found.items())
+                tuple(osc.Property(part, _text(value)) for part, value in found.items())
             ),
         ),
     )

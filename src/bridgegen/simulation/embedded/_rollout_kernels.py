@@ -39,13 +39,14 @@ DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground
 REACH = 8.0  # m, a lane that is farther from a body than this is not the one beside its own
 
 OK, NOT_FINITE, OFF_ROUTE, NO_LANE = 0, 1, 2, 3
-SPEED_CHANGE, LANE_CHANGE, FRICTION = 0, 1, 2
+SPEED_CHANGE, LANE_CHANGE, FRICTION, LIGHT = 0, 1, 2, 3
 
 
 @kernel
 def simulate_one(
     paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
-    conditions, acts, events, actions, friction_slot, driver, dt, x, y, h, v, a, offset,
+    conditions, acts, events, actions, first_states, friction_slot, driver, dt, x, y, h, v, a,
+    offset, lights,
 ):  # fmt: skip
     """Fill one scenario's ``(E, T)`` arrays; return (n_steps, status)."""
     n_entities, n_steps = x.shape
@@ -67,6 +68,7 @@ def simulate_one(
     origin, speed_began, speed_lasts = np.zeros((3, n_entities))
     lane_began, lane_lasts, lane_from = np.zeros((3, n_entities))
     lane_action = np.full(n_entities, -1)
+    states = first_states.copy()
     friction_limit = DRY_FRICTION * GRAVITY
     if friction_slot >= 0:
         friction_limit *= slots[friction_slot]
@@ -79,6 +81,7 @@ def simulate_one(
             v[:] = 0.0
             a[:] = 0.0
             offset[:] = 0.0
+            lights[:] = 0
             return 1, OFF_ROUTE
         x[e, 0], y[e, 0], h[e, 0] = pose(paths[e], path_n[e], path_ds[e], station[e])
         command[e] = target[e] = v[e, 0] = min(slots[init[e]], bodies[e, 3])
@@ -126,7 +129,10 @@ def simulate_one(
                     actions[j, 0], actions[j, 1], actions[j, 2], actions[j, 3],
                 )  # fmt: skip
                 value = slots[actions[j, 5]]
-                if kind == FRICTION:
+                if kind == LIGHT:
+                    states[e] = np.int8(slots[actions[j, 4]])
+                    action_ended[j] = True
+                elif kind == FRICTION:
                     friction_limit = DRY_FRICTION * GRAVITY * slots[actions[j, 4]]
                     action_ended[j] = True
                 elif kind == SPEED_CHANGE:
@@ -167,6 +173,8 @@ def simulate_one(
             if j >= 0 and command[e] == target[e]:
                 action_ended[j] = True
                 speeding[e] = -1
+        for i in range(states.shape[0]):
+            lights[i, k] = states[i]
         # The ego: its driver demands, its tyres give.
         s0, n0, ds0 = station[0], path_n[0], path_ds[0]
         bend = steer(paths[0], n0, ds0, s0, x[0, k], y[0, k], h[0, k], v[0, k])
@@ -233,6 +241,9 @@ def simulate_one(
                     value = array[e, k]
                     for j in range(k + 1, n_steps):
                         array[e, j] = value
+            for i in range(states.shape[0]):
+                for j in range(k + 1, n_steps):
+                    lights[i, j] = states[i]
             return k + 1, status
     return n_steps, status
 
@@ -240,14 +251,15 @@ def simulate_one(
 @kernel
 def simulate_rows(
     network, paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
-    conditions, acts, events, actions, friction_slot, driver, dt, x, y, h, v, a, offset, n_steps,
-    status,
+    conditions, acts, events, actions, first_states, friction_slot, driver, dt,
+    x, y, h, v, a, offset, lights, n_steps, status,
 ):  # fmt: skip
     """Fill the batch's ``(N, E, T)`` arrays, row by row; ``network`` tells each row's roads."""
     for i in range(slots.shape[0]):
         p = network[i]
         n_steps[i], status[i] = simulate_one(
             paths[p], path_n[p], path_ds[p], zones[p], station0[i], points[p], slots[i], bodies,
-            init, triggers, groups, conditions, acts, events, actions, friction_slot, driver, dt,
-            x[i], y[i], h[i], v[i], a[i], offset[i],
+            init, triggers, groups, conditions, acts, events, actions, first_states, friction_slot,
+            driver, dt,
+            x[i], y[i], h[i], v[i], a[i], offset[i], lights[i],
         )  # fmt: skip

@@ -24,7 +24,13 @@ DEFAULT_TIME_STEP = 0.05  # s
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 MAX_STEPS = 100_000
 
-_SPEED_CHANGE, _LANE_CHANGE, _FRICTION = 0, 1, 2
+_SPEED_CHANGE, _LANE_CHANGE, _FRICTION, _LIGHT = 0, 1, 2, 3
+
+LIGHT_STATES = {
+    "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
+}  # fmt: skip
+"""The states of a traffic light's three lamps as `Rollout.lights` has them."""
+
 _SHAPES = {
     osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
     osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
@@ -65,6 +71,8 @@ class _Compiler:
         self.paths: list[PathSpec] = []
         self.actions: list[tuple[int, ...]] = []
         self.lane_paths: dict[int, int] = {}
+        self.lights: list[str] = []
+        self.first_states: list[int] = []
 
     def compile(self, driver: Driver | None, time_step: float | None) -> Program:
         if not self.tables.objects:
@@ -108,6 +116,8 @@ class _Compiler:
             events=table(events, 4),
             actions=table(self.actions, 7),
             friction_slot=friction,
+            lights=tuple(self.lights),
+            first_states=np.array(self.first_states, dtype=np.int8),
             driver=driver or self._declared_driver(),
             time_step=step,
             n_steps=n_steps,
@@ -171,7 +181,9 @@ class _Compiler:
         friction = -1
         for one in actions.global_actions:
             if not isinstance(one.action, osc.EnvironmentAction):
-                self.tables.unsupported(one.action, f"{type(one.action).__name__} at the start")
+                light, state = self._light(one.action)
+                if light >= 0:
+                    self.first_states[light] = state
                 continue
             road = one.action.environment.road_condition
             if road is not None:
@@ -289,12 +301,31 @@ class _Compiler:
     def _global(self, wrapped: osc.GlobalAction) -> None:
         action = wrapped.action
         if not isinstance(action, osc.EnvironmentAction):
-            self.tables.unsupported(action, f"{type(action).__name__} in an Event")
+            light, state = self._light(action)
+            slot = self.tables.slot(float(state))
+            self.actions.append((max(light, 0), _LIGHT, 0, 0, slot, slot, 0))
             return
         road = action.environment.road_condition
         if road is not None:
             slot = self.tables.slot(road.friction_scale_factor)
             self.actions.append((0, _FRICTION, 0, 0, slot, slot, 0))
+
+    def _light(self, action: osc.InfrastructureAction) -> tuple[int, int]:
+        """Return the number of the light that an action sets, and its state; -1 if it sets none."""
+        set_ = action.traffic_signal_action.action
+        if not isinstance(set_, osc.TrafficSignalStateAction):
+            self.tables.unsupported(set_, type(set_).__name__)
+            return -1, 0
+        state = LIGHT_STATES.get(str(set_.state))
+        if state is None:
+            known = ", ".join(LIGHT_STATES)
+            self.tables.unsupported(set_, f'state="{set_.state}" (other than {known})')
+            return -1, 0
+        name = str(set_.name)
+        if name not in self.lights:
+            self.lights.append(name)
+            self.first_states.append(0)
+        return self.lights.index(name), state
 
     def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
         action = wrapped.action

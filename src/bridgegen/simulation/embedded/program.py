@@ -107,6 +107,8 @@ class Program:
         events: ``(·, 4)`` act, trigger, first and past-the-last action.
         actions: ``(·, 7)`` entity, kind, shape, dimension, slot of the target, slot of its
             dynamics, path; see ``_rollout_kernels`` and ``_motion_kernels``.
+        lights: the traffic lights that are set.
+        first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
         friction_slot: of the road's friction scale factor, -1 if the file has none.
         driver: who drives the ego.
         time_step: [s].
@@ -129,6 +131,8 @@ class Program:
     events: Int
     actions: Int
     friction_slot: int
+    lights: tuple[str, ...]
+    first_states: npt.NDArray[np.int8]
     driver: Driver
     time_step: float
     n_steps: int

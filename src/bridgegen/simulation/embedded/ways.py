@@ -54,7 +54,8 @@ class Ways:
                 elif isinstance(spec, AlongLanes):
                     route = self._along(spec)
                     start = _known(program, spec.start)
-                    self._add(route, route.station(*start), spec.aside)
+                    side = model.road(spec.start.road).direction(spec.start.lane)
+                    self._add(route, route.station(*start), spec.aside * side)
                 else:
                     self._add(self._beside(spec), (0.0, 0.0), 0.0)
             except InputError as error:
@@ -170,7 +171,8 @@ def _position(program: Program, model: OpenDrive, point: Point) -> tuple[float, 
         raise InputError(f"a trajectory's s must be a number, got {point.s} (line {point.line})")
     road = model.road(road_id)
     pose = lane_pose(road, point.lane, s)
-    return pose.x - point.aside * math.sin(pose.h), pose.y + point.aside * math.cos(pose.h)
+    aside = point.aside * road.direction(point.lane)  # its sign is the road's, the pose the lane's
+    return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h)
 
 
 def _end(model: OpenDrive, road_id: str, lane: int, *, entry: bool) -> tuple[str, int, float]:
