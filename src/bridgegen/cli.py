@@ -208,6 +208,23 @@ def validate(
 
 
 @app.command()
+def show(
+    file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
+    out: Annotated[
+        Path | None, typer.Option(help="The page (.html); beside the .owl by default.")
+    ] = None,
+) -> None:
+    """Draw a scenario's individuals in five layers, violated constraints in red."""
+    from bridgegen.report.show import show_file
+
+    page, violations = show_file(file, out)
+    print(page)
+    if violations:
+        count = "1 violation" if violations == 1 else f"{violations} violations"
+        print(f"bridgegen: warning: {file}: {count}, shown in red", file=sys.stderr)
+
+
+@app.command()
 def ask(
     file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
     question: Annotated[

@@ -1,11 +1,21 @@
-"""A run that never happened, but could have: a left turn into the path of a crossing car."""
+"""A run that never happened, but could have: a left turn into the path of a crossing car.
 
-from collections.abc import Callable
+Besides, a scenario with something in every layer, and a browser to look at pages with.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from bridgegen.odd.reader import load
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.individuals import build as build_individuals
 from bridgegen.report.data import (
     Column,
     Entity,
@@ -188,3 +198,40 @@ def report() -> ReportData:
 def with_summary(report: ReportData) -> Callable[..., ReportData]:
     """The same report with some fields of its summary changed."""
     return lambda **changes: replace(report, summary=replace(report.summary, **changes))
+
+
+# -- something in every layer ----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def layered() -> LogicalScenario:
+    return load(Path(__file__).with_name("all_layers.yaml"))
+
+
+@pytest.fixture(scope="session")
+def values(layered) -> dict[str, float]:
+    """The middle of every range that is left."""
+    space = layered.space()
+    return space.values(space.decode([[0.5] * space.n_var])[0])
+
+
+@pytest.fixture(scope="session")
+def individuals(layered, values) -> Individuals:
+    return build_individuals(layered, values, driver="route-follower")
+
+
+# -- a browser -------------------------------------------------------------------------------------
+
+OPTIONS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update"]
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("chromium is not installed")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
+        yield browser
+        browser.close()

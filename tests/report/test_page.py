@@ -10,10 +10,11 @@ from importlib.resources import files
 import pytest
 
 from bridgegen.errors import StorageError
-from bridgegen.report import page
+from bridgegen.report import page, show
 from bridgegen.report.page import write_report
 from bridgegen.report.payload import to_json
 
+OURS = dict.fromkeys((*page.SCRIPTS, *show.SCRIPTS, *page.STYLES, "page.html", "show.html"))
 VOID = {"meta", "link", "input", "br", "img", "hr"}
 
 
@@ -91,7 +92,8 @@ def test_nothing_is_fetched(written):
     assert policy.startswith("default-src 'none';")
     assert "http" not in policy
     assert "connect-src" not in policy
-    own = b"".join(page._own(name) for name in (*page.SCRIPTS, "page.css", "page.html")).decode()
+    own = b"".join(map(page._own, OURS)).decode()
+    own = own.replace("http://www.w3.org/2000/svg", "")  # a namespace's name is no address
     for word in ("http:", "https:", "fetch(", "XMLHttpRequest", "import(", "url(", "@import"):
         assert word not in own
 
@@ -107,9 +109,15 @@ def test_every_id_that_a_script_asks_for_exists(written):
     assert asked <= set(Page(written).values("id"))
 
 
+def test_every_id_of_the_picture_page_exists():
+    scripts = b"".join(map(page._own, show.SCRIPTS)).decode()
+    asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
+    assert asked <= set(re.findall(r'id="([\w-]+)"', page._own("show.html").decode()))
+
+
 def test_every_file_of_ours_is_used():
     ours = {f.name for f in files("bridgegen.report").iterdir() if f.name.endswith((".js", ".css"))}
-    assert ours == {*page.SCRIPTS, "page.css"}
+    assert ours == {*page.SCRIPTS, *show.SCRIPTS, *page.STYLES}
 
 
 @pytest.mark.parametrize(
@@ -150,7 +158,7 @@ def test_plotly_is_read_but_not_imported(tmp_path):
 
 def test_a_missing_folder_is_one_clear_error(tmp_path, report):
     path = tmp_path / "nowhere" / "report.html"
-    with pytest.raises(StorageError, match=r"nowhere/report.html: the report cannot be written"):
+    with pytest.raises(StorageError, match=r"nowhere/report.html: the page cannot be written"):
         write_report(path, report)
 
 

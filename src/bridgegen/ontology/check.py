@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.shapes import Rule, rules, turtle
+from bridgegen.ontology.shapes import Rule, rules, structure, turtle
 from bridgegen.ontology.vocabulary import SUBCLASS, tbox
 from bridgegen.ontology.words import Finding, Violation, violations_of
 
 if TYPE_CHECKING:
     from bridgegen.odd.scenario import LogicalScenario
 
-__all__ = ["Violation", "check"]
+__all__ = ["Violation", "check", "constraints_in_words"]
 
 _SH = "http://www.w3.org/ns/shacl#"
 _KEPT = 8
@@ -45,6 +45,13 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
         for one in violations_of(individuals, scenario, compiled.rules, finding)
     }
     return sorted(found.values(), key=lambda one: (one.individual, one.message))
+
+
+def constraints_in_words(scenario: "LogicalScenario | None" = None) -> str:
+    """Return how many constraints `check` holds individuals against, and where they are from."""
+    own, general = len(rules(scenario)), structure().count(" a sh:PropertyShape ")
+    whose = f"of scenario {scenario.name}" if scenario else "of every scenario"
+    return f"{own + general} constraints checked ({own} {whose}, {general} of the ontology)"
 
 
 @cache

@@ -25,6 +25,7 @@ PREFIXES = {"bg": BG, "dcterms": DCTERMS, "owl": OWL, "rdfs": RDFS, "xsd": XSD}
 Subject = ox.NamedNode | ox.BlankNode
 
 TYPE = ox.NamedNode(RDF + "type")
+LABEL = ox.NamedNode(RDFS + "label")
 COMMENT = ox.NamedNode(RDFS + "comment")
 SUBCLASS = ox.NamedNode(RDFS + "subClassOf")
 DOMAIN = ox.NamedNode(RDFS + "domain")
@@ -63,7 +64,9 @@ class TBox:
         ranges: per property, its range: a class or a datatype.
         domains: per property, the class that it belongs to.
         units: per data property with a unit, the unit.
+        labels: per term, what people call it.
         comments: per term, what it means.
+        layers: per class that says so, its layer, 1 to 5; the others have that of a superclass.
         functional: the properties that have at most one value.
         above: per data property whose values must exceed something, that.
         allowed: per data property with an enumeration, its values.
@@ -77,7 +80,9 @@ class TBox:
     ranges: Mapping[str, ox.NamedNode]
     domains: Mapping[str, str]
     units: Mapping[str, str]
+    labels: Mapping[str, str]
     comments: Mapping[str, str]
+    layers: Mapping[str, int]
     functional: frozenset[str]
     above: Mapping[str, float]
     allowed: Mapping[str, tuple[str, ...]]
@@ -131,7 +136,9 @@ def tbox() -> TBox:
         ranges={local_name(term): target for term, target in links(RANGE)},
         domains={local_name(term): local_name(cls) for term, cls in links(DOMAIN)},
         units=first(bg("unit")),
+        labels=first(LABEL),
         comments=first(COMMENT),
+        layers={name: int(text) for name, text in first(bg("layer")).items()},
         functional=frozenset(
             local_name(term)
             for term, cls in types

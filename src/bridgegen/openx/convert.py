@@ -6,6 +6,7 @@ from pathlib import Path
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.odd.reader import names as scenario_names
+from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology import reasoner
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
@@ -129,9 +130,16 @@ def _ontology(path: Path) -> list[str]:
     individuals = load(path)
     if _is_map(individuals):
         return [str(one) for one in check(individuals)]
-    name = individuals.text(individuals.one("Scenario"), "has_name")
-    scenario = load_scenario(name) if name in scenario_names() else None
-    return [str(one) for one in check(individuals, scenario)]
+    individuals.text(individuals.one("Scenario"), "has_name")  # a file without is none of ours
+    return [str(one) for one in check(individuals, scenario_of(individuals))]
+
+
+def scenario_of(individuals: Individuals) -> LogicalScenario | None:
+    """Return the scenario of the catalogue that individuals say they are of; None if of none."""
+    said = {name for one in individuals.of_class("Scenario")
+            for name in individuals.texts(one, "has_name")}  # fmt: skip
+    known = said.intersection(scenario_names())
+    return load_scenario(known.pop()) if len(said) == len(known) == 1 else None
 
 
 def _is_map(individuals: Individuals) -> bool:

@@ -6,6 +6,8 @@ import numpy as np
 
 from bridgegen import metrics as measures
 from bridgegen.objective import Thresholds
+from bridgegen.ontology.check import constraints_in_words
+from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.opendrive.outline import outline
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
@@ -17,6 +19,7 @@ from bridgegen.report.data import (
     ReportData,
     RunSummary,
 )
+from bridgegen.report.painter import paint
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
 
@@ -40,7 +43,8 @@ def build_report(
         pipeline: what evaluated the rows.
         rows: all of the run, in order.
         summary: of the same rows.
-        kept: name, evaluation and files of the handed-over scenarios, most critical first.
+        kept: name, evaluation and files of the handed-over scenarios, most critical first; what
+            is handed over has kept all constraints.
         algorithm: its name.
         seed: of the run.
         budget: of the run.
@@ -137,10 +141,12 @@ def _playbacks(
         Entity(name, *box) for name, box in zip(rollout.names, rollout.box.tolist(), strict=True)
     )
     nearest = rollout.distance.min(axis=1)
+    checked = constraints_in_words(pipeline.scenario)
     roads: dict[bytes, tuple[Outline, ...]] = {}
     playbacks = []
     for k, (name, evaluation, files) in enumerate(kept):
         values = pipeline.space.values(rows.X[evaluation])
+        individuals = pipeline.individuals(values)
         x, y = rollout.x[k], rollout.y[k]
         playbacks.append(
             Playback(
@@ -154,22 +160,26 @@ def _playbacks(
                 entities=bodies,
                 x=x, y=y, h=rollout.h[k], v=rollout.v[k],
                 distance=nearest[k],
-                lanes=_road(pipeline, values, roads),
+                lanes=_road(pipeline, values, individuals, roads),
                 n_steps=int(rollout.n_steps[k]),
                 files=files,
+                picture=paint(individuals, (), checked),
             )
         )  # fmt: skip
     return tuple(playbacks)
 
 
 def _road(
-    pipeline: Pipeline, values: dict[str, float], known: dict[bytes, tuple[Outline, ...]]
+    pipeline: Pipeline,
+    values: dict[str, float],
+    individuals: Individuals,
+    known: dict[bytes, tuple[Outline, ...]],
 ) -> tuple[Outline, ...]:
     """Return the drawing of a scenario's road network, the same object for the same network."""
     static = [] if pipeline.road_map else [values[name] for name in pipeline.static_names]
     key = np.array(static).tobytes()
     if key not in known:
-        model = pipeline.roads(pipeline.individuals(values))
+        model = pipeline.roads(individuals)
         junction = pipeline.road_map.site.junction_id if pipeline.road_map else None
         known[key] = tuple(Outline(kind, points) for kind, points in outline(model, junction))
     return known[key]

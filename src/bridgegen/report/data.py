@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.report.picture import Picture
 
 AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median"})
 LINE_KINDS = frozenset({"edge", "solid", "broken", "centre", "stop", "route"})
@@ -209,6 +210,7 @@ class Playback:
             share one tuple: the page then holds it once.
         n_steps: in 1..T, how many instants are real.
         files: paths of its files relative to the page ("critical/0001.xosc").
+        picture: its individuals in five columns, if they are to be shown.
     """
 
     name: str
@@ -227,6 +229,7 @@ class Playback:
     lanes: tuple[Outline, ...]
     n_steps: int
     files: tuple[str, ...] = ()
+    picture: Picture | None = None
 
     def __post_init__(self) -> None:
         place = f"playback '{self.name}'"

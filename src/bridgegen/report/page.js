@@ -1,17 +1,8 @@
-// Shared by all scripts: the data, formatting, colours; and the parts of the page without motion.
+// Shared by the report's scripts: the data, formatting, colours; and the parts of the page without motion.
 
-const $ = (id) => document.getElementById(id);
 const data = JSON.parse($("data").textContent);
 const columns = new Map(data.rows.columns.map((column) => [column.name, column]));
 const darkScheme = matchMedia("(prefers-color-scheme: dark)");
-const NARROW = "\u202f"; // narrow no-break space, between a number and its unit
-
-function element(tag, attributes = {}, ...children) {
-  const node = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
-}
 
 function number(value, digits = 4) {
   if (value === null || value === undefined) return "–";
@@ -182,6 +173,18 @@ function fillDetails(kept) {
   $("details").replaceChildren(...parts);
 }
 
+// What the chosen scenario is made of.
+const showPicture = (() => {
+  let picture = null;
+  return (kept) => {
+    $("made-of").hidden = kept.picture === null;
+    if (kept.picture === null) return;
+    picture ??= new Picture($("layers"), data.pictures);
+    picture.show(data.pictures.pictures[kept.picture]);
+    $("made-of-title").textContent = `What scenario ${kept.name} is made of`;
+  };
+})();
+
 function start() {
   readPalette();
   fillSummary();
@@ -191,7 +194,7 @@ function start() {
     const player = new Player(hook);
     darkScheme.addEventListener("change", () => { readPalette(); player.redraw(); });
   } else {
-    $("kept").hidden = true;
+    $("kept").hidden = $("made-of").hidden = true;
     $("no-scenarios").hidden = false;
     $("no-scenarios").textContent = data.rows.critical.includes(1) ? "None was kept." : "None was kept: nothing critical was found.";
     darkScheme.addEventListener("change", readPalette);

@@ -14,10 +14,12 @@ from bridgegen.report.data import ReportData
 from bridgegen.report.payload import to_json
 
 SCRIPTS = (
-    "page.js", "geometry.js", "view.js", "scene.js", "curves.js", "player.js", "parallel.js",
-    "charts.js",
+    "common.js", "page.js", "geometry.js", "view.js", "scene.js", "curves.js", "picture.js",
+    "player.js", "parallel.js", "charts.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
+
+STYLES = ("page.css", "picture.css")
 
 
 def write_report(path: Path, data: ReportData) -> None:
@@ -28,21 +30,37 @@ def write_report(path: Path, data: ReportData) -> None:
     Raises:
         StorageError: the file cannot be written (no such folder, read-only, disk full).
     """
-    _write_atomically(Path(path), _chunks(data))
-
-
-def _chunks(data: ReportData) -> list[bytes]:
-    """Return the page in pieces; what is put in is never searched for placeholders again."""
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
+    write_page(Path(path), "page.html", SCRIPTS, title, to_json(data), plotly=_plotly())
+
+
+def write_page(
+    path: Path, template: str, scripts: Iterable[str], title: str, data: str, **more: bytes
+) -> None:
+    """Write a page, whole or not at all; what is put in is never searched for placeholders again.
+
+    Args:
+        path: where to.
+        template: file of this folder.
+        scripts: files of this folder.
+        title: plain text.
+        data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
+        more: of the template's other placeholders.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
     fill = {
         "title": html.escape(title).encode("utf-8", "replace"),
-        "css": _own("page.css"),
-        "data": to_json(data).encode("ascii"),
-        "scripts": b"\n".join(_own(name) for name in SCRIPTS),
-        "plotly": _plotly(),
+        "css": b"\n".join(map(_own, STYLES)),
+        "data": data.encode("ascii"),
+        "scripts": b"\n".join(map(_own, scripts)),
+        **more,
     }
-    parts = re.split(rb"\{\{(\w+)\}\}", _own("page.html"))
-    return [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
+    parts = re.split(rb"\{\{(\w+)\}\}", _own(template))
+    _write_atomically(
+        path, [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
+    )
 
 
 @cache
@@ -74,7 +92,7 @@ def _write_atomically(path: Path, chunks: Iterable[bytes]) -> None:
                 file.write(chunk)
         part.replace(path)
     except OSError as error:
-        raise StorageError(f"{path}: the report cannot be written: {error.strerror}") from None
+        raise StorageError(f"{path}: the page cannot be written: {error.strerror}") from None
     finally:
         _remove(part)
 

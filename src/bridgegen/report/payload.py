@@ -13,6 +13,7 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.report import convergence, sentences
 from bridgegen.report.data import Column, Evaluations, Playback, ReportData
+from bridgegen.report.picture_payload import pictures_payload
 
 DIGITS = 5
 """Significant digits of the largest value of a column in bulk."""
@@ -28,19 +29,26 @@ TRENDS = {"d_min": False, "v_d": True}
 
 
 def to_json(data: ReportData) -> str:
-    r"""Return the page's data as JSON that is safe inside a ``<script>`` element.
+    """Return the page's data as JSON that is safe inside a ``<script>`` element."""
+    return script_json(payload(data))
+
+
+def script_json(value: Any) -> str:
+    r"""Return plain data as JSON that is safe inside a ``<script>`` element.
 
     Every ``<`` is written as ``\u003c``, so that no text in it can close the element or open a
     comment; everything that is not ASCII is escaped, so that lone surrogates (from file names)
     do not break the encoding.
     """
-    text = json.dumps(payload(data), allow_nan=False, separators=(",", ":"))
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
 
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
     s = data.summary
+    drawn = [playback for playback in data.kept if playback.picture is not None]
+    number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
     index: dict[tuple[tuple[str, bytes], ...], int] = {}
     kept = []
@@ -49,7 +57,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         if key not in index:
             index[key] = len(roads)
             roads.append(_road(playback))
-        kept.append(_playback(playback, index[key]))
+        kept.append(_playback(playback, index[key], number.get(playback.name)))
     return {
         "summary": {
             "title": s.title,
@@ -66,6 +74,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         "batches": _batches(data.evaluations),
         "roads": roads,
         "kept": kept,
+        "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
     }
 
 
@@ -134,7 +143,7 @@ def _road(playback: Playback) -> list[dict[str, Any]]:
     ]
 
 
-def _playback(p: Playback, road: int) -> dict[str, Any]:
+def _playback(p: Playback, road: int, picture: int | None) -> dict[str, Any]:
     real = slice(0, p.n_steps)
     contact = p.distance[real] <= 0.0  # before rounding: a miss by 0.1 mm is a miss
     begins = np.flatnonzero(contact & ~np.concatenate([[False], contact[:-1]]))
@@ -149,6 +158,7 @@ def _playback(p: Playback, road: int) -> dict[str, Any]:
         "files": list(p.files),
         "time_step": float(p.time_step),
         "road": road,
+        "picture": picture,
         "entities": [
             {
                 "name": e.name,

@@ -40,6 +40,7 @@ class Player {
     this.scene.show(this.kept);
     this.curves.show(this.kept);
     fillDetails(this.kept);
+    showPicture(this.kept);
     this.seek(this.kept.closest ?? 0, false);
     this.hook.chosen?.(i);
     if (!andPlay) return;

@@ -1,0 +1,60 @@
+"""The picture of an ontology file as a page of its own, violated constraints in red."""
+
+from pathlib import Path
+
+from bridgegen.errors import InputError, StorageError
+from bridgegen.ontology.check import check, constraints_in_words
+from bridgegen.ontology.files import load
+from bridgegen.openx.convert import scenario_of
+from bridgegen.report.page import write_page
+from bridgegen.report.painter import paint
+from bridgegen.report.payload import script_json
+from bridgegen.report.picture_payload import pictures_payload
+
+SCRIPTS = ("common.js", "picture.js", "show.js")
+_OURS = b'<meta name="generator" content="bridgegen show">'
+
+
+def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
+    """Draw an ontology file's individuals as a page.
+
+    An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints, any
+    other against the ranges that it declares itself.
+
+    Args:
+        owl: the file, as written or as somebody edited it.
+        out: the page; by default beside the file, with its name and ``.html``. An earlier picture
+            is replaced, any other file is not.
+
+    Returns:
+        The page, and how many violations it shows.
+
+    Raises:
+        InputError: the page's name does not end in .html.
+        FileFormatError: not an ontology that can be read.
+        OntologyError: it cannot be checked.
+        StorageError: the page cannot be written, or is something else already.
+    """
+    out = out or owl.with_suffix(".html")
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{out}: the picture is a page, its name must end in .html")
+    individuals = load(owl)
+    scenario = scenario_of(individuals)
+    violations = check(individuals, scenario)
+    one = paint(individuals, violations, constraints_in_words(scenario))
+    _refuse_other(out)
+    title = f"{owl.name}: {one.name}" if one.name else owl.name
+    write_page(out, "show.html", SCRIPTS, title, script_json(pictures_payload([one])))
+    return out, len(violations)
+
+
+def _refuse_other(out: Path) -> None:
+    try:
+        with out.open("rb") as file:
+            ours = _OURS in file.read(1000)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise StorageError(f"{out}: the page cannot be written: {error.strerror}") from None
+    if not ours:
+        raise StorageError(f"{out}: exists already, is no picture, and is not overwritten")
