@@ -41,8 +41,8 @@ NEEDED = {
 _CLEARANCE = 0.4
 """Between the boxes of two that start in one lane [m]."""
 
-_ASIDE = 2.0
-"""Two that start this far beside each other in one lane [m] are not in each other's way."""
+_ASIDE = 0.25
+"""Between the sides of two that start beside each other in one lane [m]."""
 
 
 def use_problems(
@@ -161,15 +161,21 @@ def _places(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterat
         a, b = one.start, other.start
         if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):
             continue
-        gap = np.abs(_metres(a.distance, columns) - _metres(b.distance, columns))
-        lengths = BODIES[one.type].length + BODIES[other.type].length
+        body, others = BODIES[one.type], BODIES[other.type]
+        ahead = _metres(a.distance, columns) - _metres(b.distance, columns)
+        ahead = ahead if a.way == "out" else -ahead
         aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
-        near = gap[np.broadcast_to(aside < _ASIDE, gap.shape)] if gap.size > 1 else gap
-        clearance = 0.5 * lengths + _CLEARANCE
-        if near.size and aside.min() < _ASIDE and near.min() < clearance:
+        needed = _CLEARANCE + np.where(
+            ahead >= 0.0, body.rear + others.front, body.front + others.rear
+        )
+        in_the_way = aside < 0.5 * (body.width + others.width) + _ASIDE
+        gap, needed, in_the_way = np.broadcast_arrays(np.abs(ahead), needed, in_the_way)
+        lacking = np.where(in_the_way, needed - gap, -math.inf)
+        worst = int(lacking.argmax())
+        if lacking[worst] > slack(0.0):
             yield (
-                f"{one.name} and {other.name} start {near.min():.3g} m apart on {a}, "
-                f"at least {clearance:g} m is needed ({scenario.place})"
+                f"{one.name} and {other.name} start {gap[worst]:.3g} m apart on {a}, "
+                f"at least {needed[worst]:g} m is needed ({scenario.place})"
             )
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from bridgegen.odd.checks import time_problems, try_out, use_problems
 from bridgegen.odd.constraints import problems_of
 from bridgegen.odd.expression import parse
 from bridgegen.odd.objectives import read_objective
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, read_axes
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, read_axes
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import KNOBS, RoadsSpec
@@ -168,6 +169,31 @@ class _Declarations:
                 except InputError as error:
                     self.problems += error.problems
 
+    def set_defaults(self, document: Document) -> None:
+        """Give included parameters the defaults that the scenario wants."""
+        own = {name for name, _ in entries(document, "parameters")}
+        at_ = {one.name: number for number, one in enumerate(self.parameters)}
+        for key, value in entries(document, "defaults"):
+            place, name = document.at(("defaults", key)), str(key)
+            if name in own:
+                self.problems.append(
+                    f"{name} is this file's own: its default stands there{at(place)}"
+                )
+            elif name not in at_:
+                if name not in self.names:
+                    hint = nearest(name, at_)
+                    self.problems.append(
+                        f"defaults names the unknown parameter '{name}'{hint}{at(place)}"
+                    )
+                else:
+                    self.problems.append(f"{name} is derived: it has no default{at(place)}")
+            elif isinstance(value, int | float) and not isinstance(value, bool):
+                try:
+                    one = self.parameters[at_[name]]
+                    self.parameters[at_[name]] = replace(one, default=float(value), place=place)
+                except InputError as error:
+                    self.problems += error.problems
+
     def _parameter(self, name: str, given: ParameterSection, place: str) -> None:
         values = given.model_dump(exclude={"axis"})
         name = self._prefix + name
@@ -208,6 +234,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     said = _Declarations()
     said.include(document, folder)
     said.take(document)
+    said.set_defaults(document)
     if not said.complete or not isinstance(document.data, dict):
         raise ScenarioError(*problems, *said.problems)  # the rest would only say what follows
     parameters = {one.name: one for one in said.parameters}
@@ -229,7 +256,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     between = bounds_between_layers(roads, story, parameters, said.prefixes, document.place)
     if not quantities.problems:
         said.bounds += between
-    used = quantities.used | roads.parameters
+    used = quantities.used | roads.parameters | {one.name for one in changes.derived}
     problems += said.problems + quantities.problems
     problems += problems_of(said.parameters, said.bounds, said.derived, said.names)
     problems += use_problems(declared | derived, said.bounds, said.names, used, document.place)

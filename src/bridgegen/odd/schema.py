@@ -244,6 +244,7 @@ class ScenarioFile(ShapedSection):
     road_works: dict[str, WorksSection] = {}
     effects: list[EffectSection] = []
     parameters: dict[str, ParameterSection] = {}
+    defaults: dict[str, Number] = {}
     bounds: list[BoundSection] = []
     derived: dict[str, DerivedSection] = {}
     objective: ObjectiveSection

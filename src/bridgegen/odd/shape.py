@@ -4,7 +4,14 @@ import re
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    StringConstraints,
+    ValidationError,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from bridgegen.odd.parameters import nearest
@@ -39,7 +46,10 @@ def _lane() -> PlainValidator:
 
 # Strict, so that "3" is no number and true no 1; an integer is a number, as everywhere.
 Number = Annotated[float, Field(strict=True)]
-Text = Annotated[str, Field(strict=True, min_length=1, max_length=20_000)]
+Text = Annotated[
+    str,
+    StringConstraints(strict=True, strip_whitespace=True, min_length=1, max_length=20_000),
+]
 Word = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
 QuantityField = Annotated[
     float | str, _number_or("the name of a parameter", "[A-Za-z][A-Za-z0-9_]{0,63}")

@@ -40,6 +40,8 @@ class Builder:
             ox.Quad(header, VERSION_INFO, made_with),
         ]
         self.bound: dict[str, set[str]] = {}
+        self._bearers: dict[str, list[ox.NamedNode]] = {}
+        self._free: set[tuple[ox.NamedNode, str]] = set()
         self.named: set[str] = set()
 
     def node(self, name: str, cls: str) -> ox.NamedNode:
@@ -74,6 +76,8 @@ class Builder:
             self.put(node, name, float(value))
             if isinstance(value, Searched):
                 self.bind(node, name, value.parameter)
+            else:
+                self._free.add((node, name))
 
     def count(self, node: ox.NamedNode, name: str, number: int, given: float | None) -> None:
         """State a whole number, bound to the parameter that gives it, if one does."""
@@ -87,6 +91,7 @@ class Builder:
             return
         self.put(node, "has_parameter", self.iri(f"p_{parameter}"))
         self.bound.setdefault(parameter, set()).add(name)
+        self._bearers.setdefault(parameter, []).append(node)
 
     # -- scenario and parameters ---------------------------------------------------------------
 
@@ -99,7 +104,12 @@ class Builder:
         return node
 
     def parameter(self, name: str, parameter: Parameter | Derived) -> ox.NamedNode:
-        """Add a parameter, after all that binds it."""
+        """Add a parameter, after all that binds it.
+
+        Raises:
+            OntologyError: it gives one property of an individual, and another one elsewhere that
+                the same individual has from somewhere else: who reads it would take that for its.
+        """
         derived = isinstance(parameter, Derived)
         node = self.node(f"p_{name}", "DerivedParameter" if derived else "Parameter")
         self.put(node, "has_name", name)
@@ -114,6 +124,14 @@ class Builder:
             self.quantity(node, "has_value", name)
         for property_name in sorted(self.bound[name]):
             self.put(node, "binds_property", property_name)
+        if len(self.bound[name]) > 1:
+            for bearer in self._bearers[name]:
+                for other in sorted(self.bound[name]):
+                    if (bearer, other) in self._free:
+                        raise OntologyError(
+                            f"{name} gives {other} of one individual, so it must give that of "
+                            f"{bearer.value.removeprefix(self.base)}, too"
+                        )
         return node
 
     def explain(self, parameter: str, constraint: str) -> None:

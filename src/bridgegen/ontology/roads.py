@@ -3,7 +3,7 @@
 import pyoxigraph as ox
 
 from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.site import ArmRoad, Direction, Facility, Leg, Site, SiteLane
+from bridgegen.ontology.site import ArmRoad, Direction, Facility, Leg, Searched, Site, SiteLane
 
 _WAYS: tuple[Direction, ...] = ("in", "out")
 _NAMES = {
@@ -77,8 +77,12 @@ def _add_road(builder: Builder, leg: Leg, index: int, road: ArmRoad) -> ox.Named
         put(node, "has_segment", part)
         put(part, "has_index", number)
         quantity(part, "has_length", segment.length)
-        quantity(part, "has_start_curvature", segment.start_curvature)
-        quantity(part, "has_end_curvature", segment.end_curvature)
+        for name, curvature in (
+            ("has_start_curvature", segment.start_curvature),
+            ("has_end_curvature", segment.end_curvature),
+        ):
+            if curvature != 0.0 or isinstance(curvature, Searched):
+                quantity(part, name, curvature)
     for way in _WAYS:
         for rank, lane in enumerate(lanes[way], start=1):
             place = _add_lane(builder, lane, lane_name(leg, index, way, rank), "Lane")

@@ -87,8 +87,8 @@ def _lone_road(individuals: Individuals, name: str) -> OpenDrive:
     bends = tuple(
         (
             individuals.number(node, "has_length"),
-            individuals.number(node, "has_start_curvature"),
-            individuals.number(node, "has_end_curvature"),
+            individuals.optional_number(node, "has_start_curvature") or 0.0,
+            individuals.optional_number(node, "has_end_curvature") or 0.0,
         )
         for node in segments
     )

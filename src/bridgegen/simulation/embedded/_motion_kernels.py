@@ -75,6 +75,12 @@ def duration(shape, dimension, value, before, after):
 
 
 @kernel
+def shifted(x, y, h, aside):
+    """Return the point so far to the left of another one [m]."""
+    return x - aside * math.sin(h), y + aside * math.cos(h)
+
+
+@kernel
 def nearest(path, n, ds, x, y):
     """Return the station of a point's foot on a path, looked for all along it."""
     stride = max(int(SEARCH_STEP / ds), 1)
@@ -89,14 +95,16 @@ def nearest(path, n, ds, x, y):
 
 
 @kernel
-def between(path, n, ds, s, other, other_n, other_ds, guess, shape, u, rate):
+def between(path, n, ds, s, other, other_n, other_ds, guess, shape, u, rate, aside):
     """Return (x, y, h, station on the other path) of a body on its way between two paths.
 
     It leaves ``path``, where it is at station ``s``, for ``other``, where its foot is near
     ``guess``; ``u`` is the share of the change's time or distance that has passed, ``rate`` how
-    much of it passes per metre travelled [1/m], 0 at standstill.
+    much of it passes per metre travelled [1/m], 0 at standstill; ``aside`` is how far it was to
+    the left of ``path`` [m].
     """
     px, py, ph = pose(path, n, ds, s)
+    px, py = shifted(px, py, ph, aside)
     foot, d = project(other, other_n, other_ds, guess, px, py)
     qx, qy, qh = pose(other, other_n, other_ds, foot)
     share, slope = progress(shape, u)

@@ -32,6 +32,7 @@ from bridgegen.simulation.embedded._motion_kernels import (
     nearest,
     progress,
     ramped,
+    shifted,
 )
 
 GRAVITY = 9.81  # m/s²
@@ -44,9 +45,9 @@ SPEED_CHANGE, LANE_CHANGE, FRICTION, LIGHT = 0, 1, 2, 3
 
 @kernel
 def simulate_one(
-    paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
-    conditions, acts, events, actions, first_states, friction_slot, driver, dt, x, y, h, v, a,
-    offset, lights,
+    paths, path_n, path_ds, zones, station0, aside0, points, slots, bodies, init, triggers,
+    groups, conditions, acts, events, actions, first_states, friction_slot, driver, dt,
+    x, y, h, v, a, offset, lights,
 ):  # fmt: skip
     """Fill one scenario's ``(E, T)`` arrays; return (n_steps, status)."""
     n_entities, n_steps = x.shape
@@ -57,7 +58,7 @@ def simulate_one(
     action_ended = np.zeros(actions.shape[0], dtype=np.bool_)
     travelled = np.zeros(n_entities)
     stood = np.zeros(n_entities)
-    station = station0.copy()
+    station, aside = station0.copy(), aside0.copy()
     on = np.arange(n_entities)  # the path that a body is on …
     to = np.full(n_entities, -1)  # … the one that it changes to, if any …
     foot = np.zeros(n_entities)  # … and its station there
@@ -84,6 +85,7 @@ def simulate_one(
             lights[:] = 0
             return 1, OFF_ROUTE
         x[e, 0], y[e, 0], h[e, 0] = pose(paths[e], path_n[e], path_ds[e], station[e])
+        x[e, 0], y[e, 0] = shifted(x[e, 0], y[e, 0], h[e, 0], aside[e])
         command[e] = target[e] = v[e, 0] = min(slots[init[e]], bodies[e, 3])
         offset[e, 0] = 0.0
     ego_end = (path_n[0] - 1) * path_ds[0]
@@ -153,7 +155,7 @@ def simulate_one(
                     q = actions[j, 6]
                     if to[e] >= 0:  # it goes on from where it is: on the way to the other lane
                         action_ended[lane_action[e]] = True
-                        on[e], station[e] = to[e], foot[e]
+                        on[e], station[e], aside[e] = to[e], foot[e], 0.0
                     to[e] = q
                     foot[e] = nearest(paths[q], path_n[q], path_ds[q], x[e, k], y[e, k])
                     fx, fy, _ = pose(paths[q], path_n[q], path_ds[q], foot[e])
@@ -216,7 +218,9 @@ def simulate_one(
             offset[e, k + 1] = 0.0
             q = to[e]
             if q < 0:
-                x[e, k + 1], y[e, k + 1], h[e, k + 1] = pose(paths[p], path_n[p], path_ds[p], ahead)
+                px, py, ph = pose(paths[p], path_n[p], path_ds[p], ahead)
+                x[e, k + 1], y[e, k + 1] = shifted(px, py, ph, aside[e])
+                h[e, k + 1] = ph
                 continue
             j = lane_action[e]
             if actions[j, 3] == DISTANCE:
@@ -227,10 +231,10 @@ def simulate_one(
                 per_metre = 1.0 / (lane_lasts[e] * command[e]) if command[e] > 0.1 else 0.0
             x[e, k + 1], y[e, k + 1], h[e, k + 1], foot[e] = between(
                 paths[p], path_n[p], path_ds[p], ahead, paths[q], path_n[q], path_ds[q],
-                foot[e] + step, actions[j, 2], u, per_metre,
+                foot[e] + step, actions[j, 2], u, per_metre, aside[e],
             )  # fmt: skip
             if u >= 1.0:
-                on[e], station[e], to[e] = q, foot[e], -1
+                on[e], station[e], to[e], aside[e] = q, foot[e], -1, 0.0
                 action_ended[j] = True
         if not (math.isfinite(nx) and math.isfinite(ny) and math.isfinite(nh)):
             status = NOT_FINITE
@@ -250,16 +254,16 @@ def simulate_one(
 
 @kernel
 def simulate_rows(
-    network, paths, path_n, path_ds, zones, station0, points, slots, bodies, init, triggers, groups,
-    conditions, acts, events, actions, first_states, friction_slot, driver, dt,
+    network, paths, path_n, path_ds, zones, station0, aside0, points, slots, bodies, init,
+    triggers, groups, conditions, acts, events, actions, first_states, friction_slot, driver, dt,
     x, y, h, v, a, offset, lights, n_steps, status,
 ):  # fmt: skip
     """Fill the batch's ``(N, E, T)`` arrays, row by row; ``network`` tells each row's roads."""
     for i in range(slots.shape[0]):
         p = network[i]
         n_steps[i], status[i] = simulate_one(
-            paths[p], path_n[p], path_ds[p], zones[p], station0[i], points[p], slots[i], bodies,
-            init, triggers, groups, conditions, acts, events, actions, first_states, friction_slot,
-            driver, dt,
+            paths[p], path_n[p], path_ds[p], zones[p], station0[i], aside0[i], points[p],
+            slots[i], bodies, init, triggers, groups, conditions, acts, events, actions,
+            first_states, friction_slot, driver, dt,
             x[i], y[i], h[i], v[i], a[i], offset[i], lights[i],
         )  # fmt: skip

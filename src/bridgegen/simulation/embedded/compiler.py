@@ -8,6 +8,7 @@ from bridgegen.ego import DRIVERS, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl import TIME_STEP
+from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -88,6 +89,7 @@ class _Compiler:
             self.tables.slot(path.start.s) if isinstance(path, AlongLanes) else -1
             for path in self.paths
         ]
+        aside_slots = [self._aside_slot(path) for path in self.paths]
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
         acts, events = self._stories(storyboard)
@@ -108,6 +110,7 @@ class _Compiler:
             init=np.array(init, dtype=np.int64),
             paths=tuple(self.paths),
             start_slots=np.array(start_slots, dtype=np.int64),
+            aside_slots=np.array(aside_slots, dtype=np.int64),
             triggers=table(self.triggers.triggers, 2),
             groups=table(self.triggers.groups, 2),
             conditions=table(self.triggers.conditions, 7),
@@ -121,7 +124,14 @@ class _Compiler:
             driver=driver or self._declared_driver(),
             time_step=step,
             n_steps=n_steps,
+            fixed=self.tables.fixed,
         )
+
+    def _aside_slot(self, path: PathSpec) -> int:
+        """Return the slot of how far who is on a path is beside it; -1 if that is a number."""
+        if not isinstance(path, AlongLanes) or not isinstance(path.aside, osc.ParameterRef | Expr):
+            return -1
+        return self.tables.slot(path.aside)
 
     def _declared_time_step(self) -> float:
         properties = self.scenario.file_header.properties
@@ -189,8 +199,8 @@ class _Compiler:
             if road is not None:
                 friction = self.tables.slot(road.friction_scale_factor)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
-        starts: dict[str, tuple[Point, float]] = {}
-        routes: dict[str, tuple[LanePoint, ...]] = dict.fromkeys(self.tables.names, ())
+        starts: dict[str, tuple[Point, Value]] = {}
+        routes: dict[str, tuple[osc.Waypoint, ...]] = dict.fromkeys(self.tables.names, ())
         tracks: dict[str, AlongTrajectory] = {}
         for private in actions.privates:
             name = str(private.entity_ref)
@@ -198,6 +208,8 @@ class _Compiler:
                 action = wrapped.action
                 if isinstance(action, osc.TeleportAction):
                     point, aside = self.tables.point(action.position)
+                    if name == self.tables.names[0]:  # the ego's driver keeps to its path
+                        aside = self.tables.literal(action.position.position, "offset", aside)
                     if point is not None:
                         starts[name] = point, aside
                 elif isinstance(action, osc.LongitudinalAction):
@@ -210,10 +222,7 @@ class _Compiler:
                 elif isinstance(action.action, osc.FollowTrajectoryAction):
                     tracks[name] = self._trajectory(action.action)
                 else:
-                    points = [
-                        self.tables.lane_point(w.position) for w in action.action.route.waypoints
-                    ]
-                    routes[name] = tuple(point for point in points if point is not None)
+                    routes[name] = action.action.route.waypoints
         missing = [name for name in self.tables.names if name not in starts]
         if missing and not self.tables.problems:
             raise InputError(
@@ -229,7 +238,9 @@ class _Compiler:
             if name in tracks:
                 self.paths.append(tracks[name])
             elif isinstance(point, LanePoint):
-                self.paths.append(AlongLanes(point, routes[name], aside))
+                via = [self.tables.lane_point(one.position, aside) for one in routes[name]]
+                known = tuple(one for one in via if one is not None)
+                self.paths.append(AlongLanes(point, known, aside))
             else:
                 self.tables.problems.append(
                     f"{self.place}, line {point.line}: a WorldPosition is supported for an entity "
@@ -251,7 +262,10 @@ class _Compiler:
         for vertex in trajectory.shape.shape.vertices:
             point, aside = self.tables.point(vertex.position)
             if isinstance(point, LanePoint):
-                point = LanePoint(point.road, point.lane, point.s, point.line, aside)
+                where = vertex.position.position
+                s = self.tables.literal(where, "s", point.s)
+                aside = self.tables.literal(where, "offset", aside)
+                point = LanePoint(point.road, point.lane, s, point.line, aside)
             if point is not None:
                 points.append(point)
         return AlongTrajectory(tuple(points), action.line)

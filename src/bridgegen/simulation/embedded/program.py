@@ -49,12 +49,12 @@ class AlongLanes:
     Attributes:
         start: where on the first lane.
         via: the waypoints of the route; empty: on along the lane, while there is one way only.
-        aside: of the lanes' centre, left positive [m].
+        aside: of the lanes' centre, left of the road's direction positive [m].
     """
 
     start: LanePoint
     via: tuple[LanePoint, ...]
-    aside: float = 0.0
+    aside: Value = 0.0
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,8 @@ class Program:
         init: ``(E,)`` slot of each entity's initial speed.
         paths: K ≥ E ways: entity e starts on path e; the others are where lane changes lead.
         start_slots: ``(E,)`` slot of each start's s; -1 where the path starts with the entity.
+        aside_slots: ``(E,)`` slot of how far each is aside of its lane's centre; -1 where rows
+            do not vary that.
         triggers: ``(·, 2)`` first and past-the-last group; trigger 0 stops the scenario.
         groups: ``(·, 2)`` first and past-the-last condition.
         conditions: ``(C, 7)`` kind, entity, other entity, rule, slot, edge, delay in steps.
@@ -113,6 +115,7 @@ class Program:
         driver: who drives the ego.
         time_step: [s].
         n_steps: recorded instants at most.
+        fixed: parameters that rows may not vary, and what they are used for.
     """
 
     place: str
@@ -123,6 +126,7 @@ class Program:
     init: Int
     paths: tuple[PathSpec, ...]
     start_slots: Int
+    aside_slots: Int
     triggers: Int
     groups: Int
     conditions: Int
@@ -136,6 +140,20 @@ class Program:
     driver: Driver
     time_step: float
     n_steps: int
+    fixed: Mapping[str, str]
+
+    @cached_property
+    def nominal_aside(self) -> Float:
+        """``(E,)`` [m]: how far each is aside of its lane's centre by the declared values."""
+        chosen = [self.slots[slot] if slot >= 0 else 0.0 for slot in self.aside_slots]
+        return np.array(
+            [
+                float(one.resolve(self.parameters))
+                if isinstance(one, osc.ParameterRef | Expr)
+                else 0.0
+                for one in chosen
+            ]
+        )
 
     @cached_property
     def box(self) -> Float:
@@ -150,9 +168,16 @@ class Program:
             n_rows: N.
 
         Raises:
-            InputError: an expression that has no finite value.
+            InputError: an expression that has no finite value, or a value for a parameter that
+                rows may not vary.
         """
         columns: dict[str, Float] = {}
+        for name, use in self.fixed.items():
+            if name in values and np.any(np.asarray(values[name]) != self.parameters[name]):
+                raise InputError(
+                    f"{self.place}: parameter '{name}' is used for {use}, which must be the same "
+                    f"in every row: {self.parameters[name]:g}"
+                )
         for name, declared in self.parameters.items():
             given = np.asarray(values.get(name, declared), dtype=np.float64)
             columns[name] = np.ascontiguousarray(np.broadcast_to(given, n_rows))

@@ -66,13 +66,16 @@ class EmbeddedSimulator:
         a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
         at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
         station = np.ascontiguousarray(a + b * at)
+        a, b = roads.aside[rows, :, 0], roads.aside[rows, :, 1]
+        varied = program.aside_slots >= 0
+        aside = np.where(varied, a + b * slots[:, np.maximum(program.aside_slots, 0)], 0.0)
         shape = (n, len(program.names), program.n_steps)
         x, y, h, v, acceleration, offset = (np.empty(shape) for _ in range(6))
         lights = np.empty((n, len(program.lights), program.n_steps), dtype=np.int8)
         n_steps, status = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int8)
         simulate_rows(
-            rows, roads.paths, roads.counts, roads.steps, roads.zones, station, roads.points,
-            slots, program.bodies, program.init, program.triggers, program.groups,
+            rows, roads.paths, roads.counts, roads.steps, roads.zones, station, aside,
+            roads.points, slots, program.bodies, program.init, program.triggers, program.groups,
             program.conditions, program.acts, program.events, program.actions,
             program.first_states, program.friction_slot, program.driver.code, program.time_step,
             x, y, h, v, acceleration, offset, lights, n_steps, status,

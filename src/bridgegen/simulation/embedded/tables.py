@@ -21,6 +21,7 @@ class Tables:
         names: their names.
         parameters: the numeric parameters with their declared values.
         problems: what the rollout cannot do, a sentence each.
+        fixed: parameters that rows may not vary, and what they are used for.
     """
 
     def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
@@ -30,6 +31,7 @@ class Tables:
         self.names = tuple(str(one.name) for one in self.objects)
         self.parameters = numbers(scenario)
         self.problems: list[str] = []
+        self.fixed: dict[str, str] = {}
         self._slots: dict[tuple[type, Value], int] = {}
 
     @property
@@ -52,30 +54,34 @@ class Tables:
         self.problems.append(f"{self.place}{line}: {what} is not supported")
 
     def literal(self, element: Element, name: str, value: Value) -> float:
-        """Return a number that rows may not vary."""
+        """Return a number that rows may not vary: parameters keep their declared values."""
         if isinstance(value, osc.ParameterRef | Expr):
-            if isinstance(value, osc.ParameterRef) and value.name in self.parameters:
-                return self.parameters[value.name]
-            self.unsupported(element, f'{name}="{value}" (a number is needed)')
-            return 0.0
+            line = f" (line {element.line})" if element.line else ""
+            self.fixed |= dict.fromkeys(value.names, f'{name}="{value}"{line}')
+        return self.declared(value)
+
+    def declared(self, value: Value) -> float:
+        """Return what a value is by the declared values of the parameters."""
+        if isinstance(value, osc.ParameterRef | Expr):
+            return float(value.resolve(self.parameters))
         return float(value)
 
-    def point(self, position: osc.Position) -> tuple[Point | None, float]:
+    def point(self, position: osc.Position) -> tuple[Point | None, Value]:
         """Return a position and how far it is aside of its lane's centre [m]."""
         where = position.position
         if isinstance(where, osc.WorldPosition):
             x, y = (self.literal(where, name, getattr(where, name)) for name in ("x", "y"))
             return WorldPoint(x, y, where.line), 0.0
-        return self._on_lane(where), self.literal(where, "offset", where.offset or 0.0)
+        return self._on_lane(where), where.offset or 0.0
 
-    def lane_point(self, position: osc.Position) -> LanePoint | None:
-        """Return a position that is a plain point on a lane; others are not supported."""
+    def lane_point(self, position: osc.Position, aside: Value = 0.0) -> LanePoint | None:
+        """Return a position on a lane, ``aside`` of its centre; others are not supported."""
         where = position.position
         if not isinstance(where, osc.LanePosition):
             self.unsupported(where, f"{type(where).__name__} here")
             return None
-        if where.offset is not None and where.offset != 0.0:
-            self.unsupported(where, f'offset="{where.offset}" (other than 0)')
+        if where.offset not in (None, 0.0, aside):
+            self.unsupported(where, f'offset="{where.offset}" (other than {aside})')
         return self._on_lane(where)
 
     def _on_lane(self, where: osc.LanePosition) -> LanePoint | None:

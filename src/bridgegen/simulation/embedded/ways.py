@@ -11,7 +11,7 @@ from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Route, Stretch, next_stretches, plan_route
-from bridgegen.openx.openscenario.values import Expr, ParameterRef
+from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -35,6 +35,7 @@ class Ways:
             [1/m].
         steps: per path the distance between two samples [m].
         station: per path a, b: who starts at s on the first road starts a + b·s along it.
+        sides: per path 1 where it leads along its first road, -1 against it; 0 on a trajectory.
 
     Raises:
         InputError: a position that is not on a road, or a way that no lane leads along.
@@ -46,6 +47,7 @@ class Ways:
         self.tables: list[Float] = []
         self.steps: list[float] = []
         self.station: list[tuple[float, float]] = []
+        self.sides: list[int] = []
         for number, spec in enumerate(program.paths):
             who = program.names[number] if number < len(program.names) else f"path {number}"
             try:
@@ -54,16 +56,18 @@ class Ways:
                 elif isinstance(spec, AlongLanes):
                     route = self._along(spec)
                     start = _known(program, spec.start)
-                    side = model.road(spec.start.road).direction(spec.start.lane)
-                    self._add(route, route.station(*start), spec.aside * side)
+                    self.sides.append(model.road(spec.start.road).direction(spec.start.lane))
+                    aside = _declared(program, spec.aside) * self.sides[-1]
+                    self._add(route, route.station(*start), aside)
                 else:
+                    self.sides.append(0)
                     self._add(self._beside(spec), (0.0, 0.0), 0.0)
             except InputError as error:
                 raise InputError(f"{program.place}: route of '{who}': {error}") from None
 
     def _add(self, route: Route, station: tuple[float, float], aside: float) -> None:
         table, step = _sampled(route)
-        if aside:
+        if aside != 0.0:
             table = _shifted(table, aside)
         self._routes.append(route)
         self.tables.append(table)
@@ -103,10 +107,9 @@ class Ways:
             first = (road_id, lane_id, s)  # its lane may not reach back to the road's end
         end = model.road(last.road_id)
         forward = end.direction(last.lane_id) > 0
-        low = end.sections[last.section].s
-        high = (
-            end.sections[last.section + 1].s if last.section + 1 < len(end.sections) else end.length
-        )
+        low, high = end.sections[last.section].s, end.length
+        if last.section + 1 < len(end.sections):  # the lane ends on the road: its last place
+            high = math.nextafter(end.sections[last.section + 1].s, low)
         return plan_route(model, first, [], (last.road_id, last.lane_id, high if forward else low))
 
     def _beside(self, spec: BesideLanes) -> Route:
@@ -150,6 +153,7 @@ class Ways:
         self.tables.append(np.stack(tables, axis=1))
         self.steps.append(step)
         self.station.append((0.0, 0.0))
+        self.sides.append(0)
 
 
 def position(program: Program, model: OpenDrive, point: LanePoint) -> tuple[float, float]:
@@ -167,8 +171,6 @@ def _position(program: Program, model: OpenDrive, point: Point) -> tuple[float, 
     if not isinstance(point, LanePoint):
         return point.x, point.y
     road_id, s = _known(program, point)
-    if isinstance(point.s, ParameterRef | Expr):
-        raise InputError(f"a trajectory's s must be a number, got {point.s} (line {point.line})")
     road = model.road(road_id)
     pose = lane_pose(road, point.lane, s)
     aside = point.aside * road.direction(point.lane)  # its sign is the road's, the pose the lane's
@@ -188,9 +190,13 @@ def _place(program: Program, point: LanePoint) -> tuple[str, int, float]:
 
 def _known(program: Program, point: LanePoint) -> tuple[str, float]:
     """Return the point's road and its s by the declared values of the parameters."""
-    if isinstance(point.s, ParameterRef | Expr):
-        return point.road, float(point.s.resolve(program.parameters))
-    return point.road, float(point.s)
+    return point.road, _declared(program, point.s)
+
+
+def _declared(program: Program, value: Value) -> float:
+    if isinstance(value, ParameterRef | Expr):
+        return float(value.resolve(program.parameters))
+    return float(value)
 
 
 def _sampled(route: Route) -> tuple[Float, float]:
