@@ -64,7 +64,7 @@ class Curves {
     c.clip();
     this.drawLine(c, kept.distance, x, (v) => y(0, v), palette.ink, []);
     c.restore();
-    kept.v.forEach((row, e) => this.drawLine(c, row, x, (v) => y(1, v), entityColour(e), DASHES[e % DASHES.length]));
+    playersOf(kept).forEach((e) => this.drawLine(c, kept.v[e], x, (v) => y(1, v), entityColour(e), DASHES[e % DASHES.length]));
     this.drawCursor(c, state, x, y, panels);
     this.drawMarks(c, x, y, panels);
     this.drawHeadings(c, state, left, right, panels);
@@ -177,7 +177,7 @@ class Curves {
       c.stroke();
     };
     dot(state.distance, 0, palette.ink);
-    state.entities.forEach((s, e) => dot(s.v, 1, entityColour(e)));
+    playersOf(this.kept).forEach((e) => dot(state.entities[e].v, 1, entityColour(e)));
   }
 
   // The panels' titles, with the legend and the values of this instant.
@@ -191,7 +191,7 @@ class Curves {
     c.fillStyle = palette.ink;
     c.fillText(state.distance === null ? "–" : state.distance.toFixed(2), right, panels[0][0] - 14);
     let end = right;
-    for (let e = state.entities.length - 1; e >= 0; e--) {
+    for (const e of playersOf(this.kept).toReversed()) {
       const text = `${state.entities[e].name} ${measured(state.entities[e].v, "m/s", 2)}`;
       const y = panels[1][0] - 14, w = c.measureText(text).width;
       c.fillStyle = palette.ink;

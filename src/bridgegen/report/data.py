@@ -8,11 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
 
+import numpy as np
+import numpy.typing as npt
+
 from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.report.picture import Picture
 
-AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median"})
-LINE_KINDS = frozenset({"edge", "solid", "broken", "centre", "stop", "route"})
+AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median", "stripe"})
+LINE_KINDS = frozenset({"edge", "solid", "broken", "centre", "stop", "route", "sign"})
 
 
 @dataclass(frozen=True)
@@ -142,19 +145,21 @@ class Evaluations:
 
 @dataclass(frozen=True)
 class Entity:
-    """A body on the road; its position is the rear axle's centre.
+    """A body on the road; its position is its reference point, the rear axle's of a vehicle.
 
     Attributes:
         name: "ego", "bv" …
         length: box length [m].
         width: box width [m].
-        center_ahead: how far the box's centre lies ahead of the rear axle [m].
+        center_ahead: how far the box's centre lies ahead of the reference point [m].
+        type: what it is: "car", "truck", "bicycle", "pedestrian", "cone" …
     """
 
     name: str
     length: float
     width: float
     center_ahead: float
+    type: str = "car"
 
     def __post_init__(self) -> None:
         if not (0.0 < self.length < inf and 0.0 < self.width < inf and isfinite(self.center_ahead)):
@@ -165,13 +170,31 @@ class Entity:
 
 
 @dataclass(frozen=True)
+class Lamp:
+    """A traffic light and what it shows.
+
+    Attributes:
+        x: [m].
+        y: [m].
+        h: the direction of the traffic that it is for [rad].
+        states: ``(T,)``: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
+    """
+
+    x: float
+    y: float
+    h: float
+    states: npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True)
 class Outline:
     """One polyline of the road's picture.
 
     Attributes:
         kind: an area (closed by itself, filled): one of ``AREA_KINDS``; or a line: "edge" (border
             of the asphalt), "solid" and "broken" (between lanes of one direction), "centre"
-            (between the directions), "stop" (stop line), "route" (where an entity wants to go).
+            (between the directions), "stop" (stop line), "sign" (seen from above), "route" (where
+            an entity wants to go).
         points: ``(n, 2)`` float64 [m], n ≥ 2, x east and y north, in the entities' frame.
     """
 
@@ -211,6 +234,7 @@ class Playback:
         n_steps: in 1..T, how many instants are real.
         files: paths of its files relative to the page ("critical/0001.xosc").
         picture: its individuals in five columns, if they are to be shown.
+        lamps: the traffic lights.
     """
 
     name: str
@@ -230,6 +254,7 @@ class Playback:
     n_steps: int
     files: tuple[str, ...] = ()
     picture: Picture | None = None
+    lamps: tuple[Lamp, ...] = ()
 
     def __post_init__(self) -> None:
         place = f"playback '{self.name}'"

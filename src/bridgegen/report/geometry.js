@@ -49,4 +49,30 @@ function stateAt(kept, position) {
   };
 }
 
+// The bodies that are named and have a curve: the ego, all that move, and who is nearest at the end.
+// Of a row of cones or of parked cars the others are scenery.
+function playersOf(kept) {
+  if (kept.players) return kept.players;
+  kept.players = kept.entities.map((_, e) => (e === 0 || kept.v[e].some((v) => v > 0.05) ? e : -1)).filter((e) => e >= 0);
+  if (kept.closest !== null) {
+    const state = stateAt(kept, kept.closest), near = nearestTo(kept, state);
+    if (near && !kept.players.includes(near.entity)) kept.players.push(near.entity);
+  }
+  return kept.players;
+}
+
+// The entity nearest to the ego, and the two nearest points of their boxes.
+function nearestTo(kept, state) {
+  const [ego, ...others] = state.entities;
+  if (!isPlaced(ego)) return null;
+  const corners = boxCorners(kept.entities[0], ego.x, ego.y, ego.h);
+  let best = null;
+  others.forEach((s, i) => {
+    if (!isPlaced(s)) return;
+    const found = nearestPoints(corners, boxCorners(kept.entities[i + 1], s.x, s.y, s.h));
+    if (!best || found.distance < best.distance) best = { ...found, entity: i + 1 };
+  });
+  return best;
+}
+
 const isPlaced = (state) => state.x !== null && state.y !== null && state.h !== null;

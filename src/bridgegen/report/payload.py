@@ -12,7 +12,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.report import convergence, sentences
-from bridgegen.report.data import Column, Evaluations, Playback, ReportData
+from bridgegen.report.data import Column, Evaluations, Lamp, Playback, ReportData
 from bridgegen.report.picture_payload import pictures_payload
 
 DIGITS = 5
@@ -165,9 +165,11 @@ def _playback(p: Playback, road: int, picture: int | None) -> dict[str, Any]:
                 "length": float(e.length),
                 "width": float(e.width),
                 "center_ahead": float(e.center_ahead),
+                "type": e.type,
             }
             for e in p.entities
         ],
+        "lamps": [_lamp(lamp, p.n_steps) for lamp in p.lamps],
         "x": [decimals(row[real], MILLIMETRE) for row in p.x],
         "y": [decimals(row[real], MILLIMETRE) for row in p.y],
         "h": [decimals(row[real], ANGLE) for row in p.h],
@@ -175,6 +177,18 @@ def _playback(p: Playback, road: int, picture: int | None) -> dict[str, Any]:
         "distance": decimals(p.distance[real], MILLIMETRE),
         "closest": int(finite.argmin()) if np.isfinite(finite).any() else None,
         "contacts": begins.tolist(),
+    }
+
+
+def _lamp(lamp: Lamp, n_steps: int) -> dict[str, Any]:
+    """Return a light with the steps at which it changes, and to what."""
+    states = lamp.states[:n_steps]
+    changes = [0, *(np.flatnonzero(np.diff(states)) + 1).tolist()]
+    return {
+        "x": round(float(lamp.x), MILLIMETRE),
+        "y": round(float(lamp.y), MILLIMETRE),
+        "h": round(float(lamp.h), ANGLE),
+        "changes": [[k, int(states[k])] for k in changes],
     }
 
 

@@ -1,10 +1,16 @@
 // The bird's-eye view: road, vehicles, trails, on a canvas; x to the right, y up, in metres.
 
-const AREAS = { driving: "asphalt", junction: "asphalt", shoulder: "asphalt-2", sidewalk: "asphalt-2", median: "ground" };
+const AREAS = { driving: "asphalt", junction: "asphalt", shoulder: "asphalt-2", sidewalk: "asphalt-2", median: "ground", stripe: "marking" };
 const LINES = { // colour, width [m], dashes [m]
   edge: ["marking", 0.14, []], solid: ["marking", 0.14, []], broken: ["marking", 0.14, [3, 3]],
   centre: ["marking", 0.2, []], stop: ["stop", 0.45, []], route: ["accent", 0.12, [1, 1]],
+  sign: ["hit", 0.3, []],
 };
+
+const SMALL = { pedestrian: "person", animal: "person", bicycle: "cycle", motorcycle: "cycle", cone: "cone", sign: "sign", obstacle: "thing" };
+const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
+  { at: 2.2, lit: [1, 2], colour: "#ff4d4d" }, { at: 0, lit: [2, 3], colour: "#ffd23f" }, { at: -2.2, lit: [4], colour: "#38d39f" },
+];
 
 function overlap([ax0, ay0, ax1, ay1], [bx0, by0, bx1, by1]) {
   return Math.max(0, Math.min(ax1, bx1) - Math.max(ax0, bx0)) * Math.max(0, Math.min(ay1, by1) - Math.max(ay0, by0));
@@ -34,7 +40,7 @@ class Scene {
   }
 
   fit() {
-    this.view.fit(this.centres.flat().filter(Boolean));
+    this.view.fit(playersOf(this.kept).flatMap((e) => this.centres[e]).filter(Boolean));
   }
 
   draw(state) {
@@ -50,6 +56,7 @@ class Scene {
     c.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * (width / 2 - x * scale), ratio * (height / 2 + y * scale));
     c.lineJoin = "round";
     this.drawRoad(c, scale);
+    this.drawLamps(c, state.index, scale);
     state.entities.forEach((_, e) => this.drawTrail(c, e, state.index, scale));
     this.drawGhosts(c, state, scale);
     state.entities.forEach((s, e) => { if (isPlaced(s)) this.drawBody(c, this.kept.entities[e], s, entityColour(e), scale); });
@@ -112,6 +119,11 @@ class Scene {
     c.save();
     c.translate(...boxCentre(entity, state.x, state.y, state.h));
     c.rotate(state.h);
+    if (entity.type in SMALL) {
+      this.drawSmall(c, entity, colour, scale);
+      c.restore();
+      return;
+    }
     c.beginPath();
     if (c.roundRect && scale > 3) c.roundRect(-length / 2, -width / 2, length, width, width * 0.22);
     else c.rect(-length / 2, -width / 2, length, width);
@@ -135,6 +147,57 @@ class Scene {
     c.restore();
   }
 
+  // People, cycles and things: seen from afar they are a few pixels, so they are told by their shape.
+  drawSmall(c, { type, length, width }, colour, scale) {
+    const shape = SMALL[type], half = Math.max(0.5 * Math.max(length, width), 2.5 / scale);
+    c.beginPath();
+    if (shape === "person" || shape === "cone") c.arc(0, 0, half, 0, 2 * Math.PI);
+    else if (shape === "cycle") c.ellipse(0, 0, Math.max(length / 2, half), Math.max(width / 2, 2 / scale), 0, 0, 2 * Math.PI);
+    else c.rect(-Math.max(length / 2, 1.5 / scale), -half, Math.max(length, 3 / scale), 2 * half);
+    c.fillStyle = shape === "cone" || shape === "sign" ? palette.cone : colour;
+    c.fill();
+    c.lineWidth = 1.2 / scale;
+    c.strokeStyle = palette.marking;
+    c.stroke();
+    if (shape === "cone") {
+      c.beginPath();
+      c.arc(0, 0, half * 0.45, 0, 2 * Math.PI);
+      c.fillStyle = palette.marking;
+      c.fill();
+    } else if (shape === "person" || shape === "cycle") {
+      c.beginPath();
+      c.arc(0, 0, half * (shape === "person" ? 0.5 : 0.3), 0, 2 * Math.PI);
+      c.fillStyle = "rgba(8, 16, 26, 0.62)";
+      c.fill();
+    }
+  }
+
+  // A housing beside the lane, red farthest ahead; the place of the lamp that is lit tells as much as its colour.
+  drawLamps(c, index, scale) {
+    for (const lamp of this.kept.lamps) {
+      const state = lamp.changes.reduce((now, [k, to]) => (k <= index ? to : now), 0);
+      const r = Math.max(0.45, 3.2 / scale);
+      c.save();
+      c.translate(lamp.x, lamp.y);
+      c.rotate(lamp.h);
+      c.fillStyle = "#10161d";
+      c.strokeStyle = palette.marking;
+      c.lineWidth = 1 / scale;
+      c.beginPath();
+      if (c.roundRect) c.roundRect(-3.6 * r, -1.3 * r, 7.2 * r, 2.6 * r, 1.2 * r);
+      else c.rect(-3.6 * r, -1.3 * r, 7.2 * r, 2.6 * r);
+      c.fill();
+      c.stroke();
+      LAMPS.forEach(({ at, lit, colour }) => {
+        c.beginPath();
+        c.arc(at * r, 0, 0.85 * r, 0, 2 * Math.PI);
+        c.fillStyle = lit.includes(state) ? colour : "#3a434e";
+        c.fill();
+      });
+      c.restore();
+    }
+  }
+
   // Where both stood at the smallest gap, as dashed outlines.
   drawGhosts(c, state, scale) {
     const k = this.kept.closest;
@@ -143,7 +206,7 @@ class Scene {
     c.setLineDash([4 / scale, 3 / scale]);
     c.strokeStyle = palette.marking;
     stateAt(this.kept, k).entities.forEach((s, e) => {
-      if (!isPlaced(s)) return;
+      if (!isPlaced(s) || !playersOf(this.kept).includes(e)) return;
       c.beginPath();
       boxCorners(this.kept.entities[e], s.x, s.y, s.h).forEach((p, i) => c[i ? "lineTo" : "moveTo"](...p));
       c.closePath();
@@ -152,22 +215,8 @@ class Scene {
     c.setLineDash([]);
   }
 
-  // The entity nearest to the ego, and the two nearest points of their boxes.
-  nearest(state) {
-    const [ego, ...others] = state.entities;
-    if (!isPlaced(ego)) return null;
-    const corners = boxCorners(this.kept.entities[0], ego.x, ego.y, ego.h);
-    let best = null;
-    others.forEach((s, i) => {
-      if (!isPlaced(s)) return;
-      const found = nearestPoints(corners, boxCorners(this.kept.entities[i + 1], s.x, s.y, s.h));
-      if (!best || found.distance < best.distance) best = { ...found, entity: i + 1 };
-    });
-    return best;
-  }
-
   drawGap(c, state) {
-    const gap = this.nearest(state);
+    const gap = nearestTo(this.kept, state);
     if (!gap || !(state.distance > 0) || state.distance > 20) return;
     const from = this.view.toScreen(gap.from), to = this.view.toScreen(gap.to);
     c.strokeStyle = palette.ink;
@@ -186,7 +235,7 @@ class Scene {
   drawContacts(c, state) {
     for (const k of this.kept.contacts) {
       if (k > state.index) continue;
-      const gap = this.nearest(stateAt(this.kept, k));
+      const gap = nearestTo(this.kept, stateAt(this.kept, k));
       if (!gap) continue;
       const [x, y] = this.view.toScreen([(gap.from[0] + gap.to[0]) / 2, (gap.from[1] + gap.to[1]) / 2]);
       const r = 8;
@@ -220,8 +269,9 @@ class Scene {
     const seen = middles.filter(Boolean);
     const hub = [0, 1].map((i) => seen.reduce((sum, p) => sum + p[i], 0) / seen.length);
     c.font = FONT;
+    const players = playersOf(this.kept);
     state.entities.forEach((s, e) => {
-      if (!bodies[e]) return;
+      if (!bodies[e] || !players.includes(e)) return;
       const text = `${s.name}  ${measured(s.v, "m/s", 2)} m/s`;
       const w = c.measureText(text).width + 14, h = 20, [mx, my] = middles[e], [x0, y0, x1, y1] = bodies[e];
       const away = seen.length > 1 ? Math.atan2(my - hub[1], mx - hub[0]) : -Math.PI / 2;

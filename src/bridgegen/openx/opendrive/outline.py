@@ -10,17 +10,22 @@ from bridgegen.arrays import Float
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.lanes import borders, breaks, points, section_end
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
+from bridgegen.openx.opendrive.outline_furniture import crosswalk_stripes, signs, stop_lines
 from bridgegen.openx.opendrive.plan_view import Line
 from bridgegen.openx.opendrive.references import contacts
 
-AREAS = ("driving", "junction", "shoulder", "sidewalk", "median")
-"""Kinds that are areas; the last point is joined to the first."""
+AREAS = ("driving", "junction", "shoulder", "sidewalk", "median", "stripe")
+"""Kinds that are areas; the last point is joined to the first. A stripe is a crosswalk's."""
 
-LINES = ("edge", "solid", "broken", "centre", "stop")
+LINES = ("edge", "solid", "broken", "centre", "stop", "sign")
 """Kinds that are lines: the border of what cars drive on; between lanes of one direction;
-between the directions; across the lanes into a junction."""
+between the directions; across the lanes into a junction; a sign as it looks from above."""
 
 Shape = tuple[str, Float]
+
+_WAIT = ("205", "206")  # signs: give way, stop (VzKat)
+_NEAR = 15.0
+"""A stop line of the map's own this near a road's end [m] is the one there."""
 
 _BESIDE = {
     "shoulder": "shoulder",
@@ -50,10 +55,12 @@ def outline(model: OpenDrive, junction_id: str | None = None, *, step: float = 1
     """
     junctions = [model.junction(junction_id)] if junction_id else list(model.junctions)
     roads = _legs(model, junction_id) if junction_id else list(model.roads)
-    shapes = [shape for road in roads if not road.is_connecting for shape in _road(road, step)]
+    shapes = [
+        shape for road in roads if not road.is_connecting for shape in _road(model, road, step)
+    ]
     for junction in junctions:
         shapes += _junction(model, junction, step)
-    return sorted(shapes, key=lambda shape: shape[0] in LINES)
+    return sorted(shapes, key=lambda shape: (shape[0] in LINES, shape[0] == "stripe"))
 
 
 def _legs(model: OpenDrive, junction_id: str) -> list[Road]:
@@ -70,7 +77,7 @@ def _legs(model: OpenDrive, junction_id: str) -> list[Road]:
     return list(found.values())
 
 
-def _road(road: Road, step: float) -> Iterator[Shape]:
+def _road(model: OpenDrive, road: Road, step: float) -> Iterator[Shape]:
     for index, section in enumerate(road.sections):
         s = _stations(road, index, step)
         t = borders(road, index, s)
@@ -86,8 +93,14 @@ def _road(road: Road, step: float) -> Iterator[Shape]:
             yield "edge", points(road, s, left)
             yield "edge", points(road, s, right)
         yield from _between(road, section, s, t, drivable)
+    told = list(stop_lines(road))
     for contact in ("start", "end"):
-        yield from _stop_line(road, contact)
+        end = 0.0 if contact == "start" else road.length
+        if not any(abs(s - end) < _NEAR for s, _ in told) and _waits(model, road, contact):
+            yield from _stop_line(road, contact)
+    yield from (("stop", line) for _, line in told)
+    yield from (("stripe", area) for area in crosswalk_stripes(road))
+    yield from (("sign", line) for line in signs(road))
 
 
 def _between(
@@ -108,6 +121,19 @@ def _between(
         if marks:
             kind = "solid" if any("solid" in mark for mark in marks) else "broken"
             yield kind, points(road, s, border)
+
+
+def _waits(model: OpenDrive, road: Road, contact: str) -> bool:
+    """Return whether who leaves a road by one of its ends may have to wait there.
+
+    On motorways nobody does; where some of a junction's roads have lights or signs, those do.
+    """
+    link = road.link(contact)
+    if link is None or any(one.type == "motorway" for one in road.types):
+        return False
+    legs = [one for one in model.roads if contacts(one, link.element_id) and not one.is_connecting]
+    told = [one for one in legs if any(s.dynamic == "yes" or s.type in _WAIT for s in one.signals)]
+    return not told or road in told
 
 
 def _stop_line(road: Road, contact: str) -> Iterator[Shape]:
@@ -160,13 +186,28 @@ def _junction(model: OpenDrive, junction: Junction, step: float) -> Iterator[Sha
 def _corner(
     model: OpenDrive, junction: Junction, road: Road, following: Road, step: float
 ) -> Float | None:
-    """Return the outer border of the way from a leg to the next one counter-clockwise."""
+    """Return the border between a leg and the next one counter-clockwise.
+
+    It is the right border of the way from the one to the other; where there is none, as inside a
+    roundabout, the left border of the way back.
+    """
+    right = _border_of_way(model, junction, road, following, step, outer=True)
+    if right is not None:
+        return right
+    left = _border_of_way(model, junction, following, road, step, outer=False)
+    return None if left is None else left[::-1]
+
+
+def _border_of_way(
+    model: OpenDrive, junction: Junction, road: Road, to: Road, step: float, *, outer: bool
+) -> Float | None:
+    """Return the right (outer) or left border of the way from one leg to another, as driven."""
     for connection in model.connections_from.get((junction.id, road.id), ()):
         way = model.road(connection.connecting_road)
         forward = connection.contact_point == "start"
         onward = way.link("end" if forward else "start")
         lanes = {link.to_lane for link in connection.lane_links}
-        if onward is None or onward.element_id != following.id or not lanes:
+        if onward is None or onward.element_id != to.id or not lanes:
             continue
         side = 1 if max(lanes, key=abs) > 0 else -1
         found = []
@@ -174,7 +215,9 @@ def _corner(
             ids = [lane.id for lane in section.lanes if lane.drivable and lane.id * side > 0]
             if ids:
                 s = _stations(way, index, step)
-                found.append(points(way, s, borders(way, index, s)[max(ids, key=abs)]))
+                lane_id = (max if outer else min)(ids, key=abs)
+                t = _border(borders(way, index, s), lane_id, outer=outer)
+                found.append(points(way, s, t))
         if found:
             line = np.concatenate(found)
             return line if forward else line[::-1]
