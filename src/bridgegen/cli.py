@@ -106,6 +106,20 @@ def search(
 
 
 @app.command()
+def new(
+    name: Annotated[str, typer.Argument(help="Of your scenario; NAME.yaml is written.")],
+    like: Annotated[
+        str | None, typer.Option(help="Start from a copy of this one of the catalogue.")
+    ] = None,
+) -> None:
+    """Write a commented scenario file to start from."""
+    from bridgegen.odd.starter import start_scenario
+
+    path = start_scenario(name, like=like)
+    print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
+
+
+@app.command()
 def resume(folder: Annotated[Path, typer.Argument(help="The folder of a run.")]) -> None:
     """Go on with a run that was interrupted; the result is as if it had not been."""
     from bridgegen import campaign
@@ -209,14 +223,21 @@ def validate(
 
 @app.command()
 def show(
-    file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
+    what: Annotated[
+        str,
+        typer.Argument(help="A scenario's ontology (.owl), a catalogue name, or a YAML file."),
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="The page (.html); beside the .owl by default.")
+        Path | None, typer.Option(help="The page (.html); beside the file by default.")
     ] = None,
 ) -> None:
-    """Draw a scenario's individuals in five layers, violated constraints in red."""
-    from bridgegen.report.show import show_file
+    """Draw a scenario: its individuals, violated constraints in red; or explain a logical one."""
+    from bridgegen.report.show import show_file, show_scenario
 
+    file = Path(what)
+    if file.suffix.lower() != ".owl":
+        print(show_scenario(what, out))
+        return
     page, violations = show_file(file, out)
     print(page)
     if violations:

@@ -10,11 +10,13 @@ from importlib.resources import files
 import pytest
 
 from bridgegen.errors import StorageError
-from bridgegen.report import page, show
+from bridgegen.report import page, scenario_page, show
 from bridgegen.report.page import write_report
 from bridgegen.report.payload import to_json
 
-OURS = dict.fromkeys((*page.SCRIPTS, *show.SCRIPTS, *page.STYLES, "page.html", "show.html"))
+STYLES = (*page.STYLES, *scenario_page.STYLES)
+PAGES = ("page.html", "show.html", "scenario.html")
+OURS = dict.fromkeys((*page.SCRIPTS, *show.SCRIPTS, *STYLES, *PAGES))
 VOID = {"meta", "link", "input", "br", "img", "hr"}
 
 
@@ -117,7 +119,7 @@ def test_every_id_of_the_picture_page_exists():
 
 def test_every_file_of_ours_is_used():
     ours = {f.name for f in files("bridgegen.report").iterdir() if f.name.endswith((".js", ".css"))}
-    assert ours == {*page.SCRIPTS, *show.SCRIPTS, *page.STYLES}
+    assert ours == {*page.SCRIPTS, *show.SCRIPTS, *STYLES}
 
 
 @pytest.mark.parametrize(

@@ -87,8 +87,8 @@ class LogicalScenario:
         roads: the road network.
         story: who takes part, and what happens.
         driver: who drives the ego unless the user says otherwise.
-        effects: the user's functions that add to each scenario, as ``module:function`` or
-            ``file.py:function``.
+        effects: the user's functions that add to each scenario, as ``file.py:function`` or the
+            name of an entry point.
         axes: what is searched unless the user says otherwise.
         parameters: what may vary, by name.
         bounds: what limits it.

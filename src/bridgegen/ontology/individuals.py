@@ -11,7 +11,7 @@ from bridgegen.errors import OntologyError
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.effects import load_effect
+from bridgegen.ontology.effects import apply_effect
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.roads import add_road_network
 from bridgegen.ontology.site import Site
@@ -67,7 +67,7 @@ def build(
     if weather := add_weather(builder, declared):
         put(top, "has_weather", weather)
     for effect in scenario.effects:
-        load_effect(effect, scenario.place)(builder, values)
+        apply_effect(effect, scenario.place, builder, values)
     for name, parameter in declared.items():
         put(top, "has_parameter_declaration", builder.parameter(name, parameter))
     constraints: list[Bound | Derived] = [*scenario.bounds, *scenario.derived]

@@ -6,23 +6,17 @@ import numpy as np
 
 from bridgegen import metrics as measures
 from bridgegen.objective import Thresholds
-from bridgegen.odd.story import Story
 from bridgegen.ontology.check import constraints_in_words
-from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.opendrive.outline import outline
-from bridgegen.openx.opendrive.outline_furniture import Light, lights
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
     Column,
-    Entity,
     Evaluations,
-    Lamp,
-    Outline,
     Playback,
     ReportData,
     RunSummary,
 )
 from bridgegen.report.painter import paint
+from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
 
@@ -142,21 +136,15 @@ def _playbacks(
         return ()
     at = [evaluation for _, evaluation, _ in kept]
     rollout = pipeline.rollout(rows.X[at])
-    types = _types(pipeline.scenario.story)
-    bodies = tuple(
-        Entity(name, length, width, ahead, types.get(name, "obstacle"))
-        for name, (length, width, ahead) in zip(rollout.names, rollout.box.tolist(), strict=True)
-    )
+    entities, scenery = bodies(rollout, pipeline.scenario.story), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
     checked = constraints_in_words(pipeline.scenario)
-    roads: dict[bytes, tuple[tuple[Outline, ...], list[Light]]] = {}
-    shown = {name: s for s, name in enumerate(rollout.light_names)}
     playbacks = []
     for k, (name, evaluation, files) in enumerate(kept):
         values = pipeline.space.values(rows.X[evaluation])
         individuals = pipeline.individuals(values)
         x, y = rollout.x[k], rollout.y[k]
-        lanes, lights = _road(pipeline, values, individuals, roads)
+        lanes, lights = scenery.road(values, individuals)
         playbacks.append(
             Playback(
                 name=name,
@@ -166,44 +154,14 @@ def _playbacks(
                 metrics=dict(zip(pipeline.metrics, rows.metrics[evaluation].tolist(), strict=True)),
                 critical=bool(rows.critical[evaluation]),
                 time_step=rollout.time_step,
-                entities=bodies,
+                entities=entities,
                 x=x, y=y, h=rollout.h[k], v=rollout.v[k],
                 distance=nearest[k],
                 lanes=lanes,
                 n_steps=int(rollout.n_steps[k]),
                 files=files,
                 picture=paint(individuals, (), checked),
-                lamps=tuple(
-                    Lamp(one.x, one.y, one.h, rollout.lights[k, shown[one.id]])
-                    for one in lights
-                    if one.id in shown
-                ),
+                lamps=lamps(rollout, k, lights),
             )
         )  # fmt: skip
     return tuple(playbacks)
-
-
-def _road(
-    pipeline: Pipeline,
-    values: dict[str, float],
-    individuals: Individuals,
-    known: dict[bytes, tuple[tuple[Outline, ...], list[Light]]],
-) -> tuple[tuple[Outline, ...], list[Light]]:
-    """Return the drawing of a scenario's road network, the same objects for the same network."""
-    static = [] if pipeline.road_map else [values[name] for name in pipeline.static_names]
-    key = np.array(static).tobytes()
-    if key not in known:
-        model = pipeline.roads(individuals)
-        junction = pipeline.road_map.site.junction_id if pipeline.road_map else None
-        shapes = tuple(Outline(kind, points) for kind, points in outline(model, junction))
-        known[key] = shapes, lights(model)
-    return known[key]
-
-
-def _types(story: Story) -> dict[str, str]:
-    """Return what each body is, by name."""
-    found = {one.name: one.type for one in story.participants}
-    for works in story.works:
-        found |= {f"{works.name}_cone_{k}": "cone" for k in range(1, len(works.cones) + 1)}
-        found[f"{works.name}_sign"] = "sign"
-    return found

@@ -35,7 +35,13 @@ def write_report(path: Path, data: ReportData) -> None:
 
 
 def write_page(
-    path: Path, template: str, scripts: Iterable[str], title: str, data: str, **more: bytes
+    path: Path,
+    template: str,
+    scripts: Iterable[str],
+    title: str,
+    data: str,
+    styles: Iterable[str] = STYLES,
+    **more: bytes,
 ) -> None:
     """Write a page, whole or not at all; what is put in is never searched for placeholders again.
 
@@ -45,6 +51,7 @@ def write_page(
         scripts: files of this folder.
         title: plain text.
         data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
+        styles: files of this folder.
         more: of the template's other placeholders.
 
     Raises:
@@ -52,7 +59,7 @@ def write_page(
     """
     fill = {
         "title": html.escape(title).encode("utf-8", "replace"),
-        "css": b"\n".join(map(_own, STYLES)),
+        "css": b"\n".join(map(_own, styles)),
         "data": data.encode("ascii"),
         "scripts": b"\n".join(map(_own, scripts)),
         **more,

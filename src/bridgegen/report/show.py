@@ -1,8 +1,9 @@
-"""The picture of an ontology file as a page of its own, violated constraints in red."""
+"""Pages of their own: an ontology file with violated constraints in red, a logical scenario."""
 
 from pathlib import Path
 
 from bridgegen.errors import InputError, StorageError
+from bridgegen.odd.reader import load as load_scenario
 from bridgegen.ontology.check import check, constraints_in_words
 from bridgegen.ontology.files import load
 from bridgegen.openx.convert import scenario_of
@@ -10,9 +11,33 @@ from bridgegen.report.page import write_page
 from bridgegen.report.painter import paint
 from bridgegen.report.payload import script_json
 from bridgegen.report.picture_payload import pictures_payload
+from bridgegen.report.scenario_page import write_scenario_page
 
 SCRIPTS = ("common.js", "picture.js", "show.js")
 _OURS = b'<meta name="generator" content="bridgegen show">'
+
+
+def show_scenario(name_or_path: str, out: Path | None = None) -> Path:
+    """Draw a logical scenario as a page.
+
+    Args:
+        name_or_path: a name of the catalogue, or a scenario file.
+        out: the page; by default with the scenario's name, beside its file or, of the catalogue,
+            here.
+
+    Raises:
+        InputError: no such scenario, one that breaks a rule, or a page whose name does not end in
+            .html.
+        StorageError: the page cannot be written, or is something else already.
+    """
+    scenario = load_scenario(name_or_path)
+    path = Path(name_or_path)
+    beside = path.parent if path.suffix in (".yaml", ".yml") else Path()
+    out = out or beside / f"{scenario.name}.html"
+    _refuse_name(out)
+    _refuse_other(out)
+    write_scenario_page(out, scenario)
+    return out
 
 
 def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
@@ -36,8 +61,7 @@ def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
         StorageError: the page cannot be written, or is something else already.
     """
     out = out or owl.with_suffix(".html")
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{out}: the picture is a page, its name must end in .html")
+    _refuse_name(out)
     individuals = load(owl)
     scenario = scenario_of(individuals)
     violations = check(individuals, scenario)
@@ -46,6 +70,11 @@ def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
     title = f"{owl.name}: {one.name}" if one.name else owl.name
     write_page(out, "show.html", SCRIPTS, title, script_json(pictures_payload([one])))
     return out, len(violations)
+
+
+def _refuse_name(out: Path) -> None:
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{out}: the picture is a page, its name must end in .html")
 
 
 def _refuse_other(out: Path) -> None:

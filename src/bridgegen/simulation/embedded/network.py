@@ -25,8 +25,8 @@ class Network:
             ``bridgegen.ego._reference_kernels``.
         station: ``(P, E, 2)`` float64: an entity that starts at s on its road starts a + b·s along
             its path.
-        aside: ``(P, E, 2)`` float64: an entity that is placed at the offset t from its lane's
-            centre is a + b·t to the left of its path.
+        sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
+            against it; what is to its left, then, of what is to the road's.
         points: ``(P, C, 2)`` float64 [m], the position that a condition names; 0 where none.
     """
 
@@ -35,7 +35,7 @@ class Network:
     steps: Float
     zones: Float
     station: Float
-    aside: Float
+    sides: Float
     points: Float
 
     @property
@@ -69,7 +69,6 @@ def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
     steps = np.array([each.steps for each in ways]).reshape(shape)
     station = np.array([each.station[:n_entities] for each in ways])
     sides = np.array([each.sides[:n_entities] for each in ways], dtype=np.float64)
-    aside = np.stack([-sides * program.nominal_aside, sides], axis=-1)
     paths = padded(tables, shape)
     bodies = _bodies(program)
     zones = np.full((*shape, 5), np.inf)
@@ -78,7 +77,7 @@ def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
             paths[p, 0], counts[p, 0], steps[p, 0], program.bodies[0],
             paths[p, k], counts[p, k], steps[p, k], bodies[k], zones[p, k],
         )  # fmt: skip
-    return Network(paths, counts, steps, zones, station, aside, points)
+    return Network(paths, counts, steps, zones, station, sides, points)
 
 
 def _bodies(program: Program) -> list[Float]:

@@ -143,19 +143,6 @@ class Program:
     fixed: Mapping[str, str]
 
     @cached_property
-    def nominal_aside(self) -> Float:
-        """``(E,)`` [m]: how far each is aside of its lane's centre by the declared values."""
-        chosen = [self.slots[slot] if slot >= 0 else 0.0 for slot in self.aside_slots]
-        return np.array(
-            [
-                float(one.resolve(self.parameters))
-                if isinstance(one, osc.ParameterRef | Expr)
-                else 0.0
-                for one in chosen
-            ]
-        )
-
-    @cached_property
     def box(self) -> Float:
         """``(E, 3)`` [m]: length, width, centre ahead of the reference point."""
         return np.ascontiguousarray(self.bodies[:, :3])

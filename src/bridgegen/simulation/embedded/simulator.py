@@ -66,9 +66,8 @@ class EmbeddedSimulator:
         a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
         at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
         station = np.ascontiguousarray(a + b * at)
-        a, b = roads.aside[rows, :, 0], roads.aside[rows, :, 1]
-        varied = program.aside_slots >= 0
-        aside = np.where(varied, a + b * slots[:, np.maximum(program.aside_slots, 0)], 0.0)
+        varied = slots[:, np.maximum(program.aside_slots, 0)]
+        aside = np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0)
         shape = (n, len(program.names), program.n_steps)
         x, y, h, v, acceleration, offset = (np.empty(shape) for _ in range(6))
         lights = np.empty((n, len(program.lights), program.n_steps), dtype=np.int8)

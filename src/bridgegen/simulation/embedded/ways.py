@@ -57,8 +57,9 @@ class Ways:
                     route = self._along(spec)
                     start = _known(program, spec.start)
                     self.sides.append(model.road(spec.start.road).direction(spec.start.lane))
-                    aside = _declared(program, spec.aside) * self.sides[-1]
-                    self._add(route, route.station(*start), aside)
+                    # one that rows vary is added as they are run
+                    fixed = spec.aside if isinstance(spec.aside, float) else 0.0
+                    self._add(route, route.station(*start), fixed * self.sides[-1])
                 else:
                     self.sides.append(0)
                     self._add(self._beside(spec), (0.0, 0.0), 0.0)

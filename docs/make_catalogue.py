@@ -1,0 +1,71 @@
+"""Write catalogue.md and its pictures: what ships, and the measures of the road templates.
+
+Run it after a change to the catalogue: ``python docs/make_catalogue.py``.
+"""
+
+from pathlib import Path
+
+from bridgegen.odd.reader import load, names
+from bridgegen.odd.roads import KNOBS
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.scenario_words import story_lines
+from bridgegen.report.sketch import sketch
+
+HERE = Path(__file__).parent
+PICTURES = HERE / "catalogue"
+
+HEAD = """\
+# The catalogue
+
+Logical scenarios that ship. Each picture shows the defaults at the moment of the closest approach,
+with the scenario's own ego driver; dashed outlines are where everybody starts. Search one with
+`bridgegen search NAME`, draw it with all its parameters, constraints and sources with
+`bridgegen show NAME`, start your own from it with `bridgegen new MINE --like NAME`.
+
+<!-- Written by docs/make_catalogue.py. -->
+"""
+
+TEMPLATES = """
+## Road templates
+
+`template:` says what kind of road network a scenario takes place on, `roads:` gives its measures: a
+number, or the name of a parameter of the static axis. A static parameter of a measure's own name
+needs no mention. Besides, junctions have `legs` (`heading`, `lanes_in`, `lanes_out`, `turns`,
+`sign`, `crosswalk`), `crosswalks` and `signals`; a road may have `segments` and `crosswalk_at`.
+"""
+
+
+def catalogue() -> str:
+    """Return catalogue.md."""
+    parts = [HEAD]
+    for name in names():
+        scenario = load(name)
+        story = "\n".join(f"- {line}" for line in story_lines(scenario))
+        parts.append(
+            f"## {scenario.title}\n\n`{name}`, {scenario.roads.template}, ego "
+            f"{scenario.driver}\n\n![{scenario.title}](catalogue/{name}.svg)\n\n"
+            f"{' '.join(scenario.description.split())}\n\n{story}\n\n"
+            f"Source: {' '.join(scenario.source.split())}\n"
+        )
+    parts.append(TEMPLATES)
+    for template, knobs in KNOBS.items():
+        rows = "\n".join(
+            f"| `{name}` | {one.unit} | {one.usual:g} | {one.low:g} to {one.high:g} | {one.why} |"
+            for name, one in knobs.items()
+        )
+        head = "| measure | unit | usual | range | |\n|---|---|---|---|---|"
+        parts.append(f"### {template}\n\n{head}\n{rows}\n")
+    return "\n".join(parts)
+
+
+def picture(name: str) -> str:
+    """Return the picture of a scenario at its defaults, as SVG."""
+    scenario = load(name)
+    return sketch(Pipeline(scenario, scenario.space()))
+
+
+if __name__ == "__main__":
+    PICTURES.mkdir(exist_ok=True)
+    (HERE / "catalogue.md").write_text(catalogue(), "utf-8")
+    for each in names():
+        (PICTURES / f"{each}.svg").write_text(picture(each), "utf-8")

@@ -1,0 +1,74 @@
+"""A logical scenario as a page: its picture, what happens, its parameters and their reasons."""
+
+import html
+from collections.abc import Iterator
+from pathlib import Path
+
+from bridgegen.odd.parameters import Bound, Derived, Parameter
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.page import write_page
+from bridgegen.report.scenario_words import story_lines
+from bridgegen.report.sketch import sketch
+
+STYLES = ("page.css", "scenario.css")
+
+
+def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
+    """Write the page of a scenario, whole or not at all.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    title = f"{scenario.name}: {scenario.title}"
+    body = "\n".join(_body(scenario)).encode("utf-8", "replace")
+    write_page(path, "scenario.html", (), title, "", styles=STYLES, body=body)
+
+
+def _body(scenario: LogicalScenario) -> Iterator[str]:
+    pipeline = Pipeline(scenario, scenario.space())
+    limits = scenario.objective.critical
+    yield f"<h1>{_text(scenario.title)}</h1>"
+    facts = [
+        scenario.name, f"template {scenario.roads.template}", f"ego {pipeline.driver.name}",
+        f"{scenario.duration:g} s", f"searched: {', '.join(scenario.axes)}",
+        f"critical: a collision, or closer than {limits.d_min_below:g} m at "
+        f"{limits.v_d_at_least:g} m/s or more",
+    ]  # fmt: skip
+    yield f'<ul class="facts">{"".join(f"<li>{_text(fact)}</li>" for fact in facts)}</ul>'
+    yield f'<p class="lead">{_text(scenario.description)}</p>'
+    yield f'<p class="muted">Source: {_text(scenario.source)}</p>'
+    yield (
+        f'<figure class="card sketch">{sketch(pipeline)}<figcaption class="muted">At the '
+        "defaults, when they are closest; dashed: where each starts.</figcaption></figure>"
+    )
+    lines = "".join(f"<li>{_text(line)}</li>" for line in story_lines(scenario))
+    yield f'<section class="card"><h2>Who and what</h2><ul class="story">{lines}</ul></section>'
+    yield '<section class="card"><h2>Parameters</h2><div class="wide"><table><thead><tr>'
+    yield "<th>parameter</th><th>axis</th><th>range</th><th>default</th><th>what it is</th></tr>"
+    yield "</thead><tbody>"
+    for parameter in scenario.parameters.values():
+        yield _parameter(parameter)
+    yield "</tbody></table></div></section>"
+    yield '<section class="card"><h2>Constraints</h2><dl class="rules">'
+    rules: tuple[Bound | Derived, ...] = (*scenario.bounds, *scenario.derived)
+    for rule in rules:
+        yield (
+            f"<dt>{_text(str(rule))}</dt><dd>{_text(rule.why)} "
+            f"<small>{_text(rule.source)}</small></dd>"
+        )
+    yield "</dl></section>"
+
+
+def _parameter(one: Parameter) -> str:
+    unit = "" if one.unit in ("1", "count") else f" {one.unit}"
+    return (
+        f"<tr><th>{_text(one.name)}</th><td>{one.axis}</td>"
+        f'<td class="number">{one.low:g} to {one.high:g}{unit}</td>'
+        f'<td class="number">{one.default:g}{unit}</td>'
+        f"<td>{_text(one.description)}<small>{_text(one.source)}</small></td></tr>"
+    )
+
+
+def _text(text: str) -> str:
+    return html.escape(text.strip())

@@ -1,0 +1,45 @@
+"""Every scenario that ships: searched, handed over, and the files give the same metrics."""
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.handover import write_scenario
+from bridgegen.odd.reader import load, names
+from bridgegen.openx.convert import validate_file
+from bridgegen.pipeline import Pipeline, simulate_file
+from bridgegen.store import Store
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_smoke_search(tmp_path, name):
+    run = bg.run_search(name, algorithm="random", budget=40, keep=1, out=tmp_path / "run")
+    with Store.open(run.folder) as store:
+        rows = store.read()
+    assert len(rows) == 40
+    assert (rows.status == 0).all()
+    assert run.report.stat().st_size > 10_000
+    # What is handed over is what was searched, critical or not.
+    scenario = load(name)
+    pipeline = Pipeline(scenario, scenario.space())
+    files = write_scenario(pipeline, rows.X[7], tmp_path, "one")
+    assert [problem for file in files for problem in validate_file(file)] == []
+    result = simulate_file(files[2])
+    np.testing.assert_array_equal([result.metrics[m] for m in pipeline.metrics], rows.metrics[7])
+
+
+@pytest.mark.parametrize("name", names())
+def test_neither_driver_is_never_or_always_at_risk(name):
+    """A scenario in which nothing can go wrong, or nothing else, tells nobody anything."""
+    scenario = load(name)
+    shares = []
+    for ego in ("route-follower", "reference"):
+        space = scenario.space()
+        pipeline = Pipeline(scenario, space, ego=ego)
+        pipeline.choose_objective()
+        X = space.decode(np.random.default_rng(1).random((400, space.n_var)))
+        shares.append(float(pipeline.evaluate(X).critical.mean()))
+    careless, careful = shares
+    assert careless > 0.0
+    assert careful < 0.7
+    assert careful <= careless + 0.05

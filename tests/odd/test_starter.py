@@ -1,0 +1,40 @@
+"""A file to start from: valid as it is, and nobody's file is overwritten."""
+
+import pytest
+
+from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.odd.reader import load, names
+from bridgegen.odd.starter import start_scenario
+
+
+def test_it_is_valid_and_says_what_each_section_is(tmp_path):
+    path = start_scenario("my-own", folder=tmp_path)
+    assert path == tmp_path / "my-own.yaml"
+    assert load(path).name == "my-own"
+    text = path.read_text("utf-8")
+    assert text.count("#") > 30
+    assert "NAME" not in text
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_copy_differs_in_its_name_only(tmp_path, name):
+    copy, original = load(start_scenario("mine", like=name, folder=tmp_path)), load(name)
+    assert copy.name == "mine"
+    assert copy.parameters == original.parameters
+    assert copy.story == original.story
+    assert copy.roads == original.roads
+
+
+def test_mistakes(tmp_path):
+    start_scenario("mine", folder=tmp_path)
+    with pytest.raises(StorageError, match="exists already, and is not overwritten"):
+        start_scenario("mine", folder=tmp_path)
+    with pytest.raises(UnknownNameError, match="did you mean 'cut-in'"):
+        start_scenario("other", like="cut-inn", folder=tmp_path)
+    with pytest.raises(InputError, match="is a word of letters"):
+        start_scenario("../evil", folder=tmp_path)
+    with pytest.raises(InputError, match="ships with BridgeGen"):
+        start_scenario("cut-in", folder=tmp_path)
+    with pytest.raises(StorageError, match="cannot be written"):
+        start_scenario("mine", folder=tmp_path / "nowhere")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]

@@ -1,0 +1,60 @@
+"""A user's own function in a scenario, and what it does when it is wrong."""
+
+from pathlib import Path
+
+import pytest
+
+from bridgegen.errors import InputError
+from bridgegen.odd.reader import load
+from bridgegen.odd.starter import start_scenario
+from bridgegen.ontology.individuals import build
+
+GOOD = """
+def apply(builder, values):
+    node = builder.node("crate", "Misc")
+    builder.put(node, "has_name", "crate")
+    builder.put(builder.iri("scenario"), "has_participant", node)
+"""
+
+
+def scenario_with(folder: Path, code: str, spec: str = "mine.py:apply"):
+    own = start_scenario("own", folder=folder)
+    text = own.read_text("utf-8").replace(
+        '# effects: [{function: "my_effect.py:apply"}]', f'effects: [{{function: "{spec}"}}]'
+    )
+    own.write_text(text, "utf-8")
+    (folder / "mine.py").write_text(code, "utf-8")
+    return load(own)
+
+
+def individuals(scenario):
+    space = scenario.space()
+    return build(scenario, space.values(space.row({})), driver="reference")
+
+
+def test_it_adds_what_it_says(tmp_path):
+    found = individuals(scenario_with(tmp_path, GOOD))
+    assert [found.text(one, "has_name") for one in found.of_class("Misc")] == ["crate"]
+
+
+@pytest.mark.parametrize(
+    ("code", "spec", "text"),
+    [
+        (GOOD, "mine.py:aply", "effect 'mine.py:aply' must be a function, got NoneType"),
+        (GOOD, "other.py:apply", r"no such file: .*other\.py"),
+        (GOOD, "../mine.py:apply", "an effect is 'file.py:function' beside the scenario's file"),
+        (GOOD, "os:system", "an effect is 'file.py:function' beside the scenario's file"),
+        (GOOD, "nobodys", "no installed package offers the effect 'nobodys'"),
+        ("def apply(:", "mine.py:apply", r"mine\.py fails: SyntaxError.*line 1"),
+        ("1 / 0", "mine.py:apply", r"mine\.py fails: ZeroDivisionError: division by zero, line 1"),
+        (
+            "def apply(builder, values):\n    return values['speeed']",
+            "mine.py:apply",
+            r"effect 'mine\.py:apply' failed: KeyError: 'speeed', line 2 \(.*own\.yaml\)",
+        ),
+    ],
+)
+def test_mistakes_are_one_clear_error(tmp_path, code, spec, text):
+    scenario = scenario_with(tmp_path, code, spec)
+    with pytest.raises(InputError, match=text):
+        individuals(scenario)

@@ -1,0 +1,111 @@
+"""The page of a logical scenario, and its picture."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.odd.reader import load, names
+from bridgegen.odd.starter import start_scenario
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.scenario_words import story_lines
+from bridgegen.report.show import show_scenario
+from bridgegen.report.sketch import HEIGHT, WIDTH, sketch
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_picture_shows_everybody_who_matters(name):
+    scenario = load(name)
+    text = sketch(Pipeline(scenario, scenario.space()))
+    root = ElementTree.fromstring(text)
+    assert root.get("viewBox") == f"0 0 {WIDTH} {HEIGHT}"
+    labels = {one.text for one in root.iter(f"{SVG}text")}
+    assert "ego" in labels
+    assert len(labels) >= 3  # another one, and the scale
+    assert len(list(root.iter(f"{SVG}polygon"))) >= 1  # asphalt
+    assert "nan" not in text
+    assert len(text) < 60_000
+
+
+def test_bodies_are_drawn_where_they_are():
+    """The ego of S4 at its closest approach, from the rollout, in pixels."""
+    scenario = load("crossroads-s4")
+    pipeline = Pipeline(scenario, scenario.space())
+    x = pipeline.space.row({})
+    rollout = pipeline.rollout(x[np.newaxis])
+    k = int(rollout.distance[0, 1, : rollout.n_steps[0]].argmin())
+    gap = np.array(
+        [rollout.x[0, 1, k] - rollout.x[0, 0, k], rollout.y[0, 1, k] - rollout.y[0, 0, k]]
+    )
+    heading = rollout.h[0, :, k]
+    gap += 1.4 * np.array(
+        [np.cos(heading[1]) - np.cos(heading[0]), np.sin(heading[1]) - np.sin(heading[0])]
+    )
+    root = ElementTree.fromstring(sketch(pipeline, x))
+    bodies = [
+        one.get("transform")
+        for one in root.iter(f"{SVG}g")
+        if one.find(f"{SVG}rect").get("fill") not in (None, "none")
+    ]
+    places = [np.array(re.findall(r"-?\d+\.\d", text)[:2], float) for text in bodies]
+    (bar,) = root.findall(f"{SVG}path")[-1:]
+    metres = float(root.findall(f"{SVG}text")[-1].text.split()[0])
+    scale = float(re.search(r"h(\d+\.\d)", bar.get("d")).group(1)) / metres
+    assert len(places) == 2
+    np.testing.assert_allclose((places[1] - places[0]) / scale, gap * [1, -1], atol=0.05)
+
+
+def test_it_tells_the_story():
+    lines = list(story_lines(load("pedestrian-behind-parked")))
+    assert lines == [
+        "ego, a car, starts at 40 m on lane 1 at ego_speed and goes to 190 m on lane 1.",
+        "van, a van, stands at van_at on the shoulder.",
+        "parked, a car, stands at 94 m on the shoulder.",
+        "walker, a pedestrian, goes from 110 m on the sidewalk to 110 m on the sidewalk of leg "
+        "main in at 0 m/s.",
+        "walker_steps_out: walker takes up walker_speed at 3 m/s² when the distance (between "
+        "reference points, as the crow flies) from walker to ego is ≤ trigger_distance.",
+    ]
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_page_says_everything(tmp_path, name):
+    scenario = load(name)
+    text = show_scenario(name, tmp_path / "page.html").read_text("utf-8")
+    for parameter in scenario.parameters.values():
+        assert f"<th>{parameter.name}</th>" in text
+    assert text.count("<dt>") == len(scenario.bounds) + len(scenario.derived)
+    assert not re.findall(r"""(?:src|href)=["'](?!data:,)""", text)  # nothing is fetched
+    assert "<script" not in text
+
+
+def test_where_it_goes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert show_scenario("cut-in").name == "cut-in.html"
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    own = start_scenario("own", folder=folder)
+    assert show_scenario(str(own)) == folder / "own.html"
+    assert show_scenario(str(own)) == folder / "own.html"  # an earlier picture is replaced
+    (tmp_path / "notes.html").write_text("mine")
+    with pytest.raises(StorageError, match="is no picture, and is not overwritten"):
+        show_scenario("cut-in", tmp_path / "notes.html")
+    with pytest.raises(InputError, match=r"must end in \.html"):
+        show_scenario("cut-in", tmp_path / "page.pdf")
+    with pytest.raises(UnknownNameError, match="did you mean 'cut-in'"):
+        show_scenario("cut-on")
+
+
+def test_hostile_text_is_text(tmp_path):
+    own = start_scenario("own", folder=tmp_path)
+    text = own.read_text("utf-8").replace(
+        "title: A slower car", "title: <script>alert(1)</script> & a slower car"
+    )
+    own.write_text(text, "utf-8")
+    page = show_scenario(str(own)).read_text("utf-8")
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; a slower car" in page

@@ -1,0 +1,58 @@
+"""What the documentation shows is what there is."""
+
+import importlib.util
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from bridgegen.odd.reader import load, names
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+@pytest.fixture(scope="module")
+def make():
+    spec = importlib.util.spec_from_file_location("make_catalogue", DOCS / "make_catalogue.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_catalogue_is_up_to_date(make):
+    """Otherwise: python docs/make_catalogue.py."""
+    assert (DOCS / "catalogue.md").read_text("utf-8") == make.catalogue()
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_scenario_has_its_picture(make, name):
+    """The same as drawn now, but for the last digit of a pixel: other machines round otherwise."""
+    kept = ElementTree.fromstring((DOCS / "catalogue" / f"{name}.svg").read_text("utf-8"))
+    drawn = ElementTree.fromstring(make.picture(name))
+    assert [(one.tag, one.text) for one in kept.iter()] == [
+        (one.tag, one.text) for one in drawn.iter()
+    ]
+    assert kept[0].text == f"{load(name).title}, seen from above"
+
+
+def test_the_language_is_described(make):
+    from bridgegen.odd.schema import EventSection, ScenarioFile, WaypointSection
+    from bridgegen.odd.story import CONDITIONS, TYPES
+
+    text = (DOCS / "scenarios.md").read_text("utf-8")
+    for kind in CONDITIONS:
+        assert f"| `{kind}` |" in text
+    for kind in TYPES:
+        assert kind in text
+    known = {
+        "scenario",
+        "title",
+        "description",
+        "source",
+        "driver",
+        "duration",
+        "time_step",
+        "axes",
+    }
+    keys = {*ScenarioFile.model_fields, *EventSection.model_fields, *WaypointSection.model_fields}
+    assert [key for key in keys - known if key not in text] == []
