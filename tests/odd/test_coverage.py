@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError
+from bridgegen.odd import binned
 from bridgegen.odd import coverage as module
-from bridgegen.odd.coverage import coverage
+from bridgegen.odd.coverage import Ways, coverage, coverage_map
 from bridgegen.search.pairwise import Pairwise
 
 
@@ -59,7 +60,7 @@ def test_what_was_evaluated_is_feasible(build, make_parameter):
     """Even what is too rare for the sample: here there is no sample at all."""
     space = build([make_parameter("a"), make_parameter("b")]).space()
     found = coverage(space, np.array([[1.0, 9.0]]), np.array([True]), sample=0)
-    assert found.ways[1] == module.Ways(2, 25, 1, 1, 1)
+    assert found.ways[1] == Ways(2, 25, 1, 1, 1)
     assert coverage(space, np.empty((0, 2)), none([]), sample=0).ways[0].share == 0.0
 
 
@@ -82,6 +83,23 @@ def counted(bins_of, shape, t):
     )
 
 
+def agree(drawn, found):
+    """Check that a map's totals are those of the coverage alone, and of its own cells."""
+    whole = drawn.total
+    assert (whole.evaluations, whole.critical, whole.sample, whole.ways) == (
+        found.evaluations, found.critical, found.sample, found.ways,
+    )  # fmt: skip
+    for one, same in zip(whole.parameters, found.parameters, strict=True):
+        assert (one.name, one.unit, one.axis, one.integer) == (
+            same.name, same.unit, same.axis, same.integer,
+        )  # fmt: skip
+        for name in ("edges", "evaluated", "critical", "feasible"):
+            assert np.array_equal(getattr(one, name), getattr(same, name))
+    for pair in drawn.pairs:
+        counts = (pair.feasible, pair.evaluated, pair.critical)
+        assert pair.ways == Ways(2, pair.evaluated.size, *(int((c > 0).sum()) for c in counts))
+
+
 @given(st.data())
 @settings(max_examples=40)
 @pytest.mark.parametrize("cells", [1 << 24, 1])
@@ -100,14 +118,23 @@ def test_as_counted_one_by_one(build, make_parameter, cells, data):
     X = space.decode(rng.random((data.draw(st.integers(0, 40)), space.n_var)))
     hit = rng.random(len(X)) < 0.3
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_CELLS", cells)
+        patch.setattr(binned, "_CELLS", cells)
         found = coverage(space, X, hit, bins=bins, sample=50)
+        drawn = coverage_map(space, X, hit, bins=bins, sample=50)
     which = np.array(
         [
             np.minimum(column * bins, bins - 1).astype(int) if real else column.astype(int) - 1
             for column, real in zip(X.T, floats, strict=True)
         ]
     ).T
+    agree(drawn, found)
+    for pair, (i, j) in zip(drawn.pairs, combinations(range(space.n_var), 2), strict=True):
+        assert (pair.first, pair.second) == (space.variables[i], space.variables[j])
+        for cell in product(range(shape[i]), range(shape[j])):
+            there = (which[:, [i, j]] == cell).all(axis=1)
+            assert pair.evaluated[cell] == there.sum()
+            assert pair.critical[cell] == (there & hit).sum()
+            assert pair.feasible[cell] or not there.any()
     sample = coverage(space, X[:0], hit[:0], bins=bins, sample=50)
     for way, alone in zip(found.ways, sample.ways, strict=True):
         t = way.strength
@@ -123,6 +150,43 @@ def test_as_counted_one_by_one(build, make_parameter, cells, data):
             == np.bincount(which[:, number], minlength=shape[number]).tolist()
         )
         assert one.critical.sum() == hit.sum()
+
+
+def test_a_pair_by_hand(build, make_parameter):
+    """Where b <= a, the pair of bins (a low, b high) is in no scenario."""
+    space = build([make_parameter("a"), make_parameter("b")], bounds=[("b", None, "a")]).space()
+    X = np.array([[2.0, 1.0], [9.0, 8.0], [8.0, 1.0], [7.0, 6.0]])
+    found = coverage_map(space, X, np.array([False, True, False, False]), bins=2)
+    (pair,) = found.pairs
+    assert (pair.first, pair.second) == ("a", "b")
+    assert pair.evaluated.tolist() == [[1, 0], [1, 2]]  # rows are a's bins
+    assert pair.critical.tolist() == [[0, 0], [0, 1]]
+    assert pair.feasible.tolist() == [[True, False], [True, True]]
+    assert found.total.ways[1] == pair.ways == Ways(2, 4, 3, 3, 1)
+
+
+def test_a_grid_that_is_too_large_is_only_summed(build, make_parameter, monkeypatch):
+    names = [make_parameter("n", 1.0, 4.0, kind="integer"), make_parameter("a")]
+    space = build(names).space()
+    X = space.decode(np.random.default_rng(0).random((9, 2)))
+    whole = coverage_map(space, X, none(X))
+    monkeypatch.setattr(module, "MAX_GRID", 19)
+    (pair,) = coverage_map(space, X, none(X)).pairs
+    assert (pair.evaluated, pair.critical, pair.feasible) == (None, None, None)
+    assert pair.ways == whole.pairs[0].ways
+
+
+def test_one_parameter_has_no_pairs(build, make_parameter):
+    space = build([make_parameter("a")]).space()
+    found = coverage_map(space, np.array([[1.0]]), none([0]), sample=10)
+    assert found.pairs == ()
+    assert [one.strength for one in found.total.ways] == [1]
+
+
+def test_pairs_are_told_whatever_the_strength(build, make_parameter):
+    space = build([make_parameter("a"), make_parameter("b")]).space()
+    found = coverage_map(space, np.array([[1.0, 2.0]]), none([0]), strength=1, sample=10)
+    assert len(found.total.ways) == len(found.pairs) == 1
 
 
 def test_a_covering_array_covers_all_pairs(build, make_parameter):
@@ -155,6 +219,8 @@ def test_limits(build, make_parameter, more, message):
     space = build([make_parameter("a")]).space()
     with pytest.raises(InputError, match=message):
         coverage(space, np.empty((0, 1)), none([]), **more)
+    with pytest.raises(InputError, match=message):
+        coverage_map(space, np.empty((0, 1)), none([]), **more)
 
 
 def test_wrong_shapes(build, make_parameter):

@@ -8,16 +8,15 @@ space says which are feasible. A combination that is possible but rare may be mi
 number of feasible ones is a lower bound.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from math import prod
 
 import numpy as np
-import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.errors import InputError
+from bridgegen.odd.binned import BinnedRows
 from bridgegen.odd.space import SearchSpace
 
 SAMPLE = 200_000
@@ -26,9 +25,8 @@ SAMPLE = 200_000
 MAX_STRENGTH = 3
 MAX_BINS = 1000
 
-# Rows decoded at a time, and cells of a table that marks combinations: both bound the memory.
-_CHUNK = 20_000
-_CELLS = 1 << 24
+MAX_GRID = 2_500
+"""Pairs of bins of two parameters that are counted one by one; whole numbers may have more."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +98,40 @@ class Coverage:
     ways: tuple[Ways, ...]
 
 
+@dataclass(frozen=True)
+class PairBins:
+    """The bins of two searched parameters, n of the first and m of the second.
+
+    Attributes:
+        first: one parameter.
+        second: the other, later in the search space's order.
+        ways: how many pairs of their bins there are; ``strength`` is 2.
+        evaluated: ``(n, m)`` int64, rows in each pair of bins; None if n·m is above `MAX_GRID`.
+        critical: ``(n, m)`` int64, critical ones among them; likewise.
+        feasible: ``(n, m)`` bool, whether the sample or the run has a row there; likewise.
+    """
+
+    first: str
+    second: str
+    ways: Ways
+    evaluated: Int | None
+    critical: Int | None
+    feasible: Bool | None
+
+
+@dataclass(frozen=True)
+class CoverageMap:
+    """What a run has covered, and where: to be drawn.
+
+    Attributes:
+        total: over all parameters.
+        pairs: every pair of parameters, in the order of `itertools.combinations`.
+    """
+
+    total: Coverage
+    pairs: tuple[PairBins, ...]
+
+
 def coverage(
     space: SearchSpace,
     X: Float,
@@ -123,6 +155,46 @@ def coverage(
         InputError: bins or strength out of range.
         ValueError: wrong shape.
     """
+    _check(bins, strength)
+    rows = BinnedRows(space, X, critical, bins, sample)
+    ways = (_ways(rows, t) for t in range(1, min(strength, space.n_var) + 1))
+    return Coverage(rows.n_rows, rows.n_critical, sample, _parameters(rows), tuple(ways))
+
+
+def coverage_map(
+    space: SearchSpace,
+    X: Float,
+    critical: Bool,
+    *,
+    bins: int = 5,
+    strength: int = MAX_STRENGTH,
+    sample: int = SAMPLE,
+) -> CoverageMap:
+    """Count as `coverage` does, and say in which pairs of bins the rows are.
+
+    Args:
+        space: what was searched.
+        X: ``(N, len(space.names))`` float64, rows whose simulation succeeded.
+        critical: ``(N,)`` bool.
+        bins: as for `coverage`.
+        strength: the largest t; pairs are counted even where it is 1.
+        sample: as for `coverage`.
+
+    Raises:
+        InputError: bins or strength out of range.
+        ValueError: wrong shape.
+    """
+    _check(bins, strength)
+    rows = BinnedRows(space, X, critical, bins, sample)
+    pairs = tuple(_pair(rows, i, j) for i, j in combinations(range(space.n_var), 2))
+    ways = []
+    for t in range(1, min(strength, space.n_var) + 1):
+        ways.append(_ways(rows, t) if t != 2 else _sum([pair.ways for pair in pairs]))
+    total = Coverage(rows.n_rows, rows.n_critical, sample, _parameters(rows), tuple(ways))
+    return CoverageMap(total, pairs)
+
+
+def _check(bins: int, strength: int) -> None:
     problems = [
         f"1 <= {name} <= {high} must hold, got {value}"
         for name, value, high in (("bins", bins, MAX_BINS), ("strength", strength, MAX_STRENGTH))
@@ -130,87 +202,55 @@ def coverage(
     ]
     if problems:
         raise InputError(*problems)
-    X = as_float("X", X, (None, len(space.names)))
-    hit = np.asarray(critical, np.bool_)
-    if hit.shape != (len(X),):
-        raise ValueError(f"critical must have shape ({len(X)},), got {hit.shape}")
-    edges = [_edges(space, name, bins) for name in space.variables]
-    sizes = [len(one) - 1 for one in edges]
-    # Sorted into evaluated, critical ones first, then sampled: each kind is a stretch.
-    order = np.argsort(~hit, kind="stable")
-    n_critical, n_rows = int(hit.sum()), len(X)
-    seen = [_bin(space, X[order], edges), *_sampled(space, edges, sample)]
-    where = np.concatenate(seen, axis=1)
-    parts = (n_critical, n_rows, where.shape[1])
 
-    parameters = []
-    for number, name in enumerate(space.variables):
-        one, size = space.scenario.parameters[name], sizes[number]
-        counts = [np.bincount(where[number, :end], minlength=size) for end in parts]
-        parameters.append(
+
+def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
+    found = []
+    for number, name in enumerate(rows.space.variables):
+        one = rows.space.scenario.parameters[name]
+        critical, evaluated, met = rows.counts([number])
+        found.append(
             ParameterBins(
                 name,
                 one.unit,
                 str(one.axis),
                 one.kind == "integer",
-                edges[number],
-                evaluated=counts[1],
-                critical=counts[0],
-                feasible=counts[2] > 0,
+                rows.edges[number],
+                evaluated=evaluated,
+                critical=critical,
+                feasible=met > 0,
             )
         )
-    ways = []
-    for t in range(1, min(strength, space.n_var) + 1):
-        total, found = 0, np.zeros(3, np.int64)
-        for chosen in combinations(range(space.n_var), t):
-            shape = [sizes[k] for k in chosen]
-            total += prod(shape)
-            found += _distinct(where[list(chosen)], shape, parts)
-        ways.append(Ways(t, total, int(found[2]), int(found[1]), int(found[0])))
-    return Coverage(n_rows, n_critical, sample, tuple(parameters), tuple(ways))
+    return tuple(found)
 
 
-def _edges(space: SearchSpace, name: str, bins: int) -> Float:
-    one = space.scenario.parameters[name]
-    if one.kind == "integer":
-        return np.arange(one.low, one.high + 2.0) - 0.5
-    return np.linspace(one.low, one.high, bins + 1)
+def _ways(rows: BinnedRows, t: int) -> Ways:
+    total, found = 0, np.zeros(3, np.int64)
+    for chosen in combinations(range(rows.space.n_var), t):
+        total += prod(rows.sizes[k] for k in chosen)
+        found += rows.distinct(chosen)
+    return Ways(t, total, int(found[2]), int(found[1]), int(found[0]))
 
 
-def _bin(space: SearchSpace, X: Float, edges: list[Float]) -> npt.NDArray[np.int32]:
-    """Return ``(n_var, len(X))``, the bin of every searched parameter."""
-    where = np.empty((space.n_var, len(X)), np.int32)
-    for number, name in enumerate(space.variables):
-        column = np.ascontiguousarray(X[:, space.index(name)])
-        # Inner edges only: what rounding puts beyond an end is in the last bin there.
-        where[number] = np.searchsorted(edges[number][1:-1], column, side="right")
-    return where
+def _pair(rows: BinnedRows, i: int, j: int) -> PairBins:
+    first, second = rows.space.variables[i], rows.space.variables[j]
+    total = rows.sizes[i] * rows.sizes[j]
+    if total > MAX_GRID:
+        hit, seen, met = rows.distinct([i, j])
+        return PairBins(first, second, Ways(2, total, met, seen, hit), None, None, None)
+    counts = rows.counts([i, j])
+    critical, evaluated, feasible = counts
+    hit, seen, met = (int(np.count_nonzero(one)) for one in counts)
+    ways = Ways(2, total, met, seen, hit)
+    return PairBins(first, second, ways, evaluated, critical, feasible > 0)
 
 
-def _sampled(
-    space: SearchSpace, edges: list[Float], sample: int
-) -> Iterator[npt.NDArray[np.int32]]:
-    """Yield the bins of the sample, a chunk at a time."""
-    rng = np.random.Generator(np.random.PCG64(0))
-    for start in range(0, sample, _CHUNK):
-        U = rng.random((min(_CHUNK, sample - start), space.n_var))
-        yield _bin(space, space.decode(U), edges)
-
-
-def _distinct(
-    where: npt.NDArray[np.int32], shape: list[int], parts: tuple[int, int, int]
-) -> list[int]:
-    """Return how many combinations of bins occur in the first ``parts`` columns, for each part."""
-    cells = prod(shape)
-    codes = np.zeros(where.shape[1], np.int64)
-    for column, size in zip(where, shape, strict=True):
-        codes *= size
-        codes += column
-    if cells > _CELLS:
-        return [len(np.unique(codes[:end])) for end in parts]
-    marks, counts, start = np.zeros(cells, np.bool_), [], 0
-    for end in parts:
-        marks[codes[start:end]] = True
-        counts.append(int(np.count_nonzero(marks)))
-        start = end
-    return counts
+def _sum(ways: list[Ways]) -> Ways:
+    """Return the sum over all pairs of parameters, of which there is one at least."""
+    return Ways(
+        2,
+        sum(one.total for one in ways),
+        sum(one.feasible for one in ways),
+        sum(one.evaluated for one in ways),
+        sum(one.critical for one in ways),
+    )

@@ -1,0 +1,125 @@
+"""The bins that rows, and a random sample of the search space, are in; and how many are where."""
+
+from collections.abc import Iterator, Sequence
+from math import prod
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.odd.space import SearchSpace
+
+# Rows decoded at a time, and cells of a table that marks combinations: both bound the memory.
+_CHUNK = 20_000
+_CELLS = 1 << 24
+
+
+class BinnedRows:
+    """The bins of rows and of a fixed random sample, to be counted parameter by parameter.
+
+    Attributes:
+        space: what was searched; parameters are numbered as in its ``variables``.
+        edges: per parameter ``(n + 1,)`` float64 in its unit, ascending.
+        sizes: per parameter n, its bins.
+        n_rows: N.
+        n_critical: critical ones among the rows.
+
+    Args:
+        space: what was searched.
+        X: ``(N, len(space.names))`` float64.
+        critical: ``(N,)`` bool.
+        bins: equal bins over the declared range; a parameter of whole numbers has one for each.
+        sample: random points of the space.
+
+    Raises:
+        ValueError: wrong shape.
+        ScenarioError: the constraints leave a parameter no value somewhere in the sample.
+    """
+
+    def __init__(
+        self, space: SearchSpace, X: Float, critical: Bool, bins: int, sample: int
+    ) -> None:
+        X = as_float("X", X, (None, len(space.names)))
+        hit = np.asarray(critical, np.bool_)
+        if hit.shape != (len(X),):
+            raise ValueError(f"critical must have shape ({len(X)},), got {hit.shape}")
+        self.space = space
+        self.edges = [_edges(space, name, bins) for name in space.variables]
+        self.sizes = [len(one) - 1 for one in self.edges]
+        self.n_rows, self.n_critical = len(X), int(hit.sum())
+        # Sorted into critical rows, other rows, sample: each is a stretch of columns.
+        order = np.argsort(~hit, kind="stable")
+        seen = [_bin(space, X[order], self.edges), *_sampled(space, self.edges, sample)]
+        self._where = np.concatenate(seen, axis=1)
+        self._ends = (self.n_critical, self.n_rows, self._where.shape[1])
+
+    def counts(self, chosen: Sequence[int]) -> tuple[Int, Int, Int]:
+        """Return how many are in each combination of the chosen parameters' bins.
+
+        Args:
+            chosen: numbers of parameters; their bins' product must fit into memory.
+
+        Returns:
+            Critical rows, rows, and rows with sample; each ``(n, m, …)`` int64.
+        """
+        shape = tuple(self.sizes[k] for k in chosen)
+        codes, start, found = self._codes(chosen), 0, []
+        for end in self._ends:
+            found.append(np.bincount(codes[start:end], minlength=prod(shape)).reshape(shape))
+            start = end
+        critical, other, sampled = found
+        return critical, critical + other, critical + other + sampled
+
+    def distinct(self, chosen: Sequence[int]) -> list[int]:
+        """Return how many combinations of the chosen parameters' bins occur.
+
+        Args:
+            chosen: numbers of parameters.
+
+        Returns:
+            In the critical rows, in the rows, and in the rows or the sample.
+        """
+        codes, cells = self._codes(chosen), prod(self.sizes[k] for k in chosen)
+        if cells > _CELLS:
+            return [len(np.unique(codes[:end])) for end in self._ends]
+        marks, counts, start = np.zeros(cells, np.bool_), [], 0
+        for end in self._ends:
+            marks[codes[start:end]] = True
+            counts.append(int(np.count_nonzero(marks)))
+            start = end
+        return counts
+
+    def _codes(self, chosen: Sequence[int]) -> Int:
+        """Return for every row and sample the number of its combination, in C order."""
+        codes = np.zeros(self._where.shape[1], np.int64)
+        for k in chosen:
+            codes *= self.sizes[k]
+            codes += self._where[k]
+        return codes
+
+
+def _edges(space: SearchSpace, name: str, bins: int) -> Float:
+    one = space.scenario.parameters[name]
+    if one.kind == "integer":
+        return np.arange(one.low, one.high + 2.0) - 0.5
+    return np.linspace(one.low, one.high, bins + 1)
+
+
+def _bin(space: SearchSpace, X: Float, edges: list[Float]) -> npt.NDArray[np.int32]:
+    """Return ``(n_var, len(X))``, the bin of every searched parameter."""
+    where = np.empty((space.n_var, len(X)), np.int32)
+    for number, name in enumerate(space.variables):
+        column = np.ascontiguousarray(X[:, space.index(name)])
+        # Inner edges only: what rounding puts beyond an end is in the last bin there.
+        where[number] = np.searchsorted(edges[number][1:-1], column, side="right")
+    return where
+
+
+def _sampled(
+    space: SearchSpace, edges: list[Float], sample: int
+) -> Iterator[npt.NDArray[np.int32]]:
+    """Yield the bins of the sample, a chunk at a time."""
+    rng = np.random.Generator(np.random.PCG64(0))
+    for start in range(0, sample, _CHUNK):
+        U = rng.random((min(_CHUNK, sample - start), space.n_var))
+        yield _bin(space, space.decode(U), edges)
