@@ -1,11 +1,14 @@
 """From a run's rows to the report's data: the kept scenarios are rolled out again for playback."""
 
 from collections.abc import Sequence
+from math import comb
 
 import numpy as np
 
 from bridgegen import metrics as measures
+from bridgegen.errors import ScenarioError
 from bridgegen.objective import Thresholds
+from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
@@ -19,6 +22,12 @@ from bridgegen.report.painter import paint
 from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
+
+SAMPLE = 50_000
+"""Random scenarios that tell what is feasible: fewer than `bridgegen coverage` draws, for speed."""
+
+TRIPLES = 25_000_000
+"""Scenarios times triples of parameters up to which triples are counted: a tenth of a second."""
 
 
 def build_report(
@@ -87,7 +96,12 @@ def build_report(
             "simulated": f"{scenario.duration:g} s at {pipeline.simulator.time_step:g} s",
         },
     )
-    return ReportData(head, _evaluations(pipeline, rows), _playbacks(pipeline, rows, kept))
+    return ReportData(
+        head,
+        _evaluations(pipeline, rows),
+        _playbacks(pipeline, rows, kept),
+        _coverage(pipeline, rows),
+    )
 
 
 def _rule(limits: Thresholds) -> str:
@@ -127,6 +141,17 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
         for j in range(n_obj)
     )
     return Evaluations(rows.batch, parameters, metrics, objectives, rows.critical, rows.status)
+
+
+def _coverage(pipeline: Pipeline, rows: Rows) -> CoverageMap:
+    space, ok = pipeline.space, rows.status == 0
+    X, critical = rows.X[ok], rows.critical[ok]
+    strength = 3 if comb(space.n_var, 3) * (len(X) + SAMPLE) <= TRIPLES else 2
+    try:
+        return coverage_map(space, X, critical, strength=strength, sample=SAMPLE)
+    except ScenarioError:
+        # Constraints that contradict each other where the search never was: no sample, then.
+        return coverage_map(space, X, critical, strength=strength, sample=0)
 
 
 def _playbacks(

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.odd.coverage import CoverageMap
 from bridgegen.report.picture import Picture
 
 AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median", "stripe"})
@@ -278,11 +279,13 @@ class ReportData:
         summary: the run in figures.
         evaluations: every row.
         kept: the scenarios that were handed over, most critical first; may be empty.
+        coverage: which bins and pairs of bins were evaluated, if it is to be shown.
     """
 
     summary: RunSummary
     evaluations: Evaluations
     kept: tuple[Playback, ...] = ()
+    coverage: CoverageMap | None = None
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

@@ -188,6 +188,8 @@ const showPicture = (() => {
 function start() {
   readPalette();
   fillSummary();
+  $("coverage").hidden = !data.coverage?.parameters.length;
+  if (!$("coverage").hidden) new Coverage(data.coverage);
   const hook = { data, state: () => null, charts: 0, chartsDrawn: 0, drawCharts };
   window.bridgegen = hook; // for tests, and for whoever wants to drive the page
   if (data.kept.length) {

@@ -15,11 +15,11 @@ from bridgegen.report.payload import to_json
 
 SCRIPTS = (
     "common.js", "page.js", "geometry.js", "view.js", "scene.js", "curves.js", "picture.js",
-    "player.js", "parallel.js", "charts.js",
+    "player.js", "parallel.js", "charts.js", "coverage.js", "coverage_pairs.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
 
-STYLES = ("page.css", "picture.css")
+STYLES = ("page.css", "picture.css", "coverage.css")
 
 
 def write_report(path: Path, data: ReportData) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.report import convergence, sentences
+from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, Lamp, Playback, ReportData
 from bridgegen.report.picture_payload import pictures_payload
 
@@ -74,6 +75,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         "batches": _batches(data.evaluations),
         "roads": roads,
         "kept": kept,
+        "coverage": coverage_payload(data.coverage) if data.coverage else None,
         "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
     }
 
