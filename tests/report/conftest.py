@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.graph import Individuals
@@ -94,6 +95,13 @@ LIMITS = {
     "precipitation": ("%", 0.0, 100.0), "cloudiness": ("%", 0.0, 100.0),
     "fog_density": ("%", 0.0, 100.0), "sun_altitude_angle": ("deg", -90.0, 50.0),
 }  # fmt: skip
+
+
+def make_coverage(n: int) -> CoverageMap:
+    """n random rows of a catalogue scenario, critical where the ego is fast."""
+    space = load("crossroads-s4").space()
+    X = space.decode(np.random.default_rng(1).random((n, space.n_var)))
+    return coverage_map(space, X, X[:, space.index("ego_speed")] > 7.5, strength=2, sample=5_000)
 
 
 def make_report(n: int = 1000, kept: int = 10, seed: int = 0) -> ReportData:
@@ -180,7 +188,7 @@ def make_report(n: int = 1000, kept: int = 10, seed: int = 0) -> ReportData:
         objectives=(Column("F", "", fitness, "objective, minimised"),), critical=critical,
         status=np.zeros(n, dtype=np.int64),
     )  # fmt: skip
-    return ReportData(summary, evaluations, playbacks)
+    return ReportData(summary, evaluations, playbacks, make_coverage(n))
 
 
 @pytest.fixture(scope="session")

@@ -117,6 +117,13 @@ def test_every_id_of_the_picture_page_exists():
     assert asked <= set(re.findall(r'id="([\w-]+)"', page._own("show.html").decode()))
 
 
+def test_no_name_is_declared_by_two_scripts():
+    """They share one scope, where a second function would silently replace the first."""
+    scripts = b"\n".join(map(page._own, page.SCRIPTS)).decode()
+    declared = re.findall(r"^(?:async )?(?:function|class|const|let) (\w+)", scripts, re.M)
+    assert len(declared) == len(set(declared)) > 50
+
+
 def test_every_file_of_ours_is_used():
     ours = {f.name for f in files("bridgegen.report").iterdir() if f.name.endswith((".js", ".css"))}
     assert ours == {*page.SCRIPTS, *show.SCRIPTS, *STYLES}

@@ -66,7 +66,8 @@ class Pairs {
     this.cells.forEach((cell, k) => {
       const pair = this.pairs[k];
       cell.textContent = percent(pair[reading], pair.feasible);
-      cell.style.setProperty("--share", share(pair[reading], pair.feasible).toFixed(3));
+      // Squared, since most pairs are nearly done: what is missing is to stand out.
+      cell.style.setProperty("--share", (share(pair[reading], pair.feasible) ** (reading === "evaluated" ? 2 : 1)).toFixed(3));
       cell.setAttribute("aria-label", `${this.title(pair)}: ${this.summary(pair)}`);
     });
     if (this.chosen !== undefined) this.choose(this.chosen);
