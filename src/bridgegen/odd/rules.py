@@ -17,7 +17,8 @@ GRIP = "0.85*9.81"
 Source: peak friction of a tyre on dry asphalt, 0.8 to 0.9: Wong, Theory of Ground Vehicles, 1.3.
 """
 
-_STRAIGHT = 45.0  # deg, a route that turns by less goes straight on
+STRAIGHT = 45.0
+"""A route that turns by less goes straight on [deg]."""
 
 _SPEED_WHY = "Nobody drives faster than the road allows, less in rain, in fog and by night."
 _SPEED_SOURCE = (
@@ -90,7 +91,7 @@ def bend(roads: RoadsSpec, one: Participant) -> str | None:
         return None
     inward = roads.legs[one.start.leg].heading + 180.0
     turn = math.remainder(roads.legs[one.end.leg].heading - inward, 360.0)
-    if abs(turn) < _STRAIGHT:
+    if abs(turn) < STRAIGHT:
         return None
     # Lane centres lie half a width beside the leg's axis: outside in a left turn, inside in a
     # right one. Legs at the angle φ have their tangent points half the junction from its centre.

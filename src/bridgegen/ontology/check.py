@@ -5,7 +5,7 @@ pyshacl is imported at the first check, as that takes half a second.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.shapes import Rule, rules, structure, turtle
-from bridgegen.ontology.vocabulary import SUBCLASS, tbox
+from bridgegen.ontology.rule import Rule
+from bridgegen.ontology.shapes import rules, structure, turtle
+from bridgegen.ontology.vocabulary import SUBCLASS, TYPE, local_name, tbox
 from bridgegen.ontology.words import Finding, Violation, violations_of
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
     store.extend(_hierarchy())
     found = {
         (one.nodes, one.message): one
-        for finding in compiled.validate(store)
+        for finding in compiled.validate(store, _terms(individuals))
         for one in violations_of(individuals, scenario, compiled.rules, finding)
     }
     return sorted(found.values(), key=lambda one: (one.individual, one.message))
@@ -60,6 +61,16 @@ def _hierarchy() -> tuple[ox.Quad, ...]:
     return tuple(quad for quad in tbox().quads if quad.predicate == SUBCLASS)
 
 
+def _terms(individuals: Individuals) -> frozenset[str]:
+    """Return the local names of the properties and classes that occur, superclasses included."""
+    names = {local_name(quad.predicate) for quad in individuals.quads}
+    types = {quad.object for quad in individuals.quads if quad.predicate == TYPE}
+    for cls in tbox().subclasses:
+        if not types.isdisjoint(individuals.subclasses(local_name(cls))):
+            names.add(local_name(cls))
+    return frozenset(names)
+
+
 class _Compiled:
     """The shapes of one scenario, as pyshacl has read them."""
 
@@ -73,16 +84,29 @@ class _Compiled:
         for quad in ox.parse(turtle(scenario), format=ox.RdfFormat.TURTLE):
             graph.add((to_rdf(quad.subject), to_rdf(quad.predicate), to_rdf(quad.object)))
         self.shapes: Any = ShapesGraph(graph)
-        _ = self.shapes.shapes  # builds them, once
+        self.needs = {
+            str(shape.node): self._needs(local_name(str(shape.node)))
+            for shape in self.shapes.shapes  # builds them, once
+        }
 
-    def validate(self, store: ox.Store) -> Iterator[Finding]:
+    def _needs(self, key: str) -> frozenset[str]:
+        """Return the terms without which a shape finds nothing to check."""
+        if key in self.rules:
+            return frozenset({self.rules[key].focus, *self.rules[key].needs})
+        first, _, rest = key.partition("-")
+        return frozenset({rest if first == "property" else first})
+
+    def validate(self, store: ox.Store, terms: Set[str]) -> Iterator[Finding]:
+        """Yield what the shapes find, but for those whose terms do not occur."""
         from pyshacl.graph_abstraction import DataGraph
         from pyshacl.validator import Validator
         from rdflib import Literal, URIRef
 
         # pyshacl.validate() would read the shapes anew at each call
         validator = Validator(
-            DataGraph.from_oxigraph_store(store), shacl_graph=self.shapes.graph, options={}
+            DataGraph.from_oxigraph_store(store),
+            shacl_graph=self.shapes.graph,
+            options={"use_shapes": [one for one, needs in self.needs.items() if needs <= terms]},
         )
         validator.shacl_graph = self.shapes
         with _quiet():
@@ -101,6 +125,7 @@ class _Compiled:
                 focus=str(said(result, "focusNode")),
                 value=str(value) if value is not None else None,
                 literal=isinstance(value, Literal),
+                message=str(said(result, "resultMessage")),
             )
 
 

@@ -4,21 +4,24 @@ The structure (which properties, of which kind, how many) is compiled from ``bri
 constraints from the declarations of `bridgegen.odd` that also make the decoder. Both are plain
 SHACL with SPARQL 1.1, in Turtle: any SHACL processor can run them.
 
-Values of the weather's parameters are found as properties of the parts of a ``bg:Weather``;
-those of all others on whatever individual binds the parameter (``bg:has_parameter``).
+Values of the weather's parameters are found as properties of the parts of the scenario's own
+``bg:Weather``; those of all others (a later weather's among them) on whatever individual binds
+the parameter (``bg:has_parameter``). What holds in every scenario, `placement` and `conduct` say.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
 from bridgegen.odd.expression import Expression
 from bridgegen.odd.parameters import TOLERANCE, Axis
+from bridgegen.ontology.conduct import conduct_rules
 from bridgegen.ontology.individuals import reason
+from bridgegen.ontology.placement import placement_rules
+from bridgegen.ontology.rule import Rule, slack
 from bridgegen.ontology.sparql import binds, literal, variable
 from bridgegen.ontology.story import WEATHER
-from bridgegen.ontology.vocabulary import BG, ONTOLOGY, XSD, tbox
+from bridgegen.ontology.vocabulary import BG, ONTOLOGY, RDFS, XSD, tbox
 
 if TYPE_CHECKING:
     from bridgegen.odd.scenario import LogicalScenario
@@ -40,31 +43,9 @@ _HEADER = f"""\
 
 :prefixes sh:declare
   [ sh:prefix "bg" ; sh:namespace "{BG}"^^xsd:anyURI ] ,
+  [ sh:prefix "rdfs" ; sh:namespace "{RDFS}"^^xsd:anyURI ] ,
   [ sh:prefix "xsd" ; sh:namespace "{XSD}"^^xsd:anyURI ] .
 """
-
-
-@dataclass(frozen=True)
-class Rule:
-    """One constraint of a scenario as a SHACL-SPARQL constraint.
-
-    Attributes:
-        key: local name of its shape.
-        target: the parameter that breaks the rule, if one does.
-        focus: the class whose individuals are asked.
-        text: the rule, as formula.
-        limit: the formula of the side that the target is compared with, if there is one.
-        why: reason and source, one sentence; may be empty.
-        select: the query; it returns each focus node that breaks the rule, with the value.
-    """
-
-    key: str
-    target: str
-    focus: str
-    text: str
-    limit: Expression | None
-    why: str
-    select: str
 
 
 def turtle(scenario: "LogicalScenario | None" = None) -> str:
@@ -121,21 +102,12 @@ def _general_rules() -> Iterator[Rule]:
         f"{_bound_by('?parameter')} }} "
         "GROUP BY $this ?parameter HAVING(COUNT(DISTINCT ?raw) > 1)",
     )  # fmt: skip
-    yield Rule(
-        "on-its-road", "", "LanePosition",
-        "a lane position lies on the road of its lane", None, "",
-        "SELECT $this ?value WHERE { $this bg:on_lane/^bg:has_lane ?road ; "
-        "bg:has_distance ?value . ?road bg:has_length ?length . "
-        "OPTIONAL { ?nearer bg:has_continuation+ ?road ; bg:has_length ?before } } "
-        "GROUP BY $this ?value ?length HAVING("
-        f"xsd:double(?value) < SUM(COALESCE(?before, 0.0e0)) - {literal(TOLERANCE)} || "
-        "xsd:double(?value) > SUM(COALESCE(?before, 0.0e0)) + xsd:double(?length) "
-        f"+ {literal(TOLERANCE)})",
-    )  # fmt: skip
+    yield from placement_rules()
+    yield from conduct_rules()
 
 
 def _declared_ranges() -> Rule:
-    low, high = _slack("xsd:double(?low)", -1), _slack("xsd:double(?high)", 1)
+    low, high = slack("xsd:double(?low)", -1), slack("xsd:double(?high)", 1)
     return Rule(
         "declared-range", "", "Parameter", "has_low <= value <= has_high", None, "",
         "SELECT DISTINCT $this ?value WHERE { $this bg:has_low ?low ; bg:has_high ?high . "
@@ -157,7 +129,7 @@ def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
     if scenario is None:
         return (*found, _declared_ranges())
     for name, parameter in scenario.parameters.items():
-        low, high = (_slack(literal(value), side) for value, side in
+        low, high = (slack(literal(value), side) for value, side in
                      ((parameter.low, -1), (parameter.high, 1)))  # fmt: skip
         x = variable(name)
         kept = f"{x} >= {low} && {x} <= {high}"
@@ -174,7 +146,7 @@ def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
                         f"bound-{number}-{'low' if side < 0 else 'high'}-{bound.target}",
                         bound.target,
                         f"{bound.target} {sign} {expression}",
-                        f"{variable(bound.target)} {sign} {_slack('?limit', side)}",
+                        f"{variable(bound.target)} {sign} {slack('?limit', side)}",
                         limit=expression,
                         why=reason(bound),
                     )
@@ -220,10 +192,9 @@ def _rule(
         axis: the target's; a map made elsewhere has no static parameters.
     """
     names = sorted({target} | (limit.names if limit else frozenset()))
-    focus = "Weather" if all(name in WEATHER_PATHS for name in names) else "Scenario"
     lines = []
     for name in names:
-        pattern = _pattern(name, focus)
+        pattern = _pattern(name)
         lines.append(f"OPTIONAL {{ {pattern} }}" if present and name == target else pattern)
         lines.append(f"BIND(xsd:double({_raw(name)}) AS {variable(name)})")
     if limit is not None:
@@ -234,14 +205,13 @@ def _rule(
         map_file = "$this bg:has_road_network/bg:has_map_file ?map_file"
         lines.append(f"FILTER(BOUND({_raw(target)}) || NOT EXISTS {{ {map_file} }})")
     select = f"SELECT DISTINCT $this ?value WHERE {{ {' '.join(lines)} }}"
-    return Rule(key, target, focus, text, limit, why, select)
+    return Rule(key, target, "Scenario", text, limit, why, select)
 
 
-def _pattern(name: str, focus: str) -> str:
+def _pattern(name: str) -> str:
     """Return the graph pattern that finds a parameter's value as `_raw`."""
     if name in WEATHER_PATHS:
-        start = "" if focus == "Weather" else "bg:has_weather/"
-        return f"$this {start}{WEATHER_PATHS[name]} {_raw(name)} ."
+        return f"$this bg:has_weather/{WEATHER_PATHS[name]} {_raw(name)} ."
     # each different value once, however many lanes have it: the rules join several parameters
     return (
         f"{{ SELECT DISTINCT $this {_raw(name)} WHERE {{ $this a bg:Scenario . "
@@ -260,20 +230,13 @@ def _bound_by(parameter: str) -> str:
     return f'{parameter} bg:binds_property ?bound . FILTER(STR(?property) = CONCAT("{BG}", ?bound))'
 
 
-def _slack(limit: str, side: int) -> str:
-    """Move a limit outwards by the one tolerance of all checks."""
-    sign = "+" if side > 0 else "-"
-    return f"({limit} {sign} {literal(TOLERANCE)} * (1.0e0 + ABS({limit})))"
-
-
 # -- Turtle ----------------------------------------------------------------------------------------
 
 
 def _sparql_shape(rule: Rule) -> str:
-    message = f"{rule.text}: {rule.why}" if rule.why else rule.text
     return (
         f":{rule.key} a sh:NodeShape ; sh:targetClass bg:{rule.focus} ;\n"
-        f"  sh:sparql [ sh:prefixes :prefixes ; sh:message {_quoted(message)} ;\n"
+        f"  sh:sparql [ sh:prefixes :prefixes ; sh:message {_quoted(rule.message)} ;\n"
         f"    sh:select {_quoted(rule.select)} ] .\n"
     )
 

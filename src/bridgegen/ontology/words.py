@@ -8,7 +8,8 @@ import numpy as np
 import pyoxigraph as ox
 
 from bridgegen.ontology.graph import Individuals, local_value
-from bridgegen.ontology.shapes import WEATHER_PATHS, Rule
+from bridgegen.ontology.rule import Rule, with_unit
+from bridgegen.ontology.shapes import WEATHER_PATHS
 from bridgegen.ontology.story import WEATHER
 from bridgegen.ontology.vocabulary import Subject, local_name, tbox
 
@@ -50,6 +51,7 @@ class Finding:
         focus: the individual that was asked.
         value: the value at fault, if there is one.
         literal: whether it is a literal.
+        message: what the shape says of it.
     """
 
     shape: str
@@ -57,6 +59,7 @@ class Finding:
     focus: str
     value: str | None
     literal: bool
+    message: str = ""
 
 
 def violations_of(
@@ -74,8 +77,8 @@ def violations_of(
         yield from _several_values(individuals)
     elif key == "declared-range":
         yield from _outside_declared(individuals, focus)
-    elif key == "on-its-road":
-        yield _beside_its_road(individuals, focus)
+    elif rules[key].individuals:
+        yield _about_individual(individuals, rules[key], focus, finding)
     elif scenario is not None:
         yield from _about_parameter(individuals, scenario, rules[key], focus)
 
@@ -125,14 +128,16 @@ def _shown(individuals: Individuals, finding: Finding) -> str:
 def carriers(individuals: Individuals, parameter: str) -> list[tuple[Subject, str]]:
     """Return the individuals and properties that carry a parameter's value.
 
-    For the weather's own parameters, those are the parts of a ``bg:Weather``, bound or not.
+    For the weather's own parameters, those are the parts of the scenario's, bound or not.
     """
     if parameter not in WEATHER_PATHS:
         return individuals.bindings.get(parameter, [])
     link = next(link for link, _, names in WEATHER if parameter in names)
     return [
         (part, f"has_{parameter}")
-        for weather in individuals.of_class("Weather")
+        for scenario in individuals.of_class("Scenario")
+        for weather in individuals.values(scenario, "has_weather")
+        if isinstance(weather, Subject)
         for part in individuals.values(weather, link)
         if isinstance(part, Subject) and individuals.values(part, f"has_{parameter}")
     ]
@@ -223,13 +228,17 @@ def _outside_declared(individuals: Individuals, parameter: Subject) -> Iterator[
         yield _at(found, who, name, message)
 
 
-def _beside_its_road(individuals: Individuals, position: Subject) -> Violation:
-    who = individuals.describe(position)
-    name = "has_distance"
-    got = ", ".join(_values(individuals, position, name))
-    lane = ", ".join(map(local_value, individuals.values(position, "on_lane")))
-    message = f"{name} [m] of {who} must lie on the road of its lane ({lane}), got {got}"
-    return Violation((position.value,), who, name, "", message)
+# -- individuals -----------------------------------------------------------------------------------
+
+
+def _about_individual(
+    individuals: Individuals, rule: Rule, focus: Subject, finding: Finding
+) -> Violation:
+    node = individuals.find(str(finding.value)) or focus
+    who, what = individuals.describe(node), with_unit(rule.at_fault)
+    said = finding.message.removeprefix(what).lstrip()
+    message = f"{what} of {who} {said}" if rule.at_fault else f"{who} {said}"
+    return Violation((node.value,), who, rule.at_fault, "", message)
 
 
 # -- values ----------------------------------------------------------------------------------------
