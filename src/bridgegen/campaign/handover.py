@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.campaign.outcomes import with_outcomes
 from bridgegen.errors import OntologyError, StorageError
 from bridgegen.metrics import METRICS
 from bridgegen.ontology.check import check
@@ -117,11 +118,15 @@ def hand_over(
 def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> list[Path]:
     """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
 
+    The ontology also holds what the scenario's rollout brought about (``has_outcome``).
+
     Raises:
         OntologyError: its individuals break a constraint (SHACL).
         OSError: the folder cannot be written.
     """
     individuals = pipeline.individuals(pipeline.space.values(x), f"{name}.xodr")
+    roads = pipeline.roads(individuals)
+    individuals = with_outcomes(individuals, pipeline.rollout(x[np.newaxis]), roads)
     violations = check(individuals, pipeline.scenario)
     if violations:
         raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
@@ -130,7 +135,7 @@ def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> lis
     if pipeline.road_map:
         xodr.write_bytes(pipeline.road_map.data)
     else:
-        xodr.write_bytes(road_xml(pipeline.roads(individuals)))
+        xodr.write_bytes(road_xml(roads))
     xosc.write_bytes(scenario_xml(openscenario_from_owl(individuals, xodr.name)))
     return [owl, xodr, xosc]
 

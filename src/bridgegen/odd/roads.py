@@ -159,7 +159,7 @@ class RoadsSpec:
         legs: of a junction or roundabout, by name.
         segments: of a road; empty: straight.
         crosswalk_at: of a road: where its crosswalk's centre lies [m], None for none.
-        signals: traffic lights at the junction: none, or two phases of opposite legs.
+        signals: traffic lights at the junction: none, or a phase for each pair of opposite legs.
         road_type: what kind of road it is.
     """
 
@@ -277,6 +277,13 @@ def knob_problems(
                 yield name, f"{rule}, got {value:g}"
             elif knob.unit == "count" and value != int(value):
                 yield name, f"{name} must be a whole number, got {value:g}"
+            continue
+        if knob.unit == "s":
+            yield (
+                name,
+                f"{name} [s] must be a constant, got '{value}': the lights' phases are part of the "
+                "storyboard, and one storyboard serves every road network",
+            )
             continue
         one = declared.get(value)
         if one is None:

@@ -330,6 +330,12 @@ class Storyboard:
             return
         kind, subject = CONDITIONS[one.kind], one.of or event.participant
         self._check(one.value, kind.unit, (*path, "value"))
+        if one.kind == "after" and isinstance(one.value, str):
+            self._say(
+                f"value of an 'after' condition [s] must be a constant, got '{one.value}': delays "
+                "are part of the storyboard, which is the same for all rows",
+                (*path, "value"),
+            )
         if not kind.pair and one.to is not None:
             self._say(f"a {one.kind} condition has no 'to', got '{one.to}'", path)
         if kind.pair and one.to is None:

@@ -8,13 +8,11 @@ from collections.abc import Iterator
 from bridgegen.odd.parameters import TOLERANCE
 from bridgegen.ontology.rule import Rule, about, called, is_a, shown
 from bridgegen.ontology.sparql import literal
+from bridgegen.ontology.templates import OPPOSITE
 
 FARTHEST_BESIDE = 5.0
 """How far from the road's edge what stands beside it may be [m], to be still seen as this road's;
 ours (signs stand 0.5 to 1.5 m from it, RSA 21)."""
-
-OPPOSITE = 45.0
-"""Legs whose directions differ from a straight line by less are opposite [deg]; ours."""
 
 _PAPER = "BridgeGen paper, Section III-B"
 _SLACK = literal(TOLERANCE)

@@ -85,8 +85,8 @@ def slack(limit: str, side: int) -> str:
 
 
 def shown(value: str) -> str:
-    """Return a number (SPARQL) rounded for people."""
-    return f"ROUND(xsd:double({value}) * 1.0e3) / 1.0e3"
+    """Return a number (SPARQL) as people read it: rounded, without superfluous digits."""
+    return f'REPLACE(STR(ROUND(xsd:double({value}) * 1.0e3) / 1.0e3), "[.]0$", "")'
 
 
 def called(node: str) -> str:

@@ -27,10 +27,12 @@ BESIDE = 0.75
 RAMP_HEADING = 190.0
 """A ramp joins a carriageway that runs along +x at 10° from its right [deg]; ours."""
 
+OPPOSITE = 45.0
+"""Legs whose directions differ from a straight line by less are opposite [deg]; ours."""
+
 _KINDS = {"roundabout": "Roundabout", "merge": "Merge"}
 _BY_LEGS = {3: "TJunction", 4: "Crossroads"}
 _WAYS: tuple[Direction, ...] = ("in", "out")
-_OPPOSITE = 45.0  # deg, off straight on
 
 
 def site_of(roads: RoadsSpec, values: Mapping[str, float]) -> Site:
@@ -218,24 +220,25 @@ class _Template:
                 yield Facility("StopLine", leg.name, stop, governs=("in",))
 
     def phases(self) -> Iterator[Phase]:
-        """Yield green, yellow and red to all, for one pair of opposite legs after the other."""
+        """Yield green, yellow and red to all, for one group of opposite legs after the other."""
         if self.roads.signals == "none":
             return
+        groups: list[list[str]] = []
         legs = self.roads.legs
-        first = next(iter(legs.values())).heading
-        one = tuple(
-            name
-            for name, leg in legs.items()
-            if abs(math.remainder(leg.heading - first, 180.0)) < _OPPOSITE
-        )
-        other = tuple(name for name in legs if name not in one)
-        for group in (one, other):
-            if group:
-                name = "".join(group)
-                yield Phase(f"{name}_green", self.knobs["green_time"], green=group)
-                yield Phase(f"{name}_yellow", self.knobs["yellow_time"], yellow=group)
-                if self.knobs["all_red_time"] > 0.0:
-                    yield Phase(f"{name}_clearing", self.knobs["all_red_time"])
+        for name, leg in legs.items():
+            for group in groups:
+                turns = (leg.heading - legs[other].heading for other in group)
+                if all(abs(math.remainder(turn, 180.0)) < OPPOSITE for turn in turns):
+                    group.append(name)
+                    break
+            else:
+                groups.append([name])
+        for together in map(tuple, groups):
+            name = "".join(together)
+            yield Phase(f"{name}_green", self.knobs["green_time"], green=together)
+            yield Phase(f"{name}_yellow", self.knobs["yellow_time"], yellow=together)
+            if self.knobs["all_red_time"] > 0.0:
+                yield Phase(f"{name}_clearing", self.knobs["all_red_time"])
 
 
 def crossroads(values: Mapping[str, float]) -> Site:

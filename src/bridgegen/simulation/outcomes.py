@@ -1,0 +1,322 @@
+"""What the participants' behaviour brought about in a rollout: collisions and queues.
+
+Paper, Section III-B: layer 4 brings about layer 3, "a collision makes a traffic accident, queueing
+a traffic jam".
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.openx.opendrive.lanes import borders, section_end
+from bridgegen.openx.opendrive.lanes import points as road_points
+from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.simulation.boxes import box_distance
+from bridgegen.simulation.rollout import Rollout
+
+MERGE_WITHIN = 5.0
+"""Contacts of the same two within this time are one accident [s], as in the metric n_collision."""
+
+CRAWL = 1.0
+QUEUE_GAP = 10.0
+QUEUE_TIME = 2.0
+QUEUE_SIZE = 3
+"""A queue: at least so many vehicles on one lane below ``CRAWL`` [m/s], behind one another with
+gaps below ``QUEUE_GAP`` [m] from bumper to bumper, for at least ``QUEUE_TIME`` [s].
+
+Ours. A vehicle has joined a queue when it is within a car's length of a standing one and about to
+stop (Highway Capacity Manual 2000, chapter 16, appendix A): 1 m/s is about to stop, and 10 m leave
+room for one vehicle's length and its usual gap. Two vehicles are one that waits for another; what
+lasts less than 2 s is a hesitation.
+"""
+
+_STEP = 1.0  # m, along lanes
+_AT_ONCE = 4_000_000  # distances
+
+
+@dataclass(frozen=True)
+class Accident:
+    """A collision.
+
+    Attributes:
+        time: of its first instant [s].
+        x: of the middle of the overlap then [m].
+        y: [m].
+        who: the two, in the rollout's order.
+    """
+
+    time: float
+    x: float
+    y: float
+    who: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Queue:
+    """A queue, when it had the most vehicles.
+
+    Attributes:
+        time: since when three of them stood [s].
+        road_id: OpenDRIVE's id.
+        lane_id: OpenDRIVE's id.
+        length: from the last one's rear to the first one's front [m].
+        who: its vehicles, in the rollout's order.
+    """
+
+    time: float
+    road_id: str
+    lane_id: int
+    length: float
+    who: tuple[str, ...]
+
+
+# -- collisions ------------------------------------------------------------------------------------
+
+
+def accidents(rollout: Rollout, row: int, standing: Iterable[str] = ()) -> tuple[Accident, ...]:
+    """Return the collisions of any two entities, in the order of time.
+
+    Args:
+        rollout: N scenarios.
+        row: which of them; it must not have failed.
+        standing: names of entities that are part of the road; two such do not collide.
+    """
+    still = set(standing)
+    e = rollout.shape[1]
+    order = sorted(range(e), key=lambda k: rollout.names[k] in still)
+    moving = sum(name not in still for name in rollout.names)
+    steps = int(rollout.n_steps[row])
+    within = round(MERGE_WITHIN / rollout.time_step)
+    found: list[Accident] = []
+    for k in range(min(moving, e - 1)):
+        rest = order[k:]
+        state = (
+            values[row : row + 1, rest, :steps] for values in (rollout.x, rollout.y, rollout.h)
+        )
+        gaps = box_distance(rollout.box[rest], *state, np.array([steps]))[0, 1:]
+        for other, first in _beginnings(gaps <= 0.0, within):
+            a, b = sorted((rest[0], rest[1 + other]))
+            px, py = _middle(_corners(rollout, row, a, first), _corners(rollout, row, b, first))
+            who = (rollout.names[a], rollout.names[b])
+            found.append(Accident(_seconds(first, rollout), px, py, who))
+    return tuple(sorted(found, key=lambda one: (one.time, one.who)))
+
+
+def _seconds(step: int, rollout: Rollout) -> float:
+    return round(step * rollout.time_step, 9)
+
+
+def _beginnings(contact: Bool, within: int) -> list[tuple[int, int]]:
+    """Return row and first step of each contact that none precedes within some steps.
+
+    Args:
+        contact: ``(K, T)`` bool.
+        within: that many steps.
+    """
+    steps = np.arange(contact.shape[1])
+    last = np.maximum.accumulate(np.where(contact, steps, -within - 1), axis=1)
+    before = np.full_like(last, -within - 1)
+    before[:, 1:] = last[:, :-1]
+    rows, first = np.nonzero(contact & (steps - before > within))
+    return list(zip(rows.tolist(), first.tolist(), strict=True))
+
+
+def _corners(rollout: Rollout, row: int, entity: int, step: int) -> Float:
+    """Return the corners of an entity's box, counter-clockwise; ``(4, 2)`` float64 [m]."""
+    length, width, ahead = rollout.box[entity]
+    h = float(rollout.h[row, entity, step])
+    along, across = np.array([1, -1, -1, 1]), np.array([1, 1, -1, -1])
+    u, v = ahead + 0.5 * length * along, 0.5 * width * across
+    x = rollout.x[row, entity, step] + u * math.cos(h) - v * math.sin(h)
+    y = rollout.y[row, entity, step] + u * math.sin(h) + v * math.cos(h)
+    return np.column_stack([x, y])
+
+
+def _middle(one: Float, other: Float) -> tuple[float, float]:
+    """Return the mean corner of where two boxes overlap; of boxes that touch, of where they do."""
+    overlap = [tuple(point) for point in one.tolist()]
+    for a, b in zip(other.tolist(), np.roll(other, -1, axis=0).tolist(), strict=True):
+        overlap = list(_left_of(overlap, a, b))
+    corners = np.array(overlap) if overlap else np.array([one.mean(axis=0), other.mean(axis=0)])
+    x, y = corners.mean(axis=0).tolist()
+    return x, y
+
+
+def _left_of(
+    polygon: Sequence[tuple[float, ...]], a: Sequence[float], b: Sequence[float]
+) -> Iterator[tuple[float, float]]:
+    """Yield the corners of a polygon's part left of a line (Sutherland and Hodgman, 1974)."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    sides = [dx * (y - a[1]) - dy * (x - a[0]) for x, y in polygon]
+    slack = 1e-9 * (dx * dx + dy * dy)
+    for k, (x, y) in enumerate(polygon):
+        before = k - 1
+        if (sides[k] > slack) != (sides[before] > slack) and sides[k] != sides[before]:
+            share = sides[before] / (sides[before] - sides[k])
+            u, v = polygon[before]
+            yield u + share * (x - u), v + share * (y - v)
+        if sides[k] >= -slack:
+            yield x, y
+
+
+# -- queues ----------------------------------------------------------------------------------------
+
+
+def queues(
+    rollout: Rollout,
+    row: int,
+    vehicles: Iterable[str],
+    model: OpenDrive,
+    lanes: set[tuple[str, int]],
+) -> tuple[Queue, ...]:
+    """Return the queues (see ``QUEUE_SIZE``), in the order of time.
+
+    Args:
+        rollout: N scenarios.
+        row: which of them; it must not have failed.
+        vehicles: names of the entities that can queue.
+        model: the road network that it took place on.
+        lanes: road id and lane id of the lanes on which vehicles can queue.
+    """
+    wanted = set(vehicles)
+    who = [k for k, name in enumerate(rollout.names) if name in wanted]
+    steps = int(rollout.n_steps[row])
+    slow = rollout.v[row, who, :steps] < CRAWL
+    if (slow.sum(axis=0) >= QUEUE_SIZE).sum() * rollout.time_step < QUEUE_TIME:
+        return ()
+    length, ahead = rollout.box[who, 0], rollout.box[who, 2, np.newaxis]
+    h = rollout.h[row, who, :steps]
+    x = rollout.x[row, who, :steps] + ahead * np.cos(h)
+    y = rollout.y[row, who, :steps] + ahead * np.sin(h)
+    known = sorted(lanes)
+    lane, station = _on_lanes(x, y, slow, [_line(model.road(road), one) for road, one in known])
+    found = []
+    for index, members, first, metres in find_queues(lane, station, length, rollout.time_step):
+        names = tuple(rollout.names[who[k]] for k in members)
+        found.append(Queue(_seconds(first, rollout), *known[index], metres, names))
+    return tuple(sorted(found, key=lambda one: (one.time, one.who)))
+
+
+def find_queues(
+    lane: Int, station: Float, length: Float, time_step: float
+) -> list[tuple[int, tuple[int, ...], int, float]]:
+    """Return each queue: its lane, its members, the first step, its length [m].
+
+    Args:
+        lane: ``(E, T)`` int64, on which lane a vehicle stands or crawls; -1: on none, or it drives.
+        station: ``(E, T)`` float64 [m], where its box's centre is along the lane.
+        length: ``(E,)`` float64 [m], of its box.
+        time_step: [s].
+    """
+    span = math.ceil(QUEUE_TIME / time_step - 1e-9)
+    found = []
+    for one in np.unique(lane[lane >= 0]).tolist():
+        on = lane == one
+        held = _held(_together(on, station, length), span)
+        size = held.sum(axis=1)
+        open_: list[tuple[int, set[int], int]] = []  # last step, members when most, first step
+        for step in np.flatnonzero((size >= QUEUE_SIZE).any(axis=0)).tolist():
+            groups = {
+                tuple(np.flatnonzero(held[k, :, step]).tolist())
+                for k in np.flatnonzero(size[:, step] >= QUEUE_SIZE)
+            }
+            for members in sorted(groups):
+                known = next((q for q in open_ if q[0] >= step - 1 and q[1] & set(members)), None)
+                if known is None:
+                    open_.append((step, set(members), step - span))
+                else:
+                    most = known[1] if len(known[1]) >= len(members) else set(members)
+                    open_[open_.index(known)] = (step, most, known[2])
+        for last, most, first in open_:
+            inside = np.array(sorted(most))
+            together = held[np.ix_(inside, inside)].all(axis=(0, 1)).nonzero()[0]
+            at = int(together[0]) if len(together) else last
+            rear = station[inside, at] - 0.5 * length[inside]
+            front = station[inside, at] + 0.5 * length[inside]
+            found.append((one, tuple(sorted(most)), first, float(front.max() - rear.min())))
+    return found
+
+
+def _together(on: Bool, station: Float, length: Float) -> Bool:
+    """Return who is in one row with whom: ``(E, E, T)`` bool."""
+    at = np.where(on, station, np.inf)
+    order = np.argsort(at, axis=0, kind="stable")
+    at = np.take_along_axis(at, order, axis=0)
+    half = 0.5 * length[order]
+    with np.errstate(invalid="ignore"):  # inf - inf: none of the two is on the lane
+        gap = (at[1:] - half[1:]) - (at[:-1] + half[:-1])
+    row = np.zeros(at.shape, dtype=np.int64)
+    row[1:] = np.cumsum(~(gap < QUEUE_GAP), axis=0)
+    back = np.empty_like(row)
+    np.put_along_axis(back, order, row, axis=0)
+    both = on[:, np.newaxis] & on[np.newaxis]
+    together: Bool = both & (back[:, np.newaxis] == back[np.newaxis])
+    return together
+
+
+def _held(state: Bool, span: int) -> Bool:
+    """Return where a state has held for ``span`` steps: ``(…, T)`` bool, at the last of them."""
+    count = np.cumsum(state, axis=-1)
+    held = np.zeros(state.shape, dtype=bool)
+    if state.shape[-1] > span:
+        earlier = np.concatenate([np.zeros_like(count[..., :1]), count[..., : -span - 1]], axis=-1)
+        held[..., span:] = count[..., span:] - earlier == span + 1
+    return held
+
+
+# -- lanes -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A lane's centre at every metre of travel: ``(P,)`` float64 each, [m], [rad]."""
+
+    x: Float
+    y: Float
+    h: Float
+    station: Float
+    width: Float
+
+
+def _line(road: Road, lane_id: int) -> _Line:
+    parts = []
+    for index, section in enumerate(road.sections):
+        end = section_end(road, index)
+        s = np.linspace(section.s, end, max(2, math.ceil((end - section.s) / _STEP) + 1))
+        edges = borders(road, index, s)
+        inner = edges[lane_id - int(np.sign(lane_id))]
+        middle, width = 0.5 * (inner + edges[lane_id]), np.abs(edges[lane_id] - inner)
+        parts.append(np.column_stack([road_points(road, s, middle), width]))
+    x, y, width = np.concatenate(parts)[:: road.direction(lane_id)].T
+    station = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    h = np.arctan2(np.gradient(y), np.gradient(x))
+    return _Line(x, y, h, station, width)
+
+
+def _on_lanes(x: Float, y: Float, asked: Bool, lines: Sequence[_Line]) -> tuple[Int, Float]:
+    """Return on which lane each point is (-1: none), and where along it.
+
+    Args:
+        x: ``(E, T)`` float64 [m].
+        y: ``(E, T)`` float64 [m].
+        asked: ``(E, T)`` bool; others are on none.
+        lines: the lanes.
+    """
+    lane, station = np.full(x.shape, -1), np.zeros(x.shape)
+    which = np.flatnonzero(asked)
+    for number, line in enumerate(lines):
+        chunk = max(1, _AT_ONCE // len(line.x))
+        for some in (which[i : i + chunk] for i in range(0, len(which), chunk)):
+            px, py = x.flat[some], y.flat[some]
+            away = (px[:, np.newaxis] - line.x) ** 2 + (py[:, np.newaxis] - line.y) ** 2
+            at = away.argmin(axis=1)
+            dx, dy = px - line.x[at], py - line.y[at]
+            cosine, sine = np.cos(line.h[at]), np.sin(line.h[at])
+            along, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
+            here = (np.abs(along) <= _STEP) & (np.abs(aside) <= 0.5 * line.width[at])
+            lane.flat[some[here]] = number
+            station.flat[some[here]] = (line.station[at] + along)[here]
+    return lane, station
