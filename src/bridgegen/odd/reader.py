@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.odd.changes import TemporaryChanges, jam_members
-from bridgegen.odd.checks import time_problems, try_out, use_problems
+from bridgegen.odd.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.odd.constraints import problems_of
 from bridgegen.odd.expression import parse
 from bridgegen.odd.objectives import read_objective
@@ -29,7 +29,7 @@ from bridgegen.odd.schema import (
     ScenarioFile,
 )
 from bridgegen.odd.shape import Section, section, shape_problems
-from bridgegen.odd.story import Story
+from bridgegen.odd.story import Story, WeatherChange
 from bridgegen.odd.storyboard import Storyboard
 
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
@@ -257,6 +257,8 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     if not quantities.problems:
         said.bounds += between
     used = quantities.used | roads.parameters | {one.name for one in changes.derived}
+    later = [a.prefix for e in board.events for a in e.actions if isinstance(a, WeatherChange)]
+    used |= {prefix + name for prefix in later for name in NEEDED}
     problems += said.problems + quantities.problems
     problems += problems_of(said.parameters, said.bounds, said.derived, said.names)
     problems += use_problems(declared | derived, said.bounds, said.names, used, document.place)

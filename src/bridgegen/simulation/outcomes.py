@@ -93,10 +93,8 @@ def accidents(rollout: Rollout, row: int, standing: Iterable[str] = ()) -> tuple
     found: list[Accident] = []
     for k in range(min(moving, e - 1)):
         rest = order[k:]
-        state = (
-            values[row : row + 1, rest, :steps] for values in (rollout.x, rollout.y, rollout.h)
-        )
-        gaps = box_distance(rollout.box[rest], *state, np.array([steps]))[0, 1:]
+        x, y, h = (one[[row]][:, rest, :steps] for one in (rollout.x, rollout.y, rollout.h))
+        gaps = box_distance(rollout.box[rest], x, y, h, np.array([steps]))[0, 1:]
         for other, first in _beginnings(gaps <= 0.0, within):
             a, b = sorted((rest[0], rest[1 + other]))
             px, py = _middle(_corners(rollout, row, a, first), _corners(rollout, row, b, first))
@@ -140,6 +138,8 @@ def _middle(one: Float, other: Float) -> tuple[float, float]:
     overlap = [tuple(point) for point in one.tolist()]
     for a, b in zip(other.tolist(), np.roll(other, -1, axis=0).tolist(), strict=True):
         overlap = list(_left_of(overlap, a, b))
+    # where they touch along a side, its ends come twice
+    overlap = list({(round(x, 6), round(y, 6)): (x, y) for x, y in overlap}.values())
     corners = np.array(overlap) if overlap else np.array([one.mean(axis=0), other.mean(axis=0)])
     x, y = corners.mean(axis=0).tolist()
     return x, y

@@ -1,0 +1,114 @@
+"""What a rollout brings about goes into the ontology that is handed over, and nowhere else."""
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.outcomes import with_outcomes
+from bridgegen.odd.reader import load
+from bridgegen.ontology.check import check
+from bridgegen.ontology.files import from_bytes, to_bytes
+from bridgegen.ontology.files import load as load_owl
+from bridgegen.ontology.questions import ask
+from bridgegen.openx.convert import convert_file
+from bridgegen.openx.opendrive.write import to_xml as road_xml
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.pipeline import Pipeline
+
+
+def records(individuals):
+    answer = ask(individuals, "outcomes")
+    return [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+
+
+def test_a_search_hands_over_its_accidents(tmp_path):
+    run = bg.run_search("crossroads-s4", budget=200, keep=3, out=tmp_path / "run")
+    crashes = 0
+    for path in run.scenarios:
+        individuals = load_owl(path.with_suffix(".owl"))
+        result = bg.simulate_file(path)
+        told = records(individuals)
+        assert len(told) == result.metrics["n_collision"]
+        distance = result.rollout.distance[0, 1]
+        for one in told:
+            crashes += 1
+            assert (one["kind"], one["participants"]) == ("traffic accident", "bv, ego")
+            step = round(one["time_s"] / result.rollout.time_step)
+            assert distance[step] == 0.0 < distance[step - 1]
+            for entity in (0, 1):  # the place is in both boxes
+                x, y, h = (a[0, entity, step] for a in
+                           (result.rollout.x, result.rollout.y, result.rollout.h))  # fmt: skip
+                length, width, ahead = result.rollout.box[entity]
+                dx, dy = one["x_m"] - x, one["y_m"] - y
+                along = np.cos(h) * dx + np.sin(h) * dy - ahead
+                aside = np.cos(h) * dy - np.sin(h) * dx
+                assert abs(along) <= length / 2 + 1e-6
+                assert abs(aside) <= width / 2 + 1e-6
+        assert check(individuals, load("crossroads-s4")) == []
+        converted, problems = convert_file(path.with_suffix(".owl"), tmp_path / "again")
+        assert problems == []
+        assert converted[1].read_bytes() == path.read_bytes()
+    assert crashes
+
+
+@pytest.fixture(scope="module")
+def jam():
+    """A truck that comes to a stand closely behind a jam of two, and stays there."""
+    scenario = load("jam-tail-in-fog")
+    pipeline = Pipeline(scenario, scenario.space())
+    return pipeline
+
+
+def test_a_declared_jam_is_no_outcome_unless_somebody_joins(jam):
+    values = jam.space.values(jam.space.row({}))
+    individuals = jam.individuals(values)
+    x = jam.space.row({})
+    rollout, roads = jam.rollout(x[np.newaxis]), jam.roads(individuals)
+    names = rollout.names
+    members = [k for k, name in enumerate(names) if name.startswith("jam_")]
+    others = [k for k in range(len(names)) if k not in members]
+    for states in (rollout.x, rollout.y):  # far away from all
+        states[0, others] += 1000.0 * (1 + np.arange(len(others)))[:, None]
+    assert records(with_outcomes(individuals, rollout, roads)) == []
+    tail, truck = names.index("jam_1"), names.index("truck")
+    rollout.x[0, truck] = rollout.x[0, tail] - 16.0
+    rollout.y[0, truck] = rollout.y[0, tail]
+    rollout.h[0, truck] = rollout.h[0, tail]
+    rollout.v[0, truck] = 0.0
+    together = with_outcomes(individuals, rollout, roads)
+    (queue,) = records(together)
+    assert queue["kind"] == "traffic jam"
+    assert queue["participants"] == "jam_1, jam_2, jam_3, jam_4, jam_5, jam_6, truck"
+    assert queue["lane"] == "leg_main_out_2"
+    assert queue["time_s"] == 0.0
+    a = rollout.x[0, truck, 0] + rollout.box[truck, 2] - rollout.box[truck, 0] / 2
+    last = names.index("jam_6")
+    b = rollout.x[0, last, 0] + rollout.box[last, 2] + rollout.box[last, 0] / 2
+    assert queue["length_m"] == pytest.approx(b - a)
+    assert check(together, jam.scenario) == []
+    assert check(from_bytes(to_bytes(together)), jam.scenario) == []
+    without = to_xml(openscenario_from_owl(individuals, "x.xodr"))
+    assert to_xml(openscenario_from_owl(together, "x.xodr")) == without
+    assert road_xml(jam.roads(together)) == road_xml(roads)
+
+
+def test_a_failed_rollout_brings_about_nothing(jam):
+    individuals = jam.individuals(jam.space.values(jam.space.row({})))
+    rollout = jam.rollout(jam.space.row({})[np.newaxis])
+    rollout.status[0] = 1
+    assert with_outcomes(individuals, rollout, jam.roads(individuals)) is individuals
+
+
+def test_hitting_a_cone_is_an_accident_of_one():
+    scenario = load("road-works")
+    pipeline = Pipeline(scenario, scenario.space())
+    x = pipeline.space.row({})
+    individuals = pipeline.individuals(pipeline.space.values(x))
+    rollout = pipeline.rollout(x[np.newaxis])
+    ego, cone = 0, rollout.names.index("works_cone_5")
+    for states in (rollout.x, rollout.y, rollout.h):
+        states[0, ego] = states[0, cone]
+    found = with_outcomes(individuals, rollout, pipeline.roads(individuals))
+    assert "ego" in {one["participants"] for one in records(found)}
+    assert check(found, scenario) == []
