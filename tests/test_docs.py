@@ -56,3 +56,13 @@ def test_the_language_is_described(make):
     }
     keys = {*ScenarioFile.model_fields, *EventSection.model_fields, *WaypointSection.model_fields}
     assert [key for key in keys - known if key not in text] == []
+
+
+def test_the_examples_run(tmp_path):
+    import bridgegen as bg
+
+    run = bg.run_search(DOCS / "examples" / "oil-spill.yaml", budget=80, out=tmp_path / "run")
+    assert run.scenarios
+    text = run.scenarios[0].with_suffix(".xosc").read_text("utf-8")
+    assert 'frictionScaleFactor="$oil_friction"' in text
+    assert 'value="$oil_at"' in text
