@@ -150,7 +150,10 @@ class Coverage {
       if (!groups.has(parameter.axis)) groups.set(parameter.axis, []);
       groups.get(parameter.axis).push(this.strip(parameter, row));
     });
-    return [...groups].map(([axis, strips]) => element("div", { class: "strip-group", role: "group", "aria-label": axis }, element("h4", {}, axis), ...strips));
+    return [...groups].map(([axis, strips]) => {
+      const columns = element("div", { class: "strips", style: `--rows: ${Math.ceil(strips.length / 2)}` }, ...strips);
+      return element("div", { role: "group", "aria-label": axis }, element("h4", {}, axis), columns);
+    });
   }
 
   strip(parameter, row) {
