@@ -151,8 +151,8 @@ class Coverage {
       groups.get(parameter.axis).push(this.strip(parameter, row));
     });
     return [...groups].map(([axis, strips]) => {
-      const columns = element("div", { class: "strips", style: `--rows: ${Math.ceil(strips.length / 2)}` }, ...strips);
-      return element("div", { role: "group", "aria-label": axis }, element("h4", {}, axis), columns);
+      const body = element("div", { class: "strips", style: `--rows: ${Math.ceil(strips.length / 2)}` }, ...strips);
+      return element("div", { role: "group", "aria-label": axis }, element("h4", {}, axis), body);
     });
   }
 
