@@ -1,6 +1,7 @@
 """bridgegen.owl as a document: complete for people, and within what OWL 2 DL and Protégé take."""
 
 from importlib.resources import files
+from pathlib import Path
 
 import pyoxigraph as ox
 import pytest
@@ -8,7 +9,18 @@ import rdflib
 
 from bridgegen.ontology.individuals import build
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.vocabulary import BG, DCTERMS, ONTOLOGY, OWL, RDF, RDFS, XSD, bg, tbox
+from bridgegen.ontology.vocabulary import (
+    BG,
+    DCTERMS,
+    ONTOLOGY,
+    OWL,
+    RDF,
+    RDFS,
+    VOCABULARIES,
+    XSD,
+    bg,
+    tbox,
+)
 
 PATH = files("bridgegen.ontology").joinpath("bridgegen.owl")
 PAPER_CLASSES = {
@@ -129,6 +141,131 @@ def test_storyboard_classes_point_to_openscenario(graph):
     for name in ("SpeedAction", "TeleportAction", "Event", "Trigger", "LanePosition", "Controller"):
         found = {str(node) for node in graph.objects(rdflib.URIRef(BG + name), see)}
         assert f"{openscenario}{name}" in found
+
+
+def test_alignment_points_to_terms_that_were_looked_up(graph):
+    """`foreign_terms.txt` is what was found in the other vocabularies, group by group."""
+    lines = Path(__file__).with_name("foreign_terms.txt").read_text("utf-8").splitlines()
+    looked_up = [line for line in lines if line and not line.startswith("#")]
+    pairs = list(graph.subject_objects(rdflib.URIRef(RDFS + "seeAlso")))
+    assert sorted({str(other) for _, other in pairs}) == sorted(looked_up)
+    assert {term for term, _ in pairs} <= terms(graph, "Class")
+    namespaces = [namespace for _, namespace in VOCABULARIES.values()]
+    for iri in looked_up:
+        assert sum(iri.startswith(one) for one in namespaces) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "counterparts"),
+    [
+        ("Road", {"odr:T_road", "auto:l1_core#Road", "openlabel:DrivableAreaType"}),
+        ("Crossroads", {"odr:T_junction", "auto:l1_de#Crossing",
+                        "openlabel:IntersectionCrossroad"}),
+        ("Crosswalk", {"odr:T_road_objects_object", "auto:l1_de#Pedestrian_Crossing",
+                       "openlabel:SpecialStructurePedestrianCrossing"}),
+        ("RoadWorks", {"auto:l3_de#Construction_Site", "openlabel:TemporaryStructureRoadWorks"}),
+        ("Car", {"osc:Vehicle", "auto:l4_de#Passenger_Car", "openlabel:VehicleCar"}),
+        ("Fog", {"osc:Fog", "auto:l5_de#Fog", "openlabel:ParticulatesWater"}),
+        ("StopSign", {"odr:T_road_signals_signal", "auto:l1_de#Halt_Vorfahrt_gewähren",
+                      "openlabel:SignsRegulatory"}),
+    ],
+)  # fmt: skip
+def test_classes_of_every_layer_have_counterparts(name, counterparts):
+    """A stop sign is StVO sign 206, "Halt. Vorfahrt gewähren"."""
+    found = set(tbox().see_also[name])
+    spelled = {(prefix, VOCABULARIES[prefix][1]) for prefix in VOCABULARIES}
+    assert found == {
+        namespace + one.removeprefix(f"{prefix}:")
+        for one in counterparts
+        for prefix, namespace in spelled
+        if one.startswith(f"{prefix}:")
+    }
+
+
+def test_every_layer_is_aligned_with_every_vocabulary():
+    """But storyboards are no matter of OpenDRIVE, nor roads of OpenSCENARIO."""
+    ontology = tbox()
+    aligned = {
+        (ontology.layer(cls), prefix)
+        for cls, others in ontology.see_also.items()
+        for prefix, (_, namespace) in VOCABULARIES.items()
+        if any(other.startswith(namespace) for other in others)
+    }
+    assert aligned >= {(layer, prefix) for layer in range(1, 6) for prefix in ("auto", "openlabel")}
+    assert {prefix for layer, prefix in aligned if layer == 1} == {
+        "osc", "odr", "auto", "openlabel",
+    }  # fmt: skip
+    assert {layer for layer, prefix in aligned if prefix == "osc"} >= {None, 2, 4, 5}
+
+
+NO_LAYER = {
+    # what a scenario is told with, as OpenSCENARIO has it, lies across the layers
+    *("ScenarioElement", "Scenario", "Parameter", "DerivedParameter", "LocatedElement", "Static"),
+    *("Event", "StoryboardEvent", "Trigger", "Condition", "ConditionGroup", "Action"),
+    *("Position", "LanePosition", "WorldPosition", "Route", "Trajectory", "Vertex", "Controller"),
+}
+TOP_OF_LAYER = {
+    1: ("RoadNetwork", "AreaEntities", "GeometrySegment", "JunctionConnection", "LaneLink"),
+    2: ("PointEntities", "SignalController", "SignalPhase", "SignalChangeEvent"),
+    3: ("TemporaryChange",),
+    4: ("TrafficParticipant",),
+    5: ("WeatherEnvironment", "EnvironmentChangeEvent", "EnvironmentAction"),
+}
+
+
+def test_every_class_has_a_layer_unless_it_lies_across_them(graph):
+    ontology = tbox()
+    names = {str(node).removeprefix(BG) for node in terms(graph, "Class")}
+    without = {name for name in names if ontology.layer(name) is None}
+    kinds = {  # of actions and conditions
+        name
+        for name in names
+        if {"Action", "Condition"} & set(ontology.parents.get(name, ()))
+    }  # fmt: skip
+    assert without - kinds == NO_LAYER
+    for layer, tops in TOP_OF_LAYER.items():
+        for top in tops:
+            for node in ontology.subclasses[bg(top)]:
+                assert ontology.layer(node.value.removeprefix(BG)) == layer, node
+    of_a_layer = {
+        node.value.removeprefix(BG)
+        for tops in TOP_OF_LAYER.values()
+        for top in tops
+        for node in ontology.subclasses[bg(top)]
+    }
+    assert names - without == of_a_layer
+
+
+def test_labels_tell_terms_apart_and_comments_are_sentences(graph):
+    for kind in ("Class", "ObjectProperty", "DatatypeProperty"):
+        labels = [str(next(graph.objects(t, rdflib.URIRef(RDFS + "label"))))
+                  for t in terms(graph, kind)]  # fmt: skip
+        for term in terms(graph, kind):
+            text = str(next(graph.objects(term, rdflib.URIRef(RDFS + "comment"))))
+            assert text[0].isupper() or not text[0].isalpha(), text
+            assert text.endswith((".", ".)")), text
+        assert len(set(labels)) >= len(labels) - 1  # hasSun, has_sun
+
+
+def test_what_the_vocabulary_reads_is_what_rdflib_reads(graph):
+    ontology = tbox()
+    for name, kind in ontology.kinds.items():
+        (source,) = graph.objects(_any_term(name), rdflib.URIRef(DCTERMS + "source"))
+        assert ontology.sources[name] == str(source)
+        assert (_any_term(name), rdflib.URIRef(RDF + "type"), rdflib.URIRef(OWL + kind)) in graph
+    for name, parents in ontology.parents.items():
+        above = graph.objects(rdflib.URIRef(BG + name), rdflib.URIRef(RDFS + "subClassOf"))
+        assert sorted(parents) == sorted(str(one).removeprefix(BG) for one in above)
+    members = rdflib.URIRef(OWL + "members")
+    groups = {
+        tuple(str(one).removeprefix(BG) for one in graph.items(head))
+        for head in graph.objects(None, members)
+    }
+    assert set(ontology.disjoint) == groups
+
+
+def _any_term(name):
+    return rdflib.URIRef((DCTERMS if name in ("source", "license") else BG) + name)
 
 
 def test_required_properties_belong_to_their_class():
