@@ -1,5 +1,8 @@
+from pathlib import Path
+
 import pytest
 
+from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import SearchSpace
@@ -27,3 +30,24 @@ def values(space) -> dict[str, float]:
 @pytest.fixture(scope="session")
 def individuals(scenario, values) -> Individuals:
     return build(scenario, values, driver="route-follower")
+
+
+@pytest.fixture(scope="session")
+def everything() -> Individuals:
+    """A scenario with lights, crosswalks, a jam, road works and a change of the weather.
+
+    At its defaults, but for the weather's fog: none at first, 40 % later.
+    """
+    return at_defaults(load(Path(__file__).with_name("everything.yaml")))
+
+
+def at_defaults(scenario: LogicalScenario) -> Individuals:
+    whole = SearchSpace(scenario, Axis)
+    defaults = {one.name: one.default for one in scenario.parameters.values()}
+    return build(scenario, whole.values(whole.row(defaults)), driver="reference")
+
+
+@pytest.fixture(scope="session")
+def individuals_of():
+    """Build the individuals of a scenario of the catalogue, at its defaults."""
+    return lambda name: at_defaults(load(name))

@@ -4,14 +4,14 @@ import pyoxigraph as ox
 import pytest
 
 from bridgegen.errors import InputError, OntologyError
-from bridgegen.odd.reader import load
+from bridgegen.odd.reader import load, names
 from bridgegen.ontology import reasoner as module
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build
 from bridgegen.ontology.reasoner import reason, require, smallest
-from bridgegen.ontology.vocabulary import OWL, SCENARIOS, SUBCLASS, TYPE, XSD, bg
+from bridgegen.ontology.vocabulary import OWL, SCENARIOS, SUBCLASS, TYPE, XSD, bg, tbox
 
 
 def installed() -> bool:
@@ -82,6 +82,117 @@ def test_planted_contradictions_are_found(individuals, statement, contradiction)
     assert len(found.contradiction) in (2, 3)
     if contradiction is not None:
         assert set(found.contradiction) == contradiction
+
+
+# -- the layers beyond the paper's crossroads ------------------------------------------------------
+
+
+@reasoning
+def test_every_class_of_the_ontology_can_have_an_individual():
+    """One of each class at once, each a thing of its own."""
+    classes = [name for name, kind in tbox().kinds.items() if kind == "Class"]
+    assert len(classes) > 90
+    each = [(ox.NamedNode(f"{SCENARIOS}x#one_{name}"), TYPE, bg(name)) for name in classes]
+    found = reason(planted(Individuals(()), *each))
+    assert found.problems == []
+    for name in classes:
+        assert found.types[f"{SCENARIOS}x#one_{name}"] == (name,)
+
+
+@reasoning
+@pytest.mark.parametrize("name", names())
+def test_the_catalogue_is_consistent(name, individuals_of):
+    found = reason(individuals_of(name))
+    assert found.problems == []
+    kinds = {classes for classes in found.types.values() if len(classes) != 1}
+    assert kinds == set()  # nothing is inferred to be two things at once
+
+
+@reasoning
+def test_everything_at_once_is_consistent(everything):
+    found = reason(everything)
+    assert found.problems == []
+    by_name = {iri.rpartition("#")[2]: classes for iri, classes in found.types.items()}
+    for name, cls in {
+        "works": "RoadWorks", "works_cone_1": "RoadCone", "works_sign": "ConstructionCard",
+        "queue": "TrafficJam", "walker": "Pedestrian", "crosswalk_B": "Crosswalk",
+        "signals_phase_1": "SignalPhase", "light_A": "TrafficLight", "fog_falls":
+        "EnvironmentChangeEvent", "bv_moves_over_condition_1": "ConditionGroup",
+        "walker_path": "Trajectory", "stop_line_C": "StopLine", "later_weather": "Weather",
+    }.items():  # fmt: skip
+        assert by_name[name] == (cls,)
+
+
+@reasoning
+@pytest.mark.parametrize(
+    ("statement", "contradiction"),
+    [
+        ("walker a Car", {"walker is a Pedestrian", "walker is a Car"}),
+        ("crosswalk_A a Lane", {"crosswalk_A is a Crosswalk", "crosswalk_A is a Lane"}),
+        ("leg_A_in_sidewalk a Shoulder",
+         {"leg_A_in_sidewalk is a Sidewalk", "leg_A_in_sidewalk is a Shoulder"}),
+        ("intersection a Roundabout", {"intersection is a Crossroads",
+                                       "intersection is a Roundabout"}),
+        ("light_A a YieldSign", {"light_A is a TrafficLight", "light_A is a YieldSign"}),
+        ("works a TrafficJam", {"works is a RoadWorks", "works is a TrafficJam"}),
+        ("fog_falls a StoryboardEvent",
+         {"fog_falls is a EnvironmentChangeEvent", "fog_falls is a StoryboardEvent"}),
+        ("bv_moves_over_condition_1 a SpeedCondition",
+         {"bv_moves_over_condition_1 is a ConditionGroup",
+          "bv_moves_over_condition_1 is a SpeedCondition"}),
+        ("later_weather a Fog", {"later_weather is a Weather", "later_weather is a Fog"}),
+        ("bv_sets_off has_who works_cone_1",
+         {"bv_sets_off has_who works_cone_1", "works_cone_1 is a RoadCone"}),
+        ("queue has_who works_sign",
+         {"queue has_who works_sign", "works_sign is a ConstructionCard"}),
+        ("works closes_lane stop_line_A",
+         {"works closes_lane stop_line_A", "stop_line_A is a StopLine"}),
+        ("works has_element bv", {"works has_element bv", "bv is a Truck"}),
+        ("signals has_phase light_A", {"signals has_phase light_A", "light_A is a TrafficLight"}),
+        ("signals_phase_1 gives_green_to crosswalk_A",
+         {"signals_phase_1 gives_green_to crosswalk_A", "crosswalk_A is a Crosswalk"}),
+        ("walker_path has_vertex walker_start",
+         {"walker_path has_vertex walker_start", "walker_start is a LanePosition"}),
+        ("scenario has_outcome bv_sets_off",
+         {"scenario has_outcome bv_sets_off", "bv_sets_off is a StoryboardEvent"}),
+        ("crosswalk_A on_road light_A", {"crosswalk_A on_road light_A",
+                                         "light_A is a TrafficLight"}),
+    ],
+)  # fmt: skip
+def test_planted_contradictions_in_every_layer(everything, statement, contradiction):
+    subject, verb, target = statement.split()
+    here = f"{SCENARIOS}everything#"
+    found = reason(planted(everything, (
+        ox.NamedNode(here + subject), TYPE if verb == "a" else bg(verb),
+        bg(target) if verb == "a" else ox.NamedNode(here + target),
+    )))  # fmt: skip
+    assert not found.consistent
+    assert set(found.contradiction) == contradiction
+
+
+@reasoning
+def test_a_phase_has_one_duration(everything):
+    phase = ox.NamedNode(f"{SCENARIOS}everything#signals_phase_1")
+    found = reason(planted(everything, (phase, bg("has_duration"), typed("7", "double"))))
+    assert not found.consistent
+    assert len(found.contradiction) == 2
+    assert all(one.startswith("signals_phase_1 has_duration") for one in found.contradiction)
+
+
+@reasoning
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("Crosswalk", "Lane"), ("RoadCone", "Signage"), ("SignalPhase", "TrafficLight"),
+     ("RoadWorks", "TrafficJam"), ("ConditionGroup", "Condition"), ("Trajectory", "Route"),
+     ("TrafficJam", "StoryboardEvent"), ("Crossroads", "TJunction")],
+)  # fmt: skip
+def test_a_class_below_two_disjoint_ones_is_named(first, second):
+    new = bg("Both")
+    found = reason(planted(
+        Individuals(()), (new, TYPE, ox.NamedNode(OWL + "Class")),
+        (new, SUBCLASS, bg(first)), (new, SUBCLASS, bg(second)),
+    ))  # fmt: skip
+    assert found.problems == ["no individual can be of class Both"]
 
 
 @reasoning

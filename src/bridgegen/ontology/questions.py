@@ -64,12 +64,12 @@ def questions() -> Mapping[str, Question]:
     """Return the catalogue, in alphabetical order."""
     found = {}
     folder = files("bridgegen.ontology").joinpath("questions")
-    for file in sorted(folder.iterdir(), key=lambda one: one.name):
+    for file in folder.iterdir():
         if file.name.endswith(".rq"):
             text = file.read_text(encoding="utf-8")
             name = file.name.removesuffix(".rq")
             found[name] = Question(name, text.partition("\n")[0].removeprefix("# "), text)
-    return found
+    return dict(sorted(found.items()))
 
 
 def ask(individuals: Individuals, question: str) -> Answer:
