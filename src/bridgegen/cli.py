@@ -20,6 +20,9 @@ app = typer.Typer(
 listing = typer.Typer(help="List what there is.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(listing, name="list")
 
+ontology = typer.Typer(help="The ontology itself.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(ontology, name="ontology")
+
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
@@ -262,6 +265,17 @@ def ask(
 
     answer = ask_file(file, question, sparql)
     print_table(answer.columns, answer.rows, as_json=as_json)
+
+
+@ontology.command("docs")
+def ontology_docs(
+    out: Annotated[Path, typer.Option(help="The page (.html).")] = Path("bridgegen-ontology.html"),
+) -> None:
+    """Write all classes and properties of the ontology as one page, with what each means."""
+    from bridgegen.ontology.docs import write_docs
+
+    write_docs(out)
+    print(out)
 
 
 @listing.command("scenarios")

@@ -50,10 +50,18 @@ def save(individuals: Individuals, path: Path | str, include_tbox: bool = True) 
     Raises:
         StorageError: the file cannot be written.
     """
-    path = Path(path)
+    write_whole(Path(path), to_bytes(individuals, include_tbox))
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file; it is there whole or not at all.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        part.write_bytes(to_bytes(individuals, include_tbox))
+        part.write_bytes(data)
         part.replace(path)
     except OSError as error:
         with suppress(OSError):
