@@ -303,6 +303,6 @@ def test_a_command_without_documentation_fails_this_test(cli):
     readme = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
     code, out, _ = cli("--help")
     assert code == 0
-    for command in ("search", "resume", "simulate", "convert", "validate", "list"):
+    for command in ("search", "resume", "simulate", "convert", "validate", "list", "ontology"):
         assert f"bridgegen {command}" in readme
         assert command in out
