@@ -14,7 +14,8 @@ from bridgegen.errors import InputError, StorageError
 from bridgegen.ontology.docs import to_html, write_docs
 from bridgegen.ontology.vocabulary import BG, OWL, RDF, RDFS, VOCABULARIES, tbox
 
-VOID = {"meta", "link", "br"}
+VOID = {"meta", "link", "br", "wbr"}
+BLOCKS = {"h3", "p", "dt", "dd", "th", "td", "summary", "span"}
 KINDS = ("Class", "ObjectProperty", "DatatypeProperty", "AnnotationProperty")
 
 
@@ -45,6 +46,8 @@ class Page(HTMLParser):
     def handle_endtag(self, tag):
         assert self.open, f"</{tag}> closes nothing"
         assert self.open.pop() == tag
+        if self._article and tag in BLOCKS:
+            self.articles[self._article] += " "
         if tag == "article":
             self._article = ""
 
@@ -138,7 +141,7 @@ def test_every_triple_of_a_class_is_on_its_article(page, graph):
                        "auto:l3_de#Construction_Site"]),
         ("Car", ["Superclasses Vehicle (and so TrafficParticipant, LocatedElement,",
                  "has_wheelbase, has_max_speed", "from Vehicle", "Inherited"]),
-        ("TrafficLight", ["Value of", "gives_green_to", "has_light", "has_signal"]),
+        ("TrafficLight", ["Pointed to by", "gives_green_to", "has_light", "has_signal"]),
         ("PointEntities", ["Superclasses Static, LocatedElement (and so ScenarioElement)"]),
     ],
 )  # fmt: skip

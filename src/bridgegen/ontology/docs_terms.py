@@ -63,7 +63,7 @@ class Terms:
             ("Disjoint with", links(one for one in disjoint if one != name)),
             ("Required", self._by_owner(name, self._required)),
             ("Inherited", self._folded(name)),
-            ("Value of", links(pointing)),
+            ("Pointed to by", links(pointing)),
             ("Counterparts", ", ".join(map(counterpart, ontology.see_also.get(name, ())))),
         ])  # fmt: skip
         own = self.by_domain.get(name, [])
@@ -85,7 +85,7 @@ class Terms:
         found: list[str] = []
         level = list(self.ontology.parents.get(name, ()))
         while level:
-            found += [one for one in level if one not in found]
+            found += dict.fromkeys(level)
             above = [up for one in level for up in self.ontology.parents.get(one, ())]
             level = [one for one in above if one not in found]
         return found
@@ -169,5 +169,6 @@ def counterpart(iri: str, with_prefix: bool = True) -> str:
         if iri.startswith(namespace):
             name = iri[len(namespace) :]
             shown = f"{prefix}:{name}" if with_prefix else name
-            return f'<code title="{escaped(iri)}">{escaped(shown)}</code>'
+            breakable = escaped(shown).replace("_", "_<wbr>")
+            return f'<code title="{escaped(iri)}">{breakable}</code>'
     return f"<code>{escaped(iri)}</code>"
