@@ -29,6 +29,9 @@ REFERENCE = Driver(
     "Follows its route, slows for bends, keeps its distance, yields and brakes by predicted "
     "conflict; perceives perfectly.",
 )
+TRAJECTORY = Driver("trajectory", 0, "Nobody: the file's own timetable moves the ego.")
+"""What an ego without a driver says it is driven by; not to be chosen."""
+
 DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE)}
 
 

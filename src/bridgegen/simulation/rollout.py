@@ -41,6 +41,8 @@ class Rollout:
             scenario are finite but meaningless.
         light_names: S ids of the traffic lights that change.
         lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
+        event_names: of the V events of the storyboard, in the order of the file.
+        began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
     """
 
     time_step: float
@@ -56,6 +58,8 @@ class Rollout:
     status: npt.NDArray[np.int8]
     light_names: tuple[str, ...] = ()
     lights: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
+    event_names: tuple[str, ...] = ()
+    began: Int = field(default_factory=lambda: np.zeros((0, 0), np.int64))
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -45,15 +45,14 @@ SPEED_CHANGE, LANE_CHANGE, FRICTION, LIGHT = 0, 1, 2, 3
 
 @kernel
 def simulate_one(
-    paths, path_n, path_ds, zones, station0, aside0, points, slots, bodies, init, triggers,
-    groups, conditions, acts, events, actions, first_states, friction_slot, driver, dt,
-    x, y, h, v, a, offset, lights,
+    paths, path_n, path_ds, zones, station0, aside0, points, timed, tracks, slots, bodies, init,
+    triggers, groups, conditions, acts, events, actions, first_states, friction_slot, driver, dt,
+    x, y, h, v, a, offset, lights, began,
 ):  # fmt: skip
     """Fill one scenario's ``(E, T)`` arrays; return (n_steps, status)."""
     n_entities, n_steps = x.shape
     history = np.zeros((conditions.shape[0], n_steps), dtype=np.bool_)
     act_runs = np.zeros(acts.shape[0], dtype=np.bool_)
-    event_done = np.zeros(events.shape[0], dtype=np.bool_)
     event_ended = np.zeros(events.shape[0], dtype=np.bool_)
     action_ended = np.zeros(actions.shape[0], dtype=np.bool_)
     travelled = np.zeros(n_entities)
@@ -74,6 +73,14 @@ def simulate_one(
     if friction_slot >= 0:
         friction_limit *= slots[friction_slot]
     for e in range(n_entities):
+        m = timed[e]
+        if m >= 0:  # its states are known beforehand
+            for k in range(n_steps):
+                x[e, k], y[e, k], h[e, k] = tracks[m, k, 0], tracks[m, k, 1], tracks[m, k, 2]
+                v[e, k], a[e, k], offset[e, k] = tracks[m, k, 3], tracks[m, k, 4], 0.0
+            command[e] = target[e] = v[e, 0]
+            station[e] = tracks[m, 0, 5]
+            continue
         length = (path_n[e] - 1) * path_ds[e]
         if not (0.0 <= station[e] <= length):
             x[:] = 0.0
@@ -89,6 +96,9 @@ def simulate_one(
         command[e] = target[e] = v[e, 0] = min(slots[init[e]], bodies[e, 3])
         offset[e, 0] = 0.0
     ego_end = (path_n[0] - 1) * path_ds[0]
+    driven = timed[0] < 0
+    if not driven:
+        ego_end = math.inf
     last = n_steps - 1
     status = OK
     for k in range(n_steps):
@@ -114,7 +124,7 @@ def simulate_one(
             if not act_runs[i] and fires(acts[i], triggers, groups, conditions, history, k):
                 act_runs[i] = True
         for i in range(events.shape[0]):
-            if event_done[i]:
+            if began[i] >= 0:
                 if not event_ended[i]:
                     ended = True
                     for j in range(events[i, 2], events[i, 3]):
@@ -125,7 +135,7 @@ def simulate_one(
                 continue
             if not fires(events[i, 1], triggers, groups, conditions, history, k):
                 continue
-            event_done[i] = True
+            began[i] = k
             for j in range(events[i, 2], events[i, 3]):
                 e, kind, shape, dimension = (
                     actions[j, 0], actions[j, 1], actions[j, 2], actions[j, 3],
@@ -178,28 +188,39 @@ def simulate_one(
         for i in range(states.shape[0]):
             lights[i, k] = states[i]
         # The ego: its driver demands, its tyres give.
-        s0, n0, ds0 = station[0], path_n[0], path_ds[0]
-        bend = steer(paths[0], n0, ds0, s0, x[0, k], y[0, k], h[0, k], v[0, k])
-        if driver == 0:
-            demanded = hold_speed(v[0, k], command[0])
-        else:
-            demanded = drive(
-                paths[0], n0, ds0, v[0, k], command[0], friction_limit, bodies, station, v, k,
-                zones, on, to, foot,
+        nx, ny, nh = x[0, k], y[0, k], h[0, k]
+        if driven:
+            s0, n0, ds0 = station[0], path_n[0], path_ds[0]
+            bend = steer(paths[0], n0, ds0, s0, x[0, k], y[0, k], h[0, k], v[0, k])
+            if driver == 0:
+                demanded = hold_speed(v[0, k], command[0])
+            else:
+                demanded = drive(
+                    paths[0], n0, ds0, v[0, k], command[0], friction_limit, bodies, station, v, k,
+                    zones, on, to, foot,
+                )  # fmt: skip
+            nx, ny, nh, nv, given = bicycle(
+                x[0, k], y[0, k], h[0, k], v[0, k], demanded, bend, bodies[0, 3:7],
+                friction_limit, dt,
             )  # fmt: skip
-        nx, ny, nh, nv, given = bicycle(
-            x[0, k], y[0, k], h[0, k], v[0, k], demanded, bend, bodies[0, 3:7],
-            friction_limit, dt,
-        )  # fmt: skip
-        a[0, k] = given
-        travelled[0] += 0.5 * (v[0, k] + nv) * dt
-        stood[0] = stood[0] + dt if nv == 0.0 else 0.0
-        if k < last:
-            x[0, k + 1], y[0, k + 1], h[0, k + 1], v[0, k + 1] = nx, ny, nh, nv
-            ahead = s0 + 0.5 * (v[0, k] + nv) * dt
-            station[0], offset[0, k + 1] = project(paths[0], n0, ds0, ahead, nx, ny)
+            a[0, k] = given
+            travelled[0] += 0.5 * (v[0, k] + nv) * dt
+            stood[0] = stood[0] + dt if nv == 0.0 else 0.0
+            if k < last:
+                x[0, k + 1], y[0, k + 1], h[0, k + 1], v[0, k + 1] = nx, ny, nh, nv
+                ahead = s0 + 0.5 * (v[0, k] + nv) * dt
+                station[0], offset[0, k + 1] = project(paths[0], n0, ds0, ahead, nx, ny)
         # The others: on their paths, at the speed the storyboard asks for.
-        for e in range(1, n_entities):
+        for e in range(n_entities):
+            m = timed[e]
+            if m >= 0:
+                if k < last:
+                    station[e] = tracks[m, k + 1, 5]
+                    travelled[e] = station[e] - tracks[m, 0, 5]
+                    stood[e] = stood[e] + dt if v[e, k + 1] == 0.0 else 0.0
+                continue
+            if e == 0:
+                continue
             before = v[e, k]
             p = on[e]
             length = (path_n[p] - 1) * path_ds[p]
@@ -254,16 +275,16 @@ def simulate_one(
 
 @kernel
 def simulate_rows(
-    network, paths, path_n, path_ds, zones, station0, aside0, points, slots, bodies, init,
-    triggers, groups, conditions, acts, events, actions, first_states, friction_slot, driver, dt,
-    x, y, h, v, a, offset, lights, n_steps, status,
+    network, paths, path_n, path_ds, zones, station0, aside0, points, timed, tracks, slots,
+    bodies, init, triggers, groups, conditions, acts, events, actions, first_states,
+    friction_slot, driver, dt, x, y, h, v, a, offset, lights, began, n_steps, status,
 ):  # fmt: skip
     """Fill the batch's ``(N, E, T)`` arrays, row by row; ``network`` tells each row's roads."""
     for i in range(slots.shape[0]):
         p = network[i]
         n_steps[i], status[i] = simulate_one(
-            paths[p], path_n[p], path_ds[p], zones[p], station0[i], aside0[i], points[p],
-            slots[i], bodies, init, triggers, groups, conditions, acts, events, actions,
+            paths[p], path_n[p], path_ds[p], zones[p], station0[i], aside0[i], points[p], timed,
+            tracks[p], slots[i], bodies, init, triggers, groups, conditions, acts, events, actions,
             first_states, friction_slot, driver, dt,
-            x[i], y[i], h[i], v[i], a[i], offset[i], lights[i],
+            x[i], y[i], h[i], v[i], a[i], offset[i], lights[i], began[i],
         )  # fmt: skip

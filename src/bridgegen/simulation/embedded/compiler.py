@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from bridgegen.ego import DRIVERS, Driver
+from bridgegen.ego import DRIVERS, TRAJECTORY, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl import TIME_STEP
@@ -19,6 +19,7 @@ from bridgegen.simulation.embedded.program import (
     Program,
 )
 from bridgegen.simulation.embedded.tables import Tables, table
+from bridgegen.simulation.embedded.trajectories import compile_trajectory
 from bridgegen.simulation.embedded.triggers import Triggers
 
 DEFAULT_TIME_STEP = 0.05  # s
@@ -80,9 +81,15 @@ class _Compiler:
             raise InputError(f"{self.place}: a scenario needs at least one entity, got none")
         step = time_step or self._declared_time_step()
         storyboard = self.scenario.storyboard
-        self.triggers = Triggers(self.tables, step, [str(one.name) for one in _events(storyboard)])
+        event_names = [str(one.name) for one in _events(storyboard)]
+        self.triggers = Triggers(self.tables, step, event_names)
         bodies = np.array([self._body(one.entity_object) for one in self.tables.objects])
         init, friction = self._init()
+        if driver and self._is_timed(0):
+            self.tables.problems.append(
+                f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
+                "trajectory with times"
+            )
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
         start_slots = [
@@ -125,7 +132,13 @@ class _Compiler:
             time_step=step,
             n_steps=n_steps,
             fixed=self.tables.fixed,
+            event_names=tuple(event_names),
         )
+
+    def _is_timed(self, entity: int) -> bool:
+        """Say whether an entity follows a trajectory with times, which rules out all else."""
+        path = self.paths[entity] if entity < len(self.paths) else None
+        return isinstance(path, AlongTrajectory) and bool(path.times)
 
     def _aside_slot(self, path: PathSpec) -> int:
         """Return the slot of how far who is on a path is beside it; -1 if that is a number."""
@@ -149,6 +162,8 @@ class _Compiler:
         return value
 
     def _declared_driver(self) -> Driver:
+        if self._is_timed(0):
+            return TRAJECTORY
         for controller in self.tables.objects[0].object_controllers:
             properties = controller.controller.properties
             name = properties.get("driver") if properties else None
@@ -220,7 +235,7 @@ class _Compiler:
                 elif isinstance(action, osc.LateralAction):
                     self.tables.unsupported(action.action, "an initial LaneChangeAction")
                 elif isinstance(action.action, osc.FollowTrajectoryAction):
-                    tracks[name] = self._trajectory(action.action)
+                    tracks[name] = compile_trajectory(self.tables, action.action)
                 else:
                     routes[name] = action.action.route.waypoints
         missing = [name for name in self.tables.names if name not in starts]
@@ -247,28 +262,6 @@ class _Compiler:
                     "that follows a trajectory, and for no other"
                 )
         return [init[name] for name in self.tables.names], friction
-
-    def _trajectory(self, action: osc.FollowTrajectoryAction) -> AlongTrajectory:
-        """Return the path of a trajectory that is followed at the entity's own speed."""
-        if not isinstance(action.time_reference.reference, osc.NoTime):
-            self.tables.unsupported(action.time_reference, "a trajectory with times")
-        mode = action.trajectory_following_mode.following_mode
-        if mode is not osc.FollowingMode.POSITION:
-            self.tables.unsupported(action.trajectory_following_mode, f'followingMode="{mode}"')
-        trajectory = action.trajectory_ref.trajectory
-        if trajectory.closed is not False:
-            self.tables.unsupported(trajectory, 'a Trajectory with closed="true"')
-        points: list[Point] = []
-        for vertex in trajectory.shape.shape.vertices:
-            point, aside = self.tables.point(vertex.position)
-            if isinstance(point, LanePoint):
-                where = vertex.position.position
-                s = self.tables.literal(where, "s", point.s)
-                aside = self.tables.literal(where, "offset", aside)
-                point = LanePoint(point.road, point.lane, s, point.line, aside)
-            if point is not None:
-                points.append(point)
-        return AlongTrajectory(tuple(points), action.line)
 
     def _speed(self, target: osc.SpeedActionTarget) -> int:
         if isinstance(target.target, osc.RelativeTargetSpeed):
@@ -343,7 +336,10 @@ class _Compiler:
 
     def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
         action = wrapped.action
-        if isinstance(action, osc.LongitudinalAction):
+        if self._is_timed(entity):
+            what = f"{type(action).__name__} of one that follows a trajectory with times"
+            self.tables.unsupported(action, what)
+        elif isinstance(action, osc.LongitudinalAction):
             shape, dimension, value = self._dynamics(action.action.dynamics)
             target = self._speed(action.action.speed_action_target)
             self.actions.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))

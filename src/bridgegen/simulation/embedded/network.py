@@ -28,6 +28,8 @@ class Network:
         sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
             against it; what is to its left, then, of what is to the road's.
         points: ``(P, C, 2)`` float64 [m], the position that a condition names; 0 where none.
+        tracks: ``(P, M, T, 6)`` float64, the states of the M entities with a timetable at every
+            instant: x, y [m], heading [rad], speed [m/s], acceleration [m/s²], metres travelled.
     """
 
     paths: Float
@@ -37,6 +39,7 @@ class Network:
     station: Float
     sides: Float
     points: Float
+    tracks: Float
 
     @property
     def n_networks(self) -> int:
@@ -77,7 +80,10 @@ def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
             paths[p, 0], counts[p, 0], steps[p, 0], program.bodies[0],
             paths[p, k], counts[p, k], steps[p, k], bodies[k], zones[p, k],
         )  # fmt: skip
-    return Network(paths, counts, steps, zones, station, sides, points)
+    tracks = np.array([each.tracks for each in ways])
+    if not tracks.size:
+        tracks = np.zeros((len(models), 0, program.n_steps, 6))
+    return Network(paths, counts, steps, zones, station, sides, points, tracks)
 
 
 def _bodies(program: Program) -> list[Float]:

@@ -32,11 +32,12 @@ class LanePoint:
 
 @dataclass(frozen=True)
 class WorldPoint:
-    """A point of the world [m] that rows may not vary."""
+    """A point of the world [m] that rows may not vary, and the heading [rad] if it states one."""
 
     x: float
     y: float
     line: int
+    h: float | None = None
 
 
 Point = LanePoint | WorldPoint
@@ -59,10 +60,17 @@ class AlongLanes:
 
 @dataclass(frozen=True)
 class AlongTrajectory:
-    """A path from point to point in straight lines."""
+    """A path from point to point in straight lines.
+
+    Attributes:
+        points: the vertices.
+        line: of the action in the file.
+        times: when to be at each vertex [s], increasing; empty: at the entity's own speed.
+    """
 
     points: tuple[Point, ...]
     line: int
+    times: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,6 +124,7 @@ class Program:
         time_step: [s].
         n_steps: recorded instants at most.
         fixed: parameters that rows may not vary, and what they are used for.
+        event_names: of the V events, in the order of the file.
     """
 
     place: str
@@ -141,6 +150,14 @@ class Program:
     time_step: float
     n_steps: int
     fixed: Mapping[str, str]
+    event_names: tuple[str, ...] = ()
+
+    @cached_property
+    def timed(self) -> Int:
+        """``(E,)``: the number of an entity's timetable, -1 for one that moves by itself."""
+        paths = self.paths[: len(self.names)]
+        is_timed = np.array([isinstance(one, AlongTrajectory) and bool(one.times) for one in paths])
+        return np.where(is_timed, np.cumsum(is_timed) - 1, -1).astype(np.int64)
 
     @cached_property
     def box(self) -> Float:

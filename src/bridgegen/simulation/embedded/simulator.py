@@ -71,13 +71,15 @@ class EmbeddedSimulator:
         shape = (n, len(program.names), program.n_steps)
         x, y, h, v, acceleration, offset = (np.empty(shape) for _ in range(6))
         lights = np.empty((n, len(program.lights), program.n_steps), dtype=np.int8)
+        began = np.full((n, len(program.events)), -1, dtype=np.int64)
         n_steps, status = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int8)
         simulate_rows(
             rows, roads.paths, roads.counts, roads.steps, roads.zones, station, aside,
-            roads.points, slots, program.bodies, program.init, program.triggers, program.groups,
-            program.conditions, program.acts, program.events, program.actions,
-            program.first_states, program.friction_slot, program.driver.code, program.time_step,
-            x, y, h, v, acceleration, offset, lights, n_steps, status,
+            roads.points, program.timed, roads.tracks, slots, program.bodies, program.init,
+            program.triggers, program.groups, program.conditions, program.acts, program.events,
+            program.actions, program.first_states, program.friction_slot, program.driver.code,
+            program.time_step,
+            x, y, h, v, acceleration, offset, lights, began, n_steps, status,
         )  # fmt: skip
         return Rollout(
             time_step=program.time_step,
@@ -86,6 +88,8 @@ class EmbeddedSimulator:
             x=x, y=y, h=h, v=v, a=acceleration, offset=offset,
             light_names=program.lights,
             lights=lights,
+            event_names=program.event_names,
+            began=began,
             n_steps=n_steps,
             status=status,
         )  # fmt: skip

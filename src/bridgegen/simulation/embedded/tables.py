@@ -71,7 +71,8 @@ class Tables:
         where = position.position
         if isinstance(where, osc.WorldPosition):
             x, y = (self.literal(where, name, getattr(where, name)) for name in ("x", "y"))
-            return WorldPoint(x, y, where.line), 0.0
+            h = None if where.h is None else self.literal(where, "h", where.h)
+            return WorldPoint(x, y, where.line, h), 0.0
         return self._on_lane(where), where.offset or 0.0
 
     def lane_point(self, position: osc.Position, aside: Value = 0.0) -> LanePoint | None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,9 +19,7 @@ from bridgegen.simulation.embedded.program import (
     Point,
     Program,
 )
-
-STEP = 0.2
-"""Between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
+from bridgegen.simulation.embedded.trajectories import STEP, Corner, polyline, timetable
 
 _MOST_STRETCHES = 1000
 
@@ -35,6 +32,7 @@ class Ways:
             [1/m].
         steps: per path the distance between two samples [m].
         station: per path a, b: who starts at s on the first road starts a + b·s along it.
+        tracks: per entity with a timetable its ``(T, 6)`` states (``trajectories.timetable``).
         sides: per path 1 where it leads along its first road, -1 against it; 0 on a trajectory.
 
     Raises:
@@ -48,6 +46,7 @@ class Ways:
         self.steps: list[float] = []
         self.station: list[tuple[float, float]] = []
         self.sides: list[int] = []
+        self.tracks: list[Float] = []
         for number, spec in enumerate(program.paths):
             who = program.names[number] if number < len(program.names) else f"path {number}"
             try:
@@ -135,26 +134,16 @@ class Ways:
         raise InputError(f"there is no lane {which} to change to{line}")
 
     def _add_trajectory(self, spec: AlongTrajectory) -> None:
-        corners = [_position(self._program, self._model, point) for point in spec.points]
-        tables: list[Float] = []
-        lengths = [math.dist(a, b) for a, b in pairwise(corners)]
-        total = sum(lengths)
-        if total <= 0.0:
-            raise InputError("a trajectory must have a length, got one point")
-        count = math.ceil(total / STEP)
-        step = total / count
-        knots = np.concatenate([[0.0], np.cumsum(lengths)])
-        s = np.arange(count + 1) * step
-        x = np.interp(s, knots, [corner[0] for corner in corners])
-        y = np.interp(s, knots, [corner[1] for corner in corners])
-        headings = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(corners)])
-        h = headings[np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(headings) - 1)]
-        tables = [x, y, h, np.cos(h), np.sin(h), np.zeros_like(s)]
+        corners = [_corner(self._program, self._model, point) for point in spec.points]
+        table, step = polyline(corners, may_stand=bool(spec.times))
         self._routes.append(None)
-        self.tables.append(np.stack(tables, axis=1))
+        self.tables.append(table)
         self.steps.append(step)
         self.station.append((0.0, 0.0))
         self.sides.append(0)
+        if spec.times:
+            instants: Float = np.arange(self._program.n_steps) * self._program.time_step
+            self.tracks.append(timetable(corners, spec.times, instants))
 
 
 def position(program: Program, model: OpenDrive, point: LanePoint) -> tuple[float, float]:
@@ -168,14 +157,14 @@ def position(program: Program, model: OpenDrive, point: LanePoint) -> tuple[floa
     return pose.x, pose.y
 
 
-def _position(program: Program, model: OpenDrive, point: Point) -> tuple[float, float]:
+def _corner(program: Program, model: OpenDrive, point: Point) -> Corner:
     if not isinstance(point, LanePoint):
-        return point.x, point.y
+        return point.x, point.y, point.h
     road_id, s = _known(program, point)
     road = model.road(road_id)
     pose = lane_pose(road, point.lane, s)
     aside = point.aside * road.direction(point.lane)  # its sign is the road's, the pose the lane's
-    return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h)
+    return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h), None
 
 
 def _end(model: OpenDrive, road_id: str, lane: int, *, entry: bool) -> tuple[str, int, float]:
