@@ -211,15 +211,12 @@ def simulate_one(
                 ahead = s0 + 0.5 * (v[0, k] + nv) * dt
                 station[0], offset[0, k + 1] = project(paths[0], n0, ds0, ahead, nx, ny)
         # The others: on their paths, at the speed the storyboard asks for.
-        for e in range(n_entities):
-            m = timed[e]
-            if m >= 0:
+        for e in range(1 if driven else 0, n_entities):
+            if timed[e] >= 0:
                 if k < last:
-                    station[e] = tracks[m, k + 1, 5]
-                    travelled[e] = station[e] - tracks[m, 0, 5]
+                    station[e] = tracks[timed[e], k + 1, 5]
+                    travelled[e] = station[e] - tracks[timed[e], 0, 5]
                     stood[e] = stood[e] + dt if v[e, k + 1] == 0.0 else 0.0
-                continue
-            if e == 0:
                 continue
             before = v[e, k]
             p = on[e]

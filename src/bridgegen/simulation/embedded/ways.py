@@ -142,7 +142,7 @@ class Ways:
         self.station.append((0.0, 0.0))
         self.sides.append(0)
         if spec.times:
-            instants: Float = np.arange(self._program.n_steps) * self._program.time_step
+            instants = np.arange(self._program.n_steps, dtype=np.float64) * self._program.time_step
             self.tracks.append(timetable(corners, spec.times, instants))
 
 
