@@ -174,6 +174,30 @@ def simulate(
 
 
 @app.command()
+def export(
+    source: Annotated[Path, typer.Argument(help="The folder of a run, or one .xosc file.")],
+    flavour: Annotated[
+        str,
+        typer.Option(
+            help="1.2 or 1.3: with parameters; resolved: without; recorded: moves by the clock."
+        ),
+    ],
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(help="A scenario of the run, e.g. 0001; may be repeated; all by default."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files; SOURCE/export/FLAVOUR by default.")
+    ] = None,
+) -> None:
+    """Write handed-over scenarios as other tools want them, each with its map."""
+    from bridgegen.campaign.export import export as export_scenarios
+
+    for path in export_scenarios(source, flavour, scenarios=scenario or (), out=out):
+        print(path)
+
+
+@app.command()
 def convert(
     file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
     out: Annotated[

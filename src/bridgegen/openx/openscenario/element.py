@@ -14,10 +14,10 @@ One declaration serves reading, writing and checking. A field's annotation says 
 import re
 import types
 import typing
-from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
-from typing import Any, Union, get_args, get_origin
+from typing import Any, TypeVar, Union, cast, get_args, get_origin
 
 from bridgegen.openx.openscenario.values import Expr, Kind, ParameterRef
 
@@ -227,6 +227,26 @@ def values_of(element: Element) -> Iterator[tuple[Attribute, Any]]:
         value = getattr(element, attribute.field)
         if value is not None:
             yield attribute, value
+
+
+E = TypeVar("E", bound=Element)
+
+
+def rewritten(element: E, change: Callable[[Element], Element]) -> E:
+    """Return an element in which all below it, and then itself, are what ``change`` makes of them.
+
+    Args:
+        element: stays as it is.
+        change: takes an element and returns one of the same class.
+    """
+    changes: dict[str, Any] = {}
+    for child in declaration(type(element)).children:
+        value = getattr(element, child.field)
+        if child.many:
+            changes[child.field] = tuple(rewritten(one, change) for one in value)
+        elif value is not None:
+            changes[child.field] = rewritten(value, change)
+    return cast(E, change(replace(element, **changes)))
 
 
 def references(element: Element) -> frozenset[str]:

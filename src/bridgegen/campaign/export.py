@@ -1,0 +1,142 @@
+"""Handed-over scenarios in other flavours, each with its map: what other tools ask for."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from bridgegen.campaign.handover import FOLDER
+from bridgegen.errors import FileFormatError, InputError, StorageError, UnknownNameError
+from bridgegen.openx.convert import roads_of
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import validate
+from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.openscenario.recorded import Recording, recorded
+from bridgegen.openx.openscenario.resolve import resolved
+from bridgegen.openx.openscenario.versions import VERSIONS, to_version
+from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.openx.xml import read_bytes
+from bridgegen.pipeline import simulate_file
+from bridgegen.store import Store
+
+EXPORT = "export"
+
+Flavour = Callable[[osc.OpenScenario, Path], osc.OpenScenario]
+
+
+def export(
+    source: Path, flavour: str, *, scenarios: Sequence[str] = (), out: Path | None = None
+) -> list[Path]:
+    """Write scenarios in another flavour, each beside a copy of its map.
+
+    The same source gives the same bytes. Files of the same names are replaced, but never the
+    source's own.
+
+    Args:
+        source: the folder of a run, for its handed-over scenarios, or one ``.xosc`` file.
+        flavour: one of `FLAVOURS`.
+        scenarios: names of a run's scenarios ("0001"); all by default.
+        out: the folder to write to; ``export/FLAVOUR`` in the run's or the file's by default.
+
+    Returns:
+        The files written, an ``.xosc`` and its ``.xodr`` each.
+
+    Raises:
+        UnknownNameError: no such flavour, or no such scenario in the run.
+        InputError: a run that kept no scenario; scenarios chosen of a file; a scenario that cannot
+            be recorded because its simulation fails.
+        FileFormatError: a scenario or its map is missing, malformed or inconsistent.
+        UnsupportedError: what the reader, the version or the simulator cannot do, by name and line.
+        StorageError: not a run, or the files cannot be written.
+    """
+    if flavour not in FLAVOURS:
+        raise UnknownNameError("flavour", flavour, FLAVOURS)
+    paths = _chosen(source, scenarios)
+    base = source.parent if source.suffix.lower() == ".xosc" else source
+    folder = out or base / EXPORT / flavour
+    return [file for path in paths for file in _export(path, FLAVOURS[flavour], folder)]
+
+
+def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
+    """Return the files to export, in the order of their names."""
+    if source.suffix.lower() == ".xosc":
+        if scenarios:
+            raise InputError(f"{source}: scenarios are chosen of a run; this is one scenario")
+        return [source]
+    Store.open(source).close()  # says what is no run
+    kept = {path.stem: path for path in sorted((source / FOLDER).glob("*.xosc"))}
+    if not kept:
+        raise InputError(
+            f"{source}: no scenario was handed over ({FOLDER}/ has none): the run found nothing "
+            f"critical, or is to be finished first: bridgegen resume {source}"
+        )
+    for name in scenarios:
+        if name not in kept:
+            raise UnknownNameError(f"scenario of {source}", name, kept)
+    return [path for name, path in kept.items() if not scenarios or name in scenarios]
+
+
+def _export(path: Path, flavour: Flavour, folder: Path) -> list[Path]:
+    scenario = read(path)
+    roads = roads_of(scenario, path)
+    if problems := validate.problems(scenario, roads):
+        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
+    logic_file = scenario.road_network.logic_file
+    assert logic_file is not None  # roads_of has read it
+    road_map = path.parent / str(logic_file.filepath)
+    made = _moved(flavour(scenario, path), path, road_map.name, folder)
+    files = {folder / path.name: to_xml(made), folder / road_map.name: read_bytes(road_map)}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for target in files:
+            if target.exists() and any(target.samefile(one) for one in (path, road_map)):
+                raise StorageError(f"{target}: is what is exported, and is not overwritten")
+        for target, data in files.items():
+            target.write_bytes(data)
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+    return list(files)
+
+
+def _moved(scenario: osc.OpenScenario, path: Path, road_map: str, folder: Path) -> osc.OpenScenario:
+    """Return a scenario for another folder, where its map lies beside it."""
+    roads = scenario.road_network
+    scene = roads.scene_graph_file
+    if scene is not None and isinstance(scene.filepath, str) and scene.filepath:
+        scene = osc.File(Path(os.path.relpath(path.parent / scene.filepath, folder)).as_posix())
+    return replace(
+        scenario,
+        road_network=replace(roads, logic_file=osc.File(road_map), scene_graph_file=scene),
+    )
+
+
+def _resolved(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    return to_version(resolved(scenario, str(path)), "1.2", str(path))
+
+
+def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    """Return a scenario as its own ego drives it in the embedded simulator."""
+    result = simulate_file(path)
+    if result.status != "ok":
+        raise InputError(f"{path}: its simulation must succeed to be recorded: {result.status}")
+    rollout = result.rollout
+    x, y, h, v = (
+        array[0, :, : rollout.n_steps[0]] for array in (rollout.x, rollout.y, rollout.h, rollout.v)
+    )
+    began = rollout.began[0].tolist()
+    recording = Recording(rollout.names, rollout.time_step, x, y, h, v, began)
+    return recorded(_resolved(scenario, path), recording)
+
+
+def _in_version(version: str, scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    return to_version(scenario, version, str(path))
+
+
+FLAVOURS: dict[str, Flavour] = {
+    **{version: partial(_in_version, version) for version in VERSIONS},
+    "resolved": _resolved,
+    "recorded": _recorded,
+}
+"""What can be written: a version of the standard with parameters; 1.2 without; or the motion as
+the embedded simulator recorded it, in 1.2."""

@@ -1,0 +1,158 @@
+"""A scenario as it was played: every entity on a timetable, what happens to all at its time.
+
+The vertices are the recorded states. Between two instants of different speed lies one more, half of
+the step later, where the entity is if it keeps its speed until then: so distance by time is the
+recorded speed on both sides of every instant, exactly where speeds change evenly within a step.
+Where nothing moves, vertices between the first and the last are left out; all others stay, because
+a smallest distance that moves by a rounding can move a first contact by a step.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import walk
+from bridgegen.openx.openscenario.versions import at, at_once
+
+SAME_SPEED = 1e-9  # m/s, recorded speeds that differ by less are one
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a simulator recorded of one scenario: E entities at K instants.
+
+    Attributes:
+        names: of the E entities.
+        time_step: between two instants [s]; instant k is at k · time_step.
+        x: ``(E, K)`` [m], of the reference point.
+        y: ``(E, K)`` [m].
+        h: ``(E, K)`` [rad], heading, continuous.
+        v: ``(E, K)`` [m/s], ≥ 0.
+        began: per event, in the order of the file, the instant at which it began; -1 if never.
+    """
+
+    names: Sequence[str]
+    time_step: float
+    x: Float
+    y: Float
+    h: Float
+    v: Float
+    began: Sequence[int]
+
+
+def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenario:
+    """Return a scenario that any player shows as it was recorded.
+
+    The environment, its changes, the traffic lights' states and the stop trigger stay; what
+    entities did of themselves and who drove them goes. It also stops where the recording did.
+
+    Args:
+        scenario: without parameters (`resolve.resolved`), of version 1.2 or 1.3.
+        recording: its own.
+    """
+    board = scenario.storyboard
+    start = replace(
+        board.init.actions,
+        privates=tuple(_private(recording, e) for e in range(len(recording.names))),
+    )
+    bodies = [replace(one, object_controllers=()) for one in scenario.entities.scenario_objects]
+    return replace(
+        scenario,
+        entities=osc.Entities(tuple(bodies)),
+        storyboard=osc.Storyboard(
+            osc.Init(start), tuple(_stories(board, recording)), _stop(board, recording)
+        ),
+    )
+
+
+def _private(recording: Recording, e: int) -> osc.Private:
+    """Return where an entity starts, how fast, and its timetable."""
+    name, dynamics = recording.names[e], (osc.DynamicsShape.STEP, osc.DynamicsDimension.TIME, 0.0)
+    speed = osc.SpeedAction(
+        osc.TransitionDynamics(*dynamics),
+        osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(float(recording.v[e, 0]))),
+    )
+    vertices = tuple(_vertices(recording, e))
+    follow = osc.FollowTrajectoryAction(
+        osc.TimeReference(osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)),
+        osc.TrajectoryFollowingMode(osc.FollowingMode.POSITION),
+        osc.TrajectoryRef(
+            osc.Trajectory(f"{name}_recorded", False, osc.Shape(osc.Polyline(vertices)))
+        ),
+    )
+    actions = (
+        osc.TeleportAction(vertices[0].position),
+        osc.LongitudinalAction(speed),
+        osc.RoutingAction(follow),
+    )
+    return osc.Private(name, tuple(osc.PrivateAction(one) for one in actions))
+
+
+def _vertices(recording: Recording, e: int) -> Iterator[osc.Vertex]:
+    x, y, h, v = (getattr(recording, field)[e] for field in ("x", "y", "h", "v"))
+    step, last = recording.time_step, len(x) - 1
+    still = (np.diff(x) == 0.0) & (np.diff(y) == 0.0) & (np.diff(h) == 0.0)
+    for k in range(last + 1):
+        if not (0 < k < last and still[k - 1] and still[k]):
+            yield _vertex(k * step, x[k], y[k], h[k])
+        if k < last and abs(v[k] - v[k + 1]) > SAME_SPEED and not still[k]:
+            share = v[k] / (v[k] + v[k + 1])
+            yield _vertex(
+                (k + 0.5) * step,
+                x[k] + share * (x[k + 1] - x[k]),
+                y[k] + share * (y[k + 1] - y[k]),
+                0.5 * (h[k] + h[k + 1]),
+            )
+    if last == 0:  # stopped at once: a line has two ends
+        yield _vertex(step, x[0], y[0], h[0])
+
+
+def _vertex(time: float, x: float, y: float, h: float) -> osc.Vertex:
+    place = osc.WorldPosition(float(x), float(y), h=float(h))
+    return osc.Vertex(osc.Position(place), float(time))
+
+
+def _stories(board: osc.Storyboard, recording: Recording) -> Iterator[osc.Story]:
+    """Yield the stories with what happened to all, at its time."""
+    began = iter(recording.began)
+    for story in board.stories:
+        acts = []
+        for act in story.acts:
+            groups = []
+            for group in act.maneuver_groups:
+                maneuvers = []
+                for maneuver in group.maneuvers:
+                    events = [
+                        one for event in maneuver.events
+                        for one in _event(event, next(began) * recording.time_step)
+                    ]  # fmt: skip
+                    if events:
+                        maneuvers.append(replace(maneuver, events=tuple(events)))
+                if maneuvers:
+                    groups.append(replace(group, maneuvers=tuple(maneuvers)))
+            if groups:
+                acts.append(osc.Act(act.name, tuple(groups), at_once()))
+        if acts:
+            yield osc.Story(story.name, tuple(acts))
+
+
+def _event(event: osc.Event, seconds: float) -> Iterator[osc.Event]:
+    """Yield the event with its actions that concern all, if it began and has any."""
+    actions = tuple(one for one in event.actions if isinstance(one.action, osc.GlobalAction))
+    if actions and seconds >= 0.0:
+        yield replace(event, actions=actions, start_trigger=at(seconds, f"{event.name}_began"))
+
+
+def _stop(board: osc.Storyboard, recording: Recording) -> osc.Trigger:
+    """Return the end: what it was, save where that asks for what is gone, and the last instant."""
+    groups = board.stop_trigger.condition_groups if board.stop_trigger else ()
+    kept = [
+        group
+        for group in groups
+        if not any(isinstance(one, osc.StoryboardElementStateCondition) for one in walk(group))
+    ]
+    end = at((recording.x.shape[1] - 1) * recording.time_step, "recording_ends")
+    return osc.Trigger((*kept, *end.condition_groups))

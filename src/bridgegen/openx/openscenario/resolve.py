@@ -1,0 +1,73 @@
+"""A scenario without parameters: every reference and expression is its value."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from bridgegen.errors import FileFormatError
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.element import Attribute, Element, rewritten, values_of
+from bridgegen.openx.openscenario.values import Kind, Literal
+
+
+def resolved(scenario: osc.OpenScenario, place: str) -> osc.OpenScenario:
+    """Return a scenario in which literals stand for all parameters, which are declared no more.
+
+    Args:
+        scenario: as read, so its references are known to fit.
+        place: what to call it in messages.
+
+    Raises:
+        FileFormatError: an expression that has no finite value, or no whole one where one is
+            needed; all of them at once.
+    """
+    declared = scenario.parameter_declarations
+    texts = {one.name: one.value for one in declared.parameters} if declared else {}
+    values, numbers = parameters.values(scenario), parameters.numbers(scenario)
+    found: list[str] = []
+
+    def change(element: Element) -> Element:
+        changes: dict[str, Any] = {}
+        for attribute, value in values_of(element):
+            if isinstance(value, osc.ParameterRef):
+                name = value.name
+                changes[attribute.field] = _literal(attribute, values[name], texts[name])
+            elif isinstance(value, osc.Expr):
+                number = _number(value, numbers)
+                whole = number.is_integer() or not attribute.kind.is_integer
+                if not np.isfinite(number) or not whole:
+                    what = "a whole number" if attribute.kind.is_integer else "finite"
+                    tag = f"{attribute.name} of {type(element).__name__}"
+                    found.append(f"{place}: {tag} must be {what}, got {value} = {number:g} "
+                                 f"(line {element.line})")  # fmt: skip
+                    continue
+                changes[attribute.field] = _typed(attribute.kind, number)
+        return replace(element, **changes) if changes else element
+
+    made = rewritten(replace(scenario, parameter_declarations=None), change)
+    if found:
+        raise FileFormatError(*found)
+    return made
+
+
+def _number(expression: osc.Expr, numbers: Mapping[str, float]) -> float:
+    with np.errstate(all="ignore"):  # what has no value is told with its place
+        return float(expression.resolve(numbers))
+
+
+def _literal(attribute: Attribute, value: Literal, text: str) -> Any:
+    """Return what a parameter is as an attribute: a text verbatim, a number by its type."""
+    if attribute.enum is not None:
+        return attribute.enum(text)
+    if isinstance(value, str) or attribute.kind in (Kind.STRING, Kind.DATE_TIME):
+        return text
+    return _typed(attribute.kind, value)
+
+
+def _typed(kind: Kind, value: Literal) -> Literal:
+    if kind is Kind.BOOLEAN:
+        return bool(value)
+    return int(value) if kind.is_integer else float(value)
