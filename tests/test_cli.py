@@ -82,6 +82,30 @@ def test_simulate_prints_what_the_store_holds(cli, finished):
     assert repr(facts["metrics"]["d_min"]) in out
 
 
+@pytest.mark.parametrize("flavour", ["1.2", "1.3", "resolved", "recorded"])
+def test_export_prints_what_it_wrote(cli, finished, flavour):
+    code, out, _ = cli("export", finished.folder, "--flavour", flavour, "--scenario", "0001")
+    assert code == 0
+    paths = [Path(line) for line in out.splitlines()]
+    assert [path.name for path in paths] == ["0001.xosc", "0001.xodr"]
+    assert paths[0].parent == finished.folder / "export" / flavour
+    _, before, _ = cli("simulate", finished.scenarios[0], "--json")
+    _, after, _ = cli("simulate", paths[0], "--json")
+    before, after = (json.loads(text)["metrics"] for text in (before, after))
+    assert before["d_min"] == after["d_min"]
+    assert before["v_d"] == pytest.approx(after["v_d"], abs=1e-6)
+
+
+def test_export_refuses(cli, finished, tmp_path):
+    refused(cli("export", finished.folder, "--flavour", "record"), "did you mean 'recorded'")
+    refused(cli("export", tmp_path / "no", "--flavour", "1.3"), "there is no such folder")
+    refused(
+        cli("export", finished.folder, "--flavour", "1.3", "--scenario", "1"), "scenario of", "0001"
+    )
+    path = cli("export", finished.folder, "--flavour", "recorded")[1].splitlines()[0]
+    refused(cli("simulate", path, "--ego", "reference"), "'reference' cannot drive an ego")
+
+
 def test_simulate_with_another_driver(cli, finished):
     path = finished.scenarios[0]
     _, out, _ = cli("simulate", path, "--json", "--ego", "reference")

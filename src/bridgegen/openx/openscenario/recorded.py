@@ -17,6 +17,10 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.versions import at, at_once
 
+_TURNING = "plineInterpolation"
+
+Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject
+
 SAME_SPEED = 1e-9  # m/s, recorded speeds that differ by less are one
 
 
@@ -58,7 +62,10 @@ def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenar
         board.init.actions,
         privates=tuple(_private(recording, e) for e in range(len(recording.names))),
     )
-    bodies = [replace(one, object_controllers=()) for one in scenario.entities.scenario_objects]
+    bodies = [
+        replace(one, object_controllers=(), entity_object=_turning(one.entity_object))
+        for one in scenario.entities.scenario_objects
+    ]
     return replace(
         scenario,
         entities=osc.Entities(tuple(bodies)),
@@ -66,6 +73,15 @@ def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenar
             osc.Init(start), tuple(_stories(board, recording)), _stop(board, recording)
         ),
     )
+
+
+def _turning(body: Body) -> Body:
+    """Return a body that esmini, too, turns steadily from vertex to vertex, not at corners only."""
+    held = body.properties or osc.Properties()
+    if held.get(_TURNING) is not None:
+        return body
+    more = (*held.properties, osc.Property(_TURNING, "segment"))
+    return replace(body, properties=replace(held, properties=more))
 
 
 def _private(recording: Recording, e: int) -> osc.Private:

@@ -1,0 +1,243 @@
+"""Handed-over scenarios in other flavours: they say it otherwise, and mean the same."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+import bridgegen as bg
+from bridgegen.campaign.export import FLAVOURS, export
+from bridgegen.campaign.handover import write_scenario
+from bridgegen.errors import FileFormatError, InputError, StorageError, UnsupportedError
+from bridgegen.odd.reader import load, names
+from bridgegen.openx.convert import validate_file
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import references, walk
+from bridgegen.openx.openscenario.read import read
+from bridgegen.pipeline import Pipeline
+
+SCHEMAS = {"1.2": "1.2.0", "1.3": "1.3.0", "resolved": "1.2.0", "recorded": "1.2.0"}
+
+
+@pytest.fixture(scope="module")
+def catalogue(tmp_path_factory) -> dict[str, Path]:
+    """Every scenario of the catalogue once at its defaults and once at random."""
+    folder = tmp_path_factory.mktemp("catalogue")
+    paths = {}
+    for name in names():
+        scenario = load(name)
+        space = scenario.space()
+        pipeline = Pipeline(scenario, space)
+        u = np.random.default_rng(0).random((1, space.n_var))
+        for label, row in ((name, space.row({})), (f"{name}-random", space.decode(u)[0])):
+            write_scenario(pipeline, row, folder, label)
+            paths[label] = folder / f"{label}.xosc"
+    return paths
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> bg.Run:
+    return bg.run_search(
+        "crossroads-s3", budget=100, keep=3, out=tmp_path_factory.mktemp("runs") / "s3"
+    )
+
+
+every = pytest.mark.parametrize(
+    "name", [f"{one}{more}" for one in names() for more in ("", "-random")]
+)
+
+
+@every
+@pytest.mark.parametrize("flavour", ["1.2", "1.3", "resolved"])
+def test_the_same_motion_bit_for_bit(catalogue, tmp_path, name, flavour):
+    path, _ = export(catalogue[name], flavour, out=tmp_path)
+    assert validate_file(path) == []
+    before, after = bg.simulate_file(catalogue[name]), bg.simulate_file(path)
+    assert before.metrics == after.metrics
+    assert before.driver == after.driver
+    for field in ("x", "y", "h", "v", "a", "offset", "n_steps", "lights"):
+        assert np.array_equal(getattr(before.rollout, field), getattr(after.rollout, field))
+
+
+@every
+def test_recorded_files_play_what_was_recorded(catalogue, tmp_path, name):
+    path, _ = export(catalogue[name], "recorded", out=tmp_path)
+    assert validate_file(path) == []
+    before, after = bg.simulate_file(catalogue[name]), bg.simulate_file(path)
+    n = before.rollout.n_steps[0]
+    assert after.rollout.n_steps[0] == n
+    for field in ("x", "y", "h"):  # at the recorded instants exactly
+        a, b = (getattr(one.rollout, field)[0, :, :n] for one in (before, after))
+        assert np.array_equal(a, b)
+    ego = [one.rollout.v[0, 0, :n] for one in (before, after)]
+    assert np.abs(ego[0] - ego[1]).max() < 1e-6
+    assert np.array_equal(before.rollout.lights, after.rollout.lights)
+    for metric in ("n_collision", "d_min"):
+        assert before.metrics[metric] == after.metrics[metric]
+    assert after.metrics["v_d"] == pytest.approx(before.metrics["v_d"], abs=1e-6)
+    assert after.metrics["n_brake"] == before.metrics["n_brake"]
+    assert after.metrics["a_change"] == pytest.approx(before.metrics["a_change"], abs=1e-6)
+
+
+@every
+def test_recorded_files_say_nothing_but_when_who_is_where(catalogue, tmp_path, name):
+    path, _ = export(catalogue[name], "recorded", out=tmp_path)
+    scenario, source = read(path), read(catalogue[name])
+    assert scenario.parameter_declarations is None
+    assert not any(one.object_controllers for one in scenario.entities.scenario_objects)
+    start = scenario.storyboard.init.actions
+    assert len(start.privates) == len(source.entities.scenario_objects)
+    follows = [one for one in walk(start) if isinstance(one, osc.FollowTrajectoryAction)]
+    assert len(follows) == len(start.privates)
+    for follow in follows:
+        timing = follow.time_reference.reference
+        assert timing == osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)
+        times = [one.time for one in follow.trajectory_ref.trajectory.shape.shape.vertices]
+        assert times[0] == 0.0
+        assert (np.diff(times) > 0.0).all()
+    assert not any(isinstance(one, osc.AssignRouteAction) for one in walk(scenario))
+    assert len(start.global_actions) == len(source.storyboard.init.actions.global_actions)
+
+
+def test_recording_a_recording_changes_nothing(catalogue, tmp_path):
+    first, _ = export(catalogue["crossroads-s3"], "recorded", out=tmp_path / "a")
+    second, _ = export(first, "recorded", out=tmp_path / "b")
+    a, b = bg.simulate_file(first), bg.simulate_file(second)
+    assert np.array_equal(a.rollout.x, b.rollout.x)
+    assert np.abs(a.rollout.v[:, 0] - b.rollout.v[:, 0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_the_same_bytes_again(catalogue, tmp_path, flavour):
+    one = export(catalogue["cut-in"], flavour, out=tmp_path / "a")
+    two = export(catalogue["cut-in"], flavour, out=tmp_path / "b")
+    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in two]
+    again = export(catalogue["cut-in"], flavour, out=tmp_path / "a")
+    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in two]
+
+
+def test_what_is_written_today_is_1_2(catalogue, tmp_path):
+    for name, path in catalogue.items():
+        assert export(path, "1.2", out=tmp_path)[0].read_bytes() == path.read_bytes(), name
+
+
+def test_only_the_version_s_number_is_another(catalogue, tmp_path):
+    old = catalogue["cut-in"].read_text()
+    new = export(catalogue["cut-in"], "1.3", out=tmp_path)[0].read_text()
+    assert new == old.replace('revMinor="2"', 'revMinor="3"')
+
+
+@every
+def test_resolved_files_hold_no_parameters(catalogue, tmp_path, name):
+    path, _ = export(catalogue[name], "resolved", out=tmp_path)
+    scenario = read(path)
+    assert scenario.parameter_declarations is None
+    assert not references(scenario)
+    assert "$" not in path.read_text()
+
+
+def test_what_happens_to_all_happens_at_its_time(catalogue, tmp_path):
+    """A light that changes and a road that gets slippery when somebody comes near."""
+    text = catalogue["red-light-runner"].read_text()
+    (event,) = re.findall(r"<Event name=\"runner_decides\".*?</Event>", text, re.DOTALL)
+    name = re.search(r'TrafficSignalStateAction name="([^"]*)"', text)[1]
+    light = f"""<Action name="turns"><GlobalAction><InfrastructureAction><TrafficSignalAction>
+<TrafficSignalStateAction name="{name}" state="off;on;off"/></TrafficSignalAction>
+</InfrastructureAction></GlobalAction></Action>"""
+    ice = """<Action name="ice"><GlobalAction><EnvironmentAction><Environment name="ice">
+<RoadCondition frictionScaleFactor="0.5"/></Environment></EnvironmentAction></GlobalAction>
+</Action>"""
+    source = catalogue["red-light-runner"].with_name("changed.xosc")
+    source.write_text(
+        text.replace(event, event.replace("<StartTrigger>", light + ice + "<StartTrigger>", 1))
+    )
+    path, _ = export(source, "recorded", out=tmp_path)
+    before, after = bg.simulate_file(source).rollout, bg.simulate_file(path).rollout
+    (k,) = before.began[0]
+    assert 0 < k < before.n_steps[0]
+    assert after.event_names == before.event_names == ("runner_decides",)
+    assert after.began.tolist() == before.began.tolist()
+    assert np.array_equal(before.lights, after.lights)
+    changed = [states for states in before.lights[0] if (states != states[0]).any()]
+    assert len(changed) == 1
+    assert changed[0][k - 1] != 3
+    assert changed[0][k] == 3
+    actions = [one.name for one in walk(read(path)) if isinstance(one, osc.Action)]
+    assert actions == ["turns", "ice"]
+
+
+def test_a_run_s_scenarios_and_their_maps(run, tmp_path):
+    paths = export(run.folder, "1.3")
+    folder = run.folder / "export" / "1.3"
+    kept = [path.name for path in run.scenarios]
+    assert [path for path in paths if path.suffix == ".xosc"] == [folder / name for name in kept]
+    assert all(path.is_file() for path in paths)
+    assert len(paths) == 2 * len(kept)
+    chosen = export(run.folder, "resolved", scenarios=["0002"], out=tmp_path)
+    assert chosen == [tmp_path / "0002.xosc", tmp_path / "0002.xodr"]
+
+
+def test_a_map_elsewhere_comes_along(catalogue, tmp_path):
+    source, far = catalogue["cut-in"], tmp_path / "maps" / "road.xodr"
+    far.parent.mkdir()
+    far.write_bytes(source.with_suffix(".xodr").read_bytes())
+    moved = tmp_path / "here" / "mine.xosc"
+    moved.parent.mkdir()
+    text = source.read_text().replace("cut-in.xodr", "../maps/road.xodr")
+    moved.write_text(
+        text.replace("</RoadNetwork>", '<SceneGraphFile filepath="a.osgb"/></RoadNetwork>')
+    )
+    paths = export(moved, "1.3")
+    folder = moved.parent / "export" / "1.3"
+    assert paths == [folder / "mine.xosc", folder / "road.xodr"]
+    assert validate_file(paths[0]) == []
+    assert 'SceneGraphFile filepath="../../a.osgb"' in paths[0].read_text()
+
+
+def test_refusals(run, catalogue, tmp_path):
+    source = catalogue["cut-in"]
+
+    def refuse(error, text, *arguments, **options):
+        with pytest.raises(error, match=text):
+            export(*arguments, **options)
+
+    refuse(InputError, "unknown flavour 'recrded'; did you mean 'recorded'", source, "recrded")
+    refuse(StorageError, "there is no such folder", tmp_path / "nothing", "1.3")
+    refuse(StorageError, "holds no run", tmp_path, "1.3")
+    refuse(FileFormatError, "cannot be read", tmp_path / "no.xosc", "1.3")
+    refuse(InputError, "0009", run.folder, "1.3", scenarios=["0009"])
+    refuse(InputError, "chosen of a run", source, "1.3", scenarios=["0001"])
+    refuse(StorageError, "not overwritten", source, "1.3", out=source.parent)
+    refuse(StorageError, "not overwritten", run.folder, "1.3", out=run.folder / "critical")
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    refuse(StorageError, "cannot be written", source, "1.3", out=blocked)
+    odd = source.with_name("odd.xosc")
+    odd.write_text(
+        source.read_text().replace(
+            "<CatalogLocations/>", "<CatalogLocations><X/></CatalogLocations>"
+        )
+    )
+    refuse(UnsupportedError, "X in CatalogLocations", odd, "1.3")
+    odd.write_text(source.read_text().replace('entityRef="bv"', 'entityRef="nobody"'))
+    refuse(FileFormatError, "nobody", odd, "1.3")
+
+
+def test_a_run_that_kept_nothing(tmp_path):
+    run = bg.run_search("crossroads-s4", budget=5, keep=0, out=tmp_path / "run")
+    with pytest.raises(InputError, match="no scenario was handed over"):
+        export(run.folder, "recorded")
+
+
+@pytest.mark.checkers
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_strangers_accept_every_flavour(checkers, catalogue, tmp_path, flavour):
+    paths = [export(path, flavour, out=tmp_path)[0] for path in catalogue.values()]
+    schema = checkers.schema("qc_openscenario", f"{SCHEMAS[flavour]}/OpenSCENARIO.xsd")
+    for path in paths:
+        assert schema.validate(etree.parse(path)), (path.name, schema.error_log)
+    for path, report in zip(paths, checkers.qc_openscenario(*paths), strict=True):
+        assert report.clean, (path.name, report)
+        assert not report.warnings, (path.name, report)
