@@ -19,6 +19,7 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.errors import FileFormatError
 from bridgegen.objective import Objective, Thresholds, needs_sample
 from bridgegen.odd.parameters import Axis
+from bridgegen.odd.rules import speed_bounds
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
@@ -213,12 +214,24 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     """Return a scenario whose static parameters are what a map says.
 
     A start that is searched stays on the road that touches the junction: a position in an
-    OpenSCENARIO file is on one road, whatever its parameter's value.
+    OpenSCENARIO file is on one road, whatever its parameter's value. The map's lowest speed limit
+    bounds speeds, too.
     """
     moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
     static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
     found = road_map.site.measures([start.leg for start in moving])
-    return scenario.measured({one.name: found.get(one.name, one.default) for one in static})
+    here = scenario.measured({one.name: found.get(one.name, one.default) for one in static})
+    limits = [
+        road.speed_limit
+        for leg in road_map.site.legs
+        for road in leg.roads
+        if road.speed_limit is not None
+    ]
+    if not limits:
+        return here
+    story = scenario.story
+    slower = speed_bounds(min(limits), story, here.parameters, story.later_weathers, scenario.place)
+    return replace(here, bounds=(*here.bounds, *slower))
 
 
 @dataclass(frozen=True)

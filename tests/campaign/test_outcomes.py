@@ -6,15 +6,19 @@ import pytest
 import bridgegen as bg
 from bridgegen.campaign.outcomes import with_outcomes
 from bridgegen.odd.reader import load
+from bridgegen.odd.roads import usual
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import from_bytes, to_bytes
 from bridgegen.ontology.files import load as load_owl
+from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.questions import ask
 from bridgegen.openx.convert import convert_file
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.pipeline import Pipeline
+from bridgegen.pipeline import Pipeline, on_map
 
 
 def records(individuals):
@@ -112,3 +116,18 @@ def test_hitting_a_cone_is_an_accident_of_one():
     found = with_outcomes(individuals, rollout, pipeline.roads(individuals))
     assert "ego" in {one["participants"] for one in records(found)}
     assert check(found, scenario) == []
+
+
+def test_the_speed_limit_of_a_map_bounds_speeds(tmp_path):
+    """Else a search on a slower map would find scenarios that no file may hold."""
+    slow = usual("crossroads", speed_limit=8.0)
+    path = tmp_path / "slow.xodr"
+    path.write_bytes(road_xml(opendrive_from_owl(build_static({}, slow))))
+    scenario = on_map(load("crossroads-s4"), load_map(path))
+    space = scenario.space()
+    X = space.decode(np.random.default_rng(3).random((500, space.n_var)))
+    speeds = X[:, space.index("ego_speed")]
+    assert (speeds <= 8.0 * X[:, space.index("speed_factor")] + 1e-9).all()
+    assert speeds.max() > 7.0
+    run = bg.run_search("crossroads-s4", road_map=path, budget=150, keep=2, out=tmp_path / "run")
+    assert run.scenarios

@@ -6,18 +6,22 @@ from importlib.resources import files
 
 import numpy as np
 import pyoxigraph as ox
+import pyshacl
 import pytest
+import rdflib
 
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.roads import LegSpec, usual
 from bridgegen.ontology.check import check, constraints_in_words
 from bridgegen.ontology.conduct import conduct_rules
+from bridgegen.ontology.files import to_bytes
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build, build_static
 from bridgegen.ontology.placement import placement_rules
 from bridgegen.ontology.rule import with_unit
-from bridgegen.ontology.vocabulary import TYPE, bg
+from bridgegen.ontology.shapes import turtle
+from bridgegen.ontology.vocabulary import SUBCLASS, TYPE, bg, tbox
 
 from ..openx.opendrive.kinds import KINDS
 
@@ -76,6 +80,8 @@ BREACHES = [
     ("1 to 2: a light where no roads meet", "red-light-runner",
      [("intersection", "-has_leg", "leg_A")],
      "light_A (TrafficLight)", "light-at-intersection", "got leg_A: Traffic lights give and take"),
+    ("1 to 2: a light on no road", "red-light-runner", [("light_A", "-on_road", "leg_A")],
+     "light_A (TrafficLight)", "light-at-intersection", "got none: Traffic lights give and take"),
     ("1 to 2: a light away from its stop line", "red-light-runner",
      [("light_B", "has_distance", 20.0)],
      "light_B (TrafficLight)", "light-at-stop-line", "got 20: Who waits at a light"),
@@ -286,6 +292,28 @@ def test_rain_fog_and_night_limit_speed(weather):
         found = check(build(scenario, {**free, **fast}, driver="reference"), scenario)
         told = [one for one in found if "as road and weather allow" in one.message]
         assert bool(told) == expected, free["speed_factor"]
+
+
+SEVERAL = ("red-light-runner", "jam-tail-in-fog", "road-works", "pedestrian-at-night")
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+def test_another_shacl_processor_blames_the_same(name):
+    """The rules over rdflib's own store and SPARQL engine, which share no code with ours."""
+    _, individuals = concrete(name)
+    planted = [one for one in BREACHES if one[1] == name and one[4]]
+    together = edited(individuals, *(edit for one in planted for edit in one[2]))
+    graph = rdflib.Graph().parse(data=to_bytes(together), format="xml")
+    for child, _, parent, _ in filter(lambda quad: quad.predicate == SUBCLASS, tbox().quads):
+        graph.add((rdflib.URIRef(child.value), rdflib.RDFS.subClassOf, rdflib.URIRef(parent.value)))
+    shapes = rdflib.Graph().parse(data=turtle(), format="turtle")
+    _, report, _ = pyshacl.validate(graph, shacl_graph=shapes)
+    said = {str(text) for text in report.objects(None, rdflib.SH.resultMessage)}
+    own = [one for one in check(together) if not one.parameter and "(source: " in one.message]
+    assert len(own) >= len({one[4] for one in planted})
+    for one in own:  # "has_t [m] of light_A (TrafficLight) must …" here, "has_t [m] must …" there
+        rule = one.message[one.message.index(" must ") + 1 :]
+        assert any(text.endswith(rule) for text in said), one.message
 
 
 # -- what is valid ---------------------------------------------------------------------------------

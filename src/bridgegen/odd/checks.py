@@ -184,7 +184,7 @@ def _fast(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterator
     prefixes = sorted(
         name.removesuffix("speed_factor") for name in columns if name.endswith("speed_factor")
     )
-    limit = parse(cap(scenario.roads, prefixes)).evaluate(columns)
+    limit = parse(cap(scenario.roads.knobs["speed_limit"], prefixes)).evaluate(columns)
     for one in scenario.participants:
         for value in speeds_of(one, scenario.story):
             speed = _metres(value, columns)

@@ -29,7 +29,7 @@ from bridgegen.odd.schema import (
     ScenarioFile,
 )
 from bridgegen.odd.shape import Section, section, shape_problems
-from bridgegen.odd.story import Story, WeatherChange
+from bridgegen.odd.story import Story
 from bridgegen.odd.storyboard import Storyboard
 
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
@@ -257,8 +257,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     if not quantities.problems:
         said.bounds += between
     used = quantities.used | roads.parameters | {one.name for one in changes.derived}
-    later = [a.prefix for e in board.events for a in e.actions if isinstance(a, WeatherChange)]
-    used |= {prefix + name for prefix in later for name in NEEDED}
+    used |= {prefix + name for prefix in story.later_weathers for name in NEEDED}
     problems += said.problems + quantities.problems
     problems += problems_of(said.parameters, said.bounds, said.derived, said.names)
     problems += use_problems(declared | derived, said.bounds, said.names, used, document.place)

@@ -51,8 +51,7 @@ def bounds_between_layers(
         place: the scenario's file.
     """
     weathers = ("", *prefixes)
-    for name in sorted(_speeds(story) & parameters.keys()):
-        yield Bound(name, None, parse(cap(roads, weathers)), _SPEED_WHY, _SPEED_SOURCE, place)
+    yield from speed_bounds(roads.knobs["speed_limit"], story, parameters, prefixes, place)
     for one in story.participants:
         if one.kind != "vehicle" or one.name == "ego":
             continue  # the ego's driver is under test: what it dares is its own affair
@@ -70,10 +69,23 @@ def bounds_between_layers(
                 yield Bound(f"{prefix}{name}", None, hi, _CLOSED_WHY, _CLOSED_SOURCE, place)
 
 
-def cap(roads: RoadsSpec, weathers: Iterable[str] = ("",)) -> str:
-    """Return the formula of the highest speed [m/s] that road and weather allow."""
+def speed_bounds(
+    limit: Quantity,
+    story: Story,
+    parameters: Mapping[str, Parameter],
+    prefixes: Iterable[str],
+    place: str,
+) -> Iterator[Bound]:
+    """Yield what a road's speed limit [m/s] demands; the rest as in `bounds_between_layers`."""
+    hi = parse(cap(limit, ("", *prefixes)))
+    for name in sorted(_speeds(story) & parameters.keys()):
+        yield Bound(name, None, hi, _SPEED_WHY, _SPEED_SOURCE, place)
+
+
+def cap(limit: Quantity, weathers: Iterable[str] = ("",)) -> str:
+    """Return the formula of the highest speed [m/s] that speed limit and weather allow."""
     factor = _least([f"{prefix}speed_factor" for prefix in weathers])
-    return f"{_text(roads.knobs['speed_limit'])} * {factor}"
+    return f"{_text(limit)} * {factor}"
 
 
 def bend(roads: RoadsSpec, one: Participant) -> str | None:

@@ -245,3 +245,10 @@ class Story:
     events: tuple[EventSpec, ...] = ()
     jams: tuple[Jam, ...] = field(default=())
     works: tuple[RoadWorks, ...] = field(default=())
+
+    @property
+    def later_weathers(self) -> tuple[str, ...]:
+        """The prefixes of the weathers that events change to."""
+        actions = (action for event in self.events for action in event.actions)
+        found = (one.prefix for one in actions if isinstance(one, WeatherChange))
+        return tuple(dict.fromkeys(found))

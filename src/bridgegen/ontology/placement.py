@@ -1,6 +1,7 @@
 """Rules of layers 1 and 2 in every scenario: where lights, signs and markings may be.
 
-Each is one query per road network, however many lights it has.
+Each is one query per road network, however many lights it has. Places are stated along the road
+(``has_distance``); those of an imported map (``has_s``) are the map's affair.
 """
 
 from collections.abc import Iterator
@@ -32,9 +33,9 @@ def _lights() -> Iterator[Rule]:
     yield about(
         "light-at-intersection", "RoadNetwork", "on_road",
         "must be a road that meets an intersection, got {?got}", why, source,
-        f"SELECT $this ?value ({called('?road')} AS ?got) WHERE {{ {light} "
-        "?value bg:on_road ?road ; bg:has_distance ?at . "
-        "FILTER NOT EXISTS { ?crossing bg:has_leg ?road } }",
+        f"SELECT $this ?value (COALESCE({called('?road')}, \"none\") AS ?got) WHERE {{ {light} "
+        "OPTIONAL { ?value bg:on_road ?road } FILTER(NOT EXISTS { ?value bg:has_s ?s } && "
+        "(!BOUND(?road) || NOT EXISTS { ?crossing bg:has_leg ?road })) }",
         ("TrafficLight",),
     )  # fmt: skip
     yield about(
