@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import TOLERANCE
 from bridgegen.odd.rules import GRIP, STRAIGHT
-from bridgegen.ontology.rule import Rule, about, called, is_a, shown, slack
+from bridgegen.ontology.rule import Rule, about, called, is_a, shown, slack, with_unit
 from bridgegen.ontology.sparql import binds, literal
 
 _PAPER = "BridgeGen paper, Section III-B"
@@ -106,7 +106,7 @@ def _vehicles() -> Iterator[Rule]:
         f"FILTER NOT EXISTS {{ {is_a('?lane', 'Lane')} }} "
         f"OPTIONAL {{ {moves} }} "
         f"FILTER(BOUND(?speed) || NOT EXISTS {{ {is_a('?lane', 'Shoulder')} }}) }}",
-        ("Vehicle", "has_strip"),
+        ("Vehicle",),
     )  # fmt: skip
     yield about(
         "within-lane", "Scenario", "has_lateral_offset",
@@ -212,8 +212,9 @@ def _bend(key: str, curvature: str, needs: tuple[str, ...]) -> Rule:
 def _closed_roads() -> Iterator[Rule]:
     for name, path in (("fog_density", "bg:has_fog"), ("precipitation", "bg:has_rain")):
         yield about(
-            f"closed-by-{name}", "Scenario", f"has_{name}",
-            "must be {?limit} at most where somebody drives: {?road} is closed beyond, got {?got}",
+            f"closed-by-{name}", "Scenario", "",
+            f"must not be on {{?road}}, closed above {with_unit(f'has_{name}')} {{?limit}}, "
+            "got {?got}",
             "The road is closed in such weather.",
             f"{_PAPER} (heavy fog or rain restricts roads); closes_above_{name} of the road",
             f"SELECT DISTINCT $this ?value ({called('?place')} AS ?road) "
