@@ -14,6 +14,8 @@ _NAMES = {
     "StopSign": "stop_sign",
     "SpeedLimitSign": "speed_sign",
     "StreetLight": "street_light",
+    "ConstructionCard": "construction_sign",
+    "Signage": "sign",
 }
 
 

@@ -6,6 +6,8 @@ from typing import Any
 from bridgegen.odd.roads import LegSpec, RoadsSpec, Segment, usual
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build_static
+from bridgegen.ontology.site import Facility
+from bridgegen.ontology.templates import site_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 
@@ -65,3 +67,23 @@ def individuals(name: str) -> Individuals:
 
 def model(name: str) -> OpenDrive:
     return opendrive_from_owl(individuals(name))
+
+
+def _furnished() -> Any:
+    """A crossroads with everything of layer 2 that a site can have."""
+    site = site_of(replace(KINDS["signals"], knobs={**KINDS["signals"].knobs, **_CLOSED}), {})
+    more = (
+        Facility("StopSign", "A", 8.0, 10.25, governs=("in",)),
+        Facility("YieldSign", "B", 8.0, 10.25, governs=("in",)),
+        Facility("SpeedLimitSign", "C", 30.0, -10.25, speed_limit=13.9),
+        Facility("SpeedLimitSign", "D", 30.0, -10.25, governs=("out",), speed_limit=8.3333),
+        Facility("ConstructionCard", "A", 40.0, 10.25, governs=("in",)),
+        Facility("Signage", "D", 45.0, 10.25),
+        Facility("StreetLight", "A", 20.0, 10.25),
+        Facility("StreetLight", "B", 0.0, -10.25),
+    )
+    return replace(site, facilities=(*site.facilities, *more))
+
+
+_CLOSED = {"closing_fog_density": 70.0, "closing_precipitation": 33.3}
+FURNISHED = _furnished()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -19,6 +19,7 @@ from bridgegen.openx.opendrive.model import (
 )
 from bridgegen.openx.opendrive.plan_view import Cubic, Geometry
 from bridgegen.openx.opendrive.turns import Ray, along
+from bridgegen.openx.opendrive.user_data import UserData, say
 
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
 
@@ -52,6 +53,7 @@ class Arm:
         road_type: OpenDRIVE's.
         objects: what lies on it.
         signals: what stands beside it.
+        user_data: what else is said of it.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Arm:
     road_type: str = "town"
     objects: tuple[Object, ...] = field(default=())
     signals: tuple[Signal, ...] = field(default=())
+    user_data: tuple[UserData, ...] = ()
 
     def lane_id(self, index: int, *, inbound: bool) -> int:
         """Return the id of the ``index``-th lane from the centre line."""
@@ -148,10 +151,25 @@ def road_of(
         plan_view=plan_view,
         elevations=LEVEL,
         lane_offsets=LEVEL,
-        sections=sections or arm_sections(*arm.sides()),
+        sections=sections or _with_turns(arm, arm_sections(*arm.sides())),
         objects=arm.objects,
         signals=arm.signals,
+        user_data=arm.user_data,
     )
+
+
+def _with_turns(arm: Arm, sections: tuple[LaneSection, ...]) -> tuple[LaneSection, ...]:
+    """Return the section of a leg whose inbound lanes say which turns they allow."""
+    if not any(arm.turns):
+        return sections
+    (section,) = sections
+    left = arm.lane_id(0, inbound=True) > 0
+    lanes = tuple(
+        replace(lane, user_data=tuple(say("allows_turn", one) for one in sorted(turns)))
+        for lane in (section.left if left else section.right)
+        for turns in (arm.turns[abs(lane.id) - 1] if abs(lane.id) <= len(arm.turns) else (),)
+    )
+    return (replace(section, left=lanes) if left else replace(section, right=lanes),)
 
 
 @lru_cache(maxsize=64)

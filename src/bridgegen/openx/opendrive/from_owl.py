@@ -15,8 +15,15 @@ from bridgegen.openx.opendrive.arms import Arm
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.owl_furniture import controllers_of
 from bridgegen.openx.opendrive.owl_legs import corner, read_arm, read_id, refuse
+from bridgegen.openx.opendrive.user_data import UserData, say
 
 MOST_LEGS = 5
+KINDS = ("Crossroads", "TJunction", "Roundabout", "Merge", "Intersection")
+"""What a junction may be; the most general one last."""
+
+MEASURES = ("has_size", "has_radius", "has_ring_lane_width", "has_merge_length", "has_taper_length")
+"""Of junctions [m]."""
+
 _SLACK = 1e-9
 _LEAST_GAP = 45.0
 """Between two legs of an intersection [deg]."""
@@ -55,7 +62,8 @@ def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
     arms: list[Arm] = []
     for leg in individuals.links(crossing, "has_leg"):
         try:
-            arms.append(read_arm(individuals, leg, problems))
+            merges = individuals.is_a(crossing, "Merge")
+            arms.append(read_arm(individuals, leg, problems, widens=merges))
         except OntologyError as error:
             problems += error.problems
     if any(arm.junction_end == "none" for arm in arms):
@@ -69,7 +77,9 @@ def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
         return _roundabout(individuals, crossing, name, junction_id, arms)
     size = _measure(individuals, crossing, "has_size", problems)
     refuse(problems or _together(size, arms))
-    return intersection.build(name, junction_id, size, tuple(arms), controllers_of(individuals))
+    controllers = controllers_of(individuals)
+    about = _about(individuals, crossing)
+    return intersection.build(name, junction_id, size, tuple(arms), controllers, about)
 
 
 def _lone_road(individuals: Individuals, name: str) -> OpenDrive:
@@ -120,8 +130,9 @@ def _merge(
         )
     refuse(problems)
     return merge.build(
-        name, junction_id, by_name["main"], by_name["ramp"], by_name["after"], length, taper
-    )
+        name, junction_id, by_name["main"], by_name["ramp"], by_name["after"], length, taper,
+        _about(individuals, node),
+    )  # fmt: skip
 
 
 def _roundabout(
@@ -145,7 +156,17 @@ def _roundabout(
             f"has_radius [m] must be at least the ring lane's width, {width:g}, got {radius:g}"
         )
     refuse(problems)
-    return roundabout.build(name, junction_id, radius, width, tuple(arms))
+    about = _about(individuals, node)
+    return roundabout.build(name, junction_id, radius, width, tuple(arms), about)
+
+
+def _about(individuals: Individuals, crossing: Subject) -> tuple[UserData, ...]:
+    """Return what OpenDRIVE cannot say of a junction: its class and its measures."""
+    cls = next(name for name in KINDS if individuals.is_a(crossing, name))
+    measures = [(name, individuals.optional_number(crossing, name)) for name in MEASURES]
+    return (
+        say("class", cls), *(say(name, value) for name, value in measures if value is not None)
+    )  # fmt: skip
 
 
 def _measure(individuals: Individuals, node: Subject, name: str, problems: list[str]) -> float:

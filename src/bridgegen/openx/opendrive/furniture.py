@@ -5,6 +5,7 @@
 from dataclasses import dataclass
 
 from bridgegen.openx.opendrive.declaration import attribute, child, children
+from bridgegen.openx.opendrive.user_data import UserData
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +75,7 @@ class Object:
     outline: Outline | None = child("outline")
     outlines: tuple[Outline, ...] = children("outlines/outline")
     validity: tuple[Validity, ...] = children("validity")
+    user_data: tuple[UserData, ...] = children("userData")
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,7 @@ class Signal:
     roll: float | None = attribute("roll", default=None, unit="rad")
     validity: tuple[Validity, ...] = children("validity")
     dependencies: tuple[Dependency, ...] = children("dependency")
+    user_data: tuple[UserData, ...] = children("userData")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,3 +141,4 @@ class Controller:
     name: str | None = attribute("name", default=None)
     sequence: int | None = attribute("sequence", default=None, low=0)
     controls: tuple[Control, ...] = children("control")
+    user_data: tuple[UserData, ...] = children("userData")

@@ -26,6 +26,7 @@ from bridgegen.openx.opendrive.model import (
 )
 from bridgegen.openx.opendrive.plan_view import Cubic
 from bridgegen.openx.opendrive.turns import joining
+from bridgegen.openx.opendrive.user_data import UserData
 
 Turn = Literal["left", "straight", "right"]
 TURNS: tuple[Turn, ...] = ("right", "straight", "left")
@@ -134,6 +135,7 @@ def build(
     size: float,
     arms: tuple[Arm, ...],
     controllers: tuple[Controller, ...] = (),
+    user_data: tuple[UserData, ...] = (),
 ) -> OpenDrive:
     """Return the road network of an intersection around the origin.
 
@@ -143,6 +145,7 @@ def build(
         size: from one leg's end to the opposite one's [m].
         arms: two or more; their ids and the junction's are whole numbers.
         controllers: of the arms' traffic lights.
+        user_data: what else is said of the junction.
 
     Raises:
         OntologyError: two lanes cannot be joined by a curve that a car can drive.
@@ -165,6 +168,7 @@ def build(
         name,
         tuple(connections),
         controllers=tuple(JunctionController(one.id, type="0") for one in controllers),
+        user_data=user_data,
     )
     return OpenDrive(header, tuple(roads), controllers, (junction,))
 

@@ -24,14 +24,16 @@ from bridgegen.openx.opendrive.model import (
 )
 from bridgegen.openx.opendrive.plan_view import Cubic
 from bridgegen.openx.opendrive.turns import Ray, along, joining
+from bridgegen.openx.opendrive.user_data import UserData
 
 NOSE = 60.0
 """Length of the junction, from where the ramp's bend begins to where it is beside [m]; ours."""
 
 
 def build(
-    name: str, junction_id: str, main: Arm, ramp: Arm, after: Arm, merge: float, taper: float
-) -> OpenDrive:
+    name: str, junction_id: str, main: Arm, ramp: Arm, after: Arm, merge: float, taper: float,
+    user_data: tuple[UserData, ...] = (),
+) -> OpenDrive:  # fmt: skip
     """Return the road network of a merge; the junction ends at the origin's right, at x = NOSE.
 
     Args:
@@ -42,6 +44,7 @@ def build(
         after: the carriageway beyond, without the acceleration lane.
         merge: length of the acceleration lane [m].
         taper: length over which it narrows [m].
+        user_data: what else is said of the junction.
 
     Raises:
         OntologyError: numbers of lanes that do not go on, or too short a carriageway.
@@ -101,7 +104,8 @@ def build(
             Connection(str(k), arm.road_id, road.id, "start", (LaneLink(-lane - 1, -1),))
         )
     header = Header(1, 7, name=name, version="1.00", vendor="BridgeGen")
-    return OpenDrive(header, tuple(roads), (), (Junction(junction_id, name, tuple(connections)),))
+    junction = Junction(junction_id, name, tuple(connections), user_data=user_data)
+    return OpenDrive(header, tuple(roads), (), (junction,))
 
 
 def _connecting(

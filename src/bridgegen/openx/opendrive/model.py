@@ -3,8 +3,8 @@
 Plain immutable values: two models are equal if they say the same. Angles are radians, lengths
 metres. Each field declares its form in XML, which `read` and `write` follow.
 
-What a file may hold besides is dropped by the reader: ``userData``, ``include``, ``dataQuality``,
-railroads and stations, junction groups, surfaces, a road's lateral shape, lane access, height,
+What a file may hold besides is dropped by the reader: ``userData`` that is not ours,
+``include``, ``dataQuality``, railroads and stations, junction groups, surfaces, a road's lateral shape, lane access, height,
 material and rule, the parts of a road mark, an object's repeat, marking, border, material,
 surface and parking space, tunnels, bridges, references to objects, a signal's physical position.
 """
@@ -19,6 +19,7 @@ from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.declaration import attribute, child, children, ids, only_child, text
 from bridgegen.openx.opendrive.furniture import Controller, Object, Signal, SignalReference
 from bridgegen.openx.opendrive.plan_view import LENGTH_LIMIT, Cubic, Geometry
+from bridgegen.openx.opendrive.user_data import UserData
 
 CONTACTS = ("start", "end")
 NO_JUNCTION = "-1"
@@ -29,7 +30,7 @@ DRIVABLE = frozenset(
 )
 """Types of lane that cars travel on."""
 
-_SPEED_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
+SPEED_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
 
 
 # -- lanes ---------------------------------------------------------------------------------------
@@ -62,7 +63,7 @@ class LaneSpeed:
 
     s: float = attribute("sOffset", unit="m", low=0.0)
     max: float = attribute("max", low=0.0)
-    unit: str = attribute("unit", default="m/s", words=tuple(_SPEED_UNITS))
+    unit: str = attribute("unit", default="m/s", words=tuple(SPEED_UNITS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +78,7 @@ class Lane:
     widths: tuple[Width, ...] = children("width")
     road_marks: tuple[RoadMark, ...] = children("roadMark")
     speeds: tuple[LaneSpeed, ...] = children("speed")
+    user_data: tuple[UserData, ...] = children("userData")
 
     @property
     def drivable(self) -> bool:
@@ -124,12 +126,12 @@ class Speed:
     """A speed limit: a number in ``unit``, or "no limit", or "undefined"."""
 
     max: float | str = attribute("max", low=0.0, words=("no limit", "undefined"))
-    unit: str = attribute("unit", default="m/s", words=tuple(_SPEED_UNITS))
+    unit: str = attribute("unit", default="m/s", words=tuple(SPEED_UNITS))
 
     @property
     def metres_per_second(self) -> float | None:
         """The limit [m/s], None where there is no number."""
-        return None if isinstance(self.max, str) else self.max * _SPEED_UNITS[self.unit]
+        return None if isinstance(self.max, str) else self.max * SPEED_UNITS[self.unit]
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +168,7 @@ class Road:
     objects: tuple[Object, ...] = children("objects/object")
     signals: tuple[Signal, ...] = children("signals/signal")
     signal_references: tuple[SignalReference, ...] = children("signals/signalReference")
+    user_data: tuple[UserData, ...] = children("userData")
 
     @property
     def is_connecting(self) -> bool:
@@ -233,6 +236,7 @@ class Junction:
     connections: tuple[Connection, ...] = children("connection")
     priorities: tuple[Priority, ...] = children("priority")
     controllers: tuple[JunctionController, ...] = children("controller")
+    user_data: tuple[UserData, ...] = children("userData")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
-"""OWL2OpenDRIVE, its layer 2: crosswalks, stop lines, lights and signs on and beside a road."""
+"""OWL2OpenDRIVE, its layer 2: crosswalks, stop lines, lights, signs, lamps on or beside a road."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
@@ -13,6 +14,7 @@ from bridgegen.openx.opendrive.furniture import (
     Signal,
     Validity,
 )
+from bridgegen.openx.opendrive.user_data import UserData, say
 
 Reach = tuple[tuple[float, float], ...]
 """How far a road reaches to its left and to its right [m]: its driving lanes, all of it."""
@@ -23,17 +25,28 @@ SIGNS = {"StopSign": "206", "YieldSign": "205", "SpeedLimitSign": "274", "Constr
 LIGHT = "1000001"
 """The type of a traffic light with three lamps, in OpenDRIVE's own catalogue."""
 
+LAMP = "streetLamp"
+"""The type of a street light, an object."""
+
+STOP_LINE = "stopLine"
+"""The subtype of a stop line, an object of type roadMark."""
+
+STATES = {
+    "gives_green_to": "green", "gives_yellow_to": "yellow", "gives_red_yellow_to": "red_yellow"
+}  # fmt: skip
+"""What a phase shows to a light that it names; to others it shows red."""
+
 STOP_LINE_WIDTH = 0.5
 """Along the road [m]; source: RMS-1, 50 cm."""
 
-_HEIGHT = {"light": 5.0, "sign": 2.2}  # m, of the lower edge or the middle; ours
+_HEIGHT = {"light": 5.0, "sign": 2.2, "lamp": 6.0}  # m, of the lower edge or the top; ours
 _SLACK = 1e-6
 
 
 def objects_on(
     individuals: Individuals, road: Subject, reach: Reach, length: float, problems: list[str]
 ) -> Iterator[Object]:
-    """Yield the crosswalks and stop lines of a road."""
+    """Yield the crosswalks, stop lines and street lights of a road."""
     left, right = reach[0][0], reach[1][0]
     for node in _on(individuals, "Crosswalk", road):
         at, width = individuals.number(node, "has_distance"), individuals.number(node, "has_width")
@@ -59,9 +72,23 @@ def objects_on(
         middle = min(at + 0.5 * STOP_LINE_WIDTH, length)
         low, high = (0.0, left) if max(ids) > 0 else (-right, 0.0)
         name = individuals.optional_text(node, "has_name")
-        yield _area(
-            _id(individuals, node), name, "roadMark", middle, STOP_LINE_WIDTH, low, high, "stopLine"
+        line = _area(
+            _id(individuals, node), name, "roadMark", middle, STOP_LINE_WIDTH, low, high, STOP_LINE
         )
+        yield replace(line, validity=ranges(ids), user_data=(say("has_distance", at),))
+    for node in _on(individuals, "StreetLight", road):
+        s, t = individuals.number(node, "has_distance"), individuals.number(node, "has_t")
+        _beside(individuals, node, t, reach, problems)
+        if not 0.0 <= s <= length:
+            problems.append(
+                f"has_distance [m] of {individuals.describe(node)} must be 0 to {length:g}, its "
+                f"road's length, got {s:g}"
+            )
+            continue
+        yield Object(
+            id=_id(individuals, node), s=s, t=t, type=LAMP, orientation="none", hdg=0.0,
+            name=individuals.optional_text(node, "has_name"), height=_HEIGHT["lamp"], radius=0.1,
+        )  # fmt: skip
 
 
 def signals_on(
@@ -72,11 +99,7 @@ def signals_on(
         for node in _on(individuals, cls, road):
             what = individuals.describe(node)
             s, t = individuals.number(node, "has_distance"), individuals.number(node, "has_t")
-            edge = reach[0][1] if t > 0.0 else reach[1][1]
-            if abs(t) < edge - _SLACK:
-                problems.append(
-                    f"{what} must stand beside the road, has_t [m] beyond ±{edge:g}, got {t:g}"
-                )
+            _beside(individuals, node, t, reach, problems)
             if cls == "TrafficLight" and junction_end == "none":
                 problems.append(
                     f"{what} must stand at an intersection, but its road meets none: traffic "
@@ -87,7 +110,9 @@ def signals_on(
             light = cls == "TrafficLight"
             kind = LIGHT
             if not light:
-                kind = next((k for n, k in SIGNS.items() if individuals.is_a(node, n)), "-1")
+                kind = next((k for n, k in SIGNS.items() if individuals.is_a(node, n)), None) or (
+                    individuals.optional_text(node, "has_signal_type") or "-1"
+                )
             limit = individuals.optional_number(node, "has_speed_limit")
             yield Signal(
                 id=_id(individuals, node),
@@ -104,12 +129,40 @@ def signals_on(
                 unit=None if limit is None else "km/h",
                 height=0.9,
                 width=0.3 if light else 0.6,
-                validity=(Validity(ids[0], ids[-1]),) if ids else (),
+                validity=ranges(ids),
+                user_data=() if limit is None else (say("has_speed_limit", limit),),
             )
 
 
+def ranges(ids: Sequence[int]) -> tuple[Validity, ...]:
+    """Return lane ids as ranges without gaps, in ascending order; 0 is no lane and no gap."""
+    found: list[Validity] = []
+    for one in sorted(set(ids)):
+        if found and one - found[-1].to_lane in (1, 2 if one == 1 else 1):
+            found[-1] = Validity(found[-1].from_lane, one)
+        else:
+            found.append(Validity(one, one))
+    return tuple(found)
+
+
+def _beside(
+    individuals: Individuals, node: Subject, t: float, reach: Reach, problems: list[str]
+) -> None:
+    edge = reach[0][1] if t > 0.0 else reach[1][1]
+    if abs(t) < edge - _SLACK:
+        problems.append(
+            f"{individuals.describe(node)} must stand beside the road, has_t [m] beyond "
+            f"±{edge:g}, got {t:g}"
+        )
+
+
 def controllers_of(individuals: Individuals) -> tuple[Controller, ...]:
-    """Return the controllers of the lights: one for all that change together."""
+    """Return the controllers of the lights: one for all that change together.
+
+    OpenDRIVE says which lights a controller switches, not when. That is an OpenSCENARIO file's
+    to say; here it is kept as ``userData``: per phase its index, what it shows to these lights,
+    its duration [s] and its name.
+    """
     found: list[Controller] = []
     for controller in individuals.of_class("SignalController"):
         groups: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -118,15 +171,38 @@ def controllers_of(individuals: Individuals) -> tuple[Controller, ...]:
             shown = sorted(
                 (individuals.integer(phase, "has_index"), link)
                 for phase in phases
-                for link in ("gives_green_to", "gives_yellow_to", "gives_red_yellow_to")
+                for link in STATES
                 if light in individuals.links(phase, link)
             )
             groups.setdefault(tuple(shown), []).append(_id(individuals, light))
-        for lights in groups.values():
+        for shown_to, lights in groups.items():
             number = str(len(found) + 1)
             controls = tuple(Control(one, "0") for one in sorted(lights))
-            found.append(Controller(number, f"signals {number}", len(found), controls))
+            about = _program(individuals, controller, dict(shown_to))
+            found.append(Controller(number, f"signals {number}", len(found), controls, about))
     return tuple(found)
+
+
+def _program(
+    individuals: Individuals, controller: Subject, shown: dict[int, str]
+) -> tuple[UserData, ...]:
+    """Return a controller as the ontology knows it: who it is, and its phases."""
+    said: list[UserData] = []
+    for name in ("has_name", "has_object_id"):
+        text = individuals.optional_text(controller, name)
+        if text is not None:
+            said.append(say(name, text))
+    offset = individuals.optional_number(controller, "has_offset")
+    if offset is not None:
+        said.append(say("has_offset", offset))
+    phases = individuals.links(controller, "has_phase")
+    for phase in sorted(phases, key=lambda one: individuals.integer(one, "has_index")):
+        index = individuals.integer(phase, "has_index")
+        state = STATES[shown[index]] if index in shown else "red"
+        duration = individuals.number(phase, "has_duration")
+        name = individuals.optional_text(phase, "has_name") or ""
+        said.append(say("phase", f"{index} {state} {duration!r} {name}".rstrip()))
+    return tuple(said)
 
 
 def _on(individuals: Individuals, cls: str, road: Subject) -> Iterator[Subject]:

@@ -1,6 +1,7 @@
 """OWL2OpenDRIVE, its legs: from a road's individuals to an arm, with all that is wrong with it."""
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 from bridgegen.errors import OntologyError
@@ -8,18 +9,24 @@ from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.opendrive.arms import Arm, Strips
 from bridgegen.openx.opendrive.owl_furniture import objects_on, signals_on
+from bridgegen.openx.opendrive.user_data import UserData, say
 
 _SLACK = 1e-9
+_CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
 _STRIPS = {"Shoulder": "shoulder", "Sidewalk": "sidewalk"}
 
 
-def read_arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm:
+def read_arm(
+    individuals: Individuals, leg: Subject, problems: list[str], *, widens: bool = False
+) -> Arm:
     """Return a leg to be built.
 
     Args:
         individuals: the road network.
         leg: a Road.
         problems: takes what is wrong.
+        widens: it may have more lanes near the junction than are said here (a merge's), so that
+            of several lane sections the one farthest from there counts.
 
     Raises:
         OntologyError: a property is missing.
@@ -44,7 +51,14 @@ def read_arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm
     length = individuals.number(leg, "has_length")
     if not 1.0 <= length <= 10_000.0:
         problems.append(f"{what}: has_length [m] must be 1 … 10000, got {length:g}")
-    lanes = _Lanes(individuals, leg, junction_end, problems)
+    bent = junction_end != "none" and any(
+        individuals.optional_number(segment, name)
+        for segment in individuals.links(leg, "has_segment")
+        for name in ("has_start_curvature", "has_end_curvature")
+    )
+    if bent:
+        problems.append(f"{what}: a generated leg must be straight, got a bend (has_segment)")
+    lanes = _Lanes(individuals, leg, junction_end, problems, widens)
     arm = Arm(
         name=individuals.text(leg, "has_name"),
         road_id=read_id(individuals, leg, "has_road_id", problems),
@@ -60,6 +74,7 @@ def read_arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm
         road_type=individuals.optional_text(leg, "has_road_type") or "town",
         objects=tuple(objects_on(individuals, leg, lanes.reach, length, problems)),
         signals=tuple(signals_on(individuals, leg, lanes.reach, junction_end, problems)),
+        user_data=tuple(_about(individuals, leg, heading, junction_end)),
     )
     if junction_end == "end" and (arm.objects or arm.signals):
         problems.append(
@@ -67,6 +82,18 @@ def read_arm(individuals: Individuals, leg: Subject, problems: list[str]) -> Arm
             "road's start, or on a road that meets none"
         )
     return arm
+
+
+def _about(
+    individuals: Individuals, leg: Subject, heading: float, junction_end: str
+) -> Iterator[UserData]:
+    """Yield what OpenDRIVE cannot say of a road, or only to rounding."""
+    if junction_end != "none":
+        yield say("has_heading", heading)
+    for name in _CLOSES:
+        limit = individuals.optional_number(leg, name)
+        if limit is not None:
+            yield say(name, limit)
 
 
 class _Lanes:
@@ -77,15 +104,25 @@ class _Lanes:
     """
 
     def __init__(
-        self, individuals: Individuals, leg: Subject, junction_end: str, problems: list[str]
-    ) -> None:
+        self, individuals: Individuals, leg: Subject, junction_end: str, problems: list[str],
+        widens: bool,
+    ) -> None:  # fmt: skip
         self._individuals, self._what = individuals, individuals.describe(leg)
         self._end, self._problems = junction_end, problems
         self._lanes: dict[str, dict[int, tuple[str, float, frozenset[str]]]] = {"in": {}, "out": {}}
         usual = individuals.optional_number(leg, "has_lane_width")
-        for lane in individuals.links(leg, "has_lane"):
+        lanes, strips = individuals.links(leg, "has_lane"), individuals.links(leg, "has_strip")
+        starts = {one: individuals.optional_number(one, "has_section_start") or 0.0
+                  for one in (*lanes, *strips)}  # fmt: skip
+        if len(set(starts.values())) > 1 and not widens:
+            problems.append(
+                f"{self._what}: a generated road must have one lane section, got "
+                f"{len(set(starts.values()))} (has_section_start)"
+            )
+        far = (min if junction_end == "end" else max)(starts.values(), default=0.0)
+        for lane in (one for one in lanes if starts[one] == far):
             self._take(lane, "driving", usual)
-        for strip in individuals.links(leg, "has_strip"):
+        for strip in (one for one in strips if starts[one] == far):
             kind = next((k for name, k in _STRIPS.items() if individuals.is_a(strip, name)), None)
             self._take(strip, kind or individuals.text(strip, "has_lane_type"), None)
         for direction, count in (("in", "has_inbound_lanes"), ("out", "has_outbound_lanes")):

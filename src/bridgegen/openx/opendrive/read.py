@@ -14,6 +14,7 @@ from bridgegen.openx.opendrive.geometry import impossible_shape
 from bridgegen.openx.opendrive.model import Connection, Junction, LaneSection, OpenDrive, Road
 from bridgegen.openx.opendrive.plan_view import Geometry
 from bridgegen.openx.opendrive.references import broken_references, misnumbered
+from bridgegen.openx.opendrive.user_data import PREFIX, UserData
 from bridgegen.openx.xml import parse_xml
 
 NUMBER_LIMIT = 1e9
@@ -134,6 +135,8 @@ class _Reader:
             tag = _tag(item)
             branch = tree.get(tag)
             if isinstance(branch, Field):
+                if branch.types[0] is UserData and not _is_ours(item):
+                    continue
                 found.setdefault(branch.name, []).append(self._item(branch, item))
             elif branch is not None:
                 self._collect(item, branch, found)
@@ -215,6 +218,10 @@ def _parse(one: Field, raw: str) -> float | int | bool | str:
     if form.low is not None and value < form.low:
         raise ValueError(f"≥ {form.low:g}")
     return value
+
+
+def _is_ours(item: etree._Element) -> bool:
+    return str(item.get("code", "")).startswith(PREFIX)
 
 
 def _tag(element: etree._Element) -> str:

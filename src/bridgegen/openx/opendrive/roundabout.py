@@ -24,6 +24,7 @@ from bridgegen.openx.opendrive.model import (
 )
 from bridgegen.openx.opendrive.plan_view import Cubic, Geometry
 from bridgegen.openx.opendrive.turns import Ray, along, joining
+from bridgegen.openx.opendrive.user_data import UserData, say
 
 APPROACH = 14.0
 """From the ring's centre line to where a leg begins [m]: room for the curves in and out; ours."""
@@ -34,8 +35,9 @@ _SHARE = 0.36
 
 
 def build(
-    name: str, junction_id: str, radius: float, ring_width: float, arms: tuple[Arm, ...]
-) -> OpenDrive:
+    name: str, junction_id: str, radius: float, ring_width: float, arms: tuple[Arm, ...],
+    user_data: tuple[UserData, ...] = (),
+) -> OpenDrive:  # fmt: skip
     """Return the road network of a roundabout around the origin.
 
     The junctions get the ids from ``junction_id`` on, which no arm may have.
@@ -46,6 +48,7 @@ def build(
         radius: of the ring lane's centre [m].
         ring_width: of the ring lane [m].
         arms: three to five, one lane in and one out each.
+        user_data: what else is said of it; the first junction carries it, the others name that.
 
     Raises:
         OntologyError: a leg with other lanes, or curves too tight for a car.
@@ -133,7 +136,10 @@ def build(
             )
             links = (LaneLink(left[3], -1),)
             connections.append(Connection(str(len(connections)), left[0], road_id, "start", links))
-        junctions.append(Junction(ids[k], f"{name} {arm.name}", tuple(connections)))
+        about = user_data if k == 0 else (say("part_of", ids[0]),)
+        junctions.append(
+            Junction(ids[k], f"{name} {arm.name}", tuple(connections), user_data=about)
+        )
     header = Header(1, 7, name=name, version="1.00", vendor="BridgeGen")
     return OpenDrive(header, tuple(roads), (), tuple(junctions))
 

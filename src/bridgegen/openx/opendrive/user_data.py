@@ -1,0 +1,62 @@
+"""What the ontology says and OpenDRIVE has no words for: our own ``<userData>`` elements.
+
+The standard allows them at any element, and other tools pass over them. A code is ours where it
+begins with `PREFIX`; after that comes the local name of a property of the ontology (or
+``class``, ``part_of`` and ``phase``), and it is said of the individual that the element stands
+for. Other people's ``userData`` is dropped by the reader.
+
+Source: ASAM OpenDRIVE 1.7, section 6.5 (ancillary data).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bridgegen.openx.opendrive.declaration import attribute
+
+PREFIX = "bridgegen:"
+
+
+@dataclass(frozen=True, slots=True)
+class UserData:
+    """One thing said; ``code`` begins with `PREFIX`."""
+
+    code: str = attribute("code")
+    value: str = attribute("value", default="")
+
+
+def say(name: str, value: str | float) -> UserData:
+    """Return a statement; numbers are written in full."""
+    return UserData(PREFIX + name, value if isinstance(value, str) else repr(float(value)))
+
+
+def said(data: Sequence[UserData], name: str) -> list[str]:
+    """Return all values of a name, in the file's order."""
+    return [one.value for one in data if one.code == PREFIX + name]
+
+
+def number(data: Sequence[UserData], name: str) -> float | None:
+    """Return the finite number said under a name; None where there is none (or nonsense)."""
+    for value in said(data, name):
+        try:
+            found = float(value)
+        except ValueError:
+            continue
+        if math.isfinite(found):
+            return found
+    return None
+
+
+def exact(data: Sequence[UserData], name: str, measured: float, slack: float = 1e-6) -> float:
+    """Return a number to the last digit: as it is said, where what is measured agrees.
+
+    Where somebody moved things without knowing of our ``userData``, the geometry counts.
+
+    Args:
+        data: of the element.
+        name: of the property.
+        measured: what the geometry says, to rounding.
+        slack: by how much the two may differ, in the property's unit.
+    """
+    found = number(data, name)
+    return measured if found is None or abs(found - measured) > slack else found
