@@ -74,7 +74,7 @@ def search(
     ] = None,
     scale: Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")] = None,
     road_map: Annotated[
-        Path | None, typer.Option("--map", help="An OpenDRIVE map instead of a generated one.")
+        Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
     ] = None,
     junction: Annotated[str | None, typer.Option(help="Which junction of the map.")] = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
@@ -224,7 +224,10 @@ def import_(
     """Turn a whole map into individuals: roads, lanes, junctions, lights and signs."""
     from bridgegen.openx.convert import import_file
 
-    print(import_file(file, out))
+    written, losses = import_file(file, out)
+    print(written)
+    for loss in losses:
+        print(f"bridgegen: note: {loss}", file=sys.stderr)
 
 
 @app.command()

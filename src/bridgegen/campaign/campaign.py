@@ -71,8 +71,9 @@ def run_search(
         ego: a name of the ego's drivers; the scenario's own choice by default.
         axes: the axes of the search space; the scenario's own by default.
         fixed: parameters to hold at a value, by name.
-        road_map: an OpenDRIVE map; by default a crossroads is generated.
-        junction: the id of the map's junction, where it has several with four legs.
+        road_map: an OpenDRIVE map, or the ``.owl`` that it was imported as; by default the
+            scenario's own road network is generated.
+        junction: the id of the map's junction, where it has several with as many legs.
         keep: how many critical scenarios to hand over.
         out: the run's folder, new; ``runs/SCENARIO-ALGORITHM-SEED`` by default.
         objective: metrics and their weights (None with entropy weights), instead of the
@@ -94,7 +95,7 @@ def run_search(
     catalogue = load(scenario)
     logical = replace(catalogue, objective=_choose(catalogue.objective, objective, weights, scale))
     method = toolkit.get(algorithm)
-    roads = load_map(Path(road_map), junction) if road_map is not None else None
+    roads = load_map(Path(road_map), junction, logical) if road_map is not None else None
     if roads:
         logical = on_map(logical, roads)
     space = logical.space(axes, fixed)
@@ -168,7 +169,7 @@ def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | N
         )
     roads: RoadMap | None = None
     if settings.map:
-        roads = load_map(Path(settings.map), settings.junction)
+        roads = load_map(Path(settings.map), settings.junction, logical)
         if hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
             raise StorageError(
                 f"{folder}: map {settings.map} is not what it was when the run began"

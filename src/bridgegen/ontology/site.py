@@ -211,7 +211,7 @@ class Site:
         starts = [roads[name] for name in legs if name in roads] or list(roads.values())
         found = {
             "lane_width": min(lane.width for lane in lanes),
-            "lanes_per_direction": float(min(counts)),
+            "lanes_per_direction": float(min(count for count in counts if count)),
             "arm_length": min(road.length for road in starts),
         }
         return found if self.size is None else found | {"intersection_size": self.size}

@@ -15,7 +15,9 @@ from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.openx.opendrive import write as opendrive_write
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.map_losses import losses
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.road_map import digest_of
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import validate as openscenario_validate
@@ -65,7 +67,7 @@ def road_bytes(individuals: Individuals, beside: Path) -> bytes:
     return read_bytes(beside / map_file)
 
 
-def import_file(road_map: Path, out: Path | None = None) -> Path:
+def import_file(road_map: Path, out: Path | None = None) -> tuple[Path, list[str]]:
     """Write a whole OpenDRIVE map as the static part of an ontology.
 
     Args:
@@ -73,20 +75,21 @@ def import_file(road_map: Path, out: Path | None = None) -> Path:
         out: the file to write, new; beside the map by default.
 
     Returns:
-        The file written.
+        The file written, and a sentence for each kind of thing that it does not say in full.
 
     Raises:
         FileFormatError: not a map that can be read.
         UnsupportedError: it uses what this version cannot represent.
         StorageError: the file exists, or cannot be written.
     """
-    model = opendrive_read.read(road_map)
+    data = read_bytes(road_map)
+    model = opendrive_read.read(data, str(road_map))
     out = out or road_map.with_suffix(".owl")
     if out.exists():
         raise StorageError(f"{out}: exists already, and is not overwritten")
     map_file = Path(os.path.relpath(road_map, out.parent)).as_posix()
-    save(individuals_from_opendrive(model, map_file), out)
-    return out
+    save(individuals_from_opendrive(model, map_file, digest_of(data)), out)
+    return out, list(losses(model))
 
 
 def validate_file(path: Path, *, reason: bool = False) -> list[str]:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError
-from bridgegen.openx.opendrive import furniture, model, plan_view
+from bridgegen.openx.opendrive import furniture, model, plan_view, user_data
 from bridgegen.openx.opendrive.declaration import Field, plan
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import NUMBER_LIMIT, read
@@ -67,6 +67,8 @@ def record(cls: type) -> st.SearchStrategy[Any]:
             "predecessor": st.none(),
             "successor": st.none(),
         }
+    if cls is user_data.UserData:  # of others' the reader keeps none
+        given_fields["code"] = given_fields["code"].map(lambda code: user_data.PREFIX + code)
     if cls is model.LaneSection:
         return st.builds(cls, **given_fields).map(renumbered)
     return st.builds(cls, **given_fields)

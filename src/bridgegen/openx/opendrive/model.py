@@ -3,10 +3,11 @@
 Plain immutable values: two models are equal if they say the same. Angles are radians, lengths
 metres. Each field declares its form in XML, which `read` and `write` follow.
 
-What a file may hold besides is dropped by the reader: ``userData`` that is not ours,
-``include``, ``dataQuality``, railroads and stations, junction groups, surfaces, a road's lateral shape, lane access, height,
-material and rule, the parts of a road mark, an object's repeat, marking, border, material,
-surface and parking space, tunnels, bridges, references to objects, a signal's physical position.
+What a file may hold besides is dropped by the reader: ``userData`` that is not ours, ``include``,
+``dataQuality``, railroads and stations, junction groups, surfaces, a road's lateral shape, lane
+access, height, material and rule, the parts of a road mark, an object's repeat, marking, border,
+material, surface and parking space, tunnels, bridges, references to objects, a signal's physical
+position.
 """
 
 # ruff: noqa: RUF009  (fields are declared through functions that call dataclasses.field)

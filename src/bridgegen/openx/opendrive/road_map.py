@@ -1,12 +1,16 @@
 """A map that was made elsewhere: its bytes as they came, its model, and the chosen intersection."""
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from bridgegen.errors import FileFormatError
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.ontology.files import load
 from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
-from bridgegen.openx.opendrive.site import find_site
+from bridgegen.openx.opendrive.site import find_site, site_for
 from bridgegen.openx.xml import read_bytes
 
 
@@ -27,18 +31,77 @@ class RoadMap:
     site: Site
 
 
-def load_map(path: Path, junction: str | None = None) -> RoadMap:
-    """Read a map and find an intersection of four legs on it.
+def load_map(
+    path: Path, junction: str | None = None, scenario: LogicalScenario | None = None
+) -> RoadMap:
+    """Read a map and find the intersection on it that a scenario takes place at.
 
     Args:
-        path: an OpenDRIVE file.
+        path: an OpenDRIVE file, or the ``.owl`` that ``bridgegen import`` made of one: the file
+            that it names is read then, which must be what it was.
         junction: the id of the junction; where the map has several, it must be named.
+        scenario: what takes place there; a usual crossroads' legs are looked for by default.
 
     Raises:
-        FileFormatError: missing, unreadable, malformed or inconsistent.
-        UnsupportedError: the junction has not four legs.
+        FileFormatError: missing, unreadable, malformed or inconsistent; an ``.owl`` that names no
+            map, or one that is missing or has changed.
+        UnsupportedError: the junction has not the legs, or the lanes, of the scenario.
         InputError: the choice of the junction is open.
     """
-    data = read_bytes(path)
+    owl = path if path.suffix.lower() == ".owl" else None
+    digest = ""
+    if owl is not None:
+        path, digest = map_of(owl)
+    data = read_bytes(path) if owl is None else _read_named(path, owl)
+    if owl is not None and digest_of(data) != digest:
+        raise FileFormatError(
+            f"{owl}: its map {path} must be what it was when it was imported, but has changed; "
+            "import it again"
+        )
     model = read(data, str(path))
-    return RoadMap(path, data, model, find_site(model, junction, map_name=path.name))
+    if scenario is None:
+        site = find_site(model, junction, map_name=path.name)
+    else:
+        site = site_for(scenario, model, junction, path.name)
+    return RoadMap(path, data, model, site)
+
+
+def map_of(owl: Path) -> tuple[Path, str]:
+    """Return the map that an import was made of, and its digest.
+
+    Raises:
+        FileFormatError: not an ontology, or one that names no map or not what that was.
+    """
+    individuals = load(owl)
+    networks = individuals.of_class("RoadNetwork")
+    named = [
+        (individuals.optional_text(one, "has_map_file"),
+         individuals.optional_text(one, "has_map_digest"))
+        for one in networks
+    ]  # fmt: skip
+    if len(named) != 1 or named[0][0] is None or individuals.of_class("Scenario"):
+        raise FileFormatError(
+            f"{owl}: it must be a map that 'bridgegen import' made individuals of, with the file "
+            "that it was (has_map_file), and no scenario"
+        )
+    ((file, digest),) = named
+    if digest is None:
+        raise FileFormatError(
+            f"{owl}: it must say what its map was when it was imported (has_map_digest), and does "
+            "not; import it again"
+        )
+    return owl.parent / str(file), digest
+
+
+def digest_of(data: bytes) -> str:
+    """Return the SHA-256 of a file, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def _read_named(path: Path, owl: Path) -> bytes:
+    try:
+        return read_bytes(path)
+    except FileFormatError as error:
+        raise FileFormatError(
+            *(f"{owl}: its map must be there beside it: {problem}" for problem in error.problems)
+        ) from None

@@ -1,13 +1,16 @@
 """Finding the intersection of a map that a scenario can take place at, and its legs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.odd.roads import HEADINGS
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.story import Waypoint
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.lanes import lane_pose
-from bridgegen.openx.opendrive.model import Junction, Lane, OpenDrive, Road
+from bridgegen.openx.opendrive.legs import heading, leads_to
+from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
 from bridgegen.openx.opendrive.references import contacts
 
 KNOWN_SITES = {"Town05": "965"}
@@ -16,48 +19,89 @@ KNOWN_SITES = {"Town05": "965"}
 Source: Town05 is CARLA's (version of 2019); 965 has two lanes in and out on each of four legs.
 """
 
-LEG_NAMES = ("A", "B", "C", "D")
-"""Clockwise from the south, as in the paper's crossroads (Section V-A)."""
+TEMPLATES = ("crossroads", "t-junction")
+"""Templates whose scenarios can take place on a map."""
 
-_SOUTH = 270.0
+ROAD_TYPES = ("town", "rural", "motorway")
+"""Types of road that a scenario tells apart."""
+
+_KINDS = {3: "TJunction", 4: "Crossroads"}
+
+
+def site_for(
+    scenario: LogicalScenario,
+    model: OpenDrive,
+    junction_id: str | None = None,
+    map_name: str | None = None,
+) -> Site:
+    """Return a junction that has the legs and lanes of a scenario; see `find_site`.
+
+    Raises:
+        InputError: as `find_site`.
+        UnsupportedError: as `find_site`; or the scenario is not one of an intersection, or the
+            junction lacks lanes that participants stand on or drive to (all of them are named).
+    """
+    roads = scenario.roads
+    if roads.template not in TEMPLATES:
+        raise UnsupportedError(
+            f"{scenario.name} takes place on the template {roads.template}; on a map, scenarios of "
+            f"the templates {' and '.join(TEMPLATES)} can"
+        )
+    headings = {name: leg.heading for name, leg in roads.legs.items()}
+    site = find_site(model, junction_id, map_name, headings)
+    missing = sorted({_missing(site, one) for one in _places(scenario)} - {""})
+    if missing:
+        raise UnsupportedError(
+            f"junction {site.junction_id} of {site.name} must have the lanes that {scenario.name} "
+            f"uses; missing: {'; '.join(missing)}"
+        )
+    return site
 
 
 def find_site(
-    model: OpenDrive, junction_id: str | None = None, map_name: str | None = None
+    model: OpenDrive,
+    junction_id: str | None = None,
+    map_name: str | None = None,
+    headings: Mapping[str, float] = HEADINGS["crossroads"],
 ) -> Site:
-    """Return a junction of four legs, with its legs named A (nearest to south), B, C, D clockwise.
+    """Return a junction with its legs named as a scenario names them.
 
     A leg is the road that touches the junction and the roads that continue it, lane by lane,
-    until the next junction or the end.
+    until the next junction or the end. Legs are named by where they lead: those of the map and
+    those of the scenario, each in their order around the junction, are matched so that the sum of
+    the squared angles between them is least. Of the usual crossroads, A is the leg nearest to
+    south, then B, C, D clockwise.
 
     Args:
         model: the road network.
         junction_id: which junction; by default the one recorded in `KNOWN_SITES` for the map, or
-            else the only one that has four legs.
+            else the only one that has as many legs.
         map_name: the map's file name, as in ``Town05.xodr``.
+        headings: by the legs' names, outwards [deg], counter-clockwise from +x.
 
     Raises:
         InputError: the map has no such junction, or none is named and several would do.
-        UnsupportedError: the junction (or every junction) has not exactly four legs with lanes in
-            and out, or a leg's lanes change on the road that touches the junction.
+        UnsupportedError: the junction (or every junction) has more or fewer legs with a driving
+            lane, or a leg's lanes change on the road that touches the junction.
     """
     name = (map_name or model.header.name or "map").rpartition("/")[2]
     stem = name.removesuffix(".xodr")
-    junction = model.junction(junction_id or _default_junction(model, stem))
-    ends = list(_incoming(model, junction))
-    if len(ends) != len(LEG_NAMES):
-        roads = ", ".join(road.id for road, _ in ends) or "none"
+    junction = model.junction(junction_id or _default_junction(model, stem, len(headings)))
+    ends = sorted(_ends(model, junction), key=lambda end: heading(*end))
+    if len(ends) != len(headings):
+        touching = {road.id for road, _ in ends}
+        roads = ", ".join(road.id for road in model.roads if road.id in touching)
         raise UnsupportedError(
-            f"junction {junction.id} of {name} must have {len(LEG_NAMES)} legs with lanes in and "
-            f"out, got {len(ends)} (roads {roads})"
+            f"junction {junction.id} of {name} must have {len(headings)} legs with driving lanes, "
+            f"as the scenario has ({', '.join(headings)}), got {len(ends)} "
+            f"(roads {roads or 'none'})"
         )
-    first = min(
-        (_heading(*end) for end in ends), key=lambda h: abs(math.remainder(h - _SOUTH, 360))
-    )
-    ends.sort(key=lambda end: (first - _heading(*end)) % 360.0)
+    names = sorted(headings, key=lambda leg: headings[leg] % 360.0)
+    turned = [ends[k:] + ends[:k] for k in range(len(ends))]
+    best = min(turned, key=lambda some: _misfit([headings[leg] for leg in names], some))
+    found = dict(zip(names, best, strict=True))
     legs = tuple(
-        Leg(leg, _heading(road, end), tuple(_arm(model, road, end)))
-        for leg, (road, end) in zip(LEG_NAMES, ends, strict=True)
+        Leg(leg, heading(*found[leg]), tuple(_arm(model, *found[leg]))) for leg in headings
     )
     return Site(
         name=stem,
@@ -65,48 +109,69 @@ def find_site(
         junction_id=junction.id,
         size=None,
         legs=legs,
-        kind="Crossroads",
+        kind=_KINDS.get(len(legs), "Intersection"),
     )
 
 
-def _default_junction(model: OpenDrive, stem: str) -> str:
+def _misfit(wanted: list[float], ends: list[tuple[Road, str]]) -> float:
+    """Return the sum of the squared angles between legs as wanted and as they are [deg²]."""
+    return sum(
+        math.remainder(heading(*end) - angle, 360.0) ** 2
+        for angle, end in zip(wanted, ends, strict=True)
+    )
+
+
+def _places(scenario: LogicalScenario) -> Iterator[Waypoint]:
+    """Yield where a scenario's participants and things stand, and where routes end."""
+    story = scenario.story
+    for one in story.participants:
+        yield one.start
+        yield from one.path
+        if one.end is not None:
+            yield one.end
+    for jam in story.jams:
+        yield jam.tail
+    for works in story.works:
+        yield from (works.start, works.sign, *works.cones)
+
+
+def _missing(site: Site, place: Waypoint) -> str:
+    """Return what is not there of a place, for a message; empty where nothing is missing."""
+    leg = site.leg(place.leg)
+    if leg is None:
+        return f"leg {place.leg}"
+    road = leg.roads[0]
+    if not isinstance(place.lane, int):
+        there = any((one.type, one.direction) == (place.lane, place.way) for one in road.strips)
+        return "" if there else f"{place} (road {road.road_id})"
+    count = len(road.along(place.way))
+    return "" if place.lane <= count else f"{place} (road {road.road_id} has {count})"
+
+
+def _default_junction(model: OpenDrive, stem: str, count: int) -> str:
+    counts = {junction.id: len(list(_ends(model, junction))) for junction in model.junctions}
     known = KNOWN_SITES.get(stem)
-    if known and any(junction.id == known for junction in model.junctions):
+    if known and counts.get(known) == count:
         return known
     if len(model.junctions) == 1:
         return model.junctions[0].id
-    counts = {junction.id: len(list(_incoming(model, junction))) for junction in model.junctions}
-    fitting = [name for name, count in counts.items() if count == len(LEG_NAMES)]
+    fitting = [name for name, legs in counts.items() if legs == count]
     if len(fitting) == 1:
         return fitting[0]
-    rule = f"a scenario takes place at a junction of {len(LEG_NAMES)} legs"
-    listed = ", ".join(f"{name} ({count} legs)" for name, count in counts.items()) or "none"
+    rule = f"a scenario takes place at a junction of {count} legs"
+    listed = ", ".join(f"{name} ({legs} legs)" for name, legs in counts.items()) or "none"
     if not fitting:
         raise UnsupportedError(f"{rule}; {stem} has none such: {listed}")
     raise InputError(f"{rule}; {stem} has {len(fitting)} such, one of them must be named: {listed}")
 
 
-def _incoming(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]]:
-    """Yield the road ends that touch a junction and have drivable lanes both in and out."""
+def _ends(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]]:
+    """Yield the road ends with a driving lane that touch a junction."""
     for road in model.roads:
-        if road.is_connecting:
-            continue
-        for end in contacts(road, junction.id):
-            lanes = [lane for lane in road.section_at(end).lanes if lane.drivable]
-            ways = {_leads_to(road, lane, end) for lane in lanes}
-            if len(ways) == 2:
-                yield road, end
-
-
-def _leads_to(road: Road, lane: Lane, end: str) -> bool:
-    """Say whether traffic on a lane leaves its road at this end."""
-    return (road.direction(lane.id) > 0) == (end == "end")
-
-
-def _heading(road: Road, end: str) -> float:
-    """Return the direction in which a road leads away from its end [deg], in [0, 360)."""
-    h = reference_pose(road, 0.0 if end == "start" else road.length).h
-    return math.degrees(h + (0.0 if end == "start" else math.pi)) % 360.0
+        if not road.is_connecting:
+            for end in contacts(road, junction.id):
+                if any(lane.drivable for lane in road.section_at(end).lanes):
+                    yield road, end
 
 
 def _arm(model: OpenDrive, road: Road, end: str) -> Iterator[ArmRoad]:
@@ -118,7 +183,7 @@ def _arm(model: OpenDrive, road: Road, end: str) -> Iterator[ArmRoad]:
             f"the lanes of a leg must not change along it, but on road {road.id} they do; "
             f"{len(road.sections)} lane sections"
         )
-    inbound = {lane.id for lane in lanes if _leads_to(road, lane, end)}
+    inbound = {lane.id for lane in lanes if leads_to(road, lane, end)}
     seen: set[str] = set()
     while True:
         seen.add(road.id)
@@ -139,7 +204,7 @@ def _arm_road(road: Road, end: str, ids: list[int], inbound: set[int]) -> ArmRoa
         for lane_id in sorted(ids, key=lambda one: (one not in inbound, abs(one)))
     ]
     speeds = [kind.speed for kind in road.types if kind.speed is not None]
-    kinds = [kind.type for kind in road.types if kind.type in ("town", "rural", "motorway")]
+    kinds = [kind.type for kind in road.types if kind.type in ROAD_TYPES]
     return ArmRoad(
         road_id=road.id,
         length=road.length,
