@@ -15,6 +15,7 @@ from bridgegen.campaign import handover
 from bridgegen.campaign.handover import most_critical
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.openx.convert import import_file
 from bridgegen.store import Store
 
 TOWN05 = Path(__file__).parents[3] / "shared" / "data" / "Town05.xodr"
@@ -223,6 +224,27 @@ def test_on_a_map_the_roads_are_the_map_s(tmp_path):
     assert frame["bv_start"].max() < 21.7 - 3.0
     facts = json.loads(run.scenarios[0].with_suffix(".json").read_text("utf-8"))
     assert "lane_width" not in facts["parameters"]
+
+
+@pytest.mark.skipif(not TOWN05.exists(), reason="needs Town05.xodr")
+@pytest.mark.parametrize(
+    ("scenario", "junction"),
+    [("crossroads-s4", "965"), (Path(__file__).with_name("t-turn.yaml"), "924")],
+)
+def test_an_imported_map_is_searched_like_the_map(tmp_path, scenario, junction):
+    road_map = tmp_path / "Town05.xodr"
+    road_map.write_bytes(TOWN05.read_bytes())
+    owl, _ = import_file(road_map)
+    settings = {"algorithm": "random", "budget": 60, "keep": 1, "junction": junction}
+    one = bg.run_search(scenario, road_map=road_map, out=tmp_path / "one", **settings)
+    other = bg.run_search(scenario, road_map=owl, out=tmp_path / "other", **settings)
+    assert same(rows_of(one.folder), rows_of(other.folder))
+    assert (other.folder / one.scenarios[0].relative_to(one.folder)).exists()
+    assert bg.resume(other.folder).summary == other.summary
+    road_map.write_bytes(TOWN05.read_bytes() + b"\n")
+    with pytest.raises(InputError, match="import it again"):
+        bg.run_search(scenario, road_map=owl, out=tmp_path / "third", **settings)
+    assert not (tmp_path / "third").exists()
 
 
 def test_the_results_are_a_data_frame(tmp_path):

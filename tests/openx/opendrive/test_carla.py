@@ -20,7 +20,7 @@ from bridgegen.openx.opendrive.references import contacts
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.write import to_xml
 
-from .kinds import KINDS
+from .kinds import FURNISHED, KINDS
 from .kinds import model as kind
 
 carla = pytest.importorskip("carla")
@@ -113,9 +113,9 @@ def test_any_four_legs(data: st.DataObject, sites: Any) -> None:
     assert check(opendrive_from_owl(build_static(place))) == lanes
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", [*KINDS, "furnished"])
 def test_every_kind(name: str) -> None:
-    model = kind(name)
+    model = opendrive_from_owl(build_static(FURNISHED)) if name == "furnished" else kind(name)
     theirs = load(model)
     assert compare(model, theirs, list(model.roads)) > 0
     for junction in model.junctions:

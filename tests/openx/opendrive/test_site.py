@@ -7,17 +7,22 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.odd.reader import load
+from bridgegen.odd.roads import LegSpec
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.site import Site
-from bridgegen.ontology.templates import crossroads
+from bridgegen.ontology.templates import crossroads, site_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
-from bridgegen.openx.opendrive.site import find_site
+from bridgegen.openx.opendrive.site import find_site, site_for
+
+from .kinds import KINDS
+from .kinds import model as kind
 
 # Leg, its roads, outward heading [deg], arm [m], in and out: the inner lane's (x, y) [m].
 TABLE = [
@@ -159,10 +164,20 @@ def test_sections_with_the_same_lanes_are_one_leg(crossroads: Callable[..., Open
     assert found == find_site(model)
 
 
-def test_one_way_roads_are_no_legs(crossroads: Callable[..., OpenDrive]) -> None:
+def test_one_way_roads_are_legs(crossroads: Callable[..., OpenDrive]) -> None:
     model = crossroads()
     road = model.road("2")
     section = dataclasses.replace(road.sections[0], left=())
+    site = find_site(with_road(model, dataclasses.replace(road, sections=(section,))))
+    road_b = site.legs[1].roads[0]
+    assert (len(road_b.along("in")), len(road_b.along("out"))) == (0, 2)
+    assert site.measures([])["lanes_per_direction"] == 2.0
+
+
+def test_a_junction_without_lanes_has_no_legs(crossroads: Callable[..., OpenDrive]) -> None:
+    model = crossroads()
+    road = model.road("2")
+    section = dataclasses.replace(road.sections[0], left=(), right=())
     with pytest.raises(UnsupportedError, match=r"got 3 \(roads 1, 3, 4\)"):
         find_site(with_road(model, dataclasses.replace(road, sections=(section,))))
 
@@ -173,3 +188,60 @@ def test_junction_that_is_known_must_be_there(crossroads: Callable[..., OpenDriv
     assert find_site(model, map_name="maps/Town05.xodr").junction_id == "100"
     two = dataclasses.replace(model, junctions=(*model.junctions, Junction("7")))
     assert find_site(two, map_name="Town05.xodr").junction_id == "100"
+
+
+JUNCTIONS = ("signals", "turn-lanes", "t-junction", "skewed-t", "bend", "five")
+
+
+@pytest.mark.parametrize("name", JUNCTIONS)
+def test_two_to_five_legs_are_found_again(name: str) -> None:
+    """With the scenario's own names, headings, and numbers and widths of lanes."""
+    headings = {leg: one.heading for leg, one in KINDS[name].legs.items()}
+    wanted = site_of(KINDS[name], {})
+    found = find_site(kind(name), headings=headings)
+    assert found.kind == wanted.kind
+    for leg, same in zip(wanted.legs, found.legs, strict=True):
+        assert (leg.name, leg.roads[0].road_id) == (same.name, same.roads[0].road_id)
+        assert math.remainder(leg.heading_deg - same.heading_deg, 360.0) == pytest.approx(0.0)
+        for way in ("in", "out"):
+            lanes, others = leg.roads[0].along(way), same.roads[0].along(way)
+            assert [(one.lane_id, one.width) for one in lanes] == [
+                (one.lane_id, one.width) for one in others
+            ]
+
+
+@given(turn=st.floats(-180.0, 180.0), skew=st.floats(-20.0, 20.0))
+@settings(max_examples=20)
+def test_the_side_road_of_a_t_is_the_side_road(turn: float, skew: float) -> None:
+    """However the junction is turned, for its legs are told by the angles between them."""
+    headings = {"A": 270.0, "B": 180.0, "D": 0.0}
+    angles = {n: h + turn + (skew if n == "A" else 0.0) for n, h in headings.items()}
+    legs = {name: LegSpec(angle % 360.0) for name, angle in angles.items()}
+    turned = dataclasses.replace(KINDS["skewed-t"], legs=legs)
+    found = find_site(opendrive_from_owl(build_static({}, turned)), headings=headings)
+    assert [(leg.name, leg.roads[0].road_id) for leg in found.legs] == [
+        ("A", "1"), ("B", "2"), ("D", "3"),
+    ]  # fmt: skip
+
+
+def test_town05_has_t_junctions(town05: OpenDrive) -> None:
+    """Junction 224: legs to the north, south and west; the side road leads west."""
+    found = find_site(town05, "224", headings={"A": 270.0, "B": 180.0, "D": 0.0})
+    assert found.kind == "TJunction"
+    assert [(leg.name, leg.roads[0].road_id) for leg in found.legs] == [
+        ("A", "48"), ("B", "19"), ("D", "20"),
+    ]  # fmt: skip
+
+
+def test_what_a_junction_lacks_is_one_error(town05: OpenDrive) -> None:
+    with pytest.raises(UnsupportedError) as caught:
+        site_for(load("red-light-runner"), town05, "685", "Town05.xodr")
+    (problem,) = caught.value.problems
+    assert problem == (
+        "junction 685 of Town05 must have the lanes that red-light-runner uses; it has 4 legs; "
+        "missing: leg B out, lane 2, 50 m away (the leg has 49.1 m); leg D in, lane 2 (road 48 has 1)"
+    )
+    with pytest.raises(UnsupportedError, match="cut-in takes place on the template road; on a map"):
+        site_for(load("cut-in"), town05, "685")
+    with pytest.raises(UnsupportedError, match="leg D out, sidewalk"):
+        site_for(load("pedestrian-at-night"), town05, "965")

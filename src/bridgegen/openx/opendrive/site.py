@@ -39,7 +39,8 @@ def site_for(
     Raises:
         InputError: as `find_site`.
         UnsupportedError: as `find_site`; or the scenario is not one of an intersection, or the
-            junction lacks lanes that participants stand on or drive to (all of them are named).
+            junction lacks lanes that participants stand on or drive to, or these are too short
+            (all of them are named).
     """
     roads = scenario.roads
     if roads.template not in TEMPLATES:
@@ -53,7 +54,7 @@ def site_for(
     if missing:
         raise UnsupportedError(
             f"junction {site.junction_id} of {site.name} must have the lanes that {scenario.name} "
-            f"uses; missing: {'; '.join(missing)}"
+            f"uses; it has {len(site.legs)} legs; missing: {'; '.join(missing)}"
         )
     return site
 
@@ -67,10 +68,10 @@ def find_site(
     """Return a junction with its legs named as a scenario names them.
 
     A leg is the road that touches the junction and the roads that continue it, lane by lane,
-    until the next junction or the end. Legs are named by where they lead: those of the map and
-    those of the scenario, each in their order around the junction, are matched so that the sum of
-    the squared angles between them is least. Of the usual crossroads, A is the leg nearest to
-    south, then B, C, D clockwise.
+    until the next junction or the end. Legs are named as those of the scenario that they are
+    most like: both are taken in their order around the junction, and matched first by the angles
+    between them, then by where they lead. Of a usual crossroads, A is the leg nearest to south,
+    then B, C, D clockwise; of a T-junction, the side road is the side road, however it is turned.
 
     Args:
         model: the road network.
@@ -114,11 +115,20 @@ def find_site(
 
 
 def _misfit(wanted: list[float], ends: list[tuple[Road, str]]) -> float:
-    """Return the sum of the squared angles between legs as wanted and as they are [deg²]."""
-    return sum(
-        math.remainder(heading(*end) - angle, 360.0) ** 2
-        for angle, end in zip(wanted, ends, strict=True)
-    )
+    """Return how badly legs are as wanted [deg²]: first their angles, then their directions.
+
+    The angles between the legs make the junction's shape (which leg of a T is the side road);
+    only among fits of one shape does it count how far the whole is turned.
+    """
+    turned = [heading(*end) - angle for angle, end in zip(wanted, ends, strict=True)]
+    beside = [math.remainder(one - turned[0], 360.0) for one in turned]
+    middle = sum(beside) / len(beside)
+    shape = sum((one - middle) ** 2 for one in beside)
+    return _SHAPE * shape + len(ends) * math.remainder(turned[0] + middle, 360.0) ** 2
+
+
+_SHAPE = 100.0
+"""How much more an angle between legs counts than a direction: 90° of these, 9° of those."""
 
 
 def _places(scenario: LogicalScenario) -> Iterator[Waypoint]:
@@ -145,7 +155,11 @@ def _missing(site: Site, place: Waypoint) -> str:
         there = any((one.type, one.direction) == (place.lane, place.way) for one in road.strips)
         return "" if there else f"{place} (road {road.road_id})"
     count = len(road.along(place.way))
-    return "" if place.lane <= count else f"{place} (road {road.road_id} has {count})"
+    if place.lane > count:
+        return f"{place} (road {road.road_id} has {count})"
+    if not isinstance(place.distance, str) and place.distance > leg.length:
+        return f"{place}, {place.distance:g} m away (the leg has {leg.length:.4g} m)"
+    return ""
 
 
 def _default_junction(model: OpenDrive, stem: str, count: int) -> str:

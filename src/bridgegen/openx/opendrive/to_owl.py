@@ -13,22 +13,19 @@ import pyoxigraph as ox
 from bridgegen.ontology.builder import Builder
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import tbox
-from bridgegen.openx.opendrive.from_owl import KINDS, MEASURES
 from bridgegen.openx.opendrive.geometry import pose
 from bridgegen.openx.opendrive.lanes import section_end, width_of
 from bridgegen.openx.opendrive.legs import heading, junction_end
 from bridgegen.openx.opendrive.map_furniture import Furniture
-from bridgegen.openx.opendrive.map_names import junction_name, lane_name, part_name, road_name
-from bridgegen.openx.opendrive.model import Connection, Junction, Lane, OpenDrive, Road, RoadLink
+from bridgegen.openx.opendrive.map_junctions import Junctions
+from bridgegen.openx.opendrive.map_names import lane_name, part_name, road_name
+from bridgegen.openx.opendrive.model import Lane, OpenDrive, Road, RoadLink
 from bridgegen.openx.opendrive.plan_view import Arc, Line, Spiral
-from bridgegen.openx.opendrive.references import contacts
 from bridgegen.openx.opendrive.user_data import number, said
 
 STRIPS = {"shoulder": "Shoulder", "sidewalk": "Sidewalk", "walking": "Sidewalk"}
 """The class of a lane that cars do not travel on, by its type; of all others, ``RoadStrip``."""
 
-_BY_LEGS = {3: "TJunction", 4: "Crossroads"}
-_NEEDED = {"Roundabout": ("has_radius",), "Merge": ("has_merge_length", "has_taper_length")}
 _CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
 
 
@@ -53,12 +50,7 @@ def individuals_from_opendrive(
 
 
 class _Map(Builder):
-    """Adds the parts of a map.
-
-    Attributes:
-        kinds: per junction, its class.
-        whole: per junction that is a part of a roundabout, the one that stands for it.
-    """
+    """Adds the parts of a map."""
 
     def __init__(self, model: OpenDrive, map_file: str, digest: str | None) -> None:
         stem = PurePath(map_file).stem
@@ -67,19 +59,12 @@ class _Map(Builder):
         self.known_types = frozenset(tbox().allowed["has_road_type"])
         self.known_lines = frozenset(tbox().allowed["has_marking_type"])
         self.known_colors = frozenset(tbox().allowed["has_marking_color"])
-        ids = {junction.id for junction in model.junctions}
-        self.whole = {
-            junction.id: first
-            for junction in model.junctions
-            for first in said(junction.user_data, "part_of")[:1]
-            if first in ids
-        }
-        self.kinds = {one.id: kind for one in model.junctions if (kind := _kind(one))}
         self.network = self.node("road_network", "RoadNetwork")
         self.put(self.network, "has_name", model.header.name or stem)
         self.put(self.network, "has_map_file", map_file)
         if digest is not None:
             self.put(self.network, "has_map_digest", digest)
+        self.junctions = Junctions(self, self.network, model)
         furniture = Furniture(self, self.network)
         for road in model.roads:
             node = self.map_road(road)
@@ -88,21 +73,14 @@ class _Map(Builder):
         for road in model.roads:
             furniture.add_references(road)
         furniture.add_controllers(model.controllers)
-        for junction in model.junctions:
-            if junction.id not in self.whole:
-                self.junction(junction)
-
-    def area(self, name: str, cls: str) -> ox.NamedNode:
-        """Add an individual as an area of the network."""
-        node = self.node(name, cls)
-        self.put(self.network, "has_area", node)
-        return node
+        self.junctions.add()
 
     # -- roads -------------------------------------------------------------------------------------
 
     def map_road(self, road: Road) -> ox.NamedNode:
         """Add a road with its lanes, its lines and its course."""
-        node = self.area(road_name(road.id), "Road")
+        node = self.node(road_name(road.id), "Road")
+        self.put(self.network, "has_area", node)
         self.put(node, "has_road_id", road.id)
         if road.name:
             self.put(node, "has_name", road.name)
@@ -139,11 +117,7 @@ class _Map(Builder):
         if link is not None and link.element_type == "road":
             self.put(node, name, self.iri(road_name(link.element_id)))
         elif link is not None:
-            self.put(node, name, self.junction_iri(link.element_id))
-
-    def junction_iri(self, junction_id: str) -> ox.NamedNode:
-        """Return the junction of an id, or the roundabout that it is part of."""
-        return self.iri(junction_name(self.whole.get(junction_id, junction_id)))
+            self.put(node, name, self.junctions.iri(link.element_id))
 
     def direction(self, road: Road, lane_id: int, end: str) -> str:
         """Return where a lane leads; a strip is like the lanes that it is beside."""
@@ -161,7 +135,7 @@ class _Map(Builder):
         """
         sections: Sequence[int] = range(len(road.sections))
         link = road.link(end) if end in ("start", "end") else None
-        if link is not None and self.kinds.get(link.element_id) == "Merge":
+        if link is not None and self.junctions.kinds.get(link.element_id) == "Merge":
             sections = sections[-1:] if end == "start" else sections[:1]
         lanes = [
             [lane for lane in road.sections[k].lanes if lane.drivable] for k in sections
@@ -240,76 +214,6 @@ class _Map(Builder):
                 continue
             for name in names:
                 self.put(node, "marks_lane", self.iri(name))
-
-    # -- junctions ---------------------------------------------------------------------------------
-
-    def junction(self, junction: Junction) -> None:
-        """Add a junction (or a roundabout, which is several) with the ways across."""
-        parts = [
-            one for one in self.model.junctions
-            if self.whole.get(one.id, one.id) == junction.id
-        ]  # fmt: skip
-        ids = [one.id for one in parts]
-        inner, legs = [], []
-        for road in self.model.roads:
-            touches = sum(len(contacts(road, one)) for one in ids)
-            if road.junction in ids or (touches == 2 and len(ids) > 1):
-                inner.append(road)
-            elif touches:
-                legs.append(road)
-        kind = self.kinds.get(junction.id) or _BY_LEGS.get(len(legs), "Intersection")
-        node = self.area(junction_name(junction.id), kind)
-        self.put(node, "has_junction_id", junction.id)
-        if junction.name and len(parts) == 1:
-            self.put(node, "has_name", junction.name)
-        for name in MEASURES:
-            measure = number(junction.user_data, name)
-            fits = tbox().domains[name] in ("Intersection", kind)
-            if fits and measure is not None and measure > 0.0:
-                self.put(node, name, measure)
-        for name, roads in (("has_inner_road", inner), ("has_leg", legs)):
-            for road in roads:
-                self.put(node, name, self.iri(road_name(road.id)))
-        for part in parts:
-            for index, connection in enumerate(part.connections):
-                self.connection(node, part, index, connection)
-
-    def connection(
-        self, junction_node: ox.NamedNode, junction: Junction, index: int, connection: Connection
-    ) -> None:
-        """Add a way into a junction, lane by lane."""
-        node = self.node(part_name("connection", junction.id, index), "JunctionConnection")
-        self.put(junction_node, "has_connection", node)
-        self.put(node, "has_connection_id", connection.id)
-        self.put(node, "has_incoming_road", self.iri(road_name(connection.incoming_road)))
-        self.put(node, "has_connecting_road", self.iri(road_name(connection.connecting_road)))
-        entered = self.model.road(connection.connecting_road)
-        left = self.model.road(connection.incoming_road)
-        start = 0 if connection.contact_point == "start" else len(entered.sections) - 1
-        end = 0 if _leaves_at(left, junction, entered, connection) == "start" else -1
-        for number_, lanes in enumerate(connection.lane_links):
-            link = self.node(part_name("link", junction.id, index, number_), "LaneLink")
-            self.put(node, "has_lane_link", link)
-            last = end % len(left.sections)
-            self.put(link, "from_lane", self.iri(lane_name(left.id, last, lanes.from_lane)))
-            self.put(link, "to_lane", self.iri(lane_name(entered.id, start, lanes.to_lane)))
-
-
-def _kind(junction: Junction) -> str | None:
-    """Return the class that our ``userData`` gives a junction, with all that it needs."""
-    for name in said(junction.user_data, "class")[:1]:
-        needed = (number(junction.user_data, one) for one in _NEEDED.get(name, ()))
-        if name in KINDS and all(value is not None and value > 0.0 for value in needed):
-            return name
-    return None
-
-
-def _leaves_at(left: Road, junction: Junction, entered: Road, connection: Connection) -> str:
-    """Return the end of the incoming road that a connection leaves it at."""
-    link = entered.link(connection.contact_point)
-    if link is not None and link.element_id == left.id and link.contact_point is not None:
-        return link.contact_point
-    return next(iter(contacts(left, junction.id)), "end")
 
 
 def _middle_width(road: Road, index: int, lane: Lane) -> float:
