@@ -216,18 +216,28 @@ def convert(
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(help="An OpenDRIVE map (.xodr).")],
+    file: Annotated[
+        Path, typer.Argument(help="An OpenDRIVE map (.xodr) or an OpenSCENARIO file (.xosc).")
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="The .owl file, new; beside the map by default.")
+        Path | None, typer.Option(help="The .owl file, new; beside the first by default.")
+    ] = None,
+    partial: Annotated[
+        bool,
+        typer.Option("--partial", help="Leave out what the ontology cannot say, and list it."),
+    ] = False,
+    ego: Annotated[
+        str | None,
+        typer.Option(help="The entity under test in an .xosc, if it is not called ego."),
     ] = None,
 ) -> None:
-    """Turn a whole map into individuals: roads, lanes, junctions, lights and signs."""
+    """Turn a whole map, or a scenario on its map, into individuals."""
     from bridgegen.openx.convert import import_file
 
-    written, losses = import_file(file, out)
+    written, notes = import_file(file, out, partial=partial, ego=ego)
     print(written)
-    for loss in losses:
-        print(f"bridgegen: note: {loss}", file=sys.stderr)
+    for note in notes:
+        print(f"bridgegen: note: {note}", file=sys.stderr)
 
 
 @app.command()

@@ -292,7 +292,7 @@ def test_who_may_cross_where(everything):
 
 
 def test_what_came_of_it(everything):
-    assert ask(everything, "outcome").rows == ()
+    assert ask(everything, "outcomes").rows == ()
     crash, jam = node("crash"), node("later_jam")
     after = planted(
         everything,
@@ -302,16 +302,19 @@ def test_what_came_of_it(everything):
         (crash, bg("has_time"), ox.Literal(7.25)),
         (crash, bg("has_who"), node("ego")),
         (crash, bg("has_who"), node("bv")),
+        (crash, bg("has_world_x"), ox.Literal(-3.5)),
+        (crash, bg("has_world_y"), ox.Literal(1.0)),
         (node("scenario"), bg("has_outcome"), jam),
         (jam, TYPE, bg("TrafficJam")),
+        (jam, bg("has_name"), ox.Literal("later jam")),
         (jam, bg("has_time"), ox.Literal(12.0)),
         (jam, bg("has_who"), node("bv")),
+        (jam, bg("has_length"), ox.Literal(9.5)),
         (jam, bg("on_lane"), node("leg_B_in_1")),
     )
-    assert ask(after, "outcome").rows == (
-        ("crash", "traffic accident", "bv", 7.25, None, None),
-        ("crash", "traffic accident", "ego", 7.25, None, None),
-        (None, "traffic jam", "bv", 12.0, "B", 1),
+    assert ask(after, "outcomes").rows == (
+        ("crash", "traffic accident", 7.25, "bv, ego", -3.5, 1.0, None, None),
+        ("later jam", "traffic jam", 12.0, "bv", None, None, "leg_B_in_1", 9.5),
     )
     assert ask(after, "jams") == ask(everything, "jams")  # what came later was not there before
 
@@ -333,7 +336,7 @@ def test_conditions_of_a_group_stand_together(everything):
 def test_every_question_finds_something_in_everything(everything):
     """But for those about two routes, as only the ego has one, and about what came of it."""
     silent = {name for name in questions() if not ask(everything, name).rows}
-    assert silent == {"conflicts", "outcome"}
+    assert silent == {"conflicts", "outcomes"}
 
 
 def test_every_question_says_what_it_asks():

@@ -17,6 +17,8 @@ ours (signs stand 0.5 to 1.5 m from it, RSA 21)."""
 
 _PAPER = "BridgeGen paper, Section III-B"
 _SLACK = literal(TOLERANCE)
+_OURS = "FILTER NOT EXISTS { ?value bg:has_s ?s }"
+"""Places on an imported map are left to it."""
 
 
 def placement_rules() -> Iterator[Rule]:
@@ -44,7 +46,7 @@ def _lights() -> Iterator[Rule]:
         "Who waits at a light waits at its stop line.",
         f"{source}; Vienna Convention on Road Signs and Signals (1968), Article 23",
         f"SELECT DISTINCT $this ?value ({shown('?at')} AS ?got) WHERE {{ {light} "
-        "?value bg:governs_lane ?lane ; bg:has_distance ?at . "
+        f"?value bg:governs_lane ?lane ; bg:has_distance ?at . {_OURS} "
         "FILTER NOT EXISTS { ?line bg:marks_lane ?lane ; bg:has_distance ?there . "
         f"FILTER(ABS(?there - ?at) <= {_SLACK}) }} }}",
         ("TrafficLight",),
@@ -62,7 +64,7 @@ def _beside_and_on_roads() -> Iterator[Rule]:
         source,
         f"SELECT $this ?value ({shown('?t')} AS ?got) ({shown('SUM(?wide)')} AS ?edge) WHERE {{ "
         "$this bg:has_facility ?value . "
-        "?value bg:has_t ?t ; bg:on_road ?road ; bg:has_distance ?at . "
+        f"?value bg:has_t ?t ; bg:on_road ?road ; bg:has_distance ?at . {_OURS} "
         "OPTIONAL { ?road bg:has_lane|bg:has_strip ?lane . ?lane bg:has_lane_id ?id ; "
         "bg:has_width ?width . FILTER(?id * ?t > 0) } "
         "BIND(COALESCE(?width, 0.0e0) AS ?wide) } GROUP BY $this ?value ?t "
@@ -76,7 +78,7 @@ def _beside_and_on_roads() -> Iterator[Rule]:
         f"SELECT DISTINCT $this ?value ({shown('?at')} AS ?got) ({shown('?half')} AS ?low) "
         f"({shown('?length - ?half')} AS ?high) WHERE {{ "
         "$this bg:has_facility|bg:has_area ?value . "
-        "?value bg:on_road ?road ; bg:has_distance ?at . ?road bg:has_length ?length . "
+        f"?value bg:on_road ?road ; bg:has_distance ?at . {_OURS} ?road bg:has_length ?length . "
         f"OPTIONAL {{ ?value bg:has_width ?width . {is_a('?value', 'Crosswalk')} }} "
         "BIND(0.5e0 * COALESCE(?width, 0.0e0) AS ?half) "
         f"FILTER(?at < ?half - {_SLACK} || ?at > ?length - ?half + {_SLACK}) }}",
@@ -87,8 +89,8 @@ def _beside_and_on_roads() -> Iterator[Rule]:
         "must be for lanes of its own road, got {?got}",
         "A light, a sign or a line is for those who drive past it.", source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) WHERE {{ "
-        "$this bg:has_facility ?value . ?value bg:on_road ?road ; bg:has_distance ?at ; "
-        "bg:marks_lane|bg:governs_lane ?lane . "
+        f"$this bg:has_facility ?value . ?value bg:on_road ?road ; bg:has_distance ?at ; "
+        f"bg:marks_lane|bg:governs_lane ?lane . {_OURS} "
         "FILTER NOT EXISTS { ?road bg:has_lane ?lane } }",
         ("has_facility", "on_road"),
     )  # fmt: skip

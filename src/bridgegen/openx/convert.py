@@ -1,4 +1,4 @@
-"""Files in, files out: ontologies to OpenDRIVE and OpenSCENARIO, maps to ontologies, checks."""
+"""Files in, files out: ontologies to OpenDRIVE and OpenSCENARIO and back, checks."""
 
 import os
 from pathlib import Path
@@ -19,11 +19,15 @@ from bridgegen.openx.opendrive.map_losses import losses
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import digest_of
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
+from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario import write as openscenario_write
-from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.renaming import rename_entity
+from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
+from bridgegen.openx.openscenario.values import ParameterRef
 from bridgegen.openx.xml import read_bytes
 
 
@@ -67,29 +71,59 @@ def road_bytes(individuals: Individuals, beside: Path) -> bytes:
     return read_bytes(beside / map_file)
 
 
-def import_file(road_map: Path, out: Path | None = None) -> tuple[Path, list[str]]:
-    """Write a whole OpenDRIVE map as the static part of an ontology.
+def import_file(
+    file: Path, out: Path | None = None, *, partial: bool = False, ego: str | None = None
+) -> tuple[Path, list[str]]:
+    """Write a whole OpenDRIVE map, or a scenario file on its map, as an ontology.
 
     Args:
-        road_map: the map.
-        out: the file to write, new; beside the map by default.
+        file: the map (``.xodr``), or the scenario (``.xosc``), whose map lies where it says.
+        out: the file to write, new; beside the first by default.
+        partial: of a scenario, leave out what the ontology cannot say, instead of refusing it.
+        ego: of a scenario, the entity under test, if it is not called so.
 
     Returns:
-        The file written, and a sentence for each kind of thing that it does not say in full.
+        The file written, and a sentence for each thing that it does not say, or not in full.
 
     Raises:
-        FileFormatError: not a map that can be read.
-        UnsupportedError: it uses what this version cannot represent.
+        FileFormatError: not a file that can be read.
+        InputError: there is no such entity, or a map has any.
+        UnsupportedError: it uses what this version, or the ontology, cannot represent.
         StorageError: the file exists, or cannot be written.
     """
-    data = read_bytes(road_map)
-    model = opendrive_read.read(data, str(road_map))
-    out = out or road_map.with_suffix(".owl")
+    out = out or file.with_suffix(".owl")
+    if file.suffix.lower() == ".xosc":
+        individuals, notes = _import_storyboard(file, out, partial, ego)
+    elif partial or ego is not None:
+        raise InputError(f"{file}: only a scenario (.xosc) can be imported in part, or has an ego")
+    else:
+        data = read_bytes(file)
+        model = opendrive_read.read(data, str(file))
+        individuals = individuals_from_opendrive(model, _seen_from(out, file), digest_of(data))
+        notes = list(losses(model))
     if out.exists():
         raise StorageError(f"{out}: exists already, and is not overwritten")
-    map_file = Path(os.path.relpath(road_map, out.parent)).as_posix()
-    save(individuals_from_opendrive(model, map_file, digest_of(data)), out)
-    return out, list(losses(model))
+    save(individuals, out)
+    return out, notes
+
+
+def _import_storyboard(
+    file: Path, out: Path, partial: bool, ego: str | None
+) -> tuple[Individuals, list[str]]:
+    skipped: list[str] = []
+    scenario = openscenario_read.read(file, skipped=skipped if partial else None)
+    if ego is not None:
+        scenario = rename_entity(scenario, ego, EGO)
+    roads = roads_of(scenario, file)
+    road_map = file.parent / logic_file(scenario, file)
+    individuals, lost = individuals_from_openscenario(
+        scenario, roads, _seen_from(out, road_map), str(file), partial=partial
+    )
+    return individuals, [f"left out: {sentence}" for sentence in (*skipped, *lost)]
+
+
+def _seen_from(out: Path, file: Path) -> str:
+    return Path(os.path.relpath(file, out.parent)).as_posix()
 
 
 def validate_file(path: Path, *, reason: bool = False) -> list[str]:
@@ -168,10 +202,21 @@ def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
     Raises:
         FileFormatError: it names none, or the map cannot be read.
     """
-    logic_file = scenario.road_network.logic_file
-    if logic_file is None:
+    return opendrive_read.read(path.parent / logic_file(scenario, path))
+
+
+def logic_file(scenario: OpenScenario, path: Path) -> str:
+    """Return the path of the map that a scenario file names, as it does.
+
+    Raises:
+        FileFormatError: it names none.
+    """
+    named = scenario.road_network.logic_file
+    if named is None:
         raise FileFormatError(f"{path}: RoadNetwork needs a LogicFile, the OpenDRIVE map")
-    return opendrive_read.read(path.parent / str(logic_file.filepath))
+    if isinstance(named.filepath, ParameterRef):
+        return str(parameters.values(scenario)[named.filepath.name])
+    return named.filepath
 
 
 def _logical(path: Path) -> list[str]:

@@ -239,7 +239,8 @@ def test_what_a_junction_lacks_is_one_error(town05: OpenDrive) -> None:
     (problem,) = caught.value.problems
     assert problem == (
         "junction 685 of Town05 must have the lanes that red-light-runner uses; it has 4 legs; "
-        "missing: leg B out, lane 2, 50 m away (the leg has 49.1 m); leg D in, lane 2 (road 48 has 1)"
+        "missing: leg B out, lane 2, 50 m away (the leg has 49.1 m); "
+        "leg D in, lane 2 (road 48 has 1)"
     )
     with pytest.raises(UnsupportedError, match="cut-in takes place on the template road; on a map"):
         site_for(load("cut-in"), town05, "685")

@@ -403,7 +403,7 @@ def test_contradictions_are_named(individuals, edited, edits, text):
     ("node", "cls", "text"),
     [
         ("bv", "TrafficParticipant", "bv (TrafficParticipant) must be one of Car, Van, "),
-        ("bv_sets_off_action", "SynchronizeAction", "must be one of SpeedAction, LaneChangeAction"),
+        ("bv_sets_off_action", "Action", "must be one of SpeedAction, LaneChangeAction"),
         ("bv_sets_off_condition_1", "Condition", "must be a condition that can be written"),
     ],
 )

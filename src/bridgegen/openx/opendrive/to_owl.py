@@ -30,7 +30,11 @@ _CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
 
 
 def individuals_from_opendrive(
-    model: OpenDrive, map_file: str, digest: str | None = None
+    model: OpenDrive,
+    map_file: str,
+    digest: str | None = None,
+    name: str | None = None,
+    controllers: bool = True,
 ) -> Individuals:
     """Return the individuals of a whole map.
 
@@ -45,16 +49,25 @@ def individuals_from_opendrive(
         model: the road network, as `bridgegen.openx.opendrive.read` returns it.
         map_file: the path that its file has, seen from the ontology's.
         digest: SHA-256 of the file, in hexadecimal.
+        name: of the ontology that they become part of; the map's by default.
+        controllers: whether to say who switches the lights; a scenario file may say so better.
     """
-    return Individuals(_Map(model, map_file, digest).quads)
+    return Individuals(_Map(model, map_file, digest, name, controllers).quads)
 
 
 class _Map(Builder):
     """Adds the parts of a map."""
 
-    def __init__(self, model: OpenDrive, map_file: str, digest: str | None) -> None:
+    def __init__(
+        self,
+        model: OpenDrive,
+        map_file: str,
+        digest: str | None,
+        ontology: str | None,
+        controllers: bool,
+    ) -> None:
         stem = PurePath(map_file).stem
-        super().__init__(stem, {})
+        super().__init__(ontology or stem, {})
         self.model = model
         self.known_types = frozenset(tbox().allowed["has_road_type"])
         self.known_lines = frozenset(tbox().allowed["has_marking_type"])
@@ -72,7 +85,8 @@ class _Map(Builder):
             furniture.add_signals(node, road)
         for road in model.roads:
             furniture.add_references(road)
-        furniture.add_controllers(model.controllers)
+        if controllers:
+            furniture.add_controllers(model.controllers)
         self.junctions.add()
 
     # -- roads -------------------------------------------------------------------------------------

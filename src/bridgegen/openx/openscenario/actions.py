@@ -97,10 +97,49 @@ class LaneChangeAction(Element):
 
 
 @dataclass(frozen=True)
+class LaneOffsetActionDynamics(Element):
+    """How an offset is reached: its course, and the most lateral acceleration [m/s²]."""
+
+    dynamics_shape: DynamicsShape | ParameterRef
+    max_lateral_acc: Annotated[Double | None, Range(0.0)] = None
+
+
+@dataclass(frozen=True)
+class AbsoluteTargetLaneOffset(Element):
+    """A distance from the centre of the present lane [m]."""
+
+    value: Double
+
+
+@dataclass(frozen=True)
+class RelativeTargetLaneOffset(Element):
+    """A distance from another entity's [m]."""
+
+    entity_ref: Annotated[String, ENTITY]
+    value: Double
+
+
+@dataclass(frozen=True)
+class LaneOffsetTarget(Element):
+    """The offset to reach."""
+
+    target: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
+
+
+@dataclass(frozen=True)
+class LaneOffsetAction(Element):
+    """A move aside within the lane; ``continuous``: kept until something else moves the entity."""
+
+    continuous: Boolean
+    dynamics: Annotated[LaneOffsetActionDynamics, Tag("LaneOffsetActionDynamics")]
+    lane_offset_target: LaneOffsetTarget
+
+
+@dataclass(frozen=True)
 class LateralAction(Element):
     """One of the actions across the road."""
 
-    action: LaneChangeAction
+    action: LaneChangeAction | LaneOffsetAction
 
 
 @dataclass(frozen=True)
@@ -125,10 +164,21 @@ class RoutingAction(Element):
 
 
 @dataclass(frozen=True)
+class SynchronizeAction(Element):
+    """Being at a position when another entity, the master, is at one of its own [m]."""
+
+    master_entity_ref: Annotated[String, ENTITY]
+    target_position_master: Annotated[Position, Tag("TargetPositionMaster")]
+    target_position: Annotated[Position, Tag("TargetPosition")]
+    target_tolerance: Annotated[Double | None, Range(0.0)] = None
+    target_tolerance_master: Annotated[Double | None, Range(0.0)] = None
+
+
+@dataclass(frozen=True)
 class PrivateAction(Element):
     """One of the actions of an entity."""
 
-    action: LongitudinalAction | LateralAction | TeleportAction | RoutingAction
+    action: LongitudinalAction | LateralAction | SynchronizeAction | TeleportAction | RoutingAction
 
 
 @dataclass(frozen=True)
@@ -169,10 +219,30 @@ class InfrastructureAction(Element):
 
 
 @dataclass(frozen=True)
+class AddEntityAction(Element):
+    """An entity comes into the scenario, at a position."""
+
+    position: Position
+
+
+@dataclass(frozen=True)
+class DeleteEntityAction(Element):
+    """An entity leaves the scenario."""
+
+
+@dataclass(frozen=True)
+class EntityAction(Element):
+    """One of the actions on the presence of an entity."""
+
+    entity_ref: Annotated[String, ENTITY]
+    action: AddEntityAction | DeleteEntityAction
+
+
+@dataclass(frozen=True)
 class GlobalAction(Element):
     """One of the actions that concern all."""
 
-    action: EnvironmentAction | InfrastructureAction
+    action: EnvironmentAction | EntityAction | InfrastructureAction
 
 
 @dataclass(frozen=True)

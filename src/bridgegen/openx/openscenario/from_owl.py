@@ -12,19 +12,18 @@ from bridgegen.errors import OntologyError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.owl_entities import plain_text, scenario_object
+from bridgegen.openx.openscenario.owl_actions import Actions
+from bridgegen.openx.openscenario.owl_conditions import Conditions
+from bridgegen.openx.openscenario.owl_entities import Cast, plain_text, scenario_object
 from bridgegen.openx.openscenario.owl_events import Events
+from bridgegen.openx.openscenario.owl_notes import Notes
 from bridgegen.openx.openscenario.owl_places import Places
 from bridgegen.openx.openscenario.owl_quantities import Quantities
 from bridgegen.openx.openscenario.owl_signals import Signals
 from bridgegen.openx.openscenario.owl_weather import environment
-from bridgegen.openx.openscenario.values import format_double
 
 DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""
-
-TIME_STEP = "time_step"
-"""Property of the header: the step [s] of the evaluation, for which the standard has no place."""
 
 EGO = "ego"
 ARRIVAL = 2.0
@@ -57,24 +56,30 @@ class _Converter:
         self.quantities = Quantities(individuals, self.node)
         self.places = Places(individuals, self.quantities)
         self.participants = self._participants()
-        self.events = Events(individuals, self.quantities, self.places, self.participants)
+        cast = Cast(individuals, self.participants)
+        said = individuals, self.quantities, self.places, cast
+        self.actions = Actions(*said)
+        self.events = Events(individuals, cast, self.actions, Conditions(*said))
         self.signals = Signals(individuals, individuals.number(self.node, "has_duration"))
 
     def scenario(self, road_file: str, date: str) -> osc.OpenScenario:
         elements = self._elements()
         init, texts = self._init(elements)
         groups = (*self.events.maneuver_groups(self.node), *self.signals.maneuver_groups())
-        texts += self.events.texts
+        texts += self.actions.texts
         declarations = self.quantities.declarations()
         for text in texts:
             if text.name in self.quantities.values:
                 raise OntologyError(f"a parameter must not have the reserved name {text.name}")
         name = plain_text(self.individuals, self.node, "has_name")
         controllers = tuple(self.signals.controllers)
+        notes = tuple(
+            Notes(self.individuals, self.node, self.quantities, self.places).properties(
+                self.signals
+            )
+        )
         return osc.OpenScenario(
-            osc.FileHeader(
-                1, 2, date, name, "BridgeGen", properties=osc.Properties(self._settings())
-            ),
+            osc.FileHeader(1, 2, date, name, "BridgeGen", properties=osc.Properties(notes)),
             osc.RoadNetwork(
                 osc.File(road_file),
                 traffic_signals=osc.TrafficSignals(controllers) if controllers else None,
@@ -88,10 +93,6 @@ class _Converter:
             osc.Storyboard(osc.Init(init), _stories(groups), self._stop(self.participants[EGO])),
             parameter_declarations=osc.ParameterDeclarations((*declarations, *texts)),
         )
-
-    def _settings(self) -> tuple[osc.Property, ...]:
-        step = self.individuals.optional_number(self.node, "has_time_step")
-        return () if step is None else (osc.Property(TIME_STEP, format_double(step)),)
 
     def _participants(self) -> dict[str, Subject]:
         """Return the participants by name, the ego first, then in alphabetical order."""
@@ -147,7 +148,7 @@ class _Converter:
         found: dict[str, list[osc.PrivateAction]] = {kind: [] for kind in kinds}
         for action in ind.links(node, "has_init_action"):
             kind = next((one for one in kinds if ind.is_a(action, one)), kinds[1])
-            found[kind].append(self.events.private(name, action))
+            found[kind].append(self.actions.private(name, action))
         counts = [len(found[kind]) for kind in kinds]
         if counts[0] != 1 or counts[1] > 1 or counts[2] > 1:
             raise OntologyError(
@@ -158,7 +159,7 @@ class _Converter:
         actions = [action for kind in kinds for action in found[kind]]
         route = ind.optional_link(node, "has_route")
         if route is not None:
-            actions.append(self.events.route(f"{name}_route", route))
+            actions.append(self.actions.route(f"{name}_route", route))
         return tuple(actions)
 
     def _stop(self, ego: Subject) -> osc.Trigger:

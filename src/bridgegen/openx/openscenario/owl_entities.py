@@ -1,11 +1,14 @@
 """OWL2OpenSCENARIO, its entities: bodies, and who drives them."""
 
+from collections.abc import Mapping
+
 from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.values import format_double
 
-_CATEGORIES = {
+CATEGORIES = {
     "Car": osc.VehicleCategory.CAR,
     "Van": osc.VehicleCategory.VAN,
     "Truck": osc.VehicleCategory.TRUCK,
@@ -14,20 +17,64 @@ _CATEGORIES = {
     "EmergencyVehicle": osc.VehicleCategory.VAN,
     "Bicycle": osc.VehicleCategory.BICYCLE,
 }
-_WALKERS = {
+WALKERS = {
     "Pedestrian": osc.PedestrianCategory.PEDESTRIAN,
     "Animal": osc.PedestrianCategory.ANIMAL,
 }
-_OBJECTS = {
+OBJECTS = {
     "Misc": osc.MiscObjectCategory.OBSTACLE,
     "RoadCone": osc.MiscObjectCategory.OBSTACLE,
     "ConstructionCard": osc.MiscObjectCategory.POLE,
 }
+MAX_SPEED = "max_speed"
+"""Property of somebody on foot: how fast they can go [m/s]; the standard has it for vehicles."""
+
+DRIVER = "driver"
+"""Property of a controller: the driver's name."""
+
 _ESMINI_CONTROLLER = "ExternalController"
 # An axle as on a mid-size saloon; the ontology has no more of it than the wheelbase.
 _MAX_STEERING = 0.6  # [rad]
 _WHEEL_DIAMETER = 0.65  # [m]
 _BODY_OVER_TRACK = 0.3  # [m], how much wider the body is than the track
+
+
+class Cast:
+    """The participants of a scenario's individuals.
+
+    Args:
+        individuals: one scenario.
+        by_name: its participants.
+    """
+
+    def __init__(self, individuals: Individuals, by_name: Mapping[str, Subject]) -> None:
+        self._individuals = individuals
+        self._names = {node: name for name, node in by_name.items()}
+
+    def name(self, node: Subject, link: str) -> str:
+        """Return the name of the participant that a property points to.
+
+        Raises:
+            OntologyError: it points to none, to several or to something else.
+        """
+        return self._name(node, link, self._individuals.link(node, link))
+
+    def names(self, node: Subject, link: str) -> tuple[str, ...]:
+        """Return the names of all participants that a property points to, in their order.
+
+        Raises:
+            OntologyError: it points to something else.
+        """
+        links = self._individuals.links(node, link)
+        return tuple(self._name(node, link, target) for target in links)
+
+    def _name(self, node: Subject, link: str, target: Subject) -> str:
+        if target in self._names:
+            return self._names[target]
+        raise OntologyError(
+            f"{link} of {self._individuals.describe(node)} must be a participant of the scenario, "
+            f"got {self._individuals.describe(target)}"
+        )
 
 
 def scenario_object(individuals: Individuals, name: str, node: Subject) -> osc.ScenarioObject:
@@ -43,21 +90,23 @@ def scenario_object(individuals: Individuals, name: str, node: Subject) -> osc.S
 
 
 def _body(individuals: Individuals, node: Subject) -> osc.Vehicle | osc.Pedestrian | osc.MiscObject:
-    for name, category in _CATEGORIES.items():
+    for name, category in CATEGORIES.items():
         if individuals.is_a(node, name):
             role = osc.Role.AMBULANCE if name == "EmergencyVehicle" else None
             return _vehicle(individuals, node, category, role)
-    for name, walker in _WALKERS.items():
+    for name, walker in WALKERS.items():
         if individuals.is_a(node, name):
+            fastest = individuals.optional_number(node, "has_max_speed")
+            said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
             return osc.Pedestrian(
                 name=walker.value,
                 pedestrian_category=walker,
                 mass=individuals.number(node, "has_mass"),
                 bounding_box=_box(individuals, node),
-                properties=osc.Properties(),
+                properties=osc.Properties(said),
                 model3d=walker.value,
             )
-    for name, kind in _OBJECTS.items():
+    for name, kind in OBJECTS.items():
         if individuals.is_a(node, name):
             return osc.MiscObject(
                 name=name.lower(),
@@ -66,7 +115,7 @@ def _body(individuals: Individuals, node: Subject) -> osc.Vehicle | osc.Pedestri
                 bounding_box=_box(individuals, node),
                 properties=osc.Properties(),
             )
-    known = ", ".join((*_CATEGORIES, *_WALKERS, *_OBJECTS))
+    known = ", ".join((*CATEGORIES, *WALKERS, *OBJECTS))
     raise UnsupportedError(f"{individuals.describe(node)} must be one of {known} to be written")
 
 
@@ -99,6 +148,7 @@ def _vehicle(
         ),
         properties=osc.Properties(),
         role=role,
+        mass=individuals.optional_number(node, "has_mass"),
     )
 
 
@@ -120,7 +170,7 @@ def _controller(individuals: Individuals, node: Subject) -> osc.ObjectController
     """
     driver = plain_text(individuals, node, "has_driver")
     properties = osc.Properties(
-        (osc.Property("driver", driver), osc.Property("esminiController", _ESMINI_CONTROLLER))
+        (osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER))
     )
     name = plain_text(individuals, node, "has_name")
     return osc.ObjectController(osc.Controller(name, properties))

@@ -19,7 +19,10 @@ _ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
 
 @dataclass(frozen=True)
 class _Road:
-    """A road of a leg; ``near`` is its end that is nearer to the junction."""
+    """A road of a leg; ``near`` is its end that is nearer to the junction.
+
+    Distances count from there, or from the start of a road that meets no junction, or two.
+    """
 
     node: Subject
     road_id: str
@@ -38,19 +41,31 @@ class Places:
         self._individuals = individuals
         self._quantities = quantities
         self._of_lane: dict[Subject, tuple[tuple[_Road, ...], int]] = {}
+        self._road_ids: dict[Subject, str] = {}
         legs = [
             leg
             for junction in individuals.of_class("Intersection")
             for leg in individuals.links(junction, "has_leg")
         ]
-        if not legs:  # one road that meets no junction
-            legs = individuals.of_class("Road")
+        covered: set[Subject] = set()
         for leg in legs:
-            roads = self._chain(leg)
-            for index, road in enumerate(roads):
-                for name in ("has_lane", "has_strip"):
-                    for lane in individuals.links(road.node, name):
-                        self._of_lane[lane] = roads, index
+            covered |= self._add(self._chain(leg))
+        for road in individuals.of_class("Road"):  # of no junction, within one, or between two
+            if road not in covered:
+                covered |= self._add(self._chain(road))
+
+    def _add(self, roads: tuple[_Road, ...]) -> set[Subject]:
+        """Take up the lanes of a leg; return its roads."""
+        for index, road in enumerate(roads):
+            for name in ("has_lane", "has_strip"):
+                for lane in self._individuals.links(road.node, name):
+                    self._of_lane[lane] = roads, index
+                    self._road_ids[lane] = road.road_id
+        return {road.node for road in roads}
+
+    def road_id(self, lane: Subject) -> str | None:
+        """Return the id of the road that a lane or strip is of, or None."""
+        return self._road_ids.get(lane)
 
     def position(self, node: Subject, *, oriented: bool) -> osc.Position:
         """Return where an individual of class LanePosition or WorldPosition is.
@@ -70,9 +85,14 @@ class Places:
         individuals = self._individuals
         if individuals.is_a(node, "WorldPosition"):
             x, y = (self._quantities.get(node, f"has_world_{one}") for one in ("x", "y"))
-            yaw = individuals.optional_number(node, "has_world_yaw")
-            heading = None if yaw is None else math.radians(yaw)
-            return osc.Position(osc.WorldPosition(x, y, h=heading))
+            turned = [
+                None
+                if (angle := individuals.optional_number(node, name)) is None
+                else math.radians(angle)
+                for name in ("has_world_yaw", "has_world_pitch", "has_world_roll")
+            ]
+            z = individuals.optional_number(node, "has_world_z")
+            return osc.Position(osc.WorldPosition(x, y, z, *turned))
         lane = individuals.link(node, "on_lane")
         try:
             roads, index = self._of_lane[lane]
@@ -109,7 +129,7 @@ class Places:
             if any(road.node == node for road in roads):
                 raise OntologyError(f"{individuals.describe(node)} must not continue itself")
             near = individuals.text(node, "has_junction_end")
-            if near not in ("start", "end", "none"):
+            if near not in ("start", "end", "none", "both"):
                 raise OntologyError(
                     f"has_junction_end of {individuals.describe(node)} must be 'start' or 'end', "
                     f"or 'none' of a road that meets no junction, got '{near}'"

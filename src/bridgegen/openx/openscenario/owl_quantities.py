@@ -28,6 +28,7 @@ class Quantities:
 
     Attributes:
         values: every dynamic parameter's value by name, in alphabetical order.
+        limits: derived parameters that only limit others: nothing in the storyboard carries them.
 
     Raises:
         OntologyError: a parameter has no value, two values, one outside its range, or no
@@ -42,13 +43,15 @@ class Quantities:
             if quad.predicate == has_parameter and not isinstance(quad.subject, ox.Triple):
                 bearers.setdefault(quad.object, []).append(quad.subject)
         found: dict[str, tuple[float, Subject]] = {}
+        self.limits: set[Subject] = set()
         for parameter in individuals.links(scenario, "has_parameter_declaration"):
             if individuals.text(parameter, "has_axis") == Axis.STATIC:
                 continue
             if individuals.is_a(parameter, "DerivedParameter") and parameter in bearers.get(
                 parameter, []
             ):
-                continue  # it only limits others; nothing in the storyboard carries it
+                self.limits.add(parameter)
+                continue
             name = individuals.text(parameter, "has_name")
             if not _NAME.fullmatch(name) or name in RESERVED or iskeyword(name):
                 raise OntologyError(

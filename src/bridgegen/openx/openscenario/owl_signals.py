@@ -21,11 +21,13 @@ LAMPS = {
 }
 """The lamps of each state, top to bottom."""
 
-_LINKS = {
+LINKS = {
     "gives_green_to": "green",
     "gives_yellow_to": "yellow",
     "gives_red_yellow_to": "red_yellow",
 }
+"""The state of the lights that a phase names by each of its properties; all others are red."""
+
 _MOST_CHANGES = 200
 
 
@@ -46,6 +48,8 @@ class Signals:
     Attributes:
         controllers: with their phases.
         start: the actions that set all lights at the start.
+        offsets: by controller, the time of its first phase that has passed at the start [s]; those
+            without any are left out.
 
     Args:
         individuals: one scenario.
@@ -60,6 +64,7 @@ class Signals:
         self._individuals, self._duration = individuals, duration
         self.controllers: list[osc.TrafficSignalController] = []
         self.start: list[osc.GlobalAction] = []
+        self.offsets: dict[str, float] = {}
         self._changes: list[tuple[str, float, list[tuple[str, str]]]] = []
         seen: set[str] = set()
         for node in individuals.of_class("SignalController"):
@@ -85,6 +90,8 @@ class Signals:
         while offset >= durations[first]:
             offset -= durations[first]
             first = (first + 1) % len(phases)
+        if offset > 0.0:
+            self.offsets[name] = offset
         # The standard's cycle begins with its first phase: the one that runs at time 0.
         order = [*range(first, len(phases)), *range(first)]
         self.controllers.append(
@@ -116,7 +123,7 @@ class Signals:
 
     def _states(self, phase: Subject, lights: dict[Subject, str]) -> dict[str, str]:
         shown = dict.fromkeys(lights.values(), "red")
-        for link, state in _LINKS.items():
+        for link, state in LINKS.items():
             for light in self._individuals.links(phase, link):
                 if light in lights:
                     shown[lights[light]] = state

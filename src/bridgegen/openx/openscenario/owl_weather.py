@@ -11,6 +11,7 @@ The originals are kept too, as properties of the road condition, for readers tha
 
 import math
 
+from bridgegen.errors import OntologyError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
@@ -46,8 +47,14 @@ PROPERTIES = (
     ("has_fog", ("has_fog_density", "has_fog_distance", "has_fog_falloff")),
     ("hasSun", ("has_sun_altitude_angle", "has_sun_azimuth_angle")),
     ("has_road_state", ("has_wetness", "has_friction")),
+    ("has_snow", ("has_snowfall",)),
 )
 """The data properties of each part of the weather; a property's name loses its ``has_``."""
+
+_OPTIONAL = frozenset(
+    {"has_precipitation_deposits", "has_fog_distance", "has_fog_falloff", "has_wetness"}
+)
+"""What the standard's own elements do not say, so that a file of others may leave it open."""
 
 CLOUD_COVER = "fractional_cloud_cover"
 ROAD_WETNESS = "road_wetness"
@@ -67,13 +74,22 @@ def environment(
         name: of the event that brings it; empty for the scenario's own.
 
     Raises:
-        OntologyError: a part of the weather lacks a property.
+        OntologyError: a part of the weather lacks a property, or it rains and snows at once.
     """
     found: dict[str, Quantity] = {}
     for link, names in PROPERTIES:
         part = individuals.optional_link(weather, link)
         if part is not None:
-            found |= {one.removeprefix("has_"): quantities.get(part, one) for one in names}
+            said = [
+                one
+                for one in names
+                if one not in _OPTIONAL or individuals.optional_number(part, one) is not None
+            ]
+            found |= {one.removeprefix("has_"): quantities.get(part, one) for one in said}
+    if "precipitation" in found and "snowfall" in found:
+        raise OntologyError(
+            f"{individuals.describe(weather)} must have has_rain or has_snow, not both"
+        )
     texts: list[osc.ParameterDeclaration] = []
 
     def declare(text: str, value: str) -> osc.ParameterRef:
@@ -123,6 +139,8 @@ def _weather(
         fog = osc.Fog(apply(VISIBILITY, found["fog_density"]))
     if "precipitation" in found:
         rain = osc.Precipitation(osc.PrecipitationType.RAIN, apply(RAIN, found["precipitation"]))
+    if "snowfall" in found:
+        rain = osc.Precipitation(osc.PrecipitationType.SNOW, found["snowfall"])
     if "wind_intensity" in found:
         wind = osc.Wind(direction=0.0, speed=apply(WIND, found["wind_intensity"]))
     return osc.Weather(cover, sun=sun, fog=fog, precipitation=rain, wind=wind)

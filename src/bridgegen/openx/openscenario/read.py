@@ -15,6 +15,7 @@ from lxml import etree
 from bridgegen.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Attribute, Declaration, Element, declaration
+from bridgegen.openx.openscenario.pruning import prune
 from bridgegen.openx.openscenario.storyboard import OpenScenario
 from bridgegen.openx.openscenario.values import ParameterRef, parse_value
 from bridgegen.openx.xml import parse_xml
@@ -22,10 +23,13 @@ from bridgegen.openx.xml import parse_xml
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")
 MAX_PROBLEMS = 50
 _ENOUGH = 1000  # problems; a file with more is not worth reading on
+_LOCAL = "ParameterDeclarations"  # of a story, a vehicle …; an empty list of them says nothing
 _HINT = "{http://www.w3.org/2001/XMLSchema-instance}"  # where to find an XSD: no content
 
 
-def read(source: Path | str | bytes, place: str | None = None) -> OpenScenario:
+def read(
+    source: Path | str | bytes, place: str | None = None, *, skipped: list[str] | None = None
+) -> OpenScenario:
     """Read a scenario file of version 1.0 to 1.3.
 
     Children may stand in any order. Parameters are checked too: each is declared once, with a
@@ -34,6 +38,9 @@ def read(source: Path | str | bytes, place: str | None = None) -> OpenScenario:
     Args:
         source: a path, or the document itself as bytes.
         place: what to call it in messages; the path by default.
+        skipped: takes a sentence for each thing that is not supported, which is left out then
+            instead of refused: an attribute, or the whole event, action, entity or condition group
+            that an element is part of.
 
     Raises:
         FileFormatError: missing, unreadable, not well-formed, hostile, malformed; all that is
@@ -48,10 +55,16 @@ def read(source: Path | str | bytes, place: str | None = None) -> OpenScenario:
         raise FileFormatError(
             f"{place}: the root element must be OpenSCENARIO, got {_tag(root)} (line 1)"
         )
-    reader = _Reader()
-    scenario: Element | None = None
-    with suppress(_EnoughError):
-        scenario = reader.element(OpenScenario, root)
+    while True:
+        reader = _Reader()
+        scenario: Element | None = None
+        with suppress(_EnoughError):
+            scenario = reader.element(OpenScenario, root)
+        if skipped is None or reader.malformed or not reader.unsupported:
+            break
+        skipped += [f"{place}: {text} (line {line})" for line, text in reader.unsupported]
+        for node, name in reader.culprits:
+            prune(node, name)
     reader.raise_problems(place)
     scenario = cast(OpenScenario, scenario)
     _check_version(scenario, place)
@@ -88,6 +101,7 @@ class _Reader:
 
     malformed: list[tuple[int, str]] = field(default_factory=list)
     unsupported: list[tuple[int, str]] = field(default_factory=list)
+    culprits: list[tuple[etree._Element, str | None]] = field(default_factory=list)
 
     def raise_problems(self, place: str) -> None:
         """Raise one error with all problems in the order of the file, if there are any."""
@@ -100,8 +114,9 @@ class _Reader:
     def wrong(self, node: etree._Element, text: str) -> None:
         self._note(self.malformed, node, text)
 
-    def unknown(self, node: etree._Element, text: str) -> None:
+    def unknown(self, node: etree._Element, text: str, attribute: str | None = None) -> None:
         self._note(self.unsupported, node, text)
+        self.culprits.append((node, attribute))
 
     def _note(self, problems: list[tuple[int, str]], node: etree._Element, text: str) -> None:
         if len(self.malformed) + len(self.unsupported) == _ENOUGH:
@@ -132,7 +147,9 @@ class _Reader:
             if attribute is None:
                 if not name.startswith(_HINT):
                     hint = _nearest(name, declared.attributes)
-                    self.unknown(node, f"attribute {name} of {_tag(node)} is not supported{hint}")
+                    self.unknown(
+                        node, f"attribute {name} of {_tag(node)} is not supported{hint}", name
+                    )
             else:
                 try:
                     value = values[attribute.field] = _value(attribute, text)
@@ -141,7 +158,7 @@ class _Reader:
                 else:
                     if attribute.is_literal and isinstance(value, ParameterRef):
                         what = f"a reference as {name} of {_tag(node)}"
-                        self.unknown(node, f"{what} is not supported, got {value}")
+                        self.unknown(node, f"{what} is not supported, got {value}", name)
         for attribute in declared.attributes.values():
             if attribute.required and attribute.name not in node.attrib:
                 self.wrong(node, f"{_tag(node)} must have the attribute {attribute.name}")
@@ -153,6 +170,8 @@ class _Reader:
         for sub in node:
             tag = _tag(sub)
             child = declared.by_tag.get(tag)
+            if child is None and tag == _LOCAL and not len(sub):
+                continue
             if child is None:
                 self.unknown(sub, f"{tag} in {_tag(node)} is not supported")
                 complete = False

@@ -7,8 +7,8 @@ import numpy as np
 from bridgegen.ego import DRIVERS, TRAJECTORY, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.from_owl import TIME_STEP
-from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.openx.openscenario.owl_notes import TIME_STEP
+from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -96,7 +96,7 @@ class _Compiler:
             self.tables.slot(path.start.s) if isinstance(path, AlongLanes) else -1
             for path in self.paths
         ]
-        aside_slots = [self._aside_slot(path) for path in self.paths]
+        aside_slots = [-1, *(self._aside_slot(path) for path in self.paths[1:])]
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
         acts, events = self._stories(storyboard)
@@ -141,8 +141,8 @@ class _Compiler:
         return isinstance(path, AlongTrajectory) and bool(path.times)
 
     def _aside_slot(self, path: PathSpec) -> int:
-        """Return the slot of how far who is on a path is beside it; -1 if that is a number."""
-        if not isinstance(path, AlongLanes) or not isinstance(path.aside, osc.ParameterRef | Expr):
+        """Return the slot of how far who is on a path is beside it; -1 if on it."""
+        if not isinstance(path, AlongLanes) or path.aside == 0.0:
             return -1
         return self.tables.slot(path.aside)
 
@@ -205,6 +205,9 @@ class _Compiler:
         actions = self.scenario.storyboard.init.actions
         friction = -1
         for one in actions.global_actions:
+            if isinstance(one.action, osc.EntityAction):
+                self.tables.unsupported(one.action, type(one.action.action).__name__)
+                continue
             if not isinstance(one.action, osc.EnvironmentAction):
                 light, state = self._light(one.action)
                 if light >= 0:
@@ -233,7 +236,10 @@ class _Compiler:
                         self.tables.unsupported(dynamics, "an initial SpeedAction other than step")
                     init[name] = self._speed(action.action.speed_action_target)
                 elif isinstance(action, osc.LateralAction):
-                    self.tables.unsupported(action.action, "an initial LaneChangeAction")
+                    what = type(action.action).__name__
+                    self.tables.unsupported(action.action, f"an initial {what}")
+                elif isinstance(action, osc.SynchronizeAction):
+                    self.tables.unsupported(action, "an initial SynchronizeAction")
                 elif isinstance(action.action, osc.FollowTrajectoryAction):
                     tracks[name] = compile_trajectory(self.tables, action.action)
                 else:
@@ -307,6 +313,9 @@ class _Compiler:
 
     def _global(self, wrapped: osc.GlobalAction) -> None:
         action = wrapped.action
+        if isinstance(action, osc.EntityAction):
+            self.tables.unsupported(action, type(action.action).__name__)
+            return
         if not isinstance(action, osc.EnvironmentAction):
             light, state = self._light(action)
             slot = self.tables.slot(float(state))
@@ -344,7 +353,10 @@ class _Compiler:
             target = self._speed(action.action.speed_action_target)
             self.actions.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))
         elif isinstance(action, osc.LateralAction):
-            self._lane_change(action.action, entity)
+            if isinstance(action.action, osc.LaneChangeAction):
+                self._lane_change(action.action, entity)
+            else:
+                self.tables.unsupported(action.action, type(action.action).__name__)
         else:
             self.tables.unsupported(action, f"{type(action).__name__} in an Event")
 

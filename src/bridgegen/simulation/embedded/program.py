@@ -107,8 +107,8 @@ class Program:
         init: ``(E,)`` slot of each entity's initial speed.
         paths: K ≥ E ways: entity e starts on path e; the others are where lane changes lead.
         start_slots: ``(E,)`` slot of each start's s; -1 where the path starts with the entity.
-        aside_slots: ``(E,)`` slot of how far each is aside of its lane's centre; -1 where rows
-            do not vary that.
+        aside_slots: ``(E,)`` slot of how far each is aside of its lane's centre; -1 of the ego,
+            whose path runs there, and of who is on the centre.
         triggers: ``(·, 2)`` first and past-the-last group; trigger 0 stops the scenario.
         groups: ``(·, 2)`` first and past-the-last condition.
         conditions: ``(C, 7)`` kind, entity, other entity, rule, slot, edge, delay in steps.

@@ -56,9 +56,10 @@ class Ways:
                     route = self._along(spec)
                     start = _known(program, spec.start)
                     self.sides.append(model.road(spec.start.road).direction(spec.start.lane))
-                    # one that rows vary is added as they are run
-                    fixed = spec.aside if isinstance(spec.aside, float) else 0.0
-                    self._add(route, route.station(*start), fixed * self.sides[-1])
+                    # the ego's driver keeps to a path beside the lane's; the others' offsets are
+                    # added as they are run, whether rows vary them or not
+                    own = spec.aside if number == 0 and isinstance(spec.aside, float) else 0.0
+                    self._add(route, route.station(*start), own * self.sides[-1])
                 else:
                     self.sides.append(0)
                     self._add(self._beside(spec), (0.0, 0.0), 0.0)

@@ -1,0 +1,166 @@
+"""What one file says that another does not: how a conversion there and back is checked.
+
+Names that nothing refers to are labels and not compared, and neither is what the second says
+besides; a value that the standard takes where none is written is that value.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Attribute, Element, children_of, declaration
+from bridgegen.openx.openscenario.values import Expr, Kind, Literal, ParameterRef
+
+_REL, _ABS = 1e-9, 1e-9
+
+_LABELS: frozenset[tuple[type[Element], str]] = frozenset(
+    {
+        (osc.Action, "name"),
+        (osc.Condition, "name"),
+        (osc.Environment, "name"),
+        (osc.ManeuverGroup, "name"),
+        (osc.Route, "name"),
+        (osc.TriggeringEntities, "triggering_entities_rule"),  # of one entity
+    }
+)
+_MEASURED = (
+    osc.RelativeDistanceCondition,
+    osc.TimeHeadwayCondition,
+    osc.TimeToCollisionCondition,
+)
+_DEFAULTS: dict[tuple[type[Element], str], Any] = {
+    (osc.Event, "maximum_execution_count"): 1,
+    (osc.LaneChangeAction, "target_lane_offset"): 0.0,
+    (osc.LanePosition, "offset"): 0.0,
+    (osc.TransitionDynamics, "following_mode"): osc.FollowingMode.POSITION,
+    (osc.Vehicle, "role"): osc.Role.NONE,
+    **{(cls, "coordinate_system"): osc.CoordinateSystem.ENTITY for cls in _MEASURED},
+    **{
+        (cls, "relative_distance_type"): osc.RelativeDistanceType.EUCLIDIAN_DISTANCE
+        for cls in _MEASURED
+    },
+    **{(osc.Orientation, angle): 0.0 for angle in "hpr"},
+    **{(osc.WorldPosition, field): 0.0 for field in "zhpr"},
+}
+_OLD_NAMES: dict[Any, Any] = {
+    osc.Priority.OVERWRITE: osc.Priority.OVERRIDE,
+    osc.RelativeDistanceType.CARTESIAN_DISTANCE: osc.RelativeDistanceType.EUCLIDIAN_DISTANCE,
+}
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Compares elements of two files.
+
+    Attributes:
+        here: the first file's parameters' values.
+        there: the second's.
+    """
+
+    here: Mapping[str, Literal]
+    there: Mapping[str, Literal]
+
+    def between(self, one: Element, other: Element | None) -> Iterator[tuple[int, str]]:
+        """Yield lines of the first, and what stands there and not in the second."""
+        tag = type(one).__name__
+        if other is None or type(other) is not type(one):
+            if not _is_nothing(one):
+                yield one.line, _called(one)
+            return
+        step = isinstance(one, osc.TransitionDynamics) and (
+            one.dynamics_shape == osc.DynamicsShape.STEP == getattr(other, "dynamics_shape", None)
+        )
+        for attribute in declaration(type(one)).attributes.values():
+            said = getattr(one, attribute.field)
+            again = getattr(other, attribute.field)
+            usual = _DEFAULTS.get((type(one), attribute.field))
+            if (
+                said is None
+                or (type(one), attribute.field) in _LABELS
+                or (step and attribute.field in ("dynamics_dimension", "value"))
+                or self._same(attribute, said, usual if again is None else again)
+            ):
+                continue
+            shown = str(said).lower() if isinstance(said, bool) else said
+            becomes = "" if again is None else f" (it would become {_text(again, self.there)})"
+            yield one.line, f'{attribute.name}="{shown}" of {tag}{becomes}'
+        text = declaration(type(one)).text
+        if text is not None and getattr(one, text) != getattr(other, text):
+            yield one.line, f"the text of {tag}"
+        yield from self._below(one, other)
+
+    def _below(self, one: Element, other: Element) -> Iterator[tuple[int, str]]:
+        before: dict[tuple[str, Any], list[Element]] = {}
+        for tag, child in children_of(other):
+            before.setdefault((tag, self._key(child, self.there)), []).append(child)
+        for tag, child in children_of(one):
+            left = before.get((tag, self._key(child, self.here)))
+            yield from self.between(child, left.pop(0) if left else None)
+        for left in before.values():
+            for child in left:
+                if isinstance(child, osc.ConditionGroup | osc.Condition):
+                    yield one.line, f"{type(one).__name__} without a further {_about(child)}"
+
+    def _key(self, child: Element, values: Mapping[str, Literal]) -> Any:
+        """Return what an element is found by among its like: a property's name, a limit's rule."""
+        if isinstance(child, osc.Property):
+            return values[child.name.name] if isinstance(child.name, ParameterRef) else child.name
+        return child.rule if isinstance(child, osc.ValueConstraint) else None
+
+    def _same(self, attribute: Attribute, one: Any, other: Any) -> bool:
+        if one == other:
+            return True
+        if other is None:
+            return False
+        if attribute.kind is Kind.STRING or attribute.kind is Kind.DATE_TIME:
+            a, b = (_text(value, of) for value, of in ((one, self.here), (other, self.there)))
+            return bool(_OLD_NAMES.get(a, a) == _OLD_NAMES.get(b, b)) or (
+                attribute.is_literal and _as_number(a) == _as_number(b) is not None
+            )
+        names = [
+            value.names if isinstance(value, ParameterRef | Expr) else frozenset[str]()
+            for value in (one, other)
+        ]
+        return names[0] == names[1] and math.isclose(
+            _number(one, self.here), _number(other, self.there), rel_tol=_REL, abs_tol=_ABS
+        )
+
+
+def _called(one: Element) -> str:
+    """Return an element's tag, with its name if it has one."""
+    name = getattr(one, "name", None)
+    return type(one).__name__ if name is None else f"{type(one).__name__} {name}"
+
+
+def _about(child: Element) -> str:
+    if isinstance(child, osc.ConditionGroup):
+        return f"ConditionGroup ({', '.join(str(one.name) for one in child.conditions)})"
+    return type(child).__name__
+
+
+def _is_nothing(one: Element) -> bool:
+    """Say whether an element says nothing by being there."""
+    if isinstance(one, osc.Precipitation):
+        return one.precipitation_type == osc.PrecipitationType.DRY
+    silent = osc.Properties | osc.TrafficSignals | osc.ParameterDeclarations
+    return isinstance(one, silent) and not list(children_of(one))
+
+
+def _text(value: Any, values: Mapping[str, Literal]) -> Any:
+    return str(values[value.name]) if isinstance(value, ParameterRef) else value
+
+
+def _number(value: Any, values: Mapping[str, Literal]) -> float:
+    if not isinstance(value, ParameterRef | Expr):
+        return float(value)
+    numbers = {name: float(values[name]) for name in value.names}
+    return float(value.resolve(numbers))
+
+
+def _as_number(text: Any) -> float | None:
+    try:
+        return float(text)
+    except (TypeError, ValueError):
+        return None
