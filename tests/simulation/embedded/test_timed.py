@@ -145,6 +145,20 @@ def test_refusals(privates, events, text):
         play(scenario(("ego", "bv"), EGO + privates, events))
 
 
+@pytest.mark.parametrize(
+    ("vertices", "text"),
+    [
+        ([vertex(0, 0.0, 0.0), vertex("INF", 1.0, 0.0)], "a Vertex at inf s"),
+        ([vertex(0, 0.0, 0.0), '<Vertex time="1"><Position><WorldPosition x="INF" y="0"/>'
+          "</Position></Vertex>"], "must be finite"),
+        ([vertex(0, 0.0, 0.0), vertex(1, 1e6, 0.0)], "at most 100000 m long, got 1e[+]06 m"),
+    ],
+)  # fmt: skip
+def test_hostile_numbers(vertices, text):
+    with pytest.raises(InputError, match=text):
+        play(scenario(("ego", "bv"), EGO + timed("bv", *vertices)))
+
+
 def test_a_lane_change_is_refused_too():
     change = lateral(1, "linear time 2")
     text = f"""<ManeuverGroup name="g" maximumExecutionCount="1">

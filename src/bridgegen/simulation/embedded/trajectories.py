@@ -15,6 +15,8 @@ from bridgegen.simulation.embedded.tables import Tables
 STEP = 0.2
 """Between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
 
+LONGEST = 100_000.0  # m, a trajectory
+
 SAME_TIME = 1e-9  # s, an instant this close to a vertex's is the vertex's
 
 Corner = tuple[float, float, float | None]
@@ -57,7 +59,9 @@ def _times(tables: Tables, timing: osc.Timing, vertices: Sequence[osc.Vertex]) -
             tables.unsupported(vertex, "a Vertex without a time in a trajectory with times")
             continue
         times.append(scale * tables.literal(vertex, "time", vertex.time) + offset)
-        if len(times) > 1 and not times[-1] > times[-2]:
+        if not math.isfinite(times[-1]):
+            tables.unsupported(vertex, f"a Vertex at {times[-1]:g} s")
+        elif len(times) > 1 and not times[-1] > times[-2]:
             tables.unsupported(
                 vertex, f"a Vertex at {times[-1]:g} s after one at {times[-2]:g} s (not later)"
             )
@@ -75,10 +79,14 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
         ``(L, 6)``: x, y [m], heading [rad], its cosine and sine, curvature 0; and the step.
 
     Raises:
-        InputError: the corners are one point, and may not be.
+        InputError: the corners are one point and may not be, are not finite, or lie too far apart.
     """
+    if not all(math.isfinite(value) for corner in corners for value in corner if value is not None):
+        raise InputError("the vertices of a trajectory must be finite")
     lengths = [math.dist(a[:2], b[:2]) for a, b in pairwise(corners)]
     total = sum(lengths)
+    if total > LONGEST:
+        raise InputError(f"a trajectory must be at most {LONGEST:g} m long, got {total:g} m")
     if total <= 0.0:
         if not may_stand:
             raise InputError("a trajectory must have a length, got one point")
