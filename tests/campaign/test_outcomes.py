@@ -1,10 +1,12 @@
 """What a rollout brings about goes into the ontology that is handed over, and nowhere else."""
 
 import numpy as np
+import pyoxigraph as ox
 import pytest
 
 import bridgegen as bg
 from bridgegen.campaign.outcomes import with_outcomes
+from bridgegen.errors import InputError
 from bridgegen.odd.reader import load
 from bridgegen.odd.roads import usual
 from bridgegen.ontology.check import check
@@ -12,6 +14,8 @@ from bridgegen.ontology.files import from_bytes, to_bytes
 from bridgegen.ontology.files import load as load_owl
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.questions import ask
+from bridgegen.ontology.reasoner import reason, require
+from bridgegen.ontology.vocabulary import local_name, tbox
 from bridgegen.openx.convert import convert_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import load_map
@@ -104,18 +108,49 @@ def test_a_failed_rollout_brings_about_nothing(jam):
     assert with_outcomes(individuals, rollout, jam.roads(individuals)) is individuals
 
 
-def test_hitting_a_cone_is_an_accident_of_one():
+def test_outcomes_use_terms_as_declared(crashed):
+    ontology = tbox()
+    quads = [q for q in crashed.quads if "#outcome_" in q.subject.value]
+    assert quads
+    for subject, predicate, value, _ in quads:
+        name = local_name(predicate)
+        if name != "type":
+            assert crashed.is_a(subject, ontology.domains[name]), name
+            target = local_name(ontology.ranges[name])
+            assert (
+                value.datatype == ontology.ranges[name]
+                if isinstance(value, ox.Literal)
+                else crashed.is_a(value, target)
+            )
+
+
+@pytest.mark.reasoner
+def test_outcomes_contradict_nothing(crashed):
+    try:
+        require()
+    except InputError:
+        pytest.skip("the extra 'reasoner' is not installed")
+    assert reason(crashed).consistent
+
+
+@pytest.fixture(scope="module")
+def crashed():
+    """The ego in the middle of a cone, and of the truck."""
     scenario = load("road-works")
     pipeline = Pipeline(scenario, scenario.space())
     x = pipeline.space.row({})
     individuals = pipeline.individuals(pipeline.space.values(x))
     rollout = pipeline.rollout(x[np.newaxis])
-    ego, cone = 0, rollout.names.index("works_cone_5")
+    ego, cone, truck = (rollout.names.index(one) for one in ("ego", "works_cone_5", "truck"))
     for states in (rollout.x, rollout.y, rollout.h):
-        states[0, ego] = states[0, cone]
-    found = with_outcomes(individuals, rollout, pipeline.roads(individuals))
-    assert "ego" in {one["participants"] for one in records(found)}
-    assert check(found, scenario) == []
+        states[0, ego] = states[0, truck] = states[0, cone]
+    return with_outcomes(individuals, rollout, pipeline.roads(individuals))
+
+
+def test_hitting_a_cone_is_an_accident_of_one(crashed):
+    told = {one["participants"] for one in records(crashed)}
+    assert {"ego", "truck", "ego, truck"} <= told
+    assert check(crashed, load("road-works")) == []
 
 
 def test_the_speed_limit_of_a_map_bounds_speeds(tmp_path):

@@ -21,7 +21,7 @@ from bridgegen.ontology.individuals import build, build_static
 from bridgegen.ontology.placement import placement_rules
 from bridgegen.ontology.rule import with_unit
 from bridgegen.ontology.shapes import turtle
-from bridgegen.ontology.vocabulary import SUBCLASS, TYPE, bg, tbox
+from bridgegen.ontology.vocabulary import SUBCLASS, TYPE, bg, local_name, tbox
 
 from ..openx.opendrive.kinds import KINDS
 
@@ -358,6 +358,17 @@ def test_individuals_of_random_rows_keep_all_rules(name):
     for row in space.decode(np.random.default_rng(21).random((2, space.n_var))):
         individuals = build(scenario, space.values(row), driver="reference")
         assert check(individuals, scenario) == []
+
+
+@pytest.mark.parametrize("name", names())
+def test_properties_belong_to_what_has_them(name):
+    """Else a reasoner takes the individual for something that it is not."""
+    _, individuals = concrete(name)
+    domains = tbox().domains
+    for subject, predicate, _, _ in individuals.quads:
+        term = local_name(predicate)
+        if term in domains:
+            assert individuals.is_a(subject, domains[term]), f"{term} of {subject}"
 
 
 # -- a second weather ------------------------------------------------------------------------------
