@@ -8,7 +8,8 @@ import pytest
 
 from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.simulation.outcomes import Accident, Queue, accidents, find_queues, queues
+from bridgegen.simulation.accidents import Accident, accidents
+from bridgegen.simulation.queues import Queue, find_queues, queues
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.1

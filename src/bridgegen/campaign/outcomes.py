@@ -5,7 +5,8 @@ import pyoxigraph as ox
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import NAMED_INDIVIDUAL, TYPE, Subject, bg
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.simulation.outcomes import accidents, queues
+from bridgegen.simulation.accidents import accidents
+from bridgegen.simulation.queues import queues
 from bridgegen.simulation.rollout import Rollout
 
 
