@@ -18,7 +18,7 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.write import to_xml
 
-from .kinds import KINDS
+from .kinds import FURNISHED, KINDS
 from .kinds import model as kind
 
 pytestmark = pytest.mark.checkers
@@ -58,6 +58,7 @@ def files(
         size = pick.uniform(max(16.0, 2 * lanes * width + 6.0), 44.0)
         models.append(crossroads(width, lanes, pick.uniform(45.0, 100.0), size))
     models += [kind(name) for name in KINDS]
+    models.insert(0, opendrive_from_owl(build_static(FURNISHED)))
     models.append(skewed())
     folder = tmp_path_factory.mktemp("xodr")
     paths = [folder / f"{number:02}.xodr" for number in range(len(models))]

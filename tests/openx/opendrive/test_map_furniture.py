@@ -6,6 +6,7 @@ from bridgegen.ontology.check import check
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.opendrive.map_losses import losses
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.owl_furniture import ranges
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 
@@ -182,3 +183,15 @@ def test_what_is_lost_is_said(model: OpenDrive) -> None:
 
 def test_nothing_is_lost_of_town05(town05: OpenDrive) -> None:
     assert list(losses(town05)) == []
+
+
+@pytest.mark.parametrize(
+    ("ids", "said"),
+    [
+        ([], []), ([3], [(3, 3)]), ([2, 1, 3], [(1, 3)]), ([1, 3], [(1, 1), (3, 3)]),
+        ([-1, 1], [(-1, 1)]), ([-2, -1, 2], [(-2, -1), (2, 2)]), ([-3, -1], [(-3, -3), (-1, -1)]),
+    ],
+)  # fmt: skip
+def test_lanes_as_ranges(ids: list[int], said: list[tuple[int, int]]) -> None:
+    """No range holds a lane that is not meant; there is no lane 0."""
+    assert [(one.from_lane, one.to_lane) for one in ranges(ids)] == said

@@ -138,7 +138,7 @@ def ranges(ids: Sequence[int]) -> tuple[Validity, ...]:
     """Return lane ids as ranges without gaps, in ascending order; 0 is no lane and no gap."""
     found: list[Validity] = []
     for one in sorted(set(ids)):
-        if found and one - found[-1].to_lane in (1, 2 if one == 1 else 1):
+        if found and one - found[-1].to_lane == (2 if found[-1].to_lane == -1 else 1):
             found[-1] = Validity(found[-1].from_lane, one)
         else:
             found.append(Validity(one, one))
