@@ -1,5 +1,7 @@
 """There and back: what a scenario's individuals say, its file says; so they can be read off it."""
 
+from pathlib import Path
+
 import numpy as np
 import pyoxigraph as ox
 import pytest
@@ -15,6 +17,7 @@ from bridgegen.openx.convert import convert_file, import_file, scenario_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
+from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.write import to_xml as roads_to_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
@@ -26,10 +29,10 @@ from . import stories
 
 def rows(name: str):
     """The defaults, and two rows from anywhere in the unit cube."""
-    space = load(name).space()
+    scenario = load(name)
+    space = scenario.space()
     rng = np.random.default_rng(sum(name.encode()))
-    cube = np.vstack([np.full(space.n_var, 0.5), rng.random((2, space.n_var))])
-    for row in space.decode(cube):
+    for row in [space.row({}), *space.decode(rng.random((2, space.n_var)))]:
         yield dict(zip(space.names, row.tolist(), strict=True))
 
 
@@ -101,6 +104,26 @@ def test_the_names_of_individuals_do_not_matter(individuals):
                           for q in source.quads)  # fmt: skip
     data = written(renamed)
     assert stories.said(imported(data, roads_of(source))) == stories.said(source)
+
+
+@pytest.fixture(scope="module")
+def town05():
+    """CARLA's Town05: it is not part of the repository."""
+    path = Path(__file__).parents[3].parent / "shared/data/Town05.xodr"
+    if not path.exists():
+        pytest.skip(f"{path} does not exist")
+    return read_roads(path)
+
+
+@pytest.mark.parametrize("name", ["crossroads-s1", "crossroads-s2", "crossroads-s3"])
+def test_on_a_town_distances_count_from_the_intersection_of_the_scenario(town05, name):
+    """Along legs of two roads, and on roads that other intersections end, too."""
+    site = find_site(town05, map_name="Town05.xodr")
+    for values in rows(name):
+        source = build(load(name), values, driver="route-follower", site=site)
+        again = imported(written(source), town05)
+        assert stories.said(again) == stories.said(source)
+        assert written(again) == written(source)
 
 
 # -- one of everything -----------------------------------------------------------------------------

@@ -179,6 +179,15 @@ def test_a_file_of_others_comes_in_whole(plain):
     assert check(found) == []
 
 
+def test_an_expression_that_is_only_a_name_is_a_parameter(plain):
+    plain.write_text(plain.read_text().replace('s="12.25"', 's="${ ($Speed) }"'))
+    owl, left_out = import_file(plain, ego="Hero")
+    assert left_out == []
+    found = load_owl(owl)
+    places = {found.parameter(one, "has_distance") for one in found.of_class("LanePosition")}
+    assert places == {None, "Speed"}
+
+
 def test_it_is_the_same_scenario_when_it_is_written_again(plain, folder):
     owl, _ = import_file(plain, ego="Hero")
     (_, again), _ = convert_file(owl, folder / "again")

@@ -47,10 +47,13 @@ class Places:
             for junction in individuals.of_class("Intersection")
             for leg in individuals.links(junction, "has_leg")
         ]
+        everywhere = individuals.of_class("Road")
+        onward = {individuals.optional_link(road, "has_continuation") for road in everywhere}
         covered: set[Subject] = set()
-        for leg in legs:
-            covered |= self._add(self._chain(leg))
-        for road in individuals.of_class("Road"):  # of no junction, within one, or between two
+        for leg in legs:  # on a whole map, a leg of one junction may continue another's
+            if leg not in onward:
+                covered |= self._add(self._chain(leg))
+        for road in everywhere:  # of no junction, within one, or between two
             if road not in covered:
                 covered |= self._add(self._chain(road))
 

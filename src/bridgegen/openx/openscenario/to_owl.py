@@ -24,6 +24,7 @@ import pyoxigraph as ox
 
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
+from bridgegen.openx.opendrive.map_names import road_name
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import model as osc
@@ -39,6 +40,7 @@ from bridgegen.openx.openscenario.to_owl_events import (
     add_events,
     happenings,
 )
+from bridgegen.openx.openscenario.to_owl_legs import stretches, told
 from bridgegen.openx.openscenario.to_owl_losses import losses
 from bridgegen.openx.openscenario.to_owl_parameters import Notes, add_parameters
 from bridgegen.openx.openscenario.to_owl_signals import add_controllers
@@ -106,18 +108,35 @@ class _Importer:
         said = header.description
         self.name = str(constants[said.name] if isinstance(said, osc.ParameterRef) else said)
         self.builder = StoryBuilder(self.name or PurePath(map_file).stem, scenario, roads)
+        self.builder.legs = stretches(roads, self._ends_of_way())
         signals = scenario.road_network.traffic_signals
-        self.static = individuals_from_opendrive(
+        whole = individuals_from_opendrive(
             roads,
             map_file,
             name=self.name or PurePath(map_file).stem,
             controllers=signals is None or not signals.controllers,
         )
+        nodes = {one: self.builder.iri(road_name(one)) for one in self.builder.legs}
+        self.static = tuple(told(self.builder.legs, nodes, whole.quads))
         self.derived: dict[str, osc.Event] = {}
         self.stated: set[str] = set()
         self.happenings: list[Happening] = []
         self.controllers: list[str] = []
         self.refused: list[str] = []
+
+    def _ends_of_way(self) -> set[str]:
+        """Return the ids of the roads on which the ego starts and on which its route ends."""
+        builder, positions = self.builder, []
+        for private in self.scenario.storyboard.init.actions.privates:
+            for wrapped in private.private_actions if private.entity_ref == EGO else ():
+                action = wrapped.action
+                if isinstance(action, osc.TeleportAction):
+                    positions.append(action.position.position)
+                elif isinstance(action, osc.RoutingAction) and isinstance(
+                    action.action, osc.AssignRouteAction
+                ):
+                    positions.append(action.action.route.waypoints[-1].position.position)
+        return {builder.text(one.road_id) for one in positions if isinstance(one, osc.LanePosition)}
 
     def build(self) -> Individuals:
         """Return the individuals."""
@@ -145,7 +164,7 @@ class _Importer:
         add_changes(builder, node, notes.of[EVENT], elements)
         self._add_weather(node)
         add_parameters(builder, node, notes)
-        return Individuals([*self.static.quads, *builder.quads])
+        return Individuals([*self.static, *builder.quads])
 
     def _put_times(self, node: ox.NamedNode, notes: Notes) -> float:
         """State how long the scenario lasts, and its step; return the duration [s]."""
@@ -195,7 +214,7 @@ class _Importer:
 
     def _lights(self, duration: float) -> Signals:
         """Return what the controllers that are stated make of the lights."""
-        quads = [*self.static.quads, *self.builder.quads]
+        quads = [*self.static, *self.builder.quads]
         return Signals(Individuals(quads), duration)
 
     def _add_weather(self, node: ox.NamedNode) -> None:

@@ -1,6 +1,7 @@
 """OpenSCENARIO2OWL, its ground: individuals that are stated, taken back, bound to parameters."""
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -16,8 +17,11 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.to_owl_legs import Stretch
 
 E = TypeVar("E", bound=StrEnum)
+
+_JUST_A_NAME = re.compile(r"\$\{[\s(]*\$([A-Za-z_][A-Za-z0-9_]*)[\s)]*\}")
 
 
 class UnsayableError(Exception):
@@ -38,8 +42,9 @@ class StoryBuilder(Builder):
     """Collects the statements of layers 3 to 5 of a file.
 
     Attributes:
-        scenario: the file's model.
+        scenario_file: the file's model.
         roads: its map.
+        legs: how distances count on roads that lead to the scenario's intersection, by their ids.
         cast: entities that have been stated, by name.
         events: events that are, or will be, stated, by name.
         referred: events whose end the event that is being stated waits for.
@@ -50,6 +55,7 @@ class StoryBuilder(Builder):
 
     def __init__(self, name: str, scenario: osc.OpenScenario, roads: OpenDrive) -> None:
         self.scenario_file, self.roads = scenario, roads
+        self.legs: dict[str, Stretch] = {}
         self.numbers = parameters.numbers(scenario)
         self._constants = parameters.values(scenario)
         super().__init__(name, self.numbers)
@@ -133,6 +139,7 @@ class StoryBuilder(Builder):
         Raises:
             UnsayableError: an expression of parameters, not finite, or out of the property's range.
         """
+        value = simplest(value)
         if isinstance(value, osc.Expr) and value.names:
             raise UnsayableError(element, f"the expression {value} in {type(element).__name__}")
         number = self.now(value, element)
@@ -189,6 +196,12 @@ class StoryBuilder(Builder):
             what = type(element).__name__
             raise UnsayableError(element, f"{what} of {name}, a traffic light that the map lacks")
         return found
+
+
+def simplest(value: Any) -> Any:
+    """Return a reference for an expression that is nothing but one, and anything else as it is."""
+    found = _JUST_A_NAME.fullmatch(value.text) if isinstance(value, osc.Expr) else None
+    return osc.ParameterRef(f"${found[1]}") if found else value
 
 
 def shortest(value: float, exact: float, back: Any) -> float:

@@ -1,6 +1,7 @@
 """OpenSCENARIO2OWL, its places: from a lane position to a distance along a leg of the map.
 
-The other way round than `bridgegen.openx.openscenario.owl_places`: on a map as a whole each road
+The other way round than `bridgegen.openx.openscenario.owl_places`. Roads that lead to the
+scenario's intersection count from there (`bridgegen.openx.openscenario.to_owl_legs`); any other
 counts by itself, from its end at a junction, or from its start where none or both ends are at one.
 """
 
@@ -16,11 +17,18 @@ from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name
 from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.to_owl_build import StoryBuilder, UnsayableError, shortest
+from bridgegen.openx.openscenario.to_owl_build import (
+    StoryBuilder,
+    UnsayableError,
+    shortest,
+    simplest,
+)
+from bridgegen.openx.openscenario.to_owl_legs import Stretch
 
 _LENGTH_SLACK = 1e-6  # [m]
 _NAME = r"\(?\s*\$(?P<name>[A-Za-z_][A-Za-z0-9_]*)\s*\)?"
 _REST = re.compile(rf"\$\{{\s*(?P<length>\d+\.?\d*|\.\d+)\s*-\s*{_NAME}\s*\}}")
+_BEYOND = re.compile(rf"\$\{{\s*{_NAME}\s*-\s*(?P<length>\d+\.?\d*|\.\d+)\s*\}}")
 _MIRRORED = re.compile(rf"\$\{{\s*-\s*{_NAME}\s*\}}")
 
 
@@ -48,7 +56,7 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
     node = builder.node(name, "LanePosition")
     lane = lane_name(road.id, section_index(road, now), lane_id)
     builder.put(node, "on_lane", builder.iri(lane))
-    builder.number(node, "has_distance", _distance(road, where, now), where)
+    builder.number(node, "has_distance", _distance(builder, road, where, now), where)
     if where.offset is not None:
         offset = where.offset if lane_id < 0 else _mirrored(where)
         builder.number(node, "has_lateral_offset", offset, where)
@@ -81,23 +89,31 @@ def _check_orientation(where: osc.LanePosition) -> None:
         raise UnsayableError(turned, "an Orientation that is not relative to its lane")
 
 
-def _distance(road: Road, where: osc.LanePosition, now: float) -> Any:
-    """Return the distance from the leg's beginning [m], or the parameter that it is."""
-    s = where.s
-    if junction_end(road) != "end":
+def _distance(builder: StoryBuilder, road: Road, where: osc.LanePosition, now: float) -> Any:
+    """Return the distance from the leg's beginning [m], or the parameter that it is.
+
+    Along the road it is ``s`` plus what lies before, against it all of that minus ``s``.
+    """
+    s, stretch = simplest(where.s), builder.legs.get(road.id) or Stretch(junction_end(road))
+    against, before = stretch.near == "end", stretch.before
+    if not against and before == 0.0:
         return s
-    length = float(road.length)
+    total = before + float(road.length)
+    form, known = (_REST, total) if against else (_BEYOND, before)
     if isinstance(s, osc.Expr):
-        found = _REST.fullmatch(s.text)
-        if found and abs(float(found["length"]) - length) <= _LENGTH_SLACK:
+        found = form.fullmatch(s.text)
+        if found and abs(float(found["length"]) - known) <= _LENGTH_SLACK:
             return osc.ParameterRef(f"${found['name']}")
     if isinstance(s, osc.ParameterRef | osc.Expr):
-        raise UnsayableError(
-            where,
-            f's="{s}" of LanePosition, which must read ${{{length!r}-($name)}} on a road whose '
-            "distances count from its end",
-        )
-    return shortest(length - now, now, lambda x: length - x if 0.0 <= x <= length else math.nan)
+        wanted = f"${{{known!r}-($name)}}" if against else f"${{($name)-{known!r}}}"
+        raise UnsayableError(where, f's="{s}" of LanePosition, which must read {wanted} there')
+
+    def station(distance: float) -> float:
+        if not before <= distance <= total:
+            return math.nan
+        return total - distance if against else distance - before
+
+    return shortest(total - now if against else before + now, now, station)
 
 
 def _mirrored(where: osc.LanePosition) -> Any:
