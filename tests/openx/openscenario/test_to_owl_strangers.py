@@ -323,6 +323,32 @@ def test_who_cannot_be_said_takes_along_what_is_about_them(plain):
     assert found.of_class("Event") == []
 
 
+def test_events_that_end_each_other_are_not_like_events_that_stand_alone(plain):
+    text = plain.read_text()
+    start, end = text.index("            <Event "), text.index("</Event>") + len("</Event>")
+    second = text[start:end].replace("sets off!", "second")
+    for priority, count in (("parallel", 0), ("overwrite", 2)):
+        both = (text[start:end] + second).replace('"overwrite"', f'"{priority}"')
+        plain.write_text(text[:start] + both + text[end:])
+        owl, left_out = import_file(plain, partial=True, ego="Hero")
+        owl.unlink()
+        assert len(left_out) == count
+        assert all('priority="overwrite" of Event' in one for one in left_out)
+
+
+def test_names_that_would_be_others_of_ours_are_changed(plain):
+    """Of an entity that is called like a parameter's individual, the scenario, a start."""
+    for name in ("p_Speed", "scenario", "ego_start", "road_network", "road:1", "a b#c"):
+        plain.write_text(plain.read_text().replace("the other one", name))
+        owl, left_out = import_file(plain, ego="Hero")
+        assert left_out == []
+        found = load_owl(owl)
+        assert check(found) == []
+        assert name in {found.text(one, "has_name") for one in found.of_class("Car")}
+        plain.write_text(plain.read_text().replace(f'"{name}"', '"the other one"'))
+        owl.unlink()
+
+
 def test_who_waits_for_what_cannot_be_said_goes_too(plain):
     text = plain.read_text()
     start = text.index("            <Event ")

@@ -90,6 +90,8 @@ class Notes:
                     value = ind.number(parameter, "has_value")
                     yield osc.Property(f"{name}.value", format_double(value))
             for k, text in enumerate(ind.texts(parameter, "constraint"), start=1):
+                if text.startswith("$"):
+                    raise OntologyError(f"a constraint must not begin with $, got '{text}'")
                 yield osc.Property(f"{name}.constraint.{k}", text)
 
     def _changes(self) -> Iterator[osc.Property]:

@@ -51,6 +51,7 @@ class StoryBuilder(Builder):
         problems: lines, and what could not be said there.
         bindings: nodes, their properties, and the parameters that give these.
         free: nodes and those of their properties that have numbers of their own.
+        parameters: the individuals of the file's numeric parameters, by name.
     """
 
     def __init__(self, name: str, scenario: osc.OpenScenario, roads: OpenDrive) -> None:
@@ -67,7 +68,7 @@ class StoryBuilder(Builder):
         self.problems: list[tuple[int, str]] = []
         self.bindings: list[tuple[ox.NamedNode, str, str]] = []
         self.free: list[tuple[ox.NamedNode, str]] = []
-        self.parameters: dict[str, ox.NamedNode] = {}
+        self.parameters = {one: self.reserve(f"p_{one}") for one in self.numbers}
         self._lights = {
             signal.id: self.iri(part_name("signal", road.id, index))
             for road in reversed(roads.roads)
@@ -166,8 +167,6 @@ class StoryBuilder(Builder):
 
     def bind(self, node: ox.NamedNode, name: str, parameter: str) -> None:
         """Bind the value of a node's property to a parameter of the file."""
-        if parameter not in self.parameters:
-            self.parameters[parameter] = self.iri(quote(f"p_{parameter}", safe=""))
         self.put(node, "has_parameter", self.parameters[parameter])
         self.bindings.append((node, name, parameter))
 

@@ -22,6 +22,7 @@ from bridgegen.openx.openscenario.to_owl_conditions import add_trigger
 from bridgegen.openx.openscenario.to_owl_entities import as_number
 from bridgegen.openx.openscenario.to_owl_parameters import Facts
 
+_ENDING = (osc.Priority.OVERRIDE, osc.Priority.OVERWRITE)
 _EARLY = (osc.Rule.GREATER_OR_EQUAL, osc.Rule.GREATER_THAN)
 
 
@@ -58,12 +59,14 @@ def happenings(builder: StoryBuilder) -> Iterator[Happening]:
                         builder.problems.append((event.line, text))
                         continue
                     seen.add(name)
-                    alone = len(maneuver.events) == 1
-                    yield Happening(name, group, _by_itself(event) if alone else event)
+                    if len(maneuver.events) > 1 and event.priority in _ENDING:
+                        text = f'priority="{event.priority}" of Event {name} among others'
+                        builder.problems.append((event.line, text))
+                    yield Happening(name, group, _by_itself(event))
 
 
 def _by_itself(event: osc.Event) -> osc.Event:
-    """Return an event whose priority makes no difference, for nothing is beside it."""
+    """Return an event as it is with nothing beside it, where its priority makes no difference."""
     if event.priority in (osc.Priority.OVERWRITE, osc.Priority.PARALLEL):
         return replace(event, priority=osc.Priority.OVERRIDE)
     return event

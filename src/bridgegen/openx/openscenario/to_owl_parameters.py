@@ -77,7 +77,7 @@ def _add_parameter(
     facts: dict[str, list[osc.Property]],
     bound: dict[str, list[ox.NamedNode]],
 ) -> ox.NamedNode:
-    node = builder.parameters.get(name) or builder.iri(f"p_{name}")
+    node = builder.parameters.get(name) or builder.reserve(f"p_{name}")
     formula = facts.get("expression")
     builder.state(node, "DerivedParameter" if formula else "Parameter")
     builder.put(node, "has_name", name)
