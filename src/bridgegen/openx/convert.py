@@ -15,15 +15,15 @@ from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.openx.opendrive import write as opendrive_write
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.map_losses import losses
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import digest_of
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
+from bridgegen.openx.opendrive.to_owl.losses import losses
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario import write as openscenario_write
-from bridgegen.openx.openscenario.from_owl import EGO, openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario

@@ -4,11 +4,11 @@ import pytest
 
 from bridgegen.ontology.check import check
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.opendrive.map_losses import losses
+from bridgegen.openx.opendrive.from_owl.furniture import ranges
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.owl_furniture import ranges
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
+from bridgegen.openx.opendrive.to_owl.losses import losses
 
 WIDTH = '<width sOffset="0" a="3" b="0" c="0" d="0"/>'
 LANES = f"""<lanes><laneSection s="0"><left>

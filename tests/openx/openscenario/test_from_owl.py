@@ -11,10 +11,9 @@ from bridgegen.odd.expression import parse
 from bridgegen.odd.reader import load
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario import owl_weather as weather
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import references, walk
-from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl, weather
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.values import Expr, resolve
 from bridgegen.openx.openscenario.write import to_xml

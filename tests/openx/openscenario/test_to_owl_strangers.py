@@ -18,7 +18,7 @@ from bridgegen.openx.convert import convert_file, import_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml as roads_to_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
-from bridgegen.openx.openscenario.owl_weather import time_of_day
+from bridgegen.openx.openscenario.from_owl.weather import time_of_day
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario

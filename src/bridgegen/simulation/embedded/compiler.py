@@ -7,7 +7,7 @@ import numpy as np
 from bridgegen.ego import DRIVERS, TRAJECTORY, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.owl_notes import TIME_STEP
+from bridgegen.openx.openscenario.from_owl.notes import TIME_STEP
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded.program import (
     AlongLanes,

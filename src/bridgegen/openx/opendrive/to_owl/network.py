@@ -1,0 +1,243 @@
+"""OpenDRIVE2OWL: a whole map as the static part of an ontology (Algorithm 1, step 3).
+
+Every road, lane, junction, crosswalk, traffic light, sign, line and lamp becomes an individual,
+linked as the map links them. What the ontology cannot say stays in the map's own file, which the
+road network names; `bridgegen.openx.opendrive.to_owl.losses` lists it.
+"""
+
+from collections.abc import Sequence
+from pathlib import PurePath
+
+import pyoxigraph as ox
+
+from bridgegen.ontology.builder import Builder
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import tbox
+from bridgegen.openx.opendrive.geometry import pose
+from bridgegen.openx.opendrive.lanes import section_end, width_of
+from bridgegen.openx.opendrive.legs import heading, junction_end
+from bridgegen.openx.opendrive.map_names import lane_name, part_name, road_name
+from bridgegen.openx.opendrive.model import Lane, OpenDrive, Road, RoadLink
+from bridgegen.openx.opendrive.plan_view import Arc, Line, Spiral
+from bridgegen.openx.opendrive.to_owl.furniture import Furniture
+from bridgegen.openx.opendrive.to_owl.junctions import Junctions
+from bridgegen.openx.opendrive.user_data import number, said
+
+STRIPS = {"shoulder": "Shoulder", "sidewalk": "Sidewalk", "walking": "Sidewalk"}
+"""The class of a lane that cars do not travel on, by its type; of all others, ``RoadStrip``."""
+
+_CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
+
+
+def individuals_from_opendrive(
+    model: OpenDrive,
+    map_file: str,
+    digest: str | None = None,
+    name: str | None = None,
+    controllers: bool = True,
+) -> Individuals:
+    """Return the individuals of a whole map.
+
+    Lanes are individuals per lane section. A lane that cars travel on is a ``Lane``; every other
+    one is a strip of its road. Lines are one individual per road, type and colour, which marks
+    all lanes whose outer border is of that kind; where along the lane it begins is the map's to
+    know. A ``paramPoly3`` or ``poly3`` is a segment with its length and its curvature at both
+    ends. What OWL2OpenDRIVE made comes back whole, from the map and from its ``userData``: it can
+    be made again from the individuals, once ``has_map_file`` is taken away.
+
+    Args:
+        model: the road network, as `bridgegen.openx.opendrive.read` returns it.
+        map_file: the path that its file has, seen from the ontology's.
+        digest: SHA-256 of the file, in hexadecimal.
+        name: of the ontology that they become part of; the map's by default.
+        controllers: whether to say who switches the lights; a scenario file may say so better.
+    """
+    return Individuals(_Map(model, map_file, digest, name, controllers).quads)
+
+
+class _Map(Builder):
+    """Adds the parts of a map."""
+
+    def __init__(
+        self,
+        model: OpenDrive,
+        map_file: str,
+        digest: str | None,
+        ontology: str | None,
+        controllers: bool,
+    ) -> None:
+        stem = PurePath(map_file).stem
+        super().__init__(ontology or stem, {})
+        self.model = model
+        self.known_types = frozenset(tbox().allowed["has_road_type"])
+        self.known_lines = frozenset(tbox().allowed["has_marking_type"])
+        self.known_colors = frozenset(tbox().allowed["has_marking_color"])
+        self.network = self.node("road_network", "RoadNetwork")
+        self.put(self.network, "has_name", model.header.name or stem)
+        self.put(self.network, "has_map_file", map_file)
+        if digest is not None:
+            self.put(self.network, "has_map_digest", digest)
+        self.junctions = Junctions(self, self.network, model)
+        furniture = Furniture(self, self.network)
+        for road in model.roads:
+            node = self.map_road(road)
+            furniture.add_objects(node, road)
+            furniture.add_signals(node, road)
+        for road in model.roads:
+            furniture.add_references(road)
+        if controllers:
+            furniture.add_controllers(model.controllers)
+        self.junctions.add()
+
+    # -- roads -------------------------------------------------------------------------------------
+
+    def map_road(self, road: Road) -> ox.NamedNode:
+        """Add a road with its lanes, its lines and its course."""
+        node = self.node(road_name(road.id), "Road")
+        self.put(self.network, "has_area", node)
+        self.put(node, "has_road_id", road.id)
+        if road.name:
+            self.put(node, "has_name", road.name)
+        self.put(node, "has_length", float(road.length))
+        end = junction_end(road)
+        self.put(node, "has_junction_end", end)
+        limit = _speed_limit(road)
+        if limit is not None:
+            self.put(node, "has_speed_limit", limit)
+        if road.types and road.types[0].type in self.known_types:
+            self.put(node, "has_road_type", road.types[0].type)
+        for name in _CLOSES:
+            above = number(road.user_data, name)
+            if above is not None:
+                self.put(node, name, above)
+        self.join(node, "has_predecessor", road.predecessor)
+        self.join(node, "has_successor", road.successor)
+        if end in ("start", "end"):
+            outwards = heading(road, end)
+            exactly = number(road.user_data, "has_heading")
+            if exactly is not None and abs((exactly - outwards + 180.0) % 360.0 - 180.0) < 1e-6:
+                outwards = exactly
+            self.put(node, "has_heading", outwards)
+        self.counts(node, road, end)
+        for index, section in enumerate(road.sections):
+            for lane in section.lanes:
+                self.lane(node, road, index, lane, end)
+        self.segments(node, road)
+        self.lines(node, road)
+        return node
+
+    def join(self, node: ox.NamedNode, name: str, link: RoadLink | None) -> None:
+        """Link a road to what it is joined to."""
+        if link is not None and link.element_type == "road":
+            self.put(node, name, self.iri(road_name(link.element_id)))
+        elif link is not None:
+            self.put(node, name, self.junctions.iri(link.element_id))
+
+    def direction(self, road: Road, lane_id: int, end: str) -> str:
+        """Return where a lane leads; a strip is like the lanes that it is beside."""
+        along = road.direction(lane_id) > 0
+        if end == "none" and not self.model.junctions:
+            return "out" if along else "in"
+        if end in ("start", "end"):
+            return "in" if along == (end == "end") else "out"
+        return "forward" if along else "backward"
+
+    def counts(self, node: ox.NamedNode, road: Road, end: str) -> None:
+        """State how many lanes lead in and out where a road meets its junction, and their width.
+
+        Of a merge's carriageway those count that go on, not the acceleration lane.
+        """
+        sections: Sequence[int] = range(len(road.sections))
+        link = road.link(end) if end in ("start", "end") else None
+        if link is not None and self.junctions.kinds.get(link.element_id) == "Merge":
+            sections = sections[-1:] if end == "start" else sections[:1]
+        lanes = [
+            [lane for lane in road.sections[k].lanes if lane.drivable] for k in sections
+        ]  # fmt: skip
+        widths = {
+            _middle_width(road, k, lane)
+            for k, some in zip(sections, lanes, strict=True)
+            for lane in some
+        }
+        if len(widths) == 1 and (width := widths.pop()) > 0.0:
+            self.put(node, "has_lane_width", width)
+        if link is not None or (end == "none" and not self.model.junctions):
+            near = lanes[-1 if end == "end" else 0]
+            ways = [self.direction(road, lane.id, end) for lane in near]
+            self.put(node, "has_inbound_lanes", ways.count("in"))
+            self.put(node, "has_outbound_lanes", ways.count("out"))
+
+    def lane(self, road_node: ox.NamedNode, road: Road, index: int, lane: Lane, end: str) -> None:
+        """Add a lane of a section, or a strip beside the lanes."""
+        section = road.sections[index]
+        cls = "Lane" if lane.drivable else STRIPS.get(lane.type, "RoadStrip")
+        node = self.node(lane_name(road.id, index, lane.id), cls)
+        self.put(road_node, "has_lane" if lane.drivable else "has_strip", node)
+        self.put(node, "has_lane_id", lane.id)
+        self.put(node, "has_lane_type", lane.type)
+        self.put(node, "has_section_start", float(section.s))
+        self.put(node, "has_start_width", width_of(section, lane, section.s, section.s)[0])
+        self.put(node, "has_direction", self.direction(road, lane.id, end))
+        width = _middle_width(road, index, lane)
+        if lane.drivable or width > 0.0:
+            self.put(node, "has_width", width)
+        for turn in said(lane.user_data, "allows_turn"):
+            if turn in tbox().allowed["allows_turn"]:
+                self.put(node, "allows_turn", turn)
+
+    def segments(self, road_node: ox.NamedNode, road: Road) -> None:
+        """Add the stretches of a road's reference line."""
+        for index, geometry in enumerate(road.plan_view, start=1):
+            node = self.node(part_name("segment", road.id, index), "GeometrySegment")
+            self.put(road_node, "has_segment", node)
+            self.put(node, "has_index", index)
+            self.put(node, "has_length", float(geometry.length))
+            shape = geometry.shape
+            if isinstance(shape, Line):
+                continue
+            if isinstance(shape, Arc):
+                ends = (shape.curvature, shape.curvature)
+            elif isinstance(shape, Spiral):
+                ends = (shape.curv_start, shape.curv_end)
+            else:
+                ends = (pose(geometry, 0.0)[3], pose(geometry, geometry.length)[3])
+            for name, curvature in zip(("start", "end"), ends, strict=True):
+                if curvature != 0.0:
+                    self.put(node, f"has_{name}_curvature", float(curvature))
+
+    def lines(self, road_node: ox.NamedNode, road: Road) -> None:
+        """Add the lines between and beside the lanes of a road, one per kind."""
+        found: dict[tuple[str, str, bool], list[str]] = {}
+        for index, section in enumerate(road.sections):
+            for lane in (*section.center, *section.lanes):
+                for mark in lane.road_marks:
+                    if mark.type in self.known_lines and mark.type != "none":
+                        kind = (mark.type, mark.color, lane.id == 0)
+                        name = lane_name(road.id, index, lane.id)
+                        if name not in (marked := found.setdefault(kind, [])):
+                            marked.append(name)
+        for number_, ((style, color, centre), names) in enumerate(found.items()):
+            node = self.node(part_name("line", road.id, number_), "LaneMarking")
+            self.put(self.network, "has_facility", node)
+            self.put(node, "on_road", road_node)
+            self.put(node, "has_marking_type", style)
+            if color in self.known_colors:
+                self.put(node, "has_marking_color", color)
+            if centre:
+                self.put(node, "has_name", "centre line")
+                continue
+            for name in names:
+                self.put(node, "marks_lane", self.iri(name))
+
+
+def _middle_width(road: Road, index: int, lane: Lane) -> float:
+    """Return the width of a lane halfway along its section [m]."""
+    section = road.sections[index]
+    middle = (section.s + section_end(road, index)) / 2.0
+    return width_of(section, lane, middle, middle)[0]
+
+
+def _speed_limit(road: Road) -> float | None:
+    """Return the first speed limit of a road [m/s], where it has one above 0."""
+    speeds = [one.speed.metres_per_second for one in road.types if one.speed is not None]
+    return speeds[0] if speeds and speeds[0] else None

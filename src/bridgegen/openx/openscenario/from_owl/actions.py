@@ -1,0 +1,237 @@
+"""OWL2OpenSCENARIO, its actions: what participants, the weather and the lights are made to do."""
+
+from collections.abc import Callable
+
+from bridgegen.errors import OntologyError, UnsupportedError
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import Subject
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
+from bridgegen.openx.openscenario.from_owl.places import Places
+from bridgegen.openx.openscenario.from_owl.quantities import Quantities
+from bridgegen.openx.openscenario.from_owl.signals import lamp_states
+from bridgegen.openx.openscenario.from_owl.weather import environment
+
+
+class Actions:
+    """The actions of a scenario's individuals.
+
+    Attributes:
+        texts: parameters of text that the environments refer to.
+
+    Args:
+        individuals: one scenario.
+        quantities: its numbers.
+        places: its positions.
+        cast: its participants.
+    """
+
+    def __init__(
+        self, individuals: Individuals, quantities: Quantities, places: Places, cast: Cast
+    ) -> None:
+        self._individuals, self._quantities = individuals, quantities
+        self._places, self._cast = places, cast
+        self.texts: list[osc.ParameterDeclaration] = []
+
+    def action(
+        self, event: str, who: tuple[str, ...], node: Subject
+    ) -> osc.PrivateAction | osc.GlobalAction:
+        """Return an action of an event.
+
+        Args:
+            event: its name, for what the action declares.
+            who: the event's actors, by name.
+            node: the action's individual.
+
+        Raises:
+            OntologyError: the action lacks what it needs.
+            UnsupportedError: an action of a class that cannot be written.
+        """
+        ind = self._individuals
+        if ind.is_a(node, "EnvironmentAction"):
+            weather = ind.link(node, "has_weather")
+            made, texts = environment(ind, weather, self._quantities, name=event)
+            self.texts += texts
+            return osc.GlobalAction(osc.EnvironmentAction(made))
+        if ind.is_a(node, "TrafficSignalStateAction"):
+            return self._signal(node)
+        if ind.is_a(node, "AddEntityAction") or ind.is_a(node, "DeleteEntityAction"):
+            return self._presence(node)
+        if not who:
+            raise OntologyError(f"{ind.describe(node)} must have an actor (has_who of its event)")
+        return self.private(who[0], node)
+
+    # -- of participants ---------------------------------------------------------------------------
+
+    def private(self, who: str, node: Subject) -> osc.PrivateAction:
+        """Return an action of a participant.
+
+        Raises:
+            OntologyError: the action lacks what it needs.
+            UnsupportedError: an action of a class that cannot be written.
+        """
+        ind = self._individuals
+        kinds: dict[str, Callable[[str, Subject], osc.PrivateAction]] = {
+            "SpeedAction": self._speed,
+            "LaneChangeAction": self._lane_change,
+            "LaneOffsetAction": self._lane_offset,
+            "TeleportAction": self._teleport,
+            "SynchronizeAction": self._synchronize,
+            "FollowTrajectoryAction": self._follow,
+            "AssignRouteAction": self._assign_route,
+        }
+        for name, make in kinds.items():
+            if ind.is_a(node, name):
+                return make(who, node)
+        raise UnsupportedError(
+            f"{ind.describe(node)} must be one of {', '.join(kinds)}, EnvironmentAction, "
+            "TrafficSignalStateAction, AddEntityAction or DeleteEntityAction to be written"
+        )
+
+    def _teleport(self, who: str, node: Subject) -> osc.PrivateAction:
+        del who
+        place = self._individuals.link(node, "has_position")
+        position = self._places.position(place, oriented=True)
+        return osc.PrivateAction(osc.TeleportAction(position))
+
+    def _speed(self, who: str, node: Subject) -> osc.PrivateAction:
+        """Return a speed action: by rate [m/s²], time [s] or distance [m], or at once."""
+        del who
+        speed = self._quantities.get(node, "has_target_speed")
+        target = osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(speed))
+        return osc.PrivateAction(
+            osc.LongitudinalAction(osc.SpeedAction(self._dynamics(node), target))
+        )
+
+    def _lane_change(self, who: str, node: Subject) -> osc.PrivateAction:
+        ind = self._individuals
+        lanes = ind.integer(node, "has_lane_count")
+        offset = None
+        if ind.optional_number(node, "has_target_offset") is not None:
+            offset = self._quantities.get(node, "has_target_offset")
+        target = osc.LaneChangeTarget(osc.RelativeTargetLane(who, lanes))
+        return osc.PrivateAction(
+            osc.LateralAction(osc.LaneChangeAction(self._dynamics(node), target, offset))
+        )
+
+    def _lane_offset(self, who: str, node: Subject) -> osc.PrivateAction:
+        """Return a move aside: at once where the shape is a step, else as softly as is said."""
+        del who
+        ind = self._individuals
+        most = None
+        if ind.optional_number(node, "has_max_lateral_acceleration") is not None:
+            most = self._quantities.get(node, "has_max_lateral_acceleration")
+        shape = osc.DynamicsShape(ind.optional_text(node, "has_dynamics_shape") or "linear")
+        offset = self._quantities.get(node, "has_target_offset")
+        return osc.PrivateAction(
+            osc.LateralAction(
+                osc.LaneOffsetAction(
+                    continuous=False,
+                    dynamics=osc.LaneOffsetActionDynamics(shape, most),
+                    lane_offset_target=osc.LaneOffsetTarget(osc.AbsoluteTargetLaneOffset(offset)),
+                )
+            )
+        )
+
+    def _synchronize(self, who: str, node: Subject) -> osc.PrivateAction:
+        del who
+        there, master = (
+            self._places.position(self._individuals.link(node, link), oriented=False)
+            for link in ("has_position", "has_master_position")
+        )
+        other = self._cast.name(node, "has_entity_ref")
+        return osc.PrivateAction(osc.SynchronizeAction(other, master, there))
+
+    def _dynamics(self, node: Subject) -> osc.TransitionDynamics:
+        ind = self._individuals
+        shape = osc.DynamicsShape(ind.optional_text(node, "has_dynamics_shape") or "linear")
+        dimensions = {
+            "has_rate": osc.DynamicsDimension.RATE,
+            "has_transition_time": osc.DynamicsDimension.TIME,
+            "has_transition_distance": osc.DynamicsDimension.DISTANCE,
+        }
+        given = [name for name in dimensions if ind.optional_number(node, name) is not None]
+        if len(given) > 1:
+            raise OntologyError(
+                f"{ind.describe(node)} must have one of {', '.join(dimensions)}, got "
+                f"{', '.join(given)}"
+            )
+        if not given or shape is osc.DynamicsShape.STEP:
+            return osc.TransitionDynamics(osc.DynamicsShape.STEP, osc.DynamicsDimension.TIME, 0.0)
+        value = self._quantities.get(node, given[0])
+        return osc.TransitionDynamics(shape, dimensions[given[0]], value)
+
+    def _follow(self, who: str, node: Subject) -> osc.PrivateAction:
+        """Return the following of a trajectory: to the times that its vertices have, if any."""
+        ind = self._individuals
+        trajectory = ind.link(node, "has_trajectory")
+        vertices = sorted(
+            ind.links(trajectory, "has_vertex"), key=lambda one: ind.integer(one, "has_index")
+        )
+        times = [ind.optional_number(one, "has_time") for one in vertices]
+        timed = all(time is not None for time in times)
+        if not timed and any(time is not None for time in times):
+            raise OntologyError(
+                f"{ind.describe(trajectory)} must have a time at all of its vertices, or at none"
+            )
+        if len(vertices) < 2:
+            raise OntologyError(
+                f"{ind.describe(trajectory)} must have two vertices or more, got {len(vertices)}"
+            )
+        polyline = osc.Polyline(
+            tuple(
+                osc.Vertex(
+                    self._places.position(ind.link(one, "has_position"), oriented=False), time
+                )
+                for one, time in zip(vertices, times, strict=True)
+            )
+        )
+        del who
+        reference: osc.NoTime | osc.Timing = osc.NoTime()
+        if timed:
+            reference = osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)
+        name = plain_text(ind, trajectory, "has_name")
+        made = osc.Trajectory(name, closed=False, shape=osc.Shape(polyline))
+        action = osc.FollowTrajectoryAction(
+            osc.TimeReference(reference),
+            osc.TrajectoryFollowingMode(osc.FollowingMode.POSITION),
+            osc.TrajectoryRef(made),
+        )
+        return osc.PrivateAction(osc.RoutingAction(action))
+
+    def _assign_route(self, who: str, node: Subject) -> osc.PrivateAction:
+        return self.route(f"{who}_route", self._individuals.link(node, "has_route"))
+
+    def route(self, name: str, node: Subject) -> osc.PrivateAction:
+        """Return a route by its ends: between them one intersection, crossed the shortest way."""
+        waypoints = tuple(
+            osc.Waypoint(
+                osc.RouteStrategy.SHORTEST,
+                self._places.position(self._individuals.link(node, end), oriented=True),
+            )
+            for end in ("has_start", "has_destination")
+        )
+        made = osc.Route(name, closed=False, waypoints=waypoints)
+        return osc.PrivateAction(osc.RoutingAction(osc.AssignRouteAction(made)))
+
+    # -- of all else -------------------------------------------------------------------------------
+
+    def _signal(self, node: Subject) -> osc.GlobalAction:
+        ind = self._individuals
+        light = ind.link(node, "has_signal")
+        state = lamp_states(ind.text(node, "has_signal_state"))
+        name = plain_text(ind, light, "has_object_id")
+        return osc.GlobalAction(
+            osc.InfrastructureAction(
+                osc.TrafficSignalAction(osc.TrafficSignalStateAction(name, state))
+            )
+        )
+
+    def _presence(self, node: Subject) -> osc.GlobalAction:
+        ind = self._individuals
+        action: osc.AddEntityAction | osc.DeleteEntityAction = osc.DeleteEntityAction()
+        if ind.is_a(node, "AddEntityAction"):
+            place = ind.link(node, "has_position")
+            action = osc.AddEntityAction(self._places.position(place, oriented=True))
+        name = self._cast.name(node, "has_entity_ref")
+        return osc.GlobalAction(osc.EntityAction(name, action))

@@ -1,0 +1,247 @@
+"""OpenSCENARIO2OWL, its actions: what participants, the weather and the lights are made to do."""
+
+import pyoxigraph as ox
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.from_owl.signals import LAMPS
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.places import add_position, same_place
+from bridgegen.openx.openscenario.to_owl.weather import add_weather
+
+Start = tuple[ox.NamedNode, osc.Position]
+
+_DIMENSIONS = {
+    osc.DynamicsDimension.RATE: "has_rate",
+    osc.DynamicsDimension.TIME: "has_transition_time",
+    osc.DynamicsDimension.DISTANCE: "has_transition_distance",
+}
+_STATES = {lamps: state for state, lamps in LAMPS.items()}
+
+
+def add_action(
+    builder: StoryBuilder,
+    event: str,
+    name: str,
+    who: tuple[str, ...],
+    wrapped: osc.PrivateAction | osc.GlobalAction,
+) -> ox.NamedNode:
+    """Add an action of an event.
+
+    Args:
+        builder: where to.
+        event: the event's name.
+        name: of the individual.
+        who: the event's actors.
+        wrapped: the action.
+
+    Raises:
+        UnsayableError: an action that the ontology has no class for, or no property.
+    """
+    if isinstance(wrapped, osc.GlobalAction):
+        return _global(builder, event, name, wrapped)
+    action = wrapped.action
+    if not who:
+        raise UnsayableError(wrapped, "a PrivateAction of nobody")
+    if isinstance(action, osc.TeleportAction):
+        node = builder.node(name, "TeleportAction")
+        put_place(builder, node, "has_position", f"{name}_place", action.position)
+    elif isinstance(action, osc.SynchronizeAction):
+        node = builder.node(name, "SynchronizeAction")
+        master = builder.entity(action.master_entity_ref, action)
+        builder.put(node, "has_entity_ref", master)
+        put_place(builder, node, "has_position", f"{name}_place", action.target_position)
+        there = action.target_position_master
+        put_place(builder, node, "has_master_position", f"{name}_master_place", there)
+    elif isinstance(action, osc.LongitudinalAction):
+        node = builder.node(name, "SpeedAction")
+        put_speed(builder, node, action.action)
+    elif isinstance(action, osc.LateralAction):
+        node = _lateral(builder, name, who, action.action)
+    elif isinstance(action.action, osc.FollowTrajectoryAction):
+        node = builder.node(name, "FollowTrajectoryAction")
+        add_trajectory(builder, name, node, action.action, None)
+    else:
+        node = builder.node(name, "AssignRouteAction")
+        builder.put(node, "has_route", add_route(builder, name, action.action.route, None))
+    return node
+
+
+def put_place(
+    builder: StoryBuilder, node: ox.NamedNode, link: str, name: str, position: osc.Position
+) -> None:
+    """Link a node to a position of its own."""
+    builder.put(node, link, add_position(builder, name, position))
+
+
+def put_speed(builder: StoryBuilder, node: ox.NamedNode, action: osc.SpeedAction) -> None:
+    """State the speed that an action leads to, and how fast.
+
+    Raises:
+        UnsayableError: the speed is relative to another's, or an expression.
+    """
+    target = action.speed_action_target.target
+    if not isinstance(target, osc.AbsoluteTargetSpeed):
+        raise UnsayableError(target, "RelativeTargetSpeed")
+    builder.number(node, "has_target_speed", target.value, target)
+    _put_change(builder, node, action.dynamics)
+
+
+def _put_change(builder: StoryBuilder, node: ox.NamedNode, how: osc.TransitionDynamics) -> None:
+    shape = builder.choice(osc.DynamicsShape, how.dynamics_shape)
+    if shape is osc.DynamicsShape.STEP:
+        return
+    dimension = builder.choice(osc.DynamicsDimension, how.dynamics_dimension)
+    if dimension is not osc.DynamicsDimension.RATE and builder.now(how.value, how) == 0.0:
+        return  # in no time, or on the spot: a step
+    builder.number(node, _DIMENSIONS[dimension], how.value, how)
+    if shape is not osc.DynamicsShape.LINEAR:
+        builder.put(node, "has_dynamics_shape", shape.value)
+
+
+def _lateral(
+    builder: StoryBuilder,
+    name: str,
+    who: tuple[str, ...],
+    action: osc.LaneChangeAction | osc.LaneOffsetAction,
+) -> ox.NamedNode:
+    if isinstance(action, osc.LaneOffsetAction):
+        aside = action.lane_offset_target.target
+        if not isinstance(aside, osc.AbsoluteTargetLaneOffset):
+            raise UnsayableError(aside, "RelativeTargetLaneOffset")
+        node = builder.node(name, "LaneOffsetAction")
+        builder.number(node, "has_target_offset", aside.value, aside)
+        how = action.dynamics
+        if how.max_lateral_acc is not None:
+            builder.number(node, "has_max_lateral_acceleration", how.max_lateral_acc, how)
+        shape = builder.choice(osc.DynamicsShape, how.dynamics_shape)
+        if shape is not osc.DynamicsShape.LINEAR:
+            builder.put(node, "has_dynamics_shape", shape.value)
+        return node
+    target = action.lane_change_target.target
+    if not isinstance(target, osc.RelativeTargetLane):
+        raise UnsayableError(target, "AbsoluteTargetLane")
+    if builder.text(target.entity_ref) != who[0]:
+        raise UnsayableError(target, f"a RelativeTargetLane of {target.entity_ref}, not the actor,")
+    node = builder.node(name, "LaneChangeAction")
+    builder.put(node, "has_lane_count", round(builder.now(target.value, target)))
+    if action.target_lane_offset is not None:
+        builder.number(node, "has_target_offset", action.target_lane_offset, action)
+    _put_change(builder, node, action.dynamics)
+    return node
+
+
+# -- ways ------------------------------------------------------------------------------------------
+
+
+def add_trajectory(
+    builder: StoryBuilder,
+    name: str,
+    node: ox.NamedNode,
+    action: osc.FollowTrajectoryAction,
+    start: Start | None,
+) -> None:
+    """Add the trajectory that an action follows.
+
+    Args:
+        builder: where to.
+        name: that the individuals' begin with.
+        node: the action's.
+        action: what is followed.
+        start: of the participant, which the first vertex may be.
+
+    Raises:
+        UnsayableError: times that count are missing, or a vertex has no place.
+    """
+    one = action.trajectory_ref.trajectory
+    trajectory = builder.node(f"{name}_path", "Trajectory")
+    builder.put(node, "has_trajectory", trajectory)
+    builder.put(trajectory, "has_name", builder.text(one.name))
+    timed = isinstance(action.time_reference.reference, osc.Timing)
+    vertices = one.shape.shape.vertices
+    for k, (number, vertex) in enumerate(zip(numbered(len(vertices)), vertices, strict=True)):
+        point = builder.node(f"{name}_vertex_{number}", "Vertex")
+        builder.put(trajectory, "has_vertex", point)
+        builder.put(point, "has_index", k + 1)
+        if timed:
+            if vertex.time is None:
+                raise UnsayableError(vertex, "a Vertex without a time among Timing's")
+            builder.put(point, "has_time", builder.now(vertex.time, vertex))
+        if k == 0 and start is not None and same_place(vertex.position, start[1]):
+            builder.put(point, "has_position", start[0])
+        else:
+            place = add_position(builder, f"{name}_point_{number}", vertex.position)
+            builder.put(point, "has_position", place)
+
+
+def add_route(
+    builder: StoryBuilder, name: str, route: osc.Route, start: Start | None
+) -> ox.NamedNode:
+    """Add a route by its ends.
+
+    Args:
+        builder: where to.
+        name: that the individuals' begin with.
+        route: of two waypoints.
+        start: of the participant, which the first waypoint may be.
+
+    Raises:
+        UnsayableError: it has more waypoints, or one of them no place.
+    """
+    if len(route.waypoints) != 2:
+        raise UnsayableError(route, f"a Route of {len(route.waypoints)} waypoints")
+    first, last = (waypoint.position for waypoint in route.waypoints)
+    node = builder.node(f"{name}_route", "Route")
+    if start is not None and same_place(first, start[1]):
+        builder.put(node, "has_start", start[0])
+    else:
+        put_place(builder, node, "has_start", f"{name}_route_start", first)
+    put_place(builder, node, "has_destination", f"{name}_destination", last)
+    return node
+
+
+# -- of all else -----------------------------------------------------------------------------------
+
+
+def _global(
+    builder: StoryBuilder, event: str, name: str, wrapped: osc.GlobalAction
+) -> ox.NamedNode:
+    action = wrapped.action
+    if isinstance(action, osc.EnvironmentAction):
+        node = builder.node(name, "EnvironmentAction")
+        weather = add_weather(builder, action.environment, event)
+        if weather is None:
+            raise UnsayableError(action, "an EnvironmentAction that sets no weather")
+        builder.put(node, "has_weather", weather)
+        return node
+    if isinstance(action, osc.EntityAction):
+        entity = builder.entity(action.entity_ref, action)
+        if isinstance(action.action, osc.DeleteEntityAction):
+            node = builder.node(name, "DeleteEntityAction")
+        else:
+            node = builder.node(name, "AddEntityAction")
+            place = action.action.position
+            put_place(builder, node, "has_position", f"{name}_place", place)
+        builder.put(node, "has_entity_ref", entity)
+        return node
+    set_ = action.traffic_signal_action.action
+    if not isinstance(set_, osc.TrafficSignalStateAction):
+        raise UnsayableError(set_, type(set_).__name__)
+    node = builder.node(name, "TrafficSignalStateAction")
+    builder.put(node, "has_signal", builder.light(set_.name, set_))
+    builder.put(node, "has_signal_state", signal_state(builder, set_.state, set_))
+    return node
+
+
+def signal_state(builder: StoryBuilder, state: str | osc.ParameterRef, element: Element) -> str:
+    """Return the state that a light's lamps show.
+
+    Raises:
+        UnsayableError: none that the ontology knows.
+    """
+    found = _STATES.get(builder.text(state))
+    if found is None:
+        known = ", ".join(_STATES)
+        what = type(element).__name__
+        raise UnsayableError(element, f'state="{state}" of {what} (other than {known})')
+    return found

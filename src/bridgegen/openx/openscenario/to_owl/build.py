@@ -1,0 +1,222 @@
+"""OpenSCENARIO2OWL, its ground: individuals that are stated, taken back, bound to parameters."""
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from typing import Any, TypeVar
+from urllib.parse import quote
+
+import pyoxigraph as ox
+
+from bridgegen.ontology.builder import Builder
+from bridgegen.ontology.vocabulary import NAMED_INDIVIDUAL, TYPE, bg, tbox
+from bridgegen.openx.opendrive.map_names import part_name
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.to_owl.legs import Stretch
+
+E = TypeVar("E", bound=StrEnum)
+
+_JUST_A_NAME = re.compile(r"\$\{[\s(]*\$([A-Za-z_][A-Za-z0-9_]*)[\s)]*\}")
+
+
+class UnsayableError(Exception):
+    """Something for which the ontology has no words.
+
+    Args:
+        element: where it stands.
+        text: what it is.
+    """
+
+    def __init__(self, element: Element, text: str) -> None:
+        super().__init__(text)
+        self.line = element.line
+        self.text = text
+
+
+class StoryBuilder(Builder):
+    """Collects the statements of layers 3 to 5 of a file.
+
+    Attributes:
+        scenario_file: the file's model.
+        roads: its map.
+        legs: how distances count on roads that lead to the scenario's intersection, by their ids.
+        cast: entities that have been stated, by name.
+        events: events that are, or will be, stated, by name.
+        referred: events whose end the event that is being stated waits for.
+        problems: lines, and what could not be said there.
+        bindings: nodes, their properties, and the parameters that give these.
+        free: nodes and those of their properties that have numbers of their own.
+        parameters: the individuals of the file's numeric parameters, by name.
+    """
+
+    def __init__(self, name: str, scenario: osc.OpenScenario, roads: OpenDrive) -> None:
+        self.scenario_file, self.roads = scenario, roads
+        self.legs: dict[str, Stretch] = {}
+        self.numbers = parameters.numbers(scenario)
+        self._constants = parameters.values(scenario)
+        super().__init__(name, self.numbers)
+        self.named.add("road_network")
+        self._names: list[str] = []
+        self.cast: dict[str, ox.NamedNode] = {}
+        self.events: dict[str, ox.NamedNode] = {}
+        self.referred: set[str] = set()
+        self.problems: list[tuple[int, str]] = []
+        self.bindings: list[tuple[ox.NamedNode, str, str]] = []
+        self.free: list[tuple[ox.NamedNode, str]] = []
+        self.parameters = {one: self.reserve(f"p_{one}") for one in self.numbers}
+        self._lights = {
+            signal.id: self.iri(part_name("signal", road.id, index))
+            for road in reversed(roads.roads)
+            for index, signal in reversed(list(enumerate(road.signals)))
+            if signal.dynamic == "yes"
+        }
+
+    # -- individuals -------------------------------------------------------------------------------
+
+    def reserve(self, name: str) -> ox.NamedNode:
+        """Return the IRI of an individual to be; its name is changed where another one has it."""
+        plain = wanted = quote(name, safe="")
+        number = 1
+        while wanted in self.named:
+            number += 1
+            wanted = f"{plain}_{number}"
+        self.named.add(wanted)
+        self._names.append(wanted)
+        return self.iri(wanted)
+
+    def state(self, node: ox.NamedNode, cls: str) -> ox.NamedNode:
+        """State that an individual is, and what."""
+        self.quads.append(ox.Quad(node, TYPE, NAMED_INDIVIDUAL))
+        self.quads.append(ox.Quad(node, TYPE, bg(cls)))
+        return node
+
+    def node(self, name: str, cls: str) -> ox.NamedNode:
+        """Add an individual; its name is changed where another one has it."""
+        return self.state(self.reserve(name), cls)
+
+    @contextmanager
+    def attempt(self) -> Iterator[None]:
+        """Take back what is stated within, and note the problem, where it proves unsayable."""
+        lengths = len(self.quads), len(self._names), len(self.bindings), len(self.free)
+        try:
+            yield
+        except UnsayableError as error:
+            self.problems.append((error.line, error.text))
+            self.named.difference_update(self._names[lengths[1] :])
+            del self.quads[lengths[0] :], self._names[lengths[1] :]
+            del self.bindings[lengths[2] :], self.free[lengths[3] :]
+
+    # -- values ------------------------------------------------------------------------------------
+
+    def text(self, value: osc.ParameterRef | str) -> str:
+        """Return a text, at the parameters' values."""
+        return str(self._constants[value.name] if isinstance(value, osc.ParameterRef) else value)
+
+    def choice(self, cls: type[E], value: Any) -> E:
+        """Return a member of an enumeration, at the parameters' values."""
+        return cls(self.text(value))
+
+    def now(self, value: Any, element: Element) -> float:
+        """Return a number, at the parameters' values.
+
+        Raises:
+            UnsayableError: it is not finite.
+        """
+        if isinstance(value, osc.ParameterRef | osc.Expr):
+            value = value.resolve(self.numbers)
+        number = float(value)
+        if not math.isfinite(number):
+            raise UnsayableError(element, f"the number {number} in {type(element).__name__}")
+        return number
+
+    def number(self, node: ox.NamedNode, name: str, value: Any, element: Element) -> None:
+        """State a number; one that a parameter gives is bound to it.
+
+        Raises:
+            UnsayableError: an expression of parameters, not finite, or out of the property's range.
+        """
+        value = simplest(value)
+        if isinstance(value, osc.Expr) and value.names:
+            raise UnsayableError(element, f"the expression {value} in {type(element).__name__}")
+        number = self.now(value, element)
+        self.check(name, number, element)
+        if isinstance(value, osc.ParameterRef):
+            self.put(node, name, number)
+            self.bind(node, name, value.name)
+        else:
+            self.put(node, name, number)
+            self.free.append((node, name))
+
+    def check(self, name: str, number: float, element: Element) -> None:
+        """Make sure that a property may have a value.
+
+        Raises:
+            UnsayableError: it must be above some number, and is not.
+        """
+        least = tbox().above.get(name)
+        if least is not None and not number > least:
+            what, unit = name.removeprefix("has_"), tbox().units.get(name, "1")
+            raise UnsayableError(
+                element, f"a {what} [{unit}] of {number!r} in {type(element).__name__}"
+            )
+
+    def bind(self, node: ox.NamedNode, name: str, parameter: str) -> None:
+        """Bind the value of a node's property to a parameter of the file."""
+        self.put(node, "has_parameter", self.parameters[parameter])
+        self.bindings.append((node, name, parameter))
+
+    # -- what is referred to -----------------------------------------------------------------------
+
+    def entity(self, name: osc.ParameterRef | str, element: Element) -> ox.NamedNode:
+        """Return the individual of an entity.
+
+        Raises:
+            UnsayableError: there is none.
+        """
+        found = self.cast.get(self.text(name))
+        if found is None:
+            what = type(element).__name__
+            raise UnsayableError(element, f"{what} of {name}, an entity that is not stated")
+        return found
+
+    def light(self, name: osc.ParameterRef | str, element: Element) -> ox.NamedNode:
+        """Return the individual of a traffic light.
+
+        Raises:
+            UnsayableError: the map has none of that id.
+        """
+        found = self._lights.get(self.text(name))
+        if found is None:
+            what = type(element).__name__
+            raise UnsayableError(element, f"{what} of {name}, a traffic light that the map lacks")
+        return found
+
+
+def simplest(value: Any) -> Any:
+    """Return a reference for an expression that is nothing but one, and anything else as it is."""
+    found = _JUST_A_NAME.fullmatch(value.text) if isinstance(value, osc.Expr) else None
+    return osc.ParameterRef(f"${found[1]}") if found else value
+
+
+def shortest(value: float, exact: float, back: Any) -> float:
+    """Return the number of fewest digits near ``value`` that ``back`` turns into ``exact``.
+
+    A sum that was rounded has no exact inverse; of all numbers that give it, people write the
+    shortest. ``value`` itself where none is found.
+    """
+    for digits in range(17):
+        candidate = round(value, digits)
+        if back(candidate) == exact:
+            return candidate
+    return value
+
+
+def numbered(count: int) -> list[str]:
+    """Return the numbers from 1 so that names that end in them sort as they count."""
+    width = len(str(count))
+    return [f"{k:0{width}}" for k in range(1, count + 1)]

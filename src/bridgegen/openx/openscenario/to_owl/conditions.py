@@ -1,0 +1,134 @@
+"""OpenSCENARIO2OWL, its conditions: when an event happens."""
+
+import pyoxigraph as ox
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.from_owl.conditions import USUAL_RULES
+from bridgegen.openx.openscenario.to_owl.actions import put_place, signal_state
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+
+Relative = osc.RelativeDistanceCondition | osc.TimeHeadwayCondition | osc.TimeToCollisionCondition
+
+
+def add_trigger(
+    builder: StoryBuilder, event: str, who: tuple[str, ...], trigger: osc.Trigger | None
+) -> ox.NamedNode:
+    """Add the trigger of an event; without one it happens at the start.
+
+    Raises:
+        UnsayableError: a condition that the ontology has no words for, or no condition at all.
+    """
+    node = builder.node(f"{event}_trigger", "Trigger")
+    if trigger is None:
+        condition = builder.node(f"{event}_condition_1", "SimulationTimeCondition")
+        builder.put(condition, "has_value", 0.0)
+        builder.put(node, "has_condition", condition)
+        return node
+    groups = trigger.condition_groups
+    if not groups:
+        raise UnsayableError(trigger, f"the event {event}, which never happens,")
+    for number, group in zip(numbered(len(groups)), groups, strict=True):
+        name = f"{event}_condition_{number}"
+        builder.put(node, "has_condition", _add_group(builder, name, who, group))
+    return node
+
+
+def _add_group(
+    builder: StoryBuilder, name: str, who: tuple[str, ...], group: osc.ConditionGroup
+) -> ox.NamedNode:
+    if len(group.conditions) == 1:
+        return _add_condition(builder, name, who, group.conditions[0])
+    node = builder.node(name, "ConditionGroup")
+    numbers = numbered(len(group.conditions))
+    for number, condition in zip(numbers, group.conditions, strict=True):
+        part = _add_condition(builder, f"{name}_{number}", who, condition)
+        builder.put(node, "has_condition", part)
+    return node
+
+
+def _add_condition(
+    builder: StoryBuilder, name: str, who: tuple[str, ...], wrapped: osc.Condition
+) -> ox.NamedNode:
+    if isinstance(wrapped.condition, osc.ByEntityCondition):
+        return _by_entity(builder, name, who, wrapped.condition)
+    one = wrapped.condition.condition
+    node = builder.node(name, type(one).__name__)
+    if isinstance(one, osc.SimulationTimeCondition):
+        builder.number(node, "has_value", one.value, one)
+        _put_rule(builder, node, one)
+    elif isinstance(one, osc.TrafficSignalCondition):
+        builder.put(node, "has_signal", builder.light(one.name, one))
+        builder.put(node, "has_signal_state", signal_state(builder, one.state, one))
+    else:
+        event = builder.text(one.storyboard_element_ref)
+        kind = builder.text(one.storyboard_element_type)
+        state = builder.text(one.state)
+        if (kind, state) != ("event", "completeState") or event not in builder.events:
+            raise UnsayableError(
+                one, f"StoryboardElementStateCondition on {state} of the {kind} {event}"
+            )
+        builder.referred.add(event)
+        builder.put(node, "has_event_ref", builder.events[event])
+        builder.number(node, "has_value", wrapped.delay, wrapped)
+    return node
+
+
+def _by_entity(
+    builder: StoryBuilder, name: str, who: tuple[str, ...], wrapped: osc.ByEntityCondition
+) -> ox.NamedNode:
+    refs = wrapped.triggering_entities.entity_refs
+    if len(refs) != 1:
+        raise UnsayableError(
+            wrapped.triggering_entities, f"a condition on {len(refs)} TriggeringEntities"
+        )
+    one = wrapped.entity_condition.condition
+    node = builder.node(name, type(one).__name__)
+    subject = builder.entity(refs[0].entity_ref, refs[0])
+    if who != (builder.text(refs[0].entity_ref),):
+        builder.put(node, "has_subject", subject)
+    if isinstance(one, osc.CollisionCondition):
+        builder.put(node, "has_entity_ref", builder.entity(one.target.entity_ref, one.target))
+    elif isinstance(one, osc.StandStillCondition):
+        builder.number(node, "has_value", one.duration, one)
+    elif isinstance(one, osc.ReachPositionCondition):
+        builder.number(node, "has_value", one.tolerance, one)
+        put_place(builder, node, "has_position", f"{name}_place", one.position)
+    else:
+        builder.number(node, "has_value", one.value, one)
+        if isinstance(one, Relative):
+            builder.put(node, "has_entity_ref", builder.entity(_other(builder, one), one))
+        if not isinstance(one, osc.TraveledDistanceCondition):
+            _put_rule(builder, node, one)
+    return node
+
+
+def _other(builder: StoryBuilder, one: Relative) -> str | osc.ParameterRef:
+    """Return whom a condition measures to, in the one way that the ontology means.
+
+    Raises:
+        UnsayableError: another distance, other axes, between boxes, or to a position.
+    """
+    what = type(one).__name__
+    distance, axes = one.relative_distance_type, one.coordinate_system
+    if distance is not None and builder.text(distance) not in (
+        osc.RelativeDistanceType.EUCLIDIAN_DISTANCE,
+        osc.RelativeDistanceType.CARTESIAN_DISTANCE,
+    ):
+        raise UnsayableError(one, f'relativeDistanceType="{distance}" of {what}')
+    if axes is not None and builder.text(axes) != osc.CoordinateSystem.ENTITY:
+        raise UnsayableError(one, f'coordinateSystem="{axes}" of {what}')
+    if one.freespace is not False:
+        raise UnsayableError(one, f'freespace="{str(one.freespace).lower()}" of {what}')
+    if not isinstance(one, osc.TimeToCollisionCondition):
+        return one.entity_ref
+    target = one.target.target
+    if not isinstance(target, osc.EntityRef):
+        raise UnsayableError(target, "TimeToCollisionCondition with a Position")
+    return target.entity_ref
+
+
+def _put_rule(builder: StoryBuilder, node: ox.NamedNode, one: Element) -> None:
+    rule = builder.choice(osc.Rule, one.rule)  # type: ignore[attr-defined]
+    if rule is not USUAL_RULES[type(one).__name__]:
+        builder.put(node, "has_rule", rule.value)

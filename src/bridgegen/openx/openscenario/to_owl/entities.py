@@ -1,0 +1,189 @@
+"""OpenSCENARIO2OWL, its entities: bodies, who drives them, and how they start."""
+
+import pyoxigraph as ox
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.from_owl.entities import (
+    CATEGORIES,
+    DRIVER,
+    MAX_SPEED,
+    OBJECTS,
+    WALKERS,
+)
+from bridgegen.openx.openscenario.to_owl.actions import (
+    add_route,
+    add_trajectory,
+    put_speed,
+)
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
+from bridgegen.openx.openscenario.to_owl.places import add_position
+
+_EMERGENCY = "EmergencyVehicle"
+_VEHICLES = {category: name for name, category in CATEGORIES.items() if name != _EMERGENCY}
+_EMERGENCY_ROLES = (osc.Role.AMBULANCE, osc.Role.FIRE, osc.Role.POLICE)
+_FURNITURE = {osc.MiscObjectCategory.POLE: "ConstructionCard"}
+
+
+def add_participant(
+    builder: StoryBuilder, one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+) -> ox.NamedNode:
+    """Add a participant with its body, its driver and its init actions.
+
+    Args:
+        builder: where to.
+        one: the entity.
+        actions: its own of the storyboard's Init.
+
+    Raises:
+        UnsayableError: it is of a kind without a class, or starts nowhere.
+    """
+    name = builder.text(one.name)
+    node = _add_body(builder, one, name, _class_of(builder, one.entity_object))
+    if len(one.object_controllers) == 1:
+        _add_controller(builder, node, name, one.object_controllers[0].controller)
+    first = _teleport(one, actions)
+    start = add_position(builder, f"{name}_start", first.position)
+    teleport = builder.node(f"{name}_teleport", "TeleportAction")
+    builder.put(teleport, "has_position", start)
+    builder.put(node, "has_init_action", teleport)
+    begun: set[type[object]] = {osc.TeleportAction}
+    for wrapped in actions:
+        if wrapped.action is not first:
+            with builder.attempt():
+                _add_init(builder, node, name, wrapped, begun, (start, first.position))
+    return node
+
+
+def add_element(
+    builder: StoryBuilder, one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+) -> ox.NamedNode:
+    """Add a cone or a sign of road works, at its place.
+
+    Raises:
+        UnsayableError: it is none, or stands nowhere.
+    """
+    name, body = builder.text(one.name), one.entity_object
+    if not isinstance(body, osc.MiscObject):
+        raise UnsayableError(body, f"{type(body).__name__} {name} at road works")
+    own = {key.lower(): key for key in OBJECTS if key != "Misc"}
+    category = builder.choice(osc.MiscObjectCategory, body.misc_object_category)
+    cls = own.get(builder.text(body.name)) or _FURNITURE.get(category, "RoadCone")
+    node = _add_body(builder, one, name, cls)
+    place = add_position(builder, f"{name}_place", _teleport(one, actions).position)
+    builder.put(node, "has_position", place)
+    return node
+
+
+def _class_of(builder: StoryBuilder, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> str:
+    if isinstance(body, osc.MiscObject):
+        return "Misc"
+    if isinstance(body, osc.Pedestrian):
+        walker = builder.choice(osc.PedestrianCategory, body.pedestrian_category)
+        return next((name for name, one in WALKERS.items() if one is walker), "Pedestrian")
+    role = None if body.role is None else builder.choice(osc.Role, body.role)
+    category = builder.choice(osc.VehicleCategory, body.vehicle_category)
+    if role in _EMERGENCY_ROLES and category in _VEHICLES:
+        return _EMERGENCY
+    if category not in _VEHICLES:
+        raise UnsayableError(body, f"a Vehicle of the category {category}")
+    return _VEHICLES[category]
+
+
+def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: str) -> ox.NamedNode:
+    body, now = one.entity_object, builder.now
+    box = body.bounding_box
+    values = {
+        "has_box_length": now(box.dimensions.length, box.dimensions),
+        "has_box_width": now(box.dimensions.width, box.dimensions),
+        "has_box_height": now(box.dimensions.height, box.dimensions),
+        "has_center_ahead": now(box.center.x, box.center),
+    }
+    if body.mass is not None:
+        values["has_mass"] = now(body.mass, body)
+    if isinstance(body, osc.Vehicle):
+        limits, axles = body.performance, body.axles
+        if axles.front is None:
+            raise UnsayableError(axles, f"the Vehicle {name} without a FrontAxle")
+        values |= {
+            "has_wheelbase": now(axles.front.position_x, axles.front)
+            - now(axles.rear.position_x, axles.rear),
+            "has_max_speed": now(limits.max_speed, limits),
+            "has_max_acceleration": now(limits.max_acceleration, limits),
+            "has_max_deceleration": now(limits.max_deceleration, limits),
+        }
+    elif isinstance(body, osc.Pedestrian) and body.properties is not None:
+        fastest = body.properties.get(MAX_SPEED)
+        if fastest is not None:
+            values["has_max_speed"] = as_number(builder, fastest, body.properties)
+    node = builder.node(name, cls)
+    builder.put(node, "has_name", name)
+    for key, value in values.items():
+        builder.check(key, value, body)
+        builder.put(node, key, value)
+    return node
+
+
+def as_number(
+    builder: StoryBuilder, text: str | osc.ParameterRef, element: osc.Property | osc.Properties
+) -> float:
+    """Return the finite number that a property says.
+
+    Raises:
+        UnsayableError: it says none.
+    """
+    said = builder.text(text)
+    try:
+        return builder.now(float(said), element)
+    except ValueError:
+        raise UnsayableError(element, f"a Property that must be a number, '{said[:40]}',") from None
+
+
+def _add_controller(
+    builder: StoryBuilder, node: ox.NamedNode, name: str, one: osc.Controller
+) -> None:
+    """Add a controller that names its driver; what is missing then, the comparison finds."""
+    driver = None if one.properties is None else one.properties.get(DRIVER)
+    if driver is None:
+        return
+    controller = builder.node(f"{name}_controller", "Controller")
+    builder.put(controller, "has_name", builder.text(one.name))
+    builder.put(controller, "has_driver", builder.text(driver))
+    builder.put(node, "has_controller", controller)
+
+
+def _teleport(
+    one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+) -> osc.TeleportAction:
+    for wrapped in actions:
+        if isinstance(wrapped.action, osc.TeleportAction):
+            return wrapped.action
+    raise UnsayableError(one, f"the entity {one.name} without an initial TeleportAction")
+
+
+def _add_init(
+    builder: StoryBuilder,
+    node: ox.NamedNode,
+    name: str,
+    wrapped: osc.PrivateAction,
+    begun: set[type[object]],
+    start: tuple[ox.NamedNode, osc.Position],
+) -> None:
+    action = wrapped.action
+    if isinstance(action, osc.LongitudinalAction | osc.LateralAction | osc.RoutingAction):
+        action = action.action  # type: ignore[assignment]
+    kind = type(action)
+    if kind in begun:
+        raise UnsayableError(wrapped, f"a second initial {kind.__name__} of {name}")
+    begun.add(kind)
+    if isinstance(action, osc.SpeedAction):
+        speed = builder.node(f"{name}_init_speed", "SpeedAction")
+        put_speed(builder, speed, action)
+        builder.put(node, "has_init_action", speed)
+    elif isinstance(action, osc.FollowTrajectoryAction):
+        follow = builder.node(f"{name}_follow", "FollowTrajectoryAction")
+        add_trajectory(builder, name, follow, action, start)
+        builder.put(node, "has_init_action", follow)
+    elif isinstance(action, osc.AssignRouteAction):
+        builder.put(node, "has_route", add_route(builder, name, action.route, start))
+    else:
+        raise UnsayableError(wrapped, f"an initial {kind.__name__}")

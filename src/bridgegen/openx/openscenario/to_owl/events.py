@@ -1,0 +1,237 @@
+"""OpenSCENARIO2OWL, its events: who does what, and when; and the temporary changes.
+
+A storyboard's stories, acts, groups and maneuvers are levels without a meaning of their own where
+they begin with the scenario and happen once: their names are not kept. An event of a maneuver with
+others, which ends these when it starts, is not like one that stands alone.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from urllib.parse import unquote
+
+import pyoxigraph as ox
+
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lanes import lane_at, section_index
+from bridgegen.openx.opendrive.map_names import lane_name, road_name
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.from_owl.notes import CHANGES
+from bridgegen.openx.openscenario.to_owl.actions import add_action
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.conditions import add_trigger
+from bridgegen.openx.openscenario.to_owl.entities import as_number
+from bridgegen.openx.openscenario.to_owl.parameters import Facts
+
+_ENDING = (osc.Priority.OVERRIDE, osc.Priority.OVERWRITE)
+_EARLY = (osc.Rule.GREATER_OR_EQUAL, osc.Rule.GREATER_THAN)
+
+
+@dataclass(frozen=True)
+class Happening:
+    """An event with whose it is.
+
+    Attributes:
+        name: its own.
+        group: of the event, as if it stood alone in it.
+        event: with the priority that it has by itself.
+    """
+
+    name: str
+    group: osc.ManeuverGroup
+    event: osc.Event
+
+
+def happenings(builder: StoryBuilder) -> Iterator[Happening]:
+    """Yield the events of a storyboard, each once; problems are noted."""
+    seen: set[str] = set()
+    for act in (one for story in builder.scenario_file.storyboard.stories for one in story.acts):
+        if not _begins_at_once(builder, act.start_trigger):
+            builder.problems.append((act.line, f"the Act {act.name}, which starts later,"))
+            continue
+        if act.stop_trigger is not None and act.stop_trigger.condition_groups:
+            builder.problems.append((act.stop_trigger.line, "StopTrigger of Act"))
+        for group in act.maneuver_groups:
+            for maneuver in group.maneuvers:
+                for event in maneuver.events:
+                    name = builder.text(event.name)
+                    if name in seen:
+                        text = f"a second Event of the name {name}"
+                        builder.problems.append((event.line, text))
+                        continue
+                    seen.add(name)
+                    if len(maneuver.events) > 1 and event.priority in _ENDING:
+                        text = f'priority="{event.priority}" of Event {name} among others'
+                        builder.problems.append((event.line, text))
+                    yield Happening(name, group, _by_itself(event))
+
+
+def _by_itself(event: osc.Event) -> osc.Event:
+    """Return an event as it is with nothing beside it, where its priority makes no difference."""
+    if event.priority in (osc.Priority.OVERWRITE, osc.Priority.PARALLEL):
+        return replace(event, priority=osc.Priority.OVERRIDE)
+    return event
+
+
+def _begins_at_once(builder: StoryBuilder, trigger: osc.Trigger | None) -> bool:
+    if trigger is None:
+        return True
+    for group in trigger.condition_groups:
+        conditions = [one.condition for one in group.conditions]
+        if len(conditions) == 1 and isinstance(conditions[0], osc.ByValueCondition):
+            time = conditions[0].condition
+            if isinstance(time, osc.SimulationTimeCondition):
+                rule = builder.choice(osc.Rule, time.rule)
+                with builder.attempt():
+                    if rule in _EARLY and builder.now(time.value, time) <= 0.0:
+                        return True
+    return False
+
+
+def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happening]) -> set[str]:
+    """Add the events; one that waits for an event that cannot be said cannot be said either.
+
+    Returns:
+        The names of those that are stated.
+    """
+    for one in all_:
+        builder.events[one.name] = builder.reserve(one.name)
+    waits: dict[str, set[str]] = {}
+    lines = {one.name: one.event.line for one in all_}
+    start = len(builder.problems)
+    kept = len(builder.quads), len(builder.bindings), len(builder.free)
+    done = {one.name for one in all_ if _attempt(builder, scenario, one, waits)}
+    lost = [name for name in lines if name not in done]
+    if not lost:
+        return done
+    waiting: dict[str, list[str]] = {}
+    for name, others in waits.items():
+        for other in others:
+            waiting.setdefault(other, []).append(name)
+    while lost:
+        for name in waiting.get(gone := lost.pop(), ()):
+            if name in done:
+                done.discard(name)
+                lost.append(name)
+                text = f"the Event {name}, which waits for {gone},"
+                builder.problems.append((lines[name], text))
+    problems = builder.problems[:]
+    del builder.quads[kept[0] :], builder.bindings[kept[1] :], builder.free[kept[2] :]
+    for one in all_:
+        if one.name in done:
+            _attempt(builder, scenario, one, waits)
+    builder.problems[start:] = problems[start:]
+    return done
+
+
+def _attempt(
+    builder: StoryBuilder, scenario: ox.NamedNode, one: Happening, waits: dict[str, set[str]]
+) -> bool:
+    builder.referred = set()
+    before = len(builder.problems)
+    with builder.attempt():
+        _add_event(builder, one)
+        builder.put(scenario, "has_event", builder.events[one.name])
+    waits[one.name] = builder.referred
+    return len(builder.problems) == before
+
+
+def _add_event(builder: StoryBuilder, one: Happening) -> None:
+    actors = one.group.actors
+    if actors.select_triggering_entities is not False:
+        raise UnsayableError(actors, "Actors by selectTriggeringEntities")
+    nodes = {
+        builder.text(ref.entity_ref): builder.entity(ref.entity_ref, ref)
+        for ref in actors.entity_refs
+    }
+    wrapped = [action.action for action in one.event.actions]
+    concerned = [
+        action.action
+        for action in wrapped
+        if isinstance(action, osc.GlobalAction) and isinstance(action.action, osc.EntityAction)
+    ]
+    if not nodes:  # of an entity that comes or goes it is its own
+        nodes = {
+            builder.text(action.entity_ref): builder.entity(action.entity_ref, action)
+            for action in concerned
+        }
+    signals = [
+        isinstance(action, osc.GlobalAction) and isinstance(action.action, osc.InfrastructureAction)
+        for action in wrapped
+    ]
+    usual = "SignalChangeEvent" if all(signals) else "EnvironmentChangeEvent"
+    node = builder.state(builder.events[one.name], "StoryboardEvent" if nodes else usual)
+    builder.put(node, "has_name", one.name)
+    for actor in nodes.values():
+        builder.put(node, "has_who", actor)
+    who = tuple(sorted(nodes))
+    for number, action in zip(numbered(len(wrapped)), wrapped, strict=True):
+        suffix = "" if int(number) == 1 else f"_{number}"
+        name = f"{one.name}_action{suffix}"
+        builder.put(node, "has_what", add_action(builder, one.name, name, who, action))
+    trigger = add_trigger(builder, one.name, who, one.event.start_trigger)
+    builder.put(node, "has_when", trigger)
+
+
+# -- temporary changes -----------------------------------------------------------------------------
+
+
+def add_changes(
+    builder: StoryBuilder, scenario: ox.NamedNode, said: Facts, elements: Mapping[str, str]
+) -> None:
+    """Add the temporary changes that the header's properties describe.
+
+    Args:
+        builder: where to.
+        scenario: whose they are.
+        said: by the change's name.
+        elements: things that stand at road works, with whose they are.
+    """
+    for name, facts in said.items():
+        with builder.attempt():
+            _add_change(builder, scenario, name, facts, elements)
+
+
+def _add_change(
+    builder: StoryBuilder,
+    scenario: ox.NamedNode,
+    name: str,
+    facts: dict[str, list[osc.Property]],
+    elements: Mapping[str, str],
+) -> None:
+    first = next(iter(facts.values()))[0]
+    cls = builder.text(facts["class"][0].value) if facts.get("class") else ""
+    if cls not in CHANGES:
+        raise UnsayableError(first, f"the temporary change {name} of the class '{cls}'")
+    if name in builder.events:
+        raise UnsayableError(first, f"a second event of the name {name}")
+    node = builder.node(name, cls)
+    builder.put(node, "has_name", name)
+    for link in ("who", "element"):
+        for one in facts.get(link, ()):
+            target = builder.text(one.value)
+            if (link == "element") != (elements.get(target) == name):
+                raise UnsayableError(one, f"{target} as {link} of {name}")
+            builder.put(node, f"has_{link}", builder.entity(one.value, one))
+    for link in ("on_lane", "closes_lane"):
+        for one in facts.get(link, ()):
+            builder.put(node, link, _lane(builder, one))
+    for one in facts.get("on_road", ()):
+        road_id = builder.text(one.value)
+        if road_id not in builder.roads.roads_by_id:
+            raise UnsayableError(one, f"the road {road_id}, which the map lacks,")
+        builder.put(node, "on_road", builder.iri(road_name(road_id)))
+    for one in facts.get("time", ())[:1]:
+        builder.put(node, "has_time", as_number(builder, one.value, one))
+    builder.put(scenario, "has_event", node)
+
+
+def _lane(builder: StoryBuilder, one: osc.Property) -> ox.NamedNode:
+    text = builder.text(one.value)
+    try:
+        road_id, lane_id, start = text.split()
+        road = builder.roads.road(unquote(road_id))
+        s = float(start)
+        lane_at(road, int(lane_id), s)
+        return builder.iri(lane_name(road.id, section_index(road, s), int(lane_id)))
+    except (ValueError, InputError):
+        raise UnsayableError(one, f"the lane '{text[:40]}', which the map lacks,") from None

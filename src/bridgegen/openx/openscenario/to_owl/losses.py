@@ -1,0 +1,116 @@
+"""OpenSCENARIO2OWL, its check: what a file says that its individuals, written again, do not."""
+
+from collections.abc import Callable, Iterator
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder
+from bridgegen.openx.openscenario.to_owl.differences import Differences
+from bridgegen.openx.openscenario.to_owl.events import Happening
+
+Problem = tuple[int, str]
+Compare = Callable[[Element, Element | None], Iterator[Problem]]
+
+
+def losses(
+    builder: StoryBuilder,
+    again: osc.OpenScenario,
+    controllers: list[str],
+    stated: list[Happening],
+) -> Iterator[Problem]:
+    """Yield lines of a file, and what stands there that is lost.
+
+    What was not stated at all, and is a problem already, is not named again.
+
+    Args:
+        builder: of the individuals.
+        again: the file that they make.
+        controllers: names of the controllers that are stated.
+        stated: events that are.
+    """
+    here = builder.scenario_file
+    compare = Differences(parameters.values(here), parameters.values(again)).between
+    if here.file_header.license is not None:
+        yield here.file_header.license.line, "License"
+    if here.file_header.properties is not None:
+        yield from compare(here.file_header.properties, again.file_header.properties)
+    declared = {one.name: one for one in _declarations(again)}
+    for declaration in _declarations(here):
+        yield from compare(declaration, declared.get(declaration.name))
+    if here.road_network.scene_graph_file is not None:
+        yield here.road_network.scene_graph_file.line, "SceneGraphFile"
+    others = {str(one.name): one for one in _controllers(again)}
+    for controller in _controllers(here):
+        if (name := builder.text(controller.name)) in controllers:
+            yield from compare(controller, others.get(name))
+    entities = {str(one.name): one for one in again.entities.scenario_objects}
+    for entity in here.entities.scenario_objects:
+        if (name := builder.text(entity.name)) in builder.cast:
+            yield from compare(entity, entities.get(name))
+    yield from _in_init(builder, compare, again.storyboard.init.actions)
+    yield from _in_events(compare, again, stated)
+    stop = here.storyboard.stop_trigger
+    if stop is not None:
+        yield from compare(stop, again.storyboard.stop_trigger)
+
+
+def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) -> Iterator[Problem]:
+    here = builder.scenario_file.storyboard.init.actions
+    left = list(there.global_actions)
+    for one in here.global_actions:
+        fitting = [other for other in left if other == one] or [
+            other
+            for other in left
+            if isinstance(other.action, osc.EnvironmentAction)
+            and isinstance(one.action, osc.EnvironmentAction)
+        ]
+        if fitting:
+            left.remove(fitting[0])
+            yield from compare(one, fitting[0])
+        else:
+            yield one.line, f"{type(one.action).__name__} of Init"
+    actions = {str(one.entity_ref): one.private_actions for one in there.privates}
+    for private in here.privates:
+        name = builder.text(private.entity_ref)
+        again = {_kind(action): action for action in actions.get(name, ())}
+        for action in private.private_actions:
+            if (other := again.pop(_kind(action), None)) is not None:
+                yield from compare(action, other)
+
+
+def _in_events(
+    compare: Compare, again: osc.OpenScenario, stated: list[Happening]
+) -> Iterator[Problem]:
+    events = {
+        str(event.name): event
+        for story in again.storyboard.stories
+        for act in story.acts
+        for group in act.maneuver_groups
+        for maneuver in group.maneuvers
+        for event in maneuver.events
+    }
+    for one in stated:
+        count = one.group.maximum_execution_count
+        if count != 1:
+            yield one.group.line, f'maximumExecutionCount="{count}" of ManeuverGroup'
+        if (event := events.get(one.name)) is not None:
+            yield from compare(one.event, event)
+
+
+def _kind(action: osc.PrivateAction) -> str:
+    """Return what an init action is, as the standard's innermost element names it."""
+    inner = action.action
+    if isinstance(inner, osc.LongitudinalAction | osc.LateralAction | osc.RoutingAction):
+        return type(inner.action).__name__
+    return type(inner).__name__
+
+
+def _declarations(scenario: osc.OpenScenario) -> tuple[osc.ParameterDeclaration, ...]:
+    declared = scenario.parameter_declarations
+    return () if declared is None else declared.parameters
+
+
+def _controllers(scenario: osc.OpenScenario) -> tuple[osc.TrafficSignalController, ...]:
+    signals = scenario.road_network.traffic_signals
+    return () if signals is None else signals.controllers

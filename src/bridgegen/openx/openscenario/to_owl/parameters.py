@@ -1,0 +1,150 @@
+"""OpenSCENARIO2OWL, its parameters: their ranges, and what the header's properties say of them.
+
+A parameter's value is already on the individuals that it gives; one that gives nothing carries its
+value itself. What a file of others does not say: the axis is ``weather`` of what gives nothing but
+weather, else ``participants``; the unit is that of the property that it gives.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable
+
+import pyoxigraph as ox
+
+from bridgegen.odd.parameters import Axis
+from bridgegen.ontology.vocabulary import bg, tbox
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.from_owl.notes import EVENT, PARAMETER, SIGNALS, TIME_STEP
+from bridgegen.openx.openscenario.from_owl.weather import PROPERTIES
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
+from bridgegen.openx.openscenario.to_owl.entities import as_number
+
+_WEATHER = frozenset(name for _, names in PROPERTIES for name in names)
+_LIMITS = {osc.Rule.GREATER_OR_EQUAL: "has_low", osc.Rule.LESS_OR_EQUAL: "has_high"}
+
+Facts = dict[str, dict[str, list[osc.Property]]]
+
+
+class Notes:
+    """What the header's properties say (`bridgegen.openx.openscenario.from_owl.notes`).
+
+    Attributes:
+        time_step: the property of it, if there is one.
+        of: per kind (``parameter``, ``event``, ``signals``) and name, what is said, by its name.
+    """
+
+    def __init__(self, builder: StoryBuilder, header: osc.FileHeader) -> None:
+        self.time_step: osc.Property | None = None
+        self.of: dict[str, Facts] = {PARAMETER: {}, EVENT: {}, SIGNALS: {}}
+        for one in () if header.properties is None else header.properties.properties:
+            name = builder.text(one.name)
+            kind, _, rest = name.partition(".")
+            which, _, what = rest.rpartition(".")
+            if what.isdecimal():  # one of several
+                which, _, what = which.rpartition(".")
+            if name == TIME_STEP:
+                self.time_step = self.time_step or one
+            elif kind in self.of and which:
+                about = self.of[kind].setdefault(which, defaultdict(list))
+                about[what].append(one)
+
+
+def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) -> None:
+    """Add the parameters, after all that is bound to them."""
+    declared = builder.scenario_file.parameter_declarations
+    ranges = {} if declared is None else {one.name: one for one in declared.parameters}
+    bound: dict[str, dict[str, list[ox.NamedNode]]] = defaultdict(dict)
+    for node, name, parameter in builder.bindings:
+        bound[parameter].setdefault(name, []).append(node)
+    free = set(builder.free)
+    said = notes.of[PARAMETER]
+    alone = [name for name, facts in said.items() if facts.get("value")]
+    for name in dict.fromkeys([*builder.numbers, *alone]):
+        with builder.attempt():
+            facts = said.get(name, {})
+            value = builder.numbers.get(name)
+            if value is None:
+                value = as_number(builder, facts["value"][0].value, facts["value"][0])
+            node = _add_parameter(builder, name, value, facts, bound.get(name, {}))
+            _put_range(builder, node, ranges.get(name))
+            builder.put(scenario, "has_parameter_declaration", node)
+            _check_clear(ranges.get(name), name, bound.get(name, {}), free)
+
+
+def _add_parameter(
+    builder: StoryBuilder,
+    name: str,
+    value: float,
+    facts: dict[str, list[osc.Property]],
+    bound: dict[str, list[ox.NamedNode]],
+) -> ox.NamedNode:
+    node = builder.parameters.get(name) or builder.reserve(f"p_{name}")
+    formula = facts.get("expression")
+    builder.state(node, "DerivedParameter" if formula else "Parameter")
+    builder.put(node, "has_name", name)
+    if formula:
+        builder.put(node, "has_expression", builder.text(formula[0].value))
+    if not bound:  # nobody carries its value, so it does so itself
+        builder.put(node, "has_value", value)
+        builder.put(node, "has_parameter", node)
+    names = sorted(bound) or ["has_value"]
+    for one in names:
+        builder.put(node, "binds_property", one)
+    axis = Axis.WEATHER if set(names) <= _WEATHER else Axis.PARTICIPANTS
+    units = [tbox().units[one] for one in names if one in tbox().units]
+    builder.put(node, "has_axis", _said(builder, facts, "axis", str(axis)))
+    builder.put(node, "has_unit", _said(builder, facts, "unit", units[0] if units else "1"))
+    for rule in facts.get("constraint", ()):
+        text = builder.text(rule.value)
+        builder.put(node, "constraint", text)
+        for property_name in names:
+            builder.quads.append(ox.Quad(bg(property_name), bg("constraint"), ox.Literal(text)))
+    return node
+
+
+def _said(
+    builder: StoryBuilder, facts: dict[str, list[osc.Property]], what: str, usual: str
+) -> str:
+    if not facts.get(what):
+        return usual
+    one = facts[what][0]
+    text = builder.text(one.value)
+    if what == "axis" and text not in [axis.value for axis in Axis if axis != Axis.STATIC]:
+        raise UnsayableError(one, f"the axis '{text}' of a parameter")
+    return text
+
+
+def _put_range(
+    builder: StoryBuilder, node: ox.NamedNode, one: osc.ParameterDeclaration | None
+) -> None:
+    """State the range that the first constraints give; what else there is the comparison finds."""
+    if one is None or len(one.constraint_groups) != 1:
+        return
+    found: set[str] = set()
+    for limit in one.constraint_groups[0].constraints:
+        name = _LIMITS.get(limit.rule)
+        if name is not None and name not in found:
+            found.add(name)
+            builder.put(node, name, builder.now(float(limit.value), limit))
+
+
+def _check_clear(
+    one: osc.ParameterDeclaration | None,
+    name: str,
+    bound: dict[str, list[ox.NamedNode]],
+    free: Iterable[tuple[ox.NamedNode, str]],
+) -> None:
+    """Make sure that nobody takes a number of somebody's own for the parameter's.
+
+    The ontology binds an individual to a parameter and the parameter to properties.
+
+    Raises:
+        UnsayableError: an individual has one of its properties from the parameter, another not.
+    """
+    if len(bound) < 2 or one is None:
+        return
+    owned = {node for nodes in bound.values() for node in nodes}
+    taken = set(free)
+    if any((node, property_name) in taken for node in owned for property_name in bound):
+        raise UnsayableError(
+            one, f"the parameter {name}, which gives {' and '.join(sorted(bound))} by turns,"
+        )

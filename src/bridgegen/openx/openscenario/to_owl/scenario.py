@@ -1,0 +1,258 @@
+"""OpenSCENARIO2OWL: a storyboard as individuals, on those of its map (Algorithm 1, step 3, back).
+
+Our own files come back as they were: the statements of layers 3 to 5 are those that the file was
+written from, word for word. Other people's files come as far as the ontology can say them. What it
+cannot is found in two ways, and all of it is named at once: by an element that no class or property
+stands for, and by writing the individuals again (`bridgegen.openx.openscenario.from_owl`) and
+comparing that file with the first, element by element. So nothing is lost without a word but
+
+- the header's date and author, which are the file's and not the scenario's;
+- labels: names of stories, acts, maneuver groups, maneuvers, actions, conditions, routes and
+  environments, which nothing refers to;
+- the order of entities, events and parameters;
+- the static parameters, and how the map was generated: the road network comes back as the map that
+  it is. Nothing in a storyboard depends on them.
+
+What individuals must have and a file need not say is added: a time step (`TIME_STEP`), the range's
+unit and axis (`bridgegen.openx.openscenario.to_owl.parameters`).
+"""
+
+from collections.abc import Iterator
+from pathlib import PurePath
+
+import pyoxigraph as ox
+
+from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.ontology.graph import Individuals
+from bridgegen.openx.opendrive.map_names import road_name
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.from_owl.notes import EVENT, SIGNALS
+from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl.signals import Signals
+from bridgegen.openx.openscenario.to_owl.build import StoryBuilder
+from bridgegen.openx.openscenario.to_owl.entities import add_element, add_participant, as_number
+from bridgegen.openx.openscenario.to_owl.events import (
+    Happening,
+    add_changes,
+    add_events,
+    happenings,
+)
+from bridgegen.openx.openscenario.to_owl.legs import stretches, told
+from bridgegen.openx.openscenario.to_owl.losses import losses
+from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
+from bridgegen.openx.openscenario.to_owl.signals import add_controllers
+from bridgegen.openx.openscenario.to_owl.weather import add_weather
+
+TIME_STEP = 0.05
+"""The step of the evaluation [s] of a file that states none: the embedded simulator's."""
+
+DURATION = 60.0
+"""The duration [s] of a file whose stop trigger names no time, if that is put up with."""
+
+MAX_PROBLEMS = 50
+
+
+def individuals_from_openscenario(
+    scenario: osc.OpenScenario,
+    roads: OpenDrive,
+    map_file: str,
+    place: str = "document",
+    *,
+    partial: bool = False,
+) -> tuple[Individuals, list[str]]:
+    """Return the individuals of a scenario file, and what it says that they do not.
+
+    Args:
+        scenario: the file, as `bridgegen.openx.openscenario.read` returns it.
+        roads: the map that it names.
+        map_file: the path that the map has, seen from the ontology's file.
+        place: the file's name, for messages.
+        partial: leave out what cannot be said, instead of refusing the whole.
+
+    Returns:
+        The individuals, and a sentence for each thing left out: none unless ``partial``.
+
+    Raises:
+        UnsupportedError: something cannot be said (at most 50 problems are named); also if
+            ``partial``, if there is no entity ``ego`` that can.
+    """
+    importer = _Importer(scenario, roads, map_file)
+    individuals = importer.build()
+    problems = sorted(dict.fromkeys(importer.problems(individuals)), key=lambda one: one[0])
+    sentences = [
+        f"{place}: {text} cannot be said in the ontology" + (f" (line {line})" if line else "")
+        for line, text in problems
+    ]
+    sentences += [f"{place}: {problem}" for problem in importer.refused]
+    if EGO not in importer.builder.cast:
+        known = ", ".join(importer.builder.cast) or "none"
+        sentences.append(f"{place}: one entity must have the name {EGO}, got {known}")
+        partial = False
+    if sentences and not partial:
+        more = len(sentences) - MAX_PROBLEMS
+        shown = sentences[:MAX_PROBLEMS] + ([f"… and {more} more problems"] if more > 0 else [])
+        raise UnsupportedError(*shown)
+    return individuals, sentences
+
+
+class _Importer:
+    """States the parts of a file in their order, then compares."""
+
+    def __init__(self, scenario: osc.OpenScenario, roads: OpenDrive, map_file: str) -> None:
+        self.scenario, self.map_file = scenario, map_file
+        header = scenario.file_header
+        constants = parameters.values(scenario)
+        said = header.description
+        self.name = str(constants[said.name] if isinstance(said, osc.ParameterRef) else said)
+        self.builder = StoryBuilder(self.name or PurePath(map_file).stem, scenario, roads)
+        self.builder.legs = stretches(roads, self._ends_of_way())
+        signals = scenario.road_network.traffic_signals
+        whole = individuals_from_opendrive(
+            roads,
+            map_file,
+            name=self.name or PurePath(map_file).stem,
+            controllers=signals is None or not signals.controllers,
+        )
+        nodes = {one: self.builder.iri(road_name(one)) for one in self.builder.legs}
+        self.static = tuple(told(self.builder.legs, nodes, whole.quads))
+        self.derived: dict[str, osc.Event] = {}
+        self.stated: set[str] = set()
+        self.happenings: list[Happening] = []
+        self.controllers: list[str] = []
+        self.refused: list[str] = []
+
+    def _ends_of_way(self) -> set[str]:
+        """Return the ids of the roads on which the ego starts and on which its route ends."""
+        builder, positions = self.builder, []
+        for private in self.scenario.storyboard.init.actions.privates:
+            for wrapped in private.private_actions if private.entity_ref == EGO else ():
+                action = wrapped.action
+                if isinstance(action, osc.TeleportAction):
+                    positions.append(action.position.position)
+                elif isinstance(action, osc.RoutingAction) and isinstance(
+                    action.action, osc.AssignRouteAction
+                ):
+                    positions.append(action.action.route.waypoints[-1].position.position)
+        return {builder.text(one.road_id) for one in positions if isinstance(one, osc.LanePosition)}
+
+    def build(self) -> Individuals:
+        """Return the individuals."""
+        builder, put = self.builder, self.builder.put
+        notes = Notes(builder, self.scenario.file_header)
+        node = builder.node("scenario", "Scenario")
+        put(node, "has_name", self.name or PurePath(self.map_file).stem)
+        duration = self._put_times(node, notes)
+        network = builder.iri("road_network")
+        put(node, "has_road_network", network)
+        elements = self._elements(notes)
+        self._add_entities(node, elements)
+        self.controllers = add_controllers(builder, network, notes.of[SIGNALS])
+        lights = self._lights(duration)
+        self.derived = {
+            str(event.name): event
+            for group in lights.maneuver_groups()
+            for maneuver in group.maneuvers
+            for event in maneuver.events
+        }
+        for happening in happenings(builder):
+            if self.derived.get(happening.name) != happening.event:
+                self.happenings.append(happening)
+        self.stated = add_events(builder, node, self.happenings)
+        add_changes(builder, node, notes.of[EVENT], elements)
+        self._add_weather(node)
+        add_parameters(builder, node, notes)
+        return Individuals([*self.static, *builder.quads])
+
+    def _put_times(self, node: ox.NamedNode, notes: Notes) -> float:
+        """State how long the scenario lasts, and its step; return the duration [s]."""
+        builder, step = self.builder, TIME_STEP
+        if notes.time_step is not None:
+            with builder.attempt():
+                step = as_number(builder, notes.time_step.value, notes.time_step)
+        builder.put(node, "has_time_step", step)
+        stop = self.scenario.storyboard.stop_trigger
+        for group in () if stop is None else stop.condition_groups:
+            if (time := _time_alone(group)) is not None:
+                with builder.attempt():
+                    builder.number(node, "has_duration", time.value, time)
+                    return builder.now(time.value, time)
+        line = self.scenario.storyboard.line if stop is None else stop.line
+        builder.problems.append((line, "a Storyboard that no SimulationTimeCondition alone stops"))
+        builder.put(node, "has_duration", DURATION)
+        return DURATION
+
+    def _elements(self, notes: Notes) -> dict[str, str]:
+        """Return the things at road works, each with whose they are."""
+        builder = self.builder
+        return {
+            builder.text(one.value): name
+            for name, facts in notes.of[EVENT].items()
+            if any(builder.text(said.value) == "RoadWorks" for said in facts.get("class", ()))
+            for one in facts.get("element", ())
+        }
+
+    def _add_entities(self, node: ox.NamedNode, elements: dict[str, str]) -> None:
+        builder = self.builder
+        starts: dict[str, list[osc.PrivateAction]] = {}
+        for private in self.scenario.storyboard.init.actions.privates:
+            name = builder.text(private.entity_ref)
+            starts.setdefault(name, []).extend(private.private_actions)
+        for one in self.scenario.entities.scenario_objects:
+            name = builder.text(one.name)
+            if name in builder.cast:
+                builder.problems.append((one.line, f"a second entity of the name {name}"))
+                continue
+            with builder.attempt():
+                add = add_element if name in elements else add_participant
+                entity = add(builder, one, tuple(starts.get(name, ())))
+                if name not in elements:
+                    builder.put(node, "has_participant", entity)
+                builder.cast[name] = entity
+
+    def _lights(self, duration: float) -> Signals:
+        """Return what the controllers that are stated make of the lights."""
+        quads = [*self.static, *self.builder.quads]
+        return Signals(Individuals(quads), duration)
+
+    def _add_weather(self, node: ox.NamedNode) -> None:
+        builder = self.builder
+        for one in self.scenario.storyboard.init.actions.global_actions:
+            if isinstance(one.action, osc.EnvironmentAction):
+                with builder.attempt():
+                    weather = add_weather(builder, one.action.environment)
+                    if weather is not None:
+                        builder.put(node, "has_weather", weather)
+                return
+
+    # -- what is not said --------------------------------------------------------------------------
+
+    def problems(self, individuals: Individuals) -> Iterator[tuple[int, str]]:
+        """Yield lines, and what stands there that the individuals do not say."""
+        builder = self.builder
+        yield from builder.problems
+        entities = {builder.text(one.name) for one in self.scenario.entities.scenario_objects}
+        for private in self.scenario.storyboard.init.actions.privates:
+            if (name := builder.text(private.entity_ref)) not in entities:
+                yield private.line, f"Private of {name}, which is no entity,"
+        if EGO not in builder.cast:
+            return
+        file = self.scenario.road_network.logic_file
+        try:
+            again = openscenario_from_owl(individuals, "" if file is None else str(file.filepath))
+        except InputError as error:
+            self.refused += error.problems
+            return
+        stated = [one for one in self.happenings if one.name in self.stated]
+        yield from losses(builder, again, self.controllers, stated)
+
+
+def _time_alone(group: osc.ConditionGroup) -> osc.SimulationTimeCondition | None:
+    """Return the one condition of a group if it is on the time."""
+    if len(group.conditions) != 1:
+        return None
+    wrapped = group.conditions[0].condition
+    one = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
+    return one if isinstance(one, osc.SimulationTimeCondition) else None
