@@ -1,0 +1,37 @@
+"""The application that the commands are registered with, and how it is run."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from bridgegen.errors import BridgeGenError, Interrupted
+
+app = typer.Typer(
+    name="bridgegen",
+    help="Search an operational design domain for the scenarios in which a vehicle comes to harm.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+listing = typer.Typer(help="List what there is.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(listing, name="list")
+
+ontology = typer.Typer(help="The ontology itself.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(ontology, name="ontology")
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one message on stderr and exit status 2."""
+    try:
+        app()
+    except Interrupted as stop:
+        print(f"bridgegen: {stop}", file=sys.stderr)
+        sys.exit(130)
+    except BridgeGenError as error:
+        for problem in error.problems:
+            print(f"bridgegen: error: {problem}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,152 @@
+"""The commands that take files: convert, check, draw, ask."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli.app import Json, app, ontology
+from bridgegen.errors import InputError
+
+
+@app.command()
+def export(
+    source: Annotated[Path, typer.Argument(help="The folder of a run, or one .xosc file.")],
+    flavour: Annotated[
+        str,
+        typer.Option(
+            help="1.2 or 1.3: with parameters; resolved: without; recorded: moves by the clock."
+        ),
+    ],
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(help="A scenario of the run, e.g. 0001; may be repeated; all by default."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files; SOURCE/export/FLAVOUR by default.")
+    ] = None,
+) -> None:
+    """Write handed-over scenarios as other tools want them, each with its map."""
+    from bridgegen.campaign.export import export as export_scenarios
+
+    for path in export_scenarios(source, flavour, scenarios=scenario or (), out=out):
+        print(path)
+
+
+@app.command()
+def convert(
+    file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files; beside the .owl by default.")
+    ] = None,
+) -> None:
+    """Turn a scenario's individuals into OpenDRIVE and OpenSCENARIO files."""
+    from bridgegen.openx.convert import convert_file
+
+    written, violations = convert_file(file, out)
+    for path in written:
+        print(path)
+    for violation in violations:
+        print(f"bridgegen: warning: {violation}", file=sys.stderr)
+
+
+@app.command("import")
+def import_(
+    file: Annotated[
+        Path, typer.Argument(help="An OpenDRIVE map (.xodr) or an OpenSCENARIO file (.xosc).")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="The .owl file, new; beside the first by default.")
+    ] = None,
+    partial: Annotated[
+        bool,
+        typer.Option("--partial", help="Leave out what the ontology cannot say, and list it."),
+    ] = False,
+    ego: Annotated[
+        str | None,
+        typer.Option(help="The entity under test in an .xosc, if it is not called ego."),
+    ] = None,
+) -> None:
+    """Turn a whole map, or a scenario on its map, into individuals."""
+    from bridgegen.openx.convert import import_file
+
+    written, notes = import_file(file, out, partial=partial, ego=ego)
+    print(written)
+    for note in notes:
+        print(f"bridgegen: note: {note}", file=sys.stderr)
+
+
+@app.command()
+def validate(
+    files: Annotated[list[Path], typer.Argument(help="Files: .owl, .xodr, .xosc or .yaml.")],
+    reason: Annotated[
+        bool,
+        typer.Option("--reason", help="Ask the reasoner HermiT about .owl files, too (extra)."),
+    ] = False,
+) -> None:
+    """Check files against their rules; exit status 2 if one breaks any."""
+    from bridgegen.openx.convert import validate_file
+
+    broken: list[str] = []
+    for file in files:
+        problems = validate_file(file, reason=reason)
+        broken += problems
+        if not problems:
+            print(f"{file}: valid")
+    if broken:
+        raise InputError(*broken)
+
+
+@app.command()
+def show(
+    what: Annotated[
+        str,
+        typer.Argument(help="A scenario's ontology (.owl), a catalogue name, or a YAML file."),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="The page (.html); beside the file by default.")
+    ] = None,
+) -> None:
+    """Draw a scenario: its individuals, violated constraints in red; or explain a logical one."""
+    from bridgegen.report.show import show_file, show_scenario
+
+    file = Path(what)
+    if file.suffix.lower() != ".owl":
+        print(show_scenario(what, out))
+        return
+    page, violations = show_file(file, out)
+    print(page)
+    if violations:
+        count = "1 violation" if violations == 1 else f"{violations} violations"
+        print(f"bridgegen: warning: {file}: {count}, shown in red", file=sys.stderr)
+
+
+@app.command()
+def ask(
+    file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
+    question: Annotated[
+        str | None, typer.Argument(help="Its name; without one, the questions are listed.")
+    ] = None,
+    sparql: Annotated[
+        Path | None, typer.Option(help="A file with a SPARQL SELECT of your own, instead.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Answer a question about a scenario's individuals."""
+    from bridgegen.ontology.questions import ask_file
+    from bridgegen.screen import print_table
+
+    answer = ask_file(file, question, sparql)
+    print_table(answer.columns, answer.rows, as_json=as_json)
+
+
+@ontology.command("docs")
+def ontology_docs(
+    out: Annotated[Path, typer.Option(help="The page (.html).")] = Path("bridgegen-ontology.html"),
+) -> None:
+    """Write all classes and properties of the ontology as one page, with what each means."""
+    from bridgegen.ontology.docs import write_docs
+
+    write_docs(out)
+    print(out)

@@ -1,0 +1,53 @@
+"""The commands that list what there is."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli.app import Json, listing
+
+
+@listing.command("scenarios")
+def list_scenarios(as_json: Json = False) -> None:
+    """The logical scenarios that ship."""
+    from bridgegen.odd.reader import load, names
+    from bridgegen.screen import print_table
+
+    rows = [(name, load(name).title) for name in names()]
+    print_table(("scenario", "title"), rows, as_json=as_json)
+
+
+@listing.command("algorithms")
+def list_algorithms(as_json: Json = False) -> None:
+    """The search algorithms."""
+    from bridgegen import search as toolkit
+    from bridgegen.screen import print_table
+
+    rows = []
+    for one in (toolkit.get(name) for name in toolkit.names()):
+        settings = ", ".join(f"{name}={json.dumps(s.default)}" for name, s in one.settings.items())
+        rows.append((one.name, one.description, settings, one.source))
+    print_table(("algorithm", "description", "settings", "source"), rows, as_json=as_json)
+
+
+@listing.command("metrics")
+def list_metrics(as_json: Json = False) -> None:
+    """The criticality metrics."""
+    from bridgegen.metrics import METRICS
+    from bridgegen.screen import print_table
+
+    rows = [(m.name, m.unit, m.sense, m.description) for m in METRICS.values()]
+    print_table(("metric", "unit", "more critical if", "description"), rows, as_json=as_json)
+
+
+@listing.command("parameters")
+def list_parameters(
+    scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
+    as_json: Json = False,
+) -> None:
+    """The parameters of a scenario, with ranges and constraints."""
+    from bridgegen.odd.reader import load
+    from bridgegen.screen import print_parameters
+
+    print_parameters(load(scenario).table(), as_json=as_json)

@@ -1,0 +1,182 @@
+"""The commands that make and look at runs."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli.app import Json, app
+from bridgegen.errors import InputError
+
+
+@app.command()
+def search(
+    scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
+    algorithm: Annotated[str, typer.Option(help="See 'bridgegen list algorithms'.")] = "pso",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A setting of the algorithm, NAME=VALUE; may be repeated."),
+    ] = None,
+    budget: Annotated[int, typer.Option(help="Evaluations, exactly.")] = 1000,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
+    ego: Annotated[
+        str | None,
+        typer.Option(
+            help="Who drives: route-follower or reference.", show_default="the scenario's choice"
+        ),
+    ] = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(help="What to search, e.g. static,participants,weather."),
+    ] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(help="Hold a parameter, e.g. --fix fog_density=80; may be repeated."),
+    ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            help="Metrics and weights, e.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy."
+        ),
+    ] = None,
+    weights: Annotated[
+        str | None, typer.Option(help="fixed, or entropy (from a random sample).")
+    ] = None,
+    scale: Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")] = None,
+    road_map: Annotated[
+        Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
+    ] = None,
+    junction: Annotated[str | None, typer.Option(help="Which junction of the map.")] = None,
+    keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
+    out: Annotated[Path | None, typer.Option(help="The run's folder, new.")] = None,
+) -> None:
+    """Search a logical scenario for its critical concrete ones."""
+    from bridgegen import campaign
+    from bridgegen.screen import Screen, print_summary
+
+    fixed = _numbers(fix or [])
+    terms = _terms(objective) if objective else None
+    with Screen(budget) as screen:
+        run = campaign.run_search(
+            scenario,
+            algorithm=algorithm,
+            settings=_settings(settings or []),
+            budget=budget,
+            seed=seed,
+            ego=ego,
+            axes=axes.split(",") if axes else None,
+            fixed=fixed,
+            road_map=road_map,
+            junction=junction,
+            keep=keep,
+            out=out,
+            objective=terms,
+            weights=weights,
+            scale=scale,
+            watch=screen.watch,
+        )
+    print_summary(run, screen.seconds)
+
+
+@app.command()
+def new(
+    name: Annotated[str, typer.Argument(help="Of your scenario; NAME.yaml is written.")],
+    like: Annotated[
+        str | None, typer.Option(help="Start from a copy of this one of the catalogue.")
+    ] = None,
+) -> None:
+    """Write a commented scenario file to start from."""
+    from bridgegen.odd.starter import start_scenario
+
+    path = start_scenario(name, like=like)
+    print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
+
+
+@app.command()
+def resume(folder: Annotated[Path, typer.Argument(help="The folder of a run.")]) -> None:
+    """Go on with a run that was interrupted; the result is as if it had not been."""
+    from bridgegen import campaign
+    from bridgegen.screen import Screen, print_summary
+
+    with Screen() as screen:
+        run = campaign.resume(folder, watch=screen.watch)
+    print_summary(run, screen.seconds)
+
+
+@app.command()
+def coverage(
+    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    bins: Annotated[
+        int, typer.Option(help="Equal bins per parameter; whole numbers have one each.")
+    ] = 5,
+    strength: Annotated[
+        int, typer.Option(help="Count combinations of up to so many parameters' bins: 1, 2, 3.")
+    ] = 3,
+    as_json: Json = False,
+) -> None:
+    """Show which bins, and combinations of bins, a run evaluated and where it was critical."""
+    from bridgegen.campaign.coverage import coverage_of
+    from bridgegen.screen import print_coverage
+
+    settings, found = coverage_of(run, bins=bins, strength=strength)
+    print_coverage(run, settings, found, as_json=as_json)
+
+
+@app.command()
+def simulate(
+    file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
+    ego: Annotated[
+        str | None, typer.Option(help="Who drives; what the file says by default.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run one scenario file and print its metrics."""
+    from bridgegen.pipeline import simulate_file
+    from bridgegen.screen import print_file_result
+
+    result = simulate_file(file, ego=ego)
+    if as_json:
+        facts = {"file": str(file), "ego": result.driver, "status": result.status}
+        metrics = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
+        print(json.dumps({**facts, "parameters": result.parameters, "metrics": metrics}, indent=2))
+    else:
+        print_file_result(file, result)
+
+
+def _terms(text: str) -> dict[str, float | None]:
+    """Read ``metric=weight,…`` or ``metric,…``."""
+    pairs = [pair.strip() for pair in text.split(",")]
+    weighted = _numbers([pair for pair in pairs if "=" in pair], "--objective")
+    return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
+
+
+def _settings(pairs: list[str]) -> dict[str, bool | int | float | str]:
+    """Read ``name=value`` pairs; a value is a number, true, false, or a text."""
+    values: dict[str, bool | int | float | str] = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise InputError(f"--set must read NAME=VALUE, got '{pair}'")
+        try:
+            value = json.loads(text)
+        except json.JSONDecodeError:
+            value = text
+        values[name] = value if isinstance(value, bool | int | float | str) else text
+    return values
+
+
+def _numbers(pairs: list[str], option: str = "--fix") -> dict[str, float]:
+    """Read ``name=value`` pairs."""
+    values, problems = {}, []
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        try:
+            values[name] = float(text)
+        except ValueError:
+            equals = ""
+        if not equals:
+            problems.append(f"{option} must read NAME=NUMBER, got '{pair}'")
+    if problems:
+        raise InputError(*problems)
+    return values
