@@ -9,10 +9,10 @@ from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.notes import TIME_STEP
 from bridgegen.openx.openscenario.values import Value
+from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
-    BesideLanes,
     LanePoint,
     PathSpec,
     Point,
@@ -25,22 +25,6 @@ from bridgegen.simulation.embedded.triggers import Triggers
 DEFAULT_TIME_STEP = 0.05  # s
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 MAX_STEPS = 100_000
-
-_SPEED_CHANGE, _LANE_CHANGE, _FRICTION, _LIGHT = 0, 1, 2, 3
-
-LIGHT_STATES = {
-    "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
-}  # fmt: skip
-"""The states of a traffic light's three lamps as `Rollout.lights` has them."""
-
-_SHAPES = {
-    osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
-    osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
-}  # fmt: skip
-_DIMENSIONS = {
-    osc.DynamicsDimension.RATE: 0, osc.DynamicsDimension.TIME: 1,
-    osc.DynamicsDimension.DISTANCE: 2,
-}  # fmt: skip
 
 
 def compile_storyboard(
@@ -71,10 +55,7 @@ class _Compiler:
         self.place = place
         self.tables = Tables(scenario, place)
         self.paths: list[PathSpec] = []
-        self.actions: list[tuple[int, ...]] = []
-        self.lane_paths: dict[int, int] = {}
-        self.lights: list[str] = []
-        self.first_states: list[int] = []
+        self.actions = Actions(self.tables, self.paths)
 
     def compile(self, driver: Driver | None, time_step: float | None) -> Program:
         if not self.tables.objects:
@@ -85,7 +66,7 @@ class _Compiler:
         self.triggers = Triggers(self.tables, step, event_names)
         bodies = np.array([self._body(one.entity_object) for one in self.tables.objects])
         init, friction = self._init()
-        if driver and self._is_timed(0):
+        if driver and self.actions.is_timed(0):
             self.tables.problems.append(
                 f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
                 "trajectory with times"
@@ -124,21 +105,16 @@ class _Compiler:
             points=tuple(self.triggers.points),
             acts=np.array(acts, dtype=np.int64),
             events=table(events, 4),
-            actions=table(self.actions, 7),
+            actions=table(self.actions.rows, 7),
             friction_slot=friction,
-            lights=tuple(self.lights),
-            first_states=np.array(self.first_states, dtype=np.int8),
+            lights=tuple(self.actions.lights),
+            first_states=np.array(self.actions.first_states, dtype=np.int8),
             driver=driver or self._declared_driver(),
             time_step=step,
             n_steps=n_steps,
             fixed=self.tables.fixed,
             event_names=tuple(event_names),
         )
-
-    def _is_timed(self, entity: int) -> bool:
-        """Say whether an entity follows a trajectory with times, which rules out all else."""
-        path = self.paths[entity] if entity < len(self.paths) else None
-        return isinstance(path, AlongTrajectory) and bool(path.times)
 
     def _aside_slot(self, path: PathSpec) -> int:
         """Return the slot of how far who is on a path is beside it; -1 if on it."""
@@ -162,7 +138,7 @@ class _Compiler:
         return value
 
     def _declared_driver(self) -> Driver:
-        if self._is_timed(0):
+        if self.actions.is_timed(0):
             return TRAJECTORY
         for controller in self.tables.objects[0].object_controllers:
             properties = controller.controller.properties
@@ -209,9 +185,9 @@ class _Compiler:
                 self.tables.unsupported(one.action, type(one.action.action).__name__)
                 continue
             if not isinstance(one.action, osc.EnvironmentAction):
-                light, state = self._light(one.action)
+                light, state = self.actions.light(one.action)
                 if light >= 0:
-                    self.first_states[light] = state
+                    self.actions.first_states[light] = state
                 continue
             road = one.action.environment.road_condition
             if road is not None:
@@ -234,7 +210,7 @@ class _Compiler:
                     dynamics = action.action.dynamics
                     if dynamics.dynamics_shape is not osc.DynamicsShape.STEP:
                         self.tables.unsupported(dynamics, "an initial SpeedAction other than step")
-                    init[name] = self._speed(action.action.speed_action_target)
+                    init[name] = self.actions.speed(action.action.speed_action_target)
                 elif isinstance(action, osc.LateralAction):
                     what = type(action.action).__name__
                     self.tables.unsupported(action.action, f"an initial {what}")
@@ -269,12 +245,6 @@ class _Compiler:
                 )
         return [init[name] for name in self.tables.names], friction
 
-    def _speed(self, target: osc.SpeedActionTarget) -> int:
-        if isinstance(target.target, osc.RelativeTargetSpeed):
-            self.tables.unsupported(target.target, "RelativeTargetSpeed")
-            return self.tables.slot(0.0)
-        return self.tables.slot(target.target.value)
-
     def _stories(self, storyboard: osc.Storyboard) -> tuple[list[int], list[tuple[int, ...]]]:
         acts: list[int] = []
         events: list[tuple[int, ...]] = []
@@ -300,100 +270,16 @@ class _Compiler:
         if event.priority is osc.Priority.SKIP or isinstance(event.priority, osc.ParameterRef):
             self.tables.unsupported(event, f'priority="{event.priority}"')
         trigger = self.triggers.add(event.start_trigger, always=True)
-        first = len(self.actions)
+        first = len(self.actions.rows)
         for one in event.actions:
             if isinstance(one.action, osc.GlobalAction):
-                self._global(one.action)
+                self.actions.add_global(one.action)
                 continue
             if not group.actors.entity_refs:
                 self.tables.unsupported(group.actors, "Actors without an EntityRef")
             for actor in group.actors.entity_refs:
-                self._private(one.action, self.tables.entity(actor.entity_ref))
-        return act, trigger, first, len(self.actions)
-
-    def _global(self, wrapped: osc.GlobalAction) -> None:
-        action = wrapped.action
-        if isinstance(action, osc.EntityAction):
-            self.tables.unsupported(action, type(action.action).__name__)
-            return
-        if not isinstance(action, osc.EnvironmentAction):
-            light, state = self._light(action)
-            slot = self.tables.slot(float(state))
-            self.actions.append((max(light, 0), _LIGHT, 0, 0, slot, slot, 0))
-            return
-        road = action.environment.road_condition
-        if road is not None:
-            slot = self.tables.slot(road.friction_scale_factor)
-            self.actions.append((0, _FRICTION, 0, 0, slot, slot, 0))
-
-    def _light(self, action: osc.InfrastructureAction) -> tuple[int, int]:
-        """Return the number of the light that an action sets, and its state; -1 if it sets none."""
-        set_ = action.traffic_signal_action.action
-        if not isinstance(set_, osc.TrafficSignalStateAction):
-            self.tables.unsupported(set_, type(set_).__name__)
-            return -1, 0
-        state = LIGHT_STATES.get(str(set_.state))
-        if state is None:
-            known = ", ".join(LIGHT_STATES)
-            self.tables.unsupported(set_, f'state="{set_.state}" (other than {known})')
-            return -1, 0
-        name = str(set_.name)
-        if name not in self.lights:
-            self.lights.append(name)
-            self.first_states.append(0)
-        return self.lights.index(name), state
-
-    def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
-        action = wrapped.action
-        if self._is_timed(entity):
-            what = f"{type(action).__name__} of one that follows a trajectory with times"
-            self.tables.unsupported(action, what)
-        elif isinstance(action, osc.LongitudinalAction):
-            shape, dimension, value = self._dynamics(action.action.dynamics)
-            target = self._speed(action.action.speed_action_target)
-            self.actions.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))
-        elif isinstance(action, osc.LateralAction):
-            if isinstance(action.action, osc.LaneChangeAction):
-                self._lane_change(action.action, entity)
-            else:
-                self.tables.unsupported(action.action, type(action.action).__name__)
-        else:
-            self.tables.unsupported(action, f"{type(action).__name__} in an Event")
-
-    def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
-        shape, dimension, value = self._dynamics(action.dynamics)
-        if dimension == 0 and shape != 0:
-            self.tables.unsupported(action.dynamics, "a LaneChangeAction by a rate")
-        if entity == 0:
-            self.tables.unsupported(action, "a LaneChangeAction of the ego")
-        if action.target_lane_offset not in (None, 0.0):
-            self.tables.unsupported(action, f'targetLaneOffset="{action.target_lane_offset}"')
-        target = action.lane_change_target.target
-        lanes = lane = None
-        if isinstance(target, osc.RelativeTargetLane):
-            if self.tables.entity(target.entity_ref) != entity:
-                self.tables.unsupported(target, "a RelativeTargetLane of another entity")
-            lanes = int(self.tables.literal(target, "value", target.value))
-        else:
-            try:
-                lane = int(str(target.value))
-            except ValueError:
-                self.tables.unsupported(target, f'value="{target.value}" (a lane id is needed)')
-        before = self.lane_paths.get(entity, entity)
-        self.lane_paths[entity] = len(self.paths)
-        self.paths.append(BesideLanes(before, lanes, lane, action.line))
-        slot = self.tables.slot(0.0) if shape == 0 else value
-        self.actions.append(
-            (entity, _LANE_CHANGE, shape, dimension, slot, slot, len(self.paths) - 1)
-        )
-
-    def _dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int, int]:
-        slot = self.tables.slot(dynamics.value)
-        shape, dimension = dynamics.dynamics_shape, dynamics.dynamics_dimension
-        if isinstance(shape, osc.ParameterRef) or isinstance(dimension, osc.ParameterRef):
-            self.tables.unsupported(dynamics, f'"{shape}" over "{dimension}"')
-            return 0, 0, slot
-        return _SHAPES[shape], _DIMENSIONS[dimension], slot
+                self.actions.add_private(one.action, self.tables.entity(actor.entity_ref))
+        return act, trigger, first, len(self.actions.rows)
 
 
 def _events(storyboard: osc.Storyboard) -> list[osc.Event]:

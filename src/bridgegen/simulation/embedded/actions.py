@@ -1,0 +1,138 @@
+"""The actions of a storyboard, at the start and in events, as rows of integers."""
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.simulation.embedded.program import AlongTrajectory, BesideLanes, PathSpec
+from bridgegen.simulation.embedded.tables import Tables
+
+_SPEED_CHANGE, _LANE_CHANGE, _FRICTION, _LIGHT = 0, 1, 2, 3
+
+LIGHT_STATES = {
+    "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
+}  # fmt: skip
+"""The states of a traffic light's three lamps as `Rollout.lights` has them."""
+
+_SHAPES = {
+    osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
+    osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
+}  # fmt: skip
+_DIMENSIONS = {
+    osc.DynamicsDimension.RATE: 0, osc.DynamicsDimension.TIME: 1,
+    osc.DynamicsDimension.DISTANCE: 2,
+}  # fmt: skip
+
+
+class Actions:
+    """What events change.
+
+    Attributes:
+        rows: as ``Program.actions`` has them.
+        lights: the traffic lights that are set.
+        first_states: their states at the start.
+
+    Args:
+        tables: the compiler's; takes down what cannot be run.
+        paths: of the entities; a lane change adds the one that it leads to.
+    """
+
+    def __init__(self, tables: Tables, paths: list[PathSpec]) -> None:
+        self._tables, self._paths = tables, paths
+        self._lane_paths: dict[int, int] = {}
+        self.rows: list[tuple[int, ...]] = []
+        self.lights: list[str] = []
+        self.first_states: list[int] = []
+
+    def speed(self, target: osc.SpeedActionTarget) -> int:
+        """Return the slot of a speed that is aimed at."""
+        if isinstance(target.target, osc.RelativeTargetSpeed):
+            self._tables.unsupported(target.target, "RelativeTargetSpeed")
+            return self._tables.slot(0.0)
+        return self._tables.slot(target.target.value)
+
+    def add_global(self, wrapped: osc.GlobalAction) -> None:
+        """Add what a global action of an event does."""
+        action = wrapped.action
+        if isinstance(action, osc.EntityAction):
+            self._tables.unsupported(action, type(action.action).__name__)
+            return
+        if not isinstance(action, osc.EnvironmentAction):
+            light, state = self.light(action)
+            slot = self._tables.slot(float(state))
+            self.rows.append((max(light, 0), _LIGHT, 0, 0, slot, slot, 0))
+            return
+        road = action.environment.road_condition
+        if road is not None:
+            slot = self._tables.slot(road.friction_scale_factor)
+            self.rows.append((0, _FRICTION, 0, 0, slot, slot, 0))
+
+    def light(self, action: osc.InfrastructureAction) -> tuple[int, int]:
+        """Return the number of the light that an action sets, and its state; -1 if it sets none."""
+        set_ = action.traffic_signal_action.action
+        if not isinstance(set_, osc.TrafficSignalStateAction):
+            self._tables.unsupported(set_, type(set_).__name__)
+            return -1, 0
+        state = LIGHT_STATES.get(str(set_.state))
+        if state is None:
+            known = ", ".join(LIGHT_STATES)
+            self._tables.unsupported(set_, f'state="{set_.state}" (other than {known})')
+            return -1, 0
+        name = str(set_.name)
+        if name not in self.lights:
+            self.lights.append(name)
+            self.first_states.append(0)
+        return self.lights.index(name), state
+
+    def add_private(self, wrapped: osc.PrivateAction, entity: int) -> None:
+        """Add what a private action of an event does to one entity."""
+        action = wrapped.action
+        if self.is_timed(entity):
+            what = f"{type(action).__name__} of one that follows a trajectory with times"
+            self._tables.unsupported(action, what)
+        elif isinstance(action, osc.LongitudinalAction):
+            shape, dimension, value = self._dynamics(action.action.dynamics)
+            target = self.speed(action.action.speed_action_target)
+            self.rows.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))
+        elif isinstance(action, osc.LateralAction):
+            if isinstance(action.action, osc.LaneChangeAction):
+                self._lane_change(action.action, entity)
+            else:
+                self._tables.unsupported(action.action, type(action.action).__name__)
+        else:
+            self._tables.unsupported(action, f"{type(action).__name__} in an Event")
+
+    def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
+        shape, dimension, value = self._dynamics(action.dynamics)
+        if dimension == 0 and shape != 0:
+            self._tables.unsupported(action.dynamics, "a LaneChangeAction by a rate")
+        if entity == 0:
+            self._tables.unsupported(action, "a LaneChangeAction of the ego")
+        if action.target_lane_offset not in (None, 0.0):
+            self._tables.unsupported(action, f'targetLaneOffset="{action.target_lane_offset}"')
+        target = action.lane_change_target.target
+        lanes = lane = None
+        if isinstance(target, osc.RelativeTargetLane):
+            if self._tables.entity(target.entity_ref) != entity:
+                self._tables.unsupported(target, "a RelativeTargetLane of another entity")
+            lanes = int(self._tables.literal(target, "value", target.value))
+        else:
+            try:
+                lane = int(str(target.value))
+            except ValueError:
+                self._tables.unsupported(target, f'value="{target.value}" (a lane id is needed)')
+        before = self._lane_paths.get(entity, entity)
+        self._lane_paths[entity] = len(self._paths)
+        self._paths.append(BesideLanes(before, lanes, lane, action.line))
+        slot = self._tables.slot(0.0) if shape == 0 else value
+        self.rows.append((entity, _LANE_CHANGE, shape, dimension, slot, slot, len(self._paths) - 1))
+
+    def _dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int, int]:
+        slot = self._tables.slot(dynamics.value)
+        shape, dimension = dynamics.dynamics_shape, dynamics.dynamics_dimension
+        if isinstance(shape, osc.ParameterRef) or isinstance(dimension, osc.ParameterRef):
+            self._tables.unsupported(dynamics, f'"{shape}" over "{dimension}"')
+            return 0, 0, slot
+        return _SHAPES[shape], _DIMENSIONS[dimension], slot
+
+    def is_timed(self, entity: int) -> bool:
+        """Say whether an entity follows a trajectory with times, which rules out all else."""
+        path = self._paths[entity] if entity < len(self._paths) else None
+        return isinstance(path, AlongTrajectory) and bool(path.times)
