@@ -5,7 +5,6 @@ import pyoxigraph as ox
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.outcomes import with_outcomes
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import load
 from bridgegen.odd.roads import usual
@@ -23,6 +22,7 @@ from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.pipeline import Pipeline, on_map
+from bridgegen.simulation.outcomes import with_outcomes
 
 
 def records(individuals):

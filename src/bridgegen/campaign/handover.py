@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.campaign.outcomes import with_outcomes
 from bridgegen.errors import OntologyError, StorageError
 from bridgegen.metrics import METRICS
 from bridgegen.ontology.check import check
@@ -18,6 +17,7 @@ from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.outcomes import with_outcomes
 from bridgegen.store import Rows
 
 DISTINCT = (0.2, 0.1)

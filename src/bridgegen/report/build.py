@@ -20,6 +20,7 @@ from bridgegen.report.data import (
 )
 from bridgegen.report.painter import paint
 from bridgegen.report.scenery import Scenery, bodies, lamps
+from bridgegen.simulation.outcomes import with_outcomes
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
 
@@ -170,6 +171,7 @@ def _playbacks(
         individuals = pipeline.individuals(values)
         x, y = rollout.x[k], rollout.y[k]
         lanes, lights = scenery.road(values, individuals)
+        whole = with_outcomes(individuals, rollout, pipeline.roads(individuals), k)
         playbacks.append(
             Playback(
                 name=name,
@@ -185,7 +187,7 @@ def _playbacks(
                 lanes=lanes,
                 n_steps=int(rollout.n_steps[k]),
                 files=files,
-                picture=paint(individuals, (), checked),
+                picture=paint(whole, (), checked),
                 lamps=lamps(rollout, k, lights),
             )
         )  # fmt: skip
