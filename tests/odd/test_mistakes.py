@@ -11,6 +11,37 @@ from bridgegen.odd.reader import load
 
 MISTAKES = [
     (
+        "objective: #",
+        "defaults: {fog_densty: 20}\n\nobjective: #",
+        "defaults names the unknown parameter 'fog_densty'; did you mean 'fog_density'?",
+        "defaults: {fog_densty: 20}",
+    ),
+    (
+        "objective: #",
+        "defaults: {fog_density: 120}\n\nobjective: #",
+        "low <= default <= high must hold for fog_density [%], got low=0.0, default=120.0, "
+        "high=100.0",
+        "defaults: {fog_density: 120}",
+    ),
+    (
+        "objective: #",
+        "defaults: {friction: 0.5}\n\nobjective: #",
+        "friction is derived: it has no default",
+        "defaults: {friction: 0.5}",
+    ),
+    (
+        "objective: #",
+        "defaults: {bv_speed: 2}\n\nobjective: #",
+        "bv_speed is this file's own: its default stands there",
+        "defaults: {bv_speed: 2}",
+    ),
+    (
+        "objective: #",
+        "defaults: {fog_density: much}\n\nobjective: #",
+        "defaults.fog_density must be a number, got 'much'",
+        "defaults: {fog_density: much}",
+    ),
+    (
         "duration: 20.0",
         "duratoin: 20.0",
         "unknown key 'duratoin'; did you mean 'duration'?",

@@ -1,0 +1,127 @@
+"""What a scenario file may say beyond the crossroads of the paper, and what it may not."""
+
+import re
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import ScenarioError
+from bridgegen.odd.bodies import BODIES
+from bridgegen.odd.reader import load
+from bridgegen.odd.starter import start_scenario
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Write the starter with some of its text replaced, and read it."""
+
+    def write(*edits):
+        path = tmp_path / "own.yaml"
+        path.unlink(missing_ok=True)
+        start_scenario("own", folder=tmp_path)
+        text = path.read_text("utf-8")
+        for old, new in edits:
+            assert old in text, old
+            text = text.replace(old, new, 1)
+        path.write_text(text, "utf-8")
+        return load(path)
+
+    return write
+
+
+def test_a_default_of_an_included_parameter(own):
+    edit = ("# defaults: {fog_density: 60, sun_altitude_angle: 20}", "defaults: {fog_density: 60}")
+    scenario = own(edit)
+    assert scenario.parameters["fog_density"].default == 60.0
+    assert scenario.space(["participants"]).row({}).shape == (len(scenario.space().names),)
+    assert own().parameters["fog_density"].default == 0.0
+    assert own().fingerprint != scenario.fingerprint
+
+
+def test_bodies_in_one_lane_need_their_lengths(own):
+    """A car ahead of a car: the rear of the one, the front of the other, and 0.4 m."""
+    car = BODIES["car"]
+    needed = car.rear + car.front + 0.4
+    assert needed == pytest.approx(5.0)
+    third = "  other: # car"
+    at = "  third:\n    type: car\n    start: {lane: 2, distance: %s}\n  other: # car"
+    own((third, at % 55.0))
+    with pytest.raises(ScenarioError, match=r"ego and third start 4\.9 m apart on leg main out"):
+        own((third, at % 54.9))
+
+
+def test_bodies_beside_each_other_need_their_widths(own):
+    bicycle = "  third:\n    type: bicycle\n    start: {lane: 2, distance: 50.0, offset: %s}\n"
+    third = "  other: # car"
+    own((third, bicycle % -1.5 + third))  # (1.9 + 0.6) / 2 and 0.25 m
+    with pytest.raises(ScenarioError, match="ego and third start 0 m apart"):
+        own((third, bicycle % -1.49 + third))
+
+
+def test_a_jam_moves_as_one(own):
+    jam = (
+        "# jams: {queue: {tail: {lane: 2, distance: 400.0}, vehicles: [car, truck, car], "
+        "gap: 3.0}}",
+        "jams: {queue: {tail: {lane: 2, distance: tail}, vehicles: [car, truck, car], gap: room}}",
+    )
+    more = (
+        "parameters:\n",
+        "parameters:\n"
+        + "".join(
+            f"  {name}: {{axis: temporary, unit: m, low: {low}, high: {high}, default: {high}, "
+            "description: d, source: s}\n"
+            for name, low, high in (("tail", 300, 400), ("room", 2, 6))
+        ),
+    )
+    scenario = own(jam, more)
+    space = scenario.space(["temporary"])
+    X = space.decode(np.random.default_rng(0).random((50, space.n_var)))
+    tail, room, second, third = (
+        X[:, space.index(name)] for name in ("tail", "room", "queue_2_at", "queue_3_at")
+    )
+    car, truck = BODIES["car"], BODIES["truck"]
+    np.testing.assert_allclose(second - truck.rear - (tail + car.front), room, atol=1e-9)
+    np.testing.assert_allclose(third - car.rear - (second + truck.front), room, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("edits", "problem"),
+    [
+        (
+            [("lanes: 2 #", "lanes: 1 #")],
+            "leg main has 1 lanes out, got lane 2",
+        ),
+        (
+            [("lane_change: {lanes: -1, time: 3.0}", "lane_change: {lanes: -1}")],
+            "a lane change takes a time or a distance",
+        ),
+        (
+            [("{kind: after, event: other_moves_over", "{kind: after, event: other_moves")],
+            "unknown event 'other_moves'; did you mean 'other_moves_over'?",
+        ),
+        (
+            [("{kind: distance, to: ego, value: near}", "{kind: distance, value: near}")],
+            "a distance condition needs 'to', the other participant",
+        ),
+        (
+            [("  # walker:\n  #   type: pedestrian", "  walker:\n    type: pedestrian"),
+             ("  #   path: [{lane", "    path: [{lane")],
+            "leg main has no sidewalk: sidewalk_width must be greater than 0 m",
+        ),
+        (
+            [("    type: car\n    start: {lane: 1, distance: other_at}",
+              "    type: pedestrian\n    start: {lane: 1, distance: other_at}")],
+            "other must stand on a sidewalk: pedestrians are on roads to cross",
+        ),
+        ([("segments: [{", "x: [{"), ("# x:", "segments: [{length: 500, curvature: 0.5}] #")],
+         "curvature [1/m] must be -0.1667 to 0.1667, got 0.5"),
+        ([("speed_limit: 27.8", "speed_limit: 10.0")],
+         "leaves no value to ego_speed [m/s], 10 to 25"),
+    ],
+)  # fmt: skip
+def test_mistakes(own, edits, problem):
+    with pytest.raises(ScenarioError) as caught:
+        own(*edits)
+    said = "\n".join(caught.value.problems)
+    assert problem in said
+    assert re.search(r"own\.yaml", said)
