@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.report.data import ReportData
+from bridgegen.report.data import Entity, Lamp, ReportData
 from bridgegen.report.page import write_report
 
 pytestmark = pytest.mark.browser
@@ -376,5 +376,62 @@ def test_hostile_text_and_missing_numbers_are_harmless(show, report):
     for k in (0, 50, 200):
         scrub(page, k)
         assert (opened.state()["entities"][1]["x"] is None) == (k == 50)
+    assert opened.complaints == []
+    page.close()
+
+
+def count_of(page: Any, rgb: tuple[int, int, int]) -> int:
+    """Return how many pixels of the scene have a colour."""
+    return page.evaluate(
+        """([r, g, b]) => {
+             const { width, height } = document.getElementById("scene");
+             const context = document.getElementById("scene").getContext("2d");
+             const { data } = context.getImageData(0, 0, width, height);
+             let n = 0;
+             for (let i = 0; i < data.length; i += 4) {
+               n += data[i] === r && data[i + 1] === g && data[i + 2] === b;
+             }
+             return n;
+           }""",
+        list(rgb),
+    )
+
+
+def test_lights_show_what_they_show_and_things_look_like_themselves(show, report):
+    red, green = (0xFF, 0x4D, 0x4D), (0x38, 0xD3, 0x9F)
+    p = report.kept[0]
+    states = np.where(np.arange(401) < 40, 1, 4).astype(np.int8)
+    spot = np.array([6.0, 8.0])
+    types = ("pedestrian", "bicycle", "cone", "sign", "obstacle", "truck")
+    things = tuple(Entity(f"thing_{t}", 0.6, 0.6, 0.0, t) for t in types)
+    n = len(things)
+    still = {
+        name: np.vstack([getattr(p, name), np.tile(values[:, None], (1, 401))])
+        for name, values in (
+            ("x", spot[0] + 3.0 * np.arange(n)), ("y", np.full(n, spot[1])),
+            ("h", np.zeros(n)), ("v", np.zeros(n)),
+        )
+    }  # fmt: skip
+    data = replace(
+        report,
+        kept=(
+            replace(
+                p,
+                entities=(*p.entities, *things),
+                lamps=(Lamp(0.0, 0.0, 0.0, states),),
+                **still,
+            ),
+        ),
+    )
+    opened = show(data)
+    page = opened.page
+    scrub(page, 10)
+    assert count_of(page, red) > 10 > count_of(page, green)
+    scrub(page, 60)
+    assert count_of(page, green) > 10 > count_of(page, red)
+    cone = tuple(colour(page, "--cone"))
+    assert count_of(page, cone) >= 1  # a ring about a white middle, a few pixels
+    legend = page.evaluate("bridgegen.state().screen.length")
+    assert legend == 2 + n
     assert opened.complaints == []
     page.close()
