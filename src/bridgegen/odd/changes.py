@@ -9,13 +9,13 @@ from collections.abc import Iterator
 from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Axis, Derived
+from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import Quantity, RoadsSpec
 from bridgegen.odd.schema import JamSection, WorksSection
 from bridgegen.odd.shape import section
 from bridgegen.odd.story import Jam, Participant, RoadWorks, Waypoint
-from bridgegen.odd.storyboard import Storyboard
 
 _BESIDE = 0.75
 """How far from the carriageway's edge a sign stands [m]; source: RSA 21, 0.5 to 1.5 m."""
@@ -44,11 +44,11 @@ class TemporaryChanges:
     Args:
         quantities: of the file; takes down what is wrong.
         roads: where it is.
-        storyboard: reads the places.
     """
 
-    def __init__(self, quantities: Quantities, roads: RoadsSpec, storyboard: Storyboard) -> None:
-        self._quantities, self._roads, self._storyboard = quantities, roads, storyboard
+    def __init__(self, quantities: Quantities, roads: RoadsSpec) -> None:
+        self._quantities, self._roads = quantities, roads
+        self._places = Places(quantities, roads)
         self.participants: list[Participant] = []
         self.derived: list[Derived] = []
         self.jams = tuple(self._jams())
@@ -61,7 +61,7 @@ class TemporaryChanges:
             if given is None:
                 continue
             self._quantities.check(given.gap, "m", (*path, "gap"), above=True)
-            tail = self._storyboard.waypoint(given.tail, (*path, "tail"))
+            tail = self._places.waypoint(given.tail, (*path, "tail"))
             ahead, names = 0.0, []
             for k, kind in enumerate(given.vehicles):
                 body = BODIES[kind]
@@ -78,7 +78,7 @@ class TemporaryChanges:
             given = section(WorksSection, data)
             if given is None:
                 continue
-            start = self._storyboard.waypoint(given.start, (*path, "start"))
+            start = self._places.waypoint(given.start, (*path, "start"))
             problem = self._works_problem(given, start)
             if problem:
                 self._quantities.say(problem, path)

@@ -245,7 +245,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     if roads is None:
         raise ScenarioError(*problems, *said.problems)  # no place can be checked without them
     board = Storyboard(quantities, roads, said.prefixes, jam_members(quantities))
-    changes = TemporaryChanges(quantities, roads, board)
+    changes = TemporaryChanges(quantities, roads)
     story = Story(
         (*board.participants, *changes.participants), board.events, changes.jams, changes.works
     )

@@ -1,10 +1,9 @@
 """Participants and events of a scenario file: built, with the rules they must keep."""
 
-import math
 from collections.abc import Iterator
-from itertools import pairwise
 
 from bridgegen.odd.parameters import nearest
+from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import LETTERS, Quantity, RoadsSpec
@@ -57,6 +56,7 @@ class Storyboard:
         more: tuple[str, ...] = (),
     ) -> None:
         self._quantities, self._roads, self._prefixes = quantities, roads, prefixes
+        self._places = Places(quantities, roads)
         self._say, self._check = quantities.say, quantities.check
         document = quantities.document
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
@@ -64,69 +64,6 @@ class Storyboard:
         self.participants = tuple(self._participants())
         self._acting = {one.name: one for one in self.participants}
         self.events = tuple(self._events())
-
-    # -- where ---------------------------------------------------------------------------------
-
-    def waypoint(self, given: WaypointSection, path: Path, *, above: bool = False) -> Waypoint:
-        """Return a place on a leg, and say what is wrong with it."""
-        self._check(given.distance, "m", (*path, "distance"), above=above)
-        self._check(given.offset, "m", (*path, "offset"), low=-math.inf)
-        roads = self._roads
-        leg, way = given.leg, given.way
-        if given.point is not None:
-            if leg is not None or way is not None:
-                self._say("a place has a point, or a leg and a way, not both", path)
-            at = Waypoint.at_point(given.point, given.distance)
-            leg, way = at.leg, at.way
-        elif roads.template == "road":
-            leg, way = leg or "main", way or "out"
-        elif leg is None or way is None:
-            self._say("a place must have a point, or a leg and a way", path)
-            leg, way = leg or roads.leg_names[0], way or "in"
-        if leg not in roads.leg_names:
-            points = [f"P{2 * LETTERS.index(n) + k}" for n in roads.legs for k in (1, 2)]
-            known = ", ".join(roads.leg_names) + (f" ({', '.join(points)})" if points else "")
-            got = given.point or leg
-            self._say(f"a place lies on one of the legs {known}, got '{got}'", path)
-        elif isinstance(given.lane, int):
-            self._check_lane(leg, way, given.lane, path)
-        else:
-            self._check_strip(leg, given.lane, path)
-        return Waypoint(leg, way, given.distance, given.lane, given.offset)  # type: ignore[arg-type]
-
-    def _check_lane(self, leg: str, way: str, lane: int, path: Path) -> None:
-        count = self._roads.lanes(leg, way)
-        if isinstance(count, str):
-            parameter = self._quantities.parameters.get(count)
-            least = parameter.low if parameter else lane
-            if lane > least:
-                self._say(
-                    f"lane {lane} of leg {leg} must always be there, '{count}' goes down to "
-                    f"{least:g}",
-                    path,
-                )
-        elif lane > count:
-            self._say(f"leg {leg} has {count:g} lanes {way}, got lane {lane}", path)
-
-    def _check_strip(self, leg: str, strip: str, path: Path) -> None:
-        width = self._roads.knobs[f"{strip}_width"]
-        if width == 0.0:
-            self._say(f"leg {leg} has no {strip}: {strip}_width must be greater than 0 m", path)
-        for way in ("in", "out"):
-            count = self._roads.lanes(leg, way)
-            if isinstance(count, str):
-                self._say(
-                    f"a place on a {strip} needs a fixed number of lanes, '{count}' varies: "
-                    "one storyboard serves every road network",
-                    path,
-                )
-
-    def _range(self, value: Quantity) -> tuple[float, float]:
-        """Return the least and the greatest value that a constant or a parameter has."""
-        if not isinstance(value, str):
-            return value, value
-        one = self._quantities.parameters.get(value)
-        return (one.low, one.high) if one else (-math.inf, math.inf)
 
     # -- who -----------------------------------------------------------------------------------
 
@@ -153,7 +90,8 @@ class Storyboard:
     def _walker(self, name: str, given: ParticipantSection, path: Path) -> Participant:
         """Return a participant with a path of its own."""
         points = tuple(
-            self.waypoint(one, (*path, "path", number)) for number, one in enumerate(given.path)
+            self._places.waypoint(one, (*path, "path", number))
+            for number, one in enumerate(given.path)
         )
         if given.start is not None or given.end is not None:
             self._say(f"{name} must have a path, or a start and an end, not both", path)
@@ -163,42 +101,17 @@ class Storyboard:
             kinds = ", ".join(_WALKERS)
             self._say(f"a {given.type} keeps to lanes; a path is for {kinds}", path)
         if given.type == "pedestrian":
-            self._check_crossing(name, points, path)
+            self._places.check_crossing(name, points, path)
         return Participant(name, given.type, points[0], None, given.speed, points)
-
-    def _check_crossing(self, name: str, points: tuple[Waypoint, ...], path: Path) -> None:
-        """Say where a pedestrian leaves the sidewalks and crosswalks (paper, Section III-B)."""
-        roads = self._roads
-        half = roads.knobs["crosswalk_width"]
-        reach = 0.5 * (half if isinstance(half, float) else 0.0)
-        for one, other in pairwise(points):
-            if one.lane == other.lane == "sidewalk" and (one.leg, one.way) == (
-                other.leg, other.way
-            ):  # fmt: skip
-                continue
-            at = roads.crosswalk(one.leg)
-            rule = "pedestrians cross on crosswalks only"
-            if at is None or one.leg != other.leg:
-                self._say(f"{rule}: there is none where {name} crosses leg {one.leg}", path)
-                return
-            for point in (one, other):
-                low, high = self._range(point.distance)
-                if low < at - reach - 1e-9 or high > at + reach + 1e-9:
-                    got = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-                    self._say(
-                        f"{rule}: distance of {name} must be {at - reach:g} to {at + reach:g} m "
-                        f"on leg {point.leg}, got {got}",
-                        path,
-                    )
 
     def _driver(
         self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
     ) -> Participant:
         """Return a participant that keeps to lanes."""
-        start = self.waypoint(place, (*path, "start"))
+        start = self._places.waypoint(place, (*path, "start"))
         end = None
         if given.end is not None:
-            end = self.waypoint(given.end, (*path, "end"), above=True)
+            end = self._places.waypoint(given.end, (*path, "end"), above=True)
             self._check_route(name, start, end, given, path)
         elif name == EGO:
             self._say("the ego's route must have an end", path)
@@ -294,7 +207,7 @@ class Storyboard:
             if one.time is None and one.distance is None:
                 self._say("a lane change takes a time or a distance", (*path, "lane_change"))
             change = self._change(None, one.time, one.distance, one.shape, (*path, "lane_change"))
-            actor = {one.name: one for one in self.participants}.get(str(given.participant))
+            actor = self._acting.get(str(given.participant))
             if actor is not None and (actor.end is not None or actor.path):
                 self._say(f"{actor.name} changes lane, so it has no end and no path", path)
             yield LaneChange(int(one.lanes), change)
