@@ -1,13 +1,17 @@
 """What a scenario file may say beyond the crossroads of the paper, and what it may not."""
 
 import re
+from importlib import resources
 
 import numpy as np
 import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from bridgegen.errors import ScenarioError
+from bridgegen.errors import InputError, ScenarioError
 from bridgegen.odd.bodies import BODIES
-from bridgegen.odd.reader import load
+from bridgegen.odd.reader import load, names
 from bridgegen.odd.starter import start_scenario
 
 
@@ -125,3 +129,48 @@ def test_mistakes(own, edits, problem):
     said = "\n".join(caught.value.problems)
     assert problem in said
     assert re.search(r"own\.yaml", said)
+
+
+# -- anything else ---------------------------------------------------------------------------------
+
+
+def places_in(data, path=()):
+    """Yield the path of everything in nested mappings and lists."""
+    items = data.items() if isinstance(data, dict) else enumerate(data)
+    for key, value in items:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places_in(value, (*path, key))
+
+
+def changed(data, path, value):
+    copy = dict(data) if isinstance(data, dict) else list(data)
+    copy[path[0]] = changed(data[path[0]], path[1:], value) if len(path) > 1 else value
+    return copy
+
+
+JUNK = st.sampled_from(
+    [None, True, -1, 0, 1e-9, 3.7, 1e12, float("nan"), float("inf"), "", "x", "ego", "P5", "main",
+     "fog_density", "1/0", "ego_speed", [], {}, [1], {"x": 1}, "road", "crossroads", 10**400]
+)  # fmt: skip
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(name=st.sampled_from(names()), data=st.data())
+def test_nonsense_anywhere_is_refused_or_taken_never_a_traceback(tmp_path, name, data):
+    text = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_text("utf-8")
+    scenario = yaml.safe_load(text)
+    for _ in range(data.draw(st.integers(1, 2))):
+        path = data.draw(st.sampled_from(sorted(places_in(scenario), key=str)))
+        scenario = changed(scenario, path, data.draw(JUNK))
+    file = tmp_path / "spoilt.yaml"
+    file.write_text(yaml.safe_dump(scenario), "utf-8")
+    found, problems = None, ()
+    try:
+        found = load(file)
+    except InputError as error:
+        problems = error.problems
+    assert all(".yaml" in problem for problem in problems)  # the file, or one that it includes
+    if found is not None:
+        space = found.space()
+        assert space.violations(space.decode(np.full((1, space.n_var), 0.5))) == []

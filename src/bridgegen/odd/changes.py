@@ -86,10 +86,12 @@ class TemporaryChanges:
             count = int(given.length / given.spacing) + 1
             cones = tuple(
                 self._moved(f"{name}_cone_{k + 1}_at", start, k * given.spacing,
-                            self._offset(given, start, k * given.spacing))
+                            self._offset(given, start, k * given.spacing), path)
                 for k in range(count)
             )  # fmt: skip
-            sign = self._moved(f"{name}_sign_at", start, -given.sign_before, self._beside(start))
+            sign = self._moved(
+                f"{name}_sign_at", start, -given.sign_before, self._beside(start), path
+            )
             yield RoadWorks(name, start, given.length, cones, sign)
 
     def _works_problem(self, given: WorksSection, start: Waypoint) -> str:
@@ -133,9 +135,11 @@ class TemporaryChanges:
         )
         return -(outer + strips + _BESIDE)
 
-    def _moved(self, name: str, start: Waypoint, along: float, offset: float) -> Waypoint:
+    def _moved(
+        self, name: str, start: Waypoint, along: float, offset: float, path: Path
+    ) -> Waypoint:
         """Return a place ``along`` metres of travel beyond another."""
-        moved = self._row(name, start, along, 0, 0.0, ())
+        moved = self._row(name, start, along, 0, 0.0, path)
         return Waypoint(moved.leg, moved.way, moved.distance, start.lane, offset)
 
     def _row(
@@ -144,6 +148,9 @@ class TemporaryChanges:
         """Return the place ``along`` metres and some gaps beyond another, in travel direction."""
         sign = 1.0 if start.way == "out" else -1.0
         distance: Quantity
+        known = self._quantities.parameters.keys() | self._quantities.derived.keys()
+        if any(isinstance(one, str) and one not in known for one in (start.distance, gap)):
+            return start  # that it is unknown has been said
         if isinstance(start.distance, str) or (isinstance(gap, str) and gaps):
             between = f"{gaps}*{gap}" if isinstance(gap, str) else repr(gaps * gap)
             text = f"{start.distance} {'+' if sign > 0 else '-'} ({along!r} + {between})"
@@ -153,10 +160,11 @@ class TemporaryChanges:
                 Derived(
                     name, Axis.TEMPORARY, "m", parse(text),
                     "It stands in a row with the first.", "BridgeGen", f"Where {name[:-3]} stands.",
-                    self._quantities.document.at(path) if path else "",
+                    self._quantities.document.at(path),
                 )
             )  # fmt: skip
             distance = name
         else:
-            distance = start.distance + sign * (along + gaps * float(gap))
+            between_them = gaps * float(gap) if gaps else 0.0
+            distance = start.distance + sign * (along + between_them)
         return Waypoint(start.leg, start.way, distance, start.lane, start.offset)
