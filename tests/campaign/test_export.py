@@ -10,9 +10,9 @@ from lxml import etree
 import bridgegen as bg
 from bridgegen.campaign.export import FLAVOURS, export
 from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import FileFormatError, InputError, StorageError, UnsupportedError
 from bridgegen.odd.reader import load, names
-from bridgegen.openx.convert import validate_file
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import references, walk
 from bridgegen.openx.openscenario.read import read

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.validate import validate_file
 from bridgegen.odd.reader import load
 from bridgegen.odd.starter import start_scenario
 from bridgegen.ontology.files import load as load_owl
 from bridgegen.ontology.questions import ask
-from bridgegen.openx.convert import validate_file
 from bridgegen.pipeline import Pipeline, simulate_file
 
 

@@ -9,6 +9,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import InputError, ScenarioError
 from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.reader import load, names
@@ -174,3 +175,13 @@ def test_nonsense_anywhere_is_refused_or_taken_never_a_traceback(tmp_path, name,
     if found is not None:
         space = found.space()
         assert space.violations(space.decode(np.full((1, space.n_var), 0.5))) == []
+
+
+def test_what_only_the_roads_tell_is_told_by_validate(own, tmp_path):
+    """The file alone does not say that there is no lane to the right of the right one."""
+    own(("lane_change: {lanes: -1", "lane_change: {lanes: -2"))
+    (problem,) = validate_file(tmp_path / "own.yaml")
+    assert problem == (
+        f"{tmp_path / 'own.yaml'}: own: lane change of 'other': there is no lane 2 to the "
+        "right to change to"
+    )

@@ -86,7 +86,7 @@ def validate(
     ] = False,
 ) -> None:
     """Check files against their rules; exit status 2 if one breaks any."""
-    from bridgegen.openx.convert import validate_file
+    from bridgegen.campaign.validate import validate_file
 
     broken: list[str] = []
     for file in files:

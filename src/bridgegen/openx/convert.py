@@ -3,16 +3,14 @@
 import os
 from pathlib import Path
 
-from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
+from bridgegen.errors import FileFormatError, InputError, StorageError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.odd.reader import names as scenario_names
 from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology import reasoner
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.opendrive import read as opendrive_read
-from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.openx.opendrive import write as opendrive_write
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -21,7 +19,6 @@ from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.to_owl.losses import losses
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario import read as openscenario_read
-from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -126,74 +123,12 @@ def _seen_from(out: Path, file: Path) -> str:
     return Path(os.path.relpath(file, out.parent)).as_posix()
 
 
-def validate_file(path: Path, *, reason: bool = False) -> list[str]:
-    """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
-
-    An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
-    ``.xosc`` is checked with the map that it names.
-
-    Args:
-        path: the file.
-        reason: ask the reasoner about an ``.owl``, too: can the individuals be at all?
-
-    Raises:
-        InputError: a file of another kind, or a reasoner is asked for that is not installed.
-    """
-    if reason:
-        reasoner.require()
-    kinds = {
-        ".owl": _ontology,
-        ".xodr": _roads,
-        ".xosc": _storyboard,
-        ".yaml": _logical,
-        ".yml": _logical,
-    }
-    if path.suffix.lower() not in kinds:
-        raise InputError(f"{path}: the file's name must end in {', '.join(kinds)}")
-    try:
-        found = kinds[path.suffix.lower()](path)
-        if reason and path.suffix.lower() == ".owl":
-            found += reasoner.reason(path).problems
-        return [_placed(path, problem) for problem in found]
-    except BridgeGenError as error:
-        return [_placed(path, problem) for problem in error.problems]
-
-
-def _placed(path: Path, problem: str) -> str:
-    return problem if str(path) in problem else f"{path}: {problem}"
-
-
-def _ontology(path: Path) -> list[str]:
-    individuals = load(path)
-    if _is_map(individuals):
-        return [str(one) for one in check(individuals)]
-    individuals.text(individuals.one("Scenario"), "has_name")  # a file without is none of ours
-    return [str(one) for one in check(individuals, scenario_of(individuals))]
-
-
 def scenario_of(individuals: Individuals) -> LogicalScenario | None:
     """Return the scenario of the catalogue that individuals say they are of; None if of none."""
     said = {name for one in individuals.of_class("Scenario")
             for name in individuals.texts(one, "has_name")}  # fmt: skip
     known = said.intersection(scenario_names())
     return load_scenario(known.pop()) if len(said) == len(known) == 1 else None
-
-
-def _is_map(individuals: Individuals) -> bool:
-    """Say whether these are a map and no scenario: what `import_file` writes."""
-    return not individuals.of_class("Scenario") and any(
-        individuals.optional_text(network, "has_map_file") is not None
-        for network in individuals.of_class("RoadNetwork")
-    )
-
-
-def _roads(path: Path) -> list[str]:
-    return opendrive_validate.problems(opendrive_read.read(path))
-
-
-def _storyboard(path: Path) -> list[str]:
-    scenario = openscenario_read.read(path)
-    return openscenario_validate.problems(scenario, roads_of(scenario, path))
 
 
 def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
@@ -217,8 +152,3 @@ def logic_file(scenario: OpenScenario, path: Path) -> str:
     if isinstance(named.filepath, ParameterRef):
         return str(parameters.values(scenario)[named.filepath.name])
     return named.filepath
-
-
-def _logical(path: Path) -> list[str]:
-    load_scenario(path)
-    return []

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridgegen.campaign.validate import validate_file
 from bridgegen.cli import main
 from bridgegen.errors import StorageError
 from bridgegen.ontology.check import check
@@ -18,7 +19,7 @@ from bridgegen.ontology.files import from_bytes, load, to_bytes
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.vocabulary import BG, tbox
-from bridgegen.openx.convert import import_file, validate_file
+from bridgegen.openx.convert import import_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import Lane, OpenDrive, Road
 from bridgegen.openx.opendrive.read import read

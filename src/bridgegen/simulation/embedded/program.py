@@ -159,6 +159,13 @@ class Program:
         is_timed = np.array([isinstance(one, AlongTrajectory) and bool(one.times) for one in paths])
         return np.where(is_timed, np.cumsum(is_timed) - 1, -1).astype(np.int64)
 
+    def owner(self, path: int) -> str:
+        """Return the name of the entity that a path is for."""
+        spec = self.paths[path]
+        while path >= len(self.names) and isinstance(spec, BesideLanes):
+            path, spec = spec.of, self.paths[spec.of]
+        return self.names[path]
+
     @cached_property
     def box(self) -> Float:
         """``(E, 3)`` [m]: length, width, centre ahead of the reference point."""

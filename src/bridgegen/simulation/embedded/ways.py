@@ -48,7 +48,9 @@ class Ways:
         self.sides: list[int] = []
         self.tracks: list[Float] = []
         for number, spec in enumerate(program.paths):
-            who = program.names[number] if number < len(program.names) else f"path {number}"
+            who = f"route of '{program.owner(number)}'"
+            if isinstance(spec, BesideLanes):
+                who = f"lane change of '{program.owner(number)}'"
             try:
                 if isinstance(spec, AlongTrajectory):
                     self._add_trajectory(spec)
@@ -64,7 +66,7 @@ class Ways:
                     self.sides.append(0)
                     self._add(self._beside(spec), (0.0, 0.0), 0.0)
             except InputError as error:
-                raise InputError(f"{program.place}: route of '{who}': {error}") from None
+                raise InputError(f"{program.place}: {who}: {error}") from None
 
     def _add(self, route: Route, station: tuple[float, float], aside: float) -> None:
         table, step = _sampled(route)
@@ -130,7 +132,9 @@ class Ways:
                 continue
             if (road.direction(lane.id) > 0) == forward:
                 return self._onward(step.road_id, lane.id, step.s)
-        which = f"{spec.lanes} to the left" if spec.lanes is not None else str(spec.lane)
+        which = str(spec.lane)
+        if spec.lanes is not None:
+            which = f"{abs(spec.lanes)} to the {'left' if spec.lanes > 0 else 'right'}"
         line = f" (line {spec.line})" if spec.line else ""
         raise InputError(f"there is no lane {which} to change to{line}")
 

@@ -1,0 +1,85 @@
+"""Is a file as it should be? Every reason why not, at once."""
+
+from pathlib import Path
+
+from bridgegen.errors import BridgeGenError, InputError
+from bridgegen.odd.reader import load as load_scenario
+from bridgegen.ontology import reasoner
+from bridgegen.ontology.check import check
+from bridgegen.ontology.files import load
+from bridgegen.ontology.graph import Individuals
+from bridgegen.openx.convert import roads_of, scenario_of
+from bridgegen.openx.opendrive import read as opendrive_read
+from bridgegen.openx.opendrive import validate as opendrive_validate
+from bridgegen.openx.openscenario import read as openscenario_read
+from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.pipeline import Pipeline
+
+
+def validate_file(path: Path, *, reason: bool = False) -> list[str]:
+    """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
+
+    An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
+    ``.xosc`` is checked with the map that it names. A ``.yaml`` is read, and built at its defaults
+    up to the ways that its participants take; its effects are run.
+
+    Args:
+        path: the file.
+        reason: ask the reasoner about an ``.owl``, too: can the individuals be at all?
+
+    Raises:
+        InputError: a file of another kind, or a reasoner is asked for that is not installed.
+    """
+    if reason:
+        reasoner.require()
+    kinds = {
+        ".owl": _ontology,
+        ".xodr": _roads,
+        ".xosc": _storyboard,
+        ".yaml": _logical,
+        ".yml": _logical,
+    }
+    if path.suffix.lower() not in kinds:
+        raise InputError(f"{path}: the file's name must end in {', '.join(kinds)}")
+    try:
+        found = kinds[path.suffix.lower()](path)
+        if reason and path.suffix.lower() == ".owl":
+            found += reasoner.reason(path).problems
+        return [_placed(path, problem) for problem in found]
+    except BridgeGenError as error:
+        return [_placed(path, problem) for problem in error.problems]
+
+
+def _placed(path: Path, problem: str) -> str:
+    return problem if str(path) in problem else f"{path}: {problem}"
+
+
+def _ontology(path: Path) -> list[str]:
+    individuals = load(path)
+    if _is_map(individuals):
+        return [str(one) for one in check(individuals)]
+    individuals.text(individuals.one("Scenario"), "has_name")  # a file without is none of ours
+    return [str(one) for one in check(individuals, scenario_of(individuals))]
+
+
+def _is_map(individuals: Individuals) -> bool:
+    """Say whether these are a map and no scenario: what `import_file` writes."""
+    return not individuals.of_class("Scenario") and any(
+        individuals.optional_text(network, "has_map_file") is not None
+        for network in individuals.of_class("RoadNetwork")
+    )
+
+
+def _roads(path: Path) -> list[str]:
+    return opendrive_validate.problems(opendrive_read.read(path))
+
+
+def _storyboard(path: Path) -> list[str]:
+    scenario = openscenario_read.read(path)
+    return openscenario_validate.problems(scenario, roads_of(scenario, path))
+
+
+def _logical(path: Path) -> list[str]:
+    scenario = load_scenario(path)
+    Pipeline(scenario, scenario.space())  # builds, converts and compiles it at the defaults
+    return []
