@@ -113,7 +113,7 @@ def test_saving_is_whole_or_not_at_all(individuals, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pathlib.Path.write_bytes", full)
+    monkeypatch.setattr("pathlib.Path.replace", full)
     with pytest.raises(StorageError, match="No space left on device") as caught:
         save(individuals, target)
     assert len(caught.value.problems) == 1

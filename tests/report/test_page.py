@@ -167,7 +167,7 @@ def test_plotly_is_read_but_not_imported(tmp_path):
 
 def test_a_missing_folder_is_one_clear_error(tmp_path, report):
     path = tmp_path / "nowhere" / "report.html"
-    with pytest.raises(StorageError, match=r"nowhere/report.html: the page cannot be written"):
+    with pytest.raises(StorageError, match=r"nowhere/report.html: cannot be written"):
         write_report(path, report)
 
 

@@ -9,14 +9,12 @@ from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
-from bridgegen.errors import InputError, StorageError
+from bridgegen.disk import refuse_other, write_whole
 from bridgegen.ontology.docs_terms import Terms, counterpart, is_in
-from bridgegen.ontology.files import write_whole
 from bridgegen.ontology.layers import LAYERS
 from bridgegen.ontology.markup import escaped, link, table_of
 from bridgegen.ontology.vocabulary import BG, VOCABULARIES, TBox, tbox
 
-_OURS = b'<meta name="generator" content="bridgegen ontology docs">'
 _PROPERTIES = ("ObjectProperty", "DatatypeProperty")
 
 
@@ -30,22 +28,8 @@ def write_docs(out: Path) -> None:
         InputError: its name does not end in .html.
         StorageError: it cannot be written, or is something else already.
     """
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{out}: the documentation is a page, its name must end in .html")
-    _refuse_other(out)
-    write_whole(out, to_html(tbox()).encode("utf-8", "replace"))
-
-
-def _refuse_other(out: Path) -> None:
-    try:
-        with out.open("rb") as file:
-            ours = _OURS in file.read(1000)
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise StorageError(f"{out}: cannot be written: {error.strerror}") from None
-    if not ours:
-        raise StorageError(f"{out}: exists already, is no documentation, and is not overwritten")
+    refuse_other(out, "bridgegen ontology docs", "documentation")
+    write_whole(out, [to_html(tbox()).encode("utf-8", "replace")])
 
 
 def to_html(ontology: TBox) -> str:

@@ -5,17 +5,16 @@ what was saved and what is loaded are the same individuals; what a user added to
 (a subclass, say) stays with them.
 """
 
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from xml.parsers import expat
 
 import pyoxigraph as ox
 
-from bridgegen.errors import FileFormatError, StorageError
+from bridgegen.disk import write_whole
+from bridgegen.errors import FileFormatError
 from bridgegen.ontology.graph import Individuals, as_number
 from bridgegen.ontology.vocabulary import (
     DOUBLE,
@@ -50,23 +49,7 @@ def save(individuals: Individuals, path: Path | str, include_tbox: bool = True) 
     Raises:
         StorageError: the file cannot be written.
     """
-    write_whole(Path(path), to_bytes(individuals, include_tbox))
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file; it is there whole or not at all.
-
-    Raises:
-        StorageError: it cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
+    write_whole(Path(path), [to_bytes(individuals, include_tbox)])
 
 
 def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:

@@ -2,14 +2,14 @@
 
 import html
 import importlib.util
-import os
 import re
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from bridgegen.errors import BridgeGenError, StorageError
+from bridgegen.disk import write_whole
+from bridgegen.errors import BridgeGenError
 from bridgegen.report.data import ReportData
 from bridgegen.report.payload import to_json
 
@@ -65,9 +65,7 @@ def write_page(
         **more,
     }
     parts = re.split(rb"\{\{(\w+)\}\}", _own(template))
-    _write_atomically(
-        path, [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
-    )
+    write_whole(path, [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)])
 
 
 @cache
@@ -89,23 +87,3 @@ def _plotly() -> bytes:
             "reinstall plotly"
         ) from None
     return text.replace(b"</script", rb"<\/script")
-
-
-def _write_atomically(path: Path, chunks: Iterable[bytes]) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as file:
-            for chunk in chunks:
-                file.write(chunk)
-        part.replace(path)
-    except OSError as error:
-        raise StorageError(f"{path}: the page cannot be written: {error.strerror}") from None
-    finally:
-        _remove(part)
-
-
-def _remove(part: Path) -> None:
-    try:
-        part.unlink(missing_ok=True)
-    except OSError:
-        return  # the folder went away or read-only; the first error has been raised already

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridgegen.errors import InputError, StorageError
+from bridgegen.disk import refuse_other
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.ontology.check import check, constraints_in_words
 from bridgegen.ontology.files import load
@@ -14,7 +14,8 @@ from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.scenario_page import write_scenario_page
 
 SCRIPTS = ("common.js", "picture.js", "show.js")
-_OURS = b'<meta name="generator" content="bridgegen show">'
+GENERATOR = "bridgegen show"
+"""As which its pages say they are made."""
 
 
 def show_scenario(name_or_path: str, out: Path | None = None) -> Path:
@@ -34,8 +35,7 @@ def show_scenario(name_or_path: str, out: Path | None = None) -> Path:
     path = Path(name_or_path)
     beside = path.parent if path.suffix in (".yaml", ".yml") else Path()
     out = out or beside / f"{scenario.name}.html"
-    _refuse_name(out)
-    _refuse_other(out)
+    refuse_other(out, GENERATOR, "picture")
     write_scenario_page(out, scenario)
     return out
 
@@ -61,29 +61,11 @@ def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
         StorageError: the page cannot be written, or is something else already.
     """
     out = out or owl.with_suffix(".html")
-    _refuse_name(out)
+    refuse_other(out, GENERATOR, "picture")
     individuals = load(owl)
     scenario = scenario_of(individuals)
     violations = check(individuals, scenario)
     one = paint(individuals, violations, constraints_in_words(scenario))
-    _refuse_other(out)
     title = f"{owl.name}: {one.name}" if one.name else owl.name
     write_page(out, "show.html", SCRIPTS, title, script_json(pictures_payload([one])))
     return out, len(violations)
-
-
-def _refuse_name(out: Path) -> None:
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{out}: the picture is a page, its name must end in .html")
-
-
-def _refuse_other(out: Path) -> None:
-    try:
-        with out.open("rb") as file:
-            ours = _OURS in file.read(1000)
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise StorageError(f"{out}: the page cannot be written: {error.strerror}") from None
-    if not ours:
-        raise StorageError(f"{out}: exists already, is no picture, and is not overwritten")

@@ -1,0 +1,59 @@
+"""Files that are written whole or not at all, and pages that replace none but their own kind."""
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from bridgegen.errors import InputError, StorageError
+
+_HEAD = 1000
+"""Bytes of a page in which it says who made it."""
+
+
+def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
+    """Write a file beside its place, then put it there: nobody ever reads half of it.
+
+    Args:
+        path: where to; a file that exists is replaced.
+        chunks: what it holds.
+
+    Raises:
+        StorageError: it cannot be written (no such folder, read-only, disk full).
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            file.writelines(chunks)
+        part.replace(path)
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
+    finally:
+        with suppress(OSError):  # it is there no more, or the first error has been raised already
+            part.unlink()
+
+
+def refuse_other(page: Path, generator: str, what: str) -> None:
+    """Refuse a page's name that is no page's, or is taken by anything but an earlier one.
+
+    Args:
+        page: where it is to be.
+        generator: what an earlier one names as its generator.
+        what: what it is, for messages ("picture").
+
+    Raises:
+        InputError: its name does not end in .html.
+        StorageError: something else is there, or nobody can tell.
+    """
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{page}: the {what} is a page, its name must end in .html")
+    mark = f'<meta name="generator" content="{generator}">'.encode()
+    try:
+        with page.open("rb") as file:
+            ours = mark in file.read(_HEAD)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise StorageError(f"{page}: cannot be written: {error.strerror}") from None
+    if not ours:
+        raise StorageError(f"{page}: exists already, is no {what}, and is not overwritten")
