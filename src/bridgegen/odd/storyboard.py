@@ -95,6 +95,13 @@ class Storyboard:
         )
         if given.start is not None or given.end is not None:
             self._say(f"{name} must have a path, or a start and an end, not both", path)
+        varied = [q for one in points for q in (one.distance, one.offset) if isinstance(q, str)]
+        if varied:
+            self._say(
+                f"the places of a path are constants, one path serves every row; {name} has "
+                f"'{varied[0]}'",
+                path,
+            )
         if len(points) < 2:
             self._say(f"a path leads through two points at least, {name} has one", path)
         if given.type not in _WALKERS:
@@ -115,6 +122,12 @@ class Storyboard:
             self._check_route(name, start, end, given, path)
         elif name == EGO:
             self._say("the ego's route must have an end", path)
+        if name == EGO and isinstance(start.offset, str):
+            self._say(
+                f"the ego's offset is a constant, its driver keeps to one path; got "
+                f"'{start.offset}'",
+                path,
+            )
         stands = TYPES[given.type] in ("obstacle", "pedestrian", "animal")
         if stands and (given.speed != 0.0 or end is not None):
             self._say(f"{name} without a path stands: no speed, no end", path)
