@@ -256,7 +256,11 @@ class FileResult:
 
 
 def simulate_file(
-    path: Path, *, ego: str | None = None, metrics: Sequence[str] | None = None
+    path: Path,
+    *,
+    ego: str | None = None,
+    metrics: Sequence[str] | None = None,
+    time_step: float | None = None,
 ) -> FileResult:
     """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
 
@@ -264,8 +268,10 @@ def simulate_file(
         path: the ``.xosc`` file.
         ego: the ego's driver; what the file's controller says by default.
         metrics: names; all by default.
+        time_step: [s]; what the file's header says by default.
 
     Raises:
+        InputError: a time step out of range.
         FileFormatError: a file is missing, malformed or inconsistent.
         UnsupportedError: an element that the simulator cannot run, by name and line.
         UnknownNameError: no such driver or metric.
@@ -277,7 +283,7 @@ def simulate_file(
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    simulator = EmbeddedSimulator(scenario, str(path), driver=driver)
+    simulator = EmbeddedSimulator(scenario, str(path), driver=driver, time_step=time_step)
     rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = measures.evaluate(rollout, names)[0]
     return FileResult(

@@ -129,13 +129,24 @@ def simulate(
     ego: Annotated[
         str | None, typer.Option(help="Who drives; what the file says by default.")
     ] = None,
+    dt: Annotated[
+        float | None,
+        typer.Option(help="Time step [s].", show_default="what the file's header says, or 0.05"),
+    ] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
     from bridgegen.pipeline import simulate_file
     from bridgegen.screen import print_file_result
+    from bridgegen.simulation.trace import write_trace
 
-    result = simulate_file(file, ego=ego)
+    result = simulate_file(file, ego=ego, time_step=dt)
+    if trace is not None:
+        write_trace(trace, result.rollout)
     if as_json:
         facts = {"file": str(file), "ego": result.driver, "status": result.status}
         metrics = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}

@@ -25,6 +25,7 @@ from bridgegen.simulation.embedded.triggers import Triggers
 DEFAULT_TIME_STEP = 0.05  # s
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 MAX_STEPS = 100_000
+LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
 
 
 def compile_storyboard(
@@ -60,7 +61,12 @@ class _Compiler:
     def compile(self, driver: Driver | None, time_step: float | None) -> Program:
         if not self.tables.objects:
             raise InputError(f"{self.place}: a scenario needs at least one entity, got none")
-        step = time_step or self._declared_time_step()
+        step = self._declared_time_step() if time_step is None else time_step
+        if not LEAST_STEP <= step <= MOST_STEP:
+            raise InputError(
+                f"{self.place}: {LEAST_STEP:g} <= time_step <= {MOST_STEP:g} [s] must hold, got "
+                f"{step:g}"
+            )
         storyboard = self.scenario.storyboard
         event_names = [str(one.name) for one in _events(storyboard)]
         self.triggers = Triggers(self.tables, step, event_names)
@@ -131,9 +137,10 @@ class _Compiler:
             value = float(str(text))
         except ValueError:
             value = 0.0
-        if not 1e-4 <= value <= 1.0:
+        if not LEAST_STEP <= value <= MOST_STEP:
             raise InputError(
-                f"{self.place}: 0.0001 <= time_step <= 1 [s] must hold, got '{text}' (FileHeader)"
+                f"{self.place}: {LEAST_STEP:g} <= time_step <= {MOST_STEP:g} [s] must hold, got "
+                f"'{text}' (FileHeader)"
             )
         return value
 

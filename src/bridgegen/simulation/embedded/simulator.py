@@ -22,19 +22,25 @@ class EmbeddedSimulator:
         storyboard: the scenario file, validated.
         place: its name, for messages.
         driver: who drives the ego; what the file says by default.
+        time_step: [s]; what the file says by default.
 
     Attributes:
         program: the compiled storyboard.
 
     Raises:
         UnsupportedError: what it cannot run, by name and line, all of it at once.
-        InputError: an entity without a start, or no entity at all.
+        InputError: an entity without a start, no entity at all, or a step out of range.
     """
 
     def __init__(
-        self, storyboard: OpenScenario, place: str, *, driver: Driver | None = None
+        self,
+        storyboard: OpenScenario,
+        place: str,
+        *,
+        driver: Driver | None = None,
+        time_step: float | None = None,
     ) -> None:
-        self.program = compile_storyboard(storyboard, place, driver=driver)
+        self.program = compile_storyboard(storyboard, place, driver=driver, time_step=time_step)
 
     @property
     def driver(self) -> str:

@@ -1,0 +1,47 @@
+"""A rollout as a table that other programs read: one line per instant and entity."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from bridgegen.disk import write_whole
+from bridgegen.errors import InputError, StorageError
+from bridgegen.simulation.rollout import Rollout
+
+COLUMNS = ("time", "entity", "x", "y", "h", "speed")
+"""[s], name, [m], [m], [rad], [m/s]; positions are OpenSCENARIO's reference points."""
+
+
+def write_trace(path: Path, rollout: Rollout, row: int = 0) -> None:
+    """Write one scenario of a rollout as CSV, whole or not at all; every number in full.
+
+    Args:
+        path: a new file, its name ends in .csv.
+        rollout: N scenarios.
+        row: which of them.
+
+    Raises:
+        InputError: the name does not end in .csv.
+        StorageError: the file exists, or cannot be written.
+    """
+    if path.suffix.lower() != ".csv":
+        raise InputError(f"{path}: a trace is a table, its name must end in .csv")
+    if path.exists():
+        raise StorageError(f"{path}: exists already, and is not overwritten")
+    write_whole(path, (line.encode() for line in _lines(rollout, row)))
+
+
+def _lines(rollout: Rollout, row: int) -> Iterator[str]:
+    yield ",".join(COLUMNS) + "\r\n"
+    names = [_quoted(name) for name in rollout.names]
+    states = [getattr(rollout, name)[row].tolist() for name in ("x", "y", "h", "v")]
+    for k in range(int(rollout.n_steps[row])):
+        time = repr(k * rollout.time_step)
+        for e, name in enumerate(names):
+            yield ",".join((time, name, *(repr(array[e][k]) for array in states))) + "\r\n"
+
+
+def _quoted(name: str) -> str:
+    """Return a name as RFC 4180 has it."""
+    if any(sign in name for sign in ',"\r\n'):
+        return '"' + name.replace('"', '""') + '"'
+    return name
