@@ -12,6 +12,9 @@ from typing import Literal
 Direction = Literal["in", "out"]
 LaneType = Literal["driving", "shoulder", "sidewalk"]
 
+JunctionEnd = Literal["start", "end", "none"]
+"""The end of a road's reference line that is nearer to its junction, if it has one."""
+
 
 class Searched(float):
     """A measure [unit of its parameter] that a parameter of the scenario gives."""
@@ -76,7 +79,7 @@ class ArmRoad:
 
     road_id: str
     length: float
-    junction_end: Literal["start", "end", "none"]
+    junction_end: JunctionEnd
     lanes: tuple[SiteLane, ...]
     speed_limit: float | None = None
     road_type: str | None = None

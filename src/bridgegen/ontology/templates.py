@@ -10,6 +10,7 @@ from bridgegen.ontology.site import (
     ArmRoad,
     Direction,
     Facility,
+    JunctionEnd,
     LaneType,
     Leg,
     Phase,
@@ -139,7 +140,7 @@ class _Template:
         self,
         road_id: str,
         length: float,
-        junction_end: str,
+        junction_end: JunctionEnd,
         counts: Mapping[Direction, float],
         spec: LegSpec | None = None,
         segments: tuple[SiteSegment, ...] = (),
@@ -150,7 +151,7 @@ class _Template:
         return ArmRoad(
             road_id=road_id,
             length=length,
-            junction_end=junction_end,  # type: ignore[arg-type]
+            junction_end=junction_end,
             lanes=tuple(self.lanes(counts, junction_end == "end", spec)),
             speed_limit=self.knobs["speed_limit"],
             road_type=self.roads.road_type,

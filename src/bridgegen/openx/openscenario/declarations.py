@@ -13,6 +13,12 @@ from bridgegen.openx.openscenario.values import (
     UnsignedShort,
 )
 
+TIME_STEP = "time_step"
+"""The header's property for the step [s] of the evaluation: the standard has no place for it."""
+
+DEFAULT_TIME_STEP = 0.05
+"""[s], where a header does not say it."""
+
 
 @dataclass(frozen=True)
 class Property(Element):

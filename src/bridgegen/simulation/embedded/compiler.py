@@ -7,7 +7,7 @@ import numpy as np
 from bridgegen.ego import DRIVERS, TRAJECTORY, Driver
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.from_owl.notes import TIME_STEP
+from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP, TIME_STEP
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.program import (
@@ -22,7 +22,6 @@ from bridgegen.simulation.embedded.tables import Tables, table
 from bridgegen.simulation.embedded.trajectories import compile_trajectory
 from bridgegen.simulation.embedded.triggers import Triggers
 
-DEFAULT_TIME_STEP = 0.05  # s
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 MAX_STEPS = 100_000
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s

@@ -30,14 +30,12 @@ from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import TIME_STEP
 from bridgegen.openx.openscenario.from_owl.entities import plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.values import format_double
-
-TIME_STEP = "time_step"
-"""The step [s] of the evaluation, for which the standard has no place."""
 
 CHANGES = ("TrafficJam", "RoadWorks", "TrafficAccident", "TemporaryChange")
 """The classes of temporary changes, a class before those above it."""

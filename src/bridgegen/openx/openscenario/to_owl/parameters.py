@@ -13,7 +13,8 @@ import pyoxigraph as ox
 from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.vocabulary import bg, tbox
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.from_owl.notes import EVENT, PARAMETER, SIGNALS, TIME_STEP
+from bridgegen.openx.openscenario.declarations import TIME_STEP
+from bridgegen.openx.openscenario.from_owl.notes import EVENT, PARAMETER, SIGNALS
 from bridgegen.openx.openscenario.from_owl.weather import PROPERTIES
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
 from bridgegen.openx.openscenario.to_owl.entities import as_number

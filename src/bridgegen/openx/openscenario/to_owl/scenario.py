@@ -13,8 +13,8 @@ comparing that file with the first, element by element. So nothing is lost witho
 - the static parameters, and how the map was generated: the road network comes back as the map that
   it is. Nothing in a storyboard depends on them.
 
-What individuals must have and a file need not say is added: a time step (`TIME_STEP`), the range's
-unit and axis (`bridgegen.openx.openscenario.to_owl.parameters`).
+What individuals must have and a file need not say is added: a time step (`DEFAULT_TIME_STEP`), the
+range's unit and axis (`bridgegen.openx.openscenario.to_owl.parameters`).
 """
 
 from collections.abc import Iterator
@@ -29,6 +29,7 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, SIGNALS
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
@@ -45,9 +46,6 @@ from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
-
-TIME_STEP = 0.05
-"""The step of the evaluation [s] of a file that states none: the embedded simulator's."""
 
 DURATION = 60.0
 """The duration [s] of a file whose stop trigger names no time, if that is put up with."""
@@ -168,7 +166,7 @@ class _Importer:
 
     def _put_times(self, node: ox.NamedNode, notes: Notes) -> float:
         """State how long the scenario lasts, and its step; return the duration [s]."""
-        builder, step = self.builder, TIME_STEP
+        builder, step = self.builder, DEFAULT_TIME_STEP
         if notes.time_step is not None:
             with builder.attempt():
                 step = as_number(builder, notes.time_step.value, notes.time_step)
