@@ -43,6 +43,14 @@ class Rollout:
         lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
         event_names: of the V events of the storyboard, in the order of the file.
         began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
+        kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
+            nobody says.
+        detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
+            instant, in the columns of `bridgegen.simulation.detections`; rows of the ego itself
+            are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
+        stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where the ego's
+            route crosses the stop line of a traffic light, the heading in travel direction.
+        stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
     """
 
     time_step: float
@@ -60,6 +68,10 @@ class Rollout:
     lights: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
     event_names: tuple[str, ...] = ()
     began: Int = field(default_factory=lambda: np.zeros((0, 0), np.int64))
+    kinds: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
+    stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
+    stop_lights: Int = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def shape(self) -> tuple[int, int, int]:
