@@ -248,6 +248,14 @@ def test_a_doctype_in_another_encoding_is_still_a_doctype(tmp_path):
         load(path)
 
 
+def test_a_type_is_a_class(individuals):
+    data = to_bytes(individuals).replace(
+        b'<rdf:type rdf:resource="', b'<rdf:type>x</rdf:type><rdf:type rdf:resource="', 1
+    )
+    with pytest.raises(FileFormatError, match="must be a class, got 'x'"):
+        from_bytes(data)
+
+
 def test_binary_noise_is_refused(tmp_path):
     path = tmp_path / "h.owl"
     path.write_bytes(bytes(range(256)) * 10)

@@ -74,7 +74,8 @@ def load(path: Path | str) -> Individuals:
 
     Raises:
         FileFormatError: missing, not a file, unreadable, larger than 100 MiB, not RDF/XML, nested
-            deeper than 256 levels, or with a DOCTYPE (entities are never expanded).
+            deeper than 256 levels, with a DOCTYPE (entities are never expanded), or with a
+            type that is no class.
     """
     path = Path(path)
     try:
@@ -96,6 +97,11 @@ def from_bytes(data: bytes, place: str = "document") -> Individuals:
         quads = list(ox.parse(data, format=_RDF_XML, base_iri=SCENARIOS + "unnamed"))
     except (SyntaxError, ValueError) as error:
         raise FileFormatError(f"{place}: not RDF/XML: {_first_line(error)}") from None
+    for quad in quads:
+        if quad.predicate == TYPE and isinstance(quad.object, ox.Literal):
+            raise FileFormatError(
+                f"{place}: the type of {quad.subject} must be a class, got '{quad.object.value}'"
+            )
     return Individuals(_typed(quad) for quad in _without_tbox(quads))
 
 
