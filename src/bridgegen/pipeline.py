@@ -20,17 +20,13 @@ from bridgegen.errors import FileFormatError
 from bridgegen.objective import Objective, Thresholds, needs_sample
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.rules import speed_bounds
-from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build, build_static
 from bridgegen.openx.convert import roads_of
-from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.openscenario import validate as openscenario_validate
-from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.openx.source import ConcreteScenario, source_of
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
@@ -67,10 +63,9 @@ class Pipeline:
         scenario: the logical scenario.
         space: its search space; names the columns of X.
         driver: the ego's driver.
-        road_map: the map that it takes place on, or None for the generated crossroads.
+        source: makes its concrete scenarios.
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded.
-        static_names: the parameters that the road network depends on.
         simulator: holds the scenario's storyboard.
     """
 
@@ -78,7 +73,7 @@ class Pipeline:
 
     def __init__(
         self,
-        scenario: LogicalScenario,
+        scenario: SearchedScenario,
         space: SearchSpace,
         *,
         ego: str | None = None,
@@ -87,19 +82,13 @@ class Pipeline:
         self.scenario = scenario
         self.space = space
         self.driver = egos.get(ego or scenario.driver)
-        self.static_names = tuple(
-            name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC
-        )
-        self.road_map = road_map
+        self.source = source_of(scenario, self.driver.name, road_map)
         self.metrics = tuple(measures.METRICS)
-        searches_roads = not road_map and bool({*self.static_names} & {*space.variables})
-        nominal = space.values(space.row({}))
-        individuals = self.individuals(nominal)
-        storyboard = openscenario_from_owl(individuals, "nominal.xodr")
-        self.simulator: Simulator[Network] = EmbeddedSimulator(storyboard, scenario.name)
+        nominal = self.concrete(space.row({}))
+        self.simulator: Simulator[Network] = EmbeddedSimulator(nominal.storyboard, scenario.name)
         self._roads: Network | None = None
-        if not searches_roads:
-            self._roads = self.simulator.roads([self.roads(individuals)])
+        if not {*self.source.static_names} & {*space.variables}:
+            self._roads = self.simulator.roads([nominal.roads])
         self._threads = ThreadPoolExecutor(os.cpu_count() or 1, "rollout")
 
     def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
@@ -149,36 +138,24 @@ class Pipeline:
         return Evaluation(metrics, F, critical & ok, status)
 
     def facts(self, x: Float) -> dict[str, float]:
-        """Return the parameters of one row that its scenario depends on, by name.
+        """Return the parameters of one row that its scenario depends on, by name."""
+        unused = self.source.unused_names
+        return {name: one for name, one in self.space.values(x).items() if name not in unused}
 
-        On a map, the road network is the map's.
+    def concrete(self, x: Float, road_file: str = "") -> ConcreteScenario:
+        """Return the concrete scenario of one row.
+
+        Args:
+            x: ``(len(space.names),)``.
+            road_file: what its OpenDRIVE file will be called; a map's own name by default.
         """
-        values = self.space.values(x)
-        ours = () if self.road_map is None else self.static_names
-        return {name: value for name, value in values.items() if name not in ours}
+        return self.source.concrete(self.space.values(x), road_file)
 
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         roads, rows = self._roads_of(X)
         return self.simulator.run(roads, rows, columns)
-
-    def individuals(self, values: Mapping[str, float], road_file: str = "") -> Individuals:
-        """Return one concrete scenario's individuals.
-
-        Args:
-            values: of every parameter, by name.
-            road_file: what the copy of the map will be called that is handed over with them; the
-                map's own name by default.
-        """
-        site = self.road_map.site if self.road_map else None
-        if site and road_file:
-            site = replace(site, map_file=road_file)
-        return build(self.scenario, values, driver=self.driver.name, site=site)
-
-    def roads(self, individuals: Individuals) -> OpenDrive:
-        """Return the road network of a scenario's individuals: its map, or OWL2OpenDRIVE's."""
-        return self.road_map.model if self.road_map else opendrive_from_owl(individuals)
 
     def _measure(self, X: Float) -> tuple[Float, npt.NDArray[np.int8]]:
         """Roll out and measure in chunks on all cores; the kernels run without the GIL."""
@@ -197,16 +174,10 @@ class Pipeline:
         """Return the compiled road networks of some rows, and which row has which."""
         if self._roads is not None:
             return self._roads, np.zeros(len(X), dtype=np.int64)
-        columns = [self.space.index(name) for name in self.static_names]
+        names = self.source.static_names
+        columns = [self.space.index(name) for name in names]
         static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
-        models = [
-            opendrive_from_owl(
-                build_static(
-                    dict(zip(self.static_names, row.tolist(), strict=True)), self.scenario.roads
-                )
-            )
-            for row in static
-        ]
+        models = [self.source.roads(dict(zip(names, row.tolist(), strict=True))) for row in static]
         return self.simulator.roads(models), rows.reshape(-1).astype(np.int64)
 
 

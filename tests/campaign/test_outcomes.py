@@ -69,10 +69,9 @@ def jam():
 
 
 def test_a_declared_jam_is_no_outcome_unless_somebody_joins(jam):
-    values = jam.space.values(jam.space.row({}))
-    individuals = jam.individuals(values)
     x = jam.space.row({})
-    rollout, roads = jam.rollout(x[np.newaxis]), jam.roads(individuals)
+    individuals, roads = jam.concrete(x).individuals, jam.concrete(x).roads
+    rollout = jam.rollout(x[np.newaxis])
     names = rollout.names
     members = [k for k, name in enumerate(names) if name.startswith("jam_")]
     others = [k for k in range(len(names)) if k not in members]
@@ -98,14 +97,14 @@ def test_a_declared_jam_is_no_outcome_unless_somebody_joins(jam):
     assert check(from_bytes(to_bytes(together)), jam.scenario) == []
     without = to_xml(openscenario_from_owl(individuals, "x.xodr"))
     assert to_xml(openscenario_from_owl(together, "x.xodr")) == without
-    assert road_xml(jam.roads(together)) == road_xml(roads)
+    assert road_xml(opendrive_from_owl(together)) == road_xml(roads)
 
 
 def test_a_failed_rollout_brings_about_nothing(jam):
-    individuals = jam.individuals(jam.space.values(jam.space.row({})))
+    individuals = jam.concrete(jam.space.row({})).individuals
     rollout = jam.rollout(jam.space.row({})[np.newaxis])
     rollout.status[0] = 1
-    assert with_outcomes(individuals, rollout, jam.roads(individuals)) is individuals
+    assert with_outcomes(individuals, rollout, jam.concrete(jam.space.row({})).roads) is individuals
 
 
 def test_outcomes_use_terms_as_declared(crashed):
@@ -139,12 +138,12 @@ def crashed():
     scenario = load("road-works")
     pipeline = Pipeline(scenario, scenario.space())
     x = pipeline.space.row({})
-    individuals = pipeline.individuals(pipeline.space.values(x))
+    concrete = pipeline.concrete(x)
     rollout = pipeline.rollout(x[np.newaxis])
     ego, cone, truck = (rollout.names.index(one) for one in ("ego", "works_cone_5", "truck"))
     for states in (rollout.x, rollout.y, rollout.h):
         states[0, ego] = states[0, truck] = states[0, cone]
-    return with_outcomes(individuals, rollout, pipeline.roads(individuals))
+    return with_outcomes(concrete.individuals, rollout, concrete.roads)
 
 
 def test_hitting_a_cone_is_an_accident_of_one(crashed):

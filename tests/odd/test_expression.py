@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError
-from bridgegen.odd.expression import MAX_LENGTH, parse
+from bridgegen.odd.expression import MAX_LENGTH, lookup, parse
 
 # Each formula beside its value at a = 2.5, b = -4, worked by hand.
 WORKED = {
@@ -216,3 +216,12 @@ def test_any_text_is_a_formula_or_one_clear_error(text):
         return
     columns = dict.fromkeys(expression.names, np.array([0.0, 1.0, -1.0]))
     assert expression.evaluate(columns).shape in ((), (3,))
+
+
+def test_a_lookup_takes_values_by_number():
+    one = lookup("k", [60.0, 80.0, 70.0])
+    assert one.names == {"k"}
+    assert one.evaluate({"k": np.array([2.0, 0.0, 0.0])}).tolist() == [70.0, 60.0, 60.0]
+    assert float(one.evaluate({"k": 1.0})) == 80.0
+    assert str(one) == "(60, 80, 70)[k]"
+    assert pickle.loads(pickle.dumps(one)) == one

@@ -13,8 +13,6 @@ from bridgegen.errors import OntologyError, StorageError
 from bridgegen.metrics import METRICS
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import save
-from bridgegen.openx.opendrive.write import to_xml as road_xml
-from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.outcomes import with_outcomes
@@ -124,19 +122,18 @@ def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> lis
         OntologyError: its individuals break a constraint (SHACL).
         OSError: the folder cannot be written.
     """
-    individuals = pipeline.individuals(pipeline.space.values(x), f"{name}.xodr")
-    roads = pipeline.roads(individuals)
-    individuals = with_outcomes(individuals, pipeline.rollout(x[np.newaxis]), roads)
-    violations = check(individuals, pipeline.scenario)
+    owl, xodr, xosc = (folder / f"{name}.{kind}" for kind in ("owl", "xodr", "xosc"))
+    concrete = pipeline.concrete(x, xodr.name)
+    rollout = pipeline.rollout(x[np.newaxis])
+    xodr.write_bytes(concrete.road_data)
+    xosc.write_bytes(scenario_xml(concrete.storyboard))
+    if concrete.individuals is None:
+        return [xodr, xosc]
+    individuals = with_outcomes(concrete.individuals, rollout, concrete.roads)
+    violations = check(individuals, pipeline.source.constraints)
     if violations:
         raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
-    owl, xodr, xosc = (folder / f"{name}.{kind}" for kind in ("owl", "xodr", "xosc"))
     save(individuals, owl)
-    if pipeline.road_map:
-        xodr.write_bytes(pipeline.road_map.data)
-    else:
-        xodr.write_bytes(road_xml(roads))
-    xosc.write_bytes(scenario_xml(openscenario_from_owl(individuals, xodr.name)))
     return [owl, xodr, xosc]
 
 

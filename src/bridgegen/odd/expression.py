@@ -23,7 +23,7 @@ import ast
 import math
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -147,8 +147,40 @@ class Expression:
     def __str__(self) -> str:
         return self.source
 
-    def __reduce__(self) -> tuple[Callable[[str], "Expression"], tuple[str]]:
+    def __reduce__(self) -> tuple[Callable[..., "Expression"], tuple[Any, ...]]:
         return parse, (self.source,)
+
+
+@dataclass(frozen=True)
+class Lookup(Expression):
+    """A value for each whole number of a parameter, from 0. Made by ``lookup``; no formula.
+
+    Attributes:
+        values: by number.
+    """
+
+    values: tuple[float, ...]
+
+    def __reduce__(self) -> tuple[Callable[..., Expression], tuple[Any, ...]]:
+        (index,) = self.names
+        return lookup, (index, self.values)
+
+
+def lookup(index: str, values: Sequence[float]) -> Lookup:
+    """Return what takes a value by number.
+
+    Args:
+        index: the parameter that holds the number, 0 to len(values) - 1.
+        values: what there is to take.
+    """
+    table = np.array(values, dtype=np.float64)
+    source = f"({', '.join(f'{value:g}' for value in values)})[{index}]"
+    tree = ast.parse(source, mode="eval").body
+
+    def take(columns: Mapping[str, Any]) -> Any:
+        return table[columns[index].astype(np.int64)]
+
+    return Lookup(source, frozenset({index}), tree, take, tuple(table.tolist()))
 
 
 def parse(text: str, place: str = "") -> Expression:

@@ -101,7 +101,7 @@ class Parameter:
     def __post_init__(self) -> None:
         label = f"{self.name} [{self.unit}]"
         values = {"low": self.low, "high": self.high, "default": self.default}
-        problems = [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
+        problems = self._naming_problems()
         unusable = [key for key, value in values.items() if not math.isfinite(value)]
         problems += [f"{key} of {label} must be finite, got {values[key]}" for key in unusable]
         if not unusable:
@@ -121,6 +121,31 @@ class Parameter:
                     if value != math.floor(value)
                 ]
         _refuse(problems, self.place)
+
+    def at(self, share: Float, lo: Float | float, hi: Float | float) -> Float:
+        """Return the values at shares of the interval that is left to it.
+
+        Args:
+            share: ``(N,)`` in [0, 1].
+            lo: smallest value, one or ``(N,)``.
+            hi: largest value, likewise.
+        """
+        if self.kind == "integer":
+            value = np.floor(lo + share * (hi - lo + 1.0))
+        else:
+            value = np.add(lo, share * (hi - lo))
+        return np.minimum(np.maximum(value, lo), hi)  # rounding may leave the interval by a bit
+
+    def share(self, value: Float, lo: Float | float, hi: Float | float) -> Float:
+        """Return the shares at which values are, ``(N,)``; 0.5 where any would do."""
+        below, width = value - lo, np.broadcast_to(hi - lo, len(value))
+        if self.kind == "integer":
+            below, width = below + 0.5, width + 1.0
+        share = np.divide(below, width, out=np.full(len(value), 0.5), where=width > 0.0)
+        return np.asarray(np.clip(share, 0.0, 1.0))
+
+    def _naming_problems(self) -> list[str]:
+        return [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
 
 
 @dataclass(frozen=True)

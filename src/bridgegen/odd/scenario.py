@@ -73,22 +73,15 @@ class ParameterLine:
 
 
 @dataclass(frozen=True)
-class LogicalScenario:
-    """A logical scenario (ISO 34501): a situation with ranges instead of values.
+class SearchedScenario:
+    """A logical scenario (ISO 34501), ranges instead of values: what a search has to know of it.
 
     Attributes:
         name: how it is called on the command line.
         title: one line.
         description: what happens.
-        source: where it comes from.
         place: the file that it was read from.
-        duration: [s] of simulated time.
-        time_step: [s].
-        roads: the road network.
-        story: who takes part, and what happens.
         driver: who drives the ego unless the user says otherwise.
-        effects: the user's functions that add to each scenario, as ``file.py:function`` or the
-            name of an entry point.
         axes: what is searched unless the user says otherwise.
         parameters: what may vary, by name.
         bounds: what limits it.
@@ -99,14 +92,8 @@ class LogicalScenario:
     name: str
     title: str
     description: str
-    source: str
     place: str = field(compare=False, repr=False)
-    duration: float
-    time_step: float
-    roads: RoadsSpec
-    story: Story
     driver: str
-    effects: tuple[str, ...]
     axes: tuple[Axis, ...]
     parameters: dict[str, Parameter]
     bounds: tuple[Bound, ...]
@@ -117,6 +104,59 @@ class LogicalScenario:
     def fingerprint(self) -> str:
         """A digest of all that it says: the same for the same scenario on any machine."""
         return sha256(repr(self).encode()).hexdigest()
+
+    def space(
+        self, axes: Iterable[str] | None = None, fixed: Mapping[str, float] | None = None
+    ) -> SearchSpace:
+        """Return the space of some axes, the scenario's own by default.
+
+        Args:
+            axes: which to search.
+            fixed: parameters to hold at a value.
+
+        Raises:
+            UnknownNameError: no such axis.
+            ScenarioError: what is fixed does not fit (see ``SearchSpace``).
+        """
+        return SearchSpace(self, axes, fixed)
+
+    def table(self) -> tuple[ParameterLine, ...]:
+        """Return every parameter and derived quantity with its range and rules, for people."""
+        lines = [
+            ParameterLine(
+                p.name, p.axis, p.unit, p.low, p.high, p.default,
+                "; ".join(str(bound) for bound in self.bounds if bound.target == p.name),
+                p.description,
+            )
+            for p in self.parameters.values()
+        ]  # fmt: skip
+        lines += [
+            ParameterLine(d.name, d.axis, d.unit, None, None, None, str(d), d.description)
+            for d in self.derived
+        ]
+        return tuple(lines)
+
+
+@dataclass(frozen=True)
+class LogicalScenario(SearchedScenario):
+    """A logical scenario of five layers, as a YAML file declares it.
+
+    Attributes:
+        source: where it comes from.
+        duration: [s] of simulated time.
+        time_step: [s].
+        roads: the road network.
+        story: who takes part, and what happens.
+        effects: the user's functions that add to each scenario, as ``file.py:function`` or the
+            name of an entry point.
+    """
+
+    source: str
+    duration: float
+    time_step: float
+    roads: RoadsSpec
+    story: Story
+    effects: tuple[str, ...]
 
     @property
     def participants(self) -> tuple[Participant, ...]:
@@ -141,21 +181,6 @@ class LogicalScenario:
         """
         return {one.name: one for one in self.participants}[name]
 
-    def space(
-        self, axes: Iterable[str] | None = None, fixed: Mapping[str, float] | None = None
-    ) -> SearchSpace:
-        """Return the space of some axes, the scenario's own by default.
-
-        Args:
-            axes: which to search.
-            fixed: parameters to hold at a value.
-
-        Raises:
-            UnknownNameError: no such axis.
-            ScenarioError: what is fixed does not fit (see ``SearchSpace``).
-        """
-        return SearchSpace(self, axes, fixed)
-
     def measured(self, values: Mapping[str, float]) -> "LogicalScenario":
         """Return this scenario at a place where some parameters are what they are.
 
@@ -171,19 +196,3 @@ class LogicalScenario:
         }
         bounds = tuple(bound for bound in self.bounds if bound.target not in values)
         return replace(self, parameters=parameters, bounds=bounds)
-
-    def table(self) -> tuple[ParameterLine, ...]:
-        """Return every parameter and derived quantity with its range and rules, for people."""
-        lines = [
-            ParameterLine(
-                p.name, p.axis, p.unit, p.low, p.high, p.default,
-                "; ".join(str(bound) for bound in self.bounds if bound.target == p.name),
-                p.description,
-            )
-            for p in self.parameters.values()
-        ]  # fmt: skip
-        lines += [
-            ParameterLine(d.name, d.axis, d.unit, None, None, None, str(d), d.description)
-            for d in self.derived
-        ]
-        return tuple(lines)

@@ -23,23 +23,23 @@ from bridgegen.odd.parameters import (
 from bridgegen.odd.violations import Violation, violations
 
 if TYPE_CHECKING:
-    from bridgegen.odd.scenario import LogicalScenario
+    from bridgegen.odd.scenario import SearchedScenario
 
 # Points at which a new space is tried: all corners of the cube up to _CORNERS, and as many others.
 _CORNERS = 2048
 
 
 class SearchSpace:
-    """What is searched of a logical scenario, and how a point of the unit cube becomes a row.
+    """What is searched of a scenario, and how a point of the unit cube becomes a row.
 
     Decoding takes the parameters in an order in which each comes after all that limit it, and
-    spreads each over the interval that the earlier ones leave to it: ``x = lo + u·(hi − lo)``,
-    or evenly over its whole numbers. So every point of the cube is feasible, and no algorithm
-    needs a penalty. A parameter that is not searched stands at its default, or where ``fixed``
-    puts it, moved into its interval where a bound asks for it. Derived quantities follow.
+    spreads each over the interval that the earlier ones leave to it (``Parameter.at``). So every
+    point of the cube is feasible, and no algorithm needs a penalty. A parameter that is not
+    searched stands at its default, or where ``fixed`` puts it, moved into its interval where a
+    bound asks for it. Derived quantities follow.
 
     Attributes:
-        scenario: the logical scenario.
+        scenario: what is searched.
         axes: the axes that are searched.
         variables: the searched parameters, in declared order: the columns of U. One whose low is
             its high is not searched.
@@ -59,7 +59,7 @@ class SearchSpace:
 
     def __init__(
         self,
-        scenario: "LogicalScenario",
+        scenario: "SearchedScenario",
         axes: Iterable[str] | None = None,
         fixed: Mapping[str, float] | None = None,
     ) -> None:
@@ -154,11 +154,7 @@ class SearchSpace:
         cube = np.empty((len(rows), self.n_var))
         for number, name in enumerate(self.variables):
             lo, hi = self._interval(name, table)
-            below, width = table[name] - lo, np.broadcast_to(hi - lo, len(rows))
-            if self.scenario.parameters[name].kind == "integer":
-                below, width = below + 0.5, width + 1.0
-            share = np.divide(below, width, out=np.full(len(rows), 0.5), where=width > 0.0)
-            cube[:, number] = np.clip(share, 0.0, 1.0)
+            cube[:, number] = self.scenario.parameters[name].share(table[name], lo, hi)
         back = self._decode(cube)
         wrong = np.argwhere(np.abs(rows - back) > slack(back)).tolist()
         if wrong:
@@ -241,14 +237,10 @@ class SearchSpace:
                 out[:] = table[name] = self._defaults[name]
                 continue
             lo, hi = self._interval(name, table)
-            if name not in shares:
-                out[:] = self._defaults[name]
-            elif self.scenario.parameters[name].kind == "integer":
-                np.floor(lo + shares[name] * (hi - lo + 1.0), out=out)
+            if name in shares:
+                out[:] = self.scenario.parameters[name].at(shares[name], lo, hi)
             else:
-                np.add(lo, shares[name] * (hi - lo), out=out)
-            np.maximum(out, lo, out=out)  # rounding may leave the interval by a bit
-            np.minimum(out, hi, out=out)
+                out[:] = np.clip(self._defaults[name], lo, hi)
             table[name] = out
         return np.ascontiguousarray(result.T)
 
@@ -293,7 +285,7 @@ class SearchSpace:
             raise ScenarioError(f"{problem} at {', '.join(values) or 'any row'}")
 
 
-def _fixed_problems(fixed: Mapping[str, float], scenario: "LogicalScenario") -> list[str]:
+def _fixed_problems(fixed: Mapping[str, float], scenario: "SearchedScenario") -> list[str]:
     problems = []
     parameters = scenario.parameters
     derived = {one.name: one for one in scenario.derived}

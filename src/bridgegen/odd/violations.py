@@ -11,7 +11,7 @@ from bridgegen.odd.expression import Expression
 from bridgegen.odd.parameters import TOLERANCE, slack
 
 if TYPE_CHECKING:
-    from bridgegen.odd.scenario import LogicalScenario
+    from bridgegen.odd.scenario import SearchedScenario
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Violation:
     reason: str
 
 
-def violations(scenario: "LogicalScenario", table: Mapping[str, Float]) -> list[Violation]:
+def violations(scenario: "SearchedScenario", table: Mapping[str, Float]) -> list[Violation]:
     """Return all that is wrong with the rows, by row; nothing if they are feasible.
 
     Args:

@@ -60,7 +60,6 @@ def build_report(
         version: of BridgeGen.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
-    site = pipeline.road_map.site if pipeline.road_map else None
     weights = ", ".join(
         f"{name} {weight:.4g}"
         for name, weight in zip(pipeline.objective.names, pipeline.objective.weights, strict=True)
@@ -69,9 +68,7 @@ def build_report(
         scenario=scenario.name,
         title=scenario.title,
         description=scenario.description.strip(),
-        road=f"{site.name}, junction {site.junction_id}"
-        if site
-        else f"generated {scenario.roads.template}",
+        road=pipeline.source.road,
         ego=pipeline.driver.name,
         algorithm=algorithm,
         seed=seed,
@@ -94,7 +91,7 @@ def build_report(
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             "weights of the objective": weights,
-            "simulated": f"{scenario.duration:g} s at {pipeline.simulator.time_step:g} s",
+            "simulated": f"{pipeline.simulator.duration:g} s at {pipeline.simulator.time_step:g} s",
         },
     )
     return ReportData(
@@ -129,7 +126,7 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
             name in space.variables,
         )
         for i, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
-        if pipeline.road_map is None or name not in pipeline.static_names
+        if name not in pipeline.source.unused_names
     )
     metrics = tuple(
         Column(name, measures.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
@@ -162,16 +159,18 @@ def _playbacks(
         return ()
     at = [evaluation for _, evaluation, _ in kept]
     rollout = pipeline.rollout(rows.X[at])
-    entities, scenery = bodies(rollout, pipeline.scenario.story), Scenery(pipeline)
+    entities, scenery = bodies(rollout, pipeline.source.bodies), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
-    checked = constraints_in_words(pipeline.scenario)
+    checked = constraints_in_words(pipeline.source.constraints)
     playbacks = []
     for k, (name, evaluation, files) in enumerate(kept):
-        values = pipeline.space.values(rows.X[evaluation])
-        individuals = pipeline.individuals(values)
+        concrete = pipeline.concrete(rows.X[evaluation])
         x, y = rollout.x[k], rollout.y[k]
-        lanes, lights = scenery.road(values, individuals)
-        whole = with_outcomes(individuals, rollout, pipeline.roads(individuals), k)
+        lanes, lights = scenery.road(rows.X[evaluation])
+        picture = None
+        if concrete.individuals is not None:
+            whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
+            picture = paint(whole, (), checked)
         playbacks.append(
             Playback(
                 name=name,
@@ -187,7 +186,7 @@ def _playbacks(
                 lanes=lanes,
                 n_steps=int(rollout.n_steps[k]),
                 files=files,
-                picture=paint(whole, (), checked),
+                picture=picture,
                 lamps=lamps(rollout, k, lights),
             )
         )  # fmt: skip

@@ -1,9 +1,8 @@
 """What is drawn of a concrete scenario besides its motion: the road, the bodies, the lights."""
 
-import numpy as np
+from collections.abc import Mapping
 
-from bridgegen.odd.story import Story
-from bridgegen.ontology.graph import Individuals
+from bridgegen.arrays import Float
 from bridgegen.openx.opendrive.outline import outline
 from bridgegen.openx.opendrive.outline_furniture import Light, lights
 from bridgegen.pipeline import Pipeline
@@ -22,32 +21,19 @@ class Scenery:
         self._pipeline = pipeline
         self._known: dict[bytes, tuple[tuple[Outline, ...], list[Light]]] = {}
 
-    def road(
-        self, values: dict[str, float], individuals: Individuals
-    ) -> tuple[tuple[Outline, ...], list[Light]]:
-        """Return the drawing of a scenario's road network, the same objects for the same network.
-
-        Args:
-            values: of every parameter.
-            individuals: the scenario's.
-        """
-        pipeline = self._pipeline
-        static = [] if pipeline.road_map else [values[name] for name in pipeline.static_names]
-        key = np.array(static).tobytes()
+    def road(self, x: Float) -> tuple[tuple[Outline, ...], list[Light]]:
+        """Return the drawing of a row's road network, the same objects for the same network."""
+        space, source = self._pipeline.space, self._pipeline.source
+        key = x[[space.index(name) for name in source.static_names]].tobytes()
         if key not in self._known:
-            model = pipeline.roads(individuals)
-            junction = pipeline.road_map.site.junction_id if pipeline.road_map else None
-            shapes = tuple(Outline(kind, points) for kind, points in outline(model, junction))
-            self._known[key] = shapes, lights(model)
+            model = self._pipeline.concrete(x).roads
+            shapes = (Outline(kind, points) for kind, points in outline(model, source.junction))
+            self._known[key] = tuple(shapes), lights(model)
         return self._known[key]
 
 
-def bodies(rollout: Rollout, story: Story) -> tuple[Entity, ...]:
-    """Return the bodies of a rollout, each as what it is."""
-    types = {one.name: one.type for one in story.participants}
-    for works in story.works:
-        types |= {f"{works.name}_cone_{k}": "cone" for k in range(1, len(works.cones) + 1)}
-        types[f"{works.name}_sign"] = "sign"
+def bodies(rollout: Rollout, types: Mapping[str, str]) -> tuple[Entity, ...]:
+    """Return the bodies of a rollout, each as what it is (`Source.bodies`)."""
     return tuple(
         Entity(name, length, width, ahead, types.get(name, "obstacle"))
         for name, (length, width, ahead) in zip(rollout.names, rollout.box.tolist(), strict=True)

@@ -67,13 +67,12 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
     """
     x = pipeline.space.row({}) if x is None else x
     rollout = pipeline.rollout(x[np.newaxis])
-    values = pipeline.space.values(x)
-    road, lights = Scenery(pipeline).road(values, pipeline.individuals(values))
+    road, lights = Scenery(pipeline).road(x)
     n = int(rollout.n_steps[0])
     distance = rollout.distance[0].min(axis=0)[:n]
     closest = int(distance.argmin()) if np.isfinite(distance).any() else n - 1
     last = min(n - 1, closest + round(_AFTER / rollout.time_step))
-    entities = bodies(rollout, pipeline.scenario.story)
+    entities = bodies(rollout, pipeline.source.bodies)
     where = np.stack([rollout.x[0], rollout.y[0], rollout.h[0]], axis=-1)  # (E, T, 3)
     moving = [e == 0 or bool((rollout.v[0, e, :n] > _MOVES).any()) for e in range(len(entities))]
     view = _view(where[moving], closest, last)

@@ -24,6 +24,14 @@ class Simulator(Protocol[Roads]):
         """Between two recorded instants [s]."""
 
     @property
+    def duration(self) -> float:
+        """The longest that a scenario takes [s]."""
+
+    @property
+    def fixed(self) -> Mapping[str, str]:
+        """The parameters that rows may not vary, and what they are used for."""
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """The storyboard's numeric parameters with their declared values."""
 

@@ -53,6 +53,16 @@ class EmbeddedSimulator:
         return self.program.time_step
 
     @property
+    def duration(self) -> float:
+        """See `Simulator`."""
+        return (self.program.n_steps - 1) * self.program.time_step
+
+    @property
+    def fixed(self) -> Mapping[str, str]:
+        """See `Simulator`."""
+        return self.program.fixed
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """See `Simulator`."""
         return self.program.parameters

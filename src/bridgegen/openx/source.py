@@ -1,0 +1,162 @@
+"""Where concrete scenarios come from: what a pipeline asks for, and how the ontology answers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+from bridgegen.odd.parameters import Axis
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.individuals import build, build_static
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.road_map import RoadMap
+from bridgegen.openx.opendrive.write import to_xml as road_xml
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.model import OpenScenario
+
+
+class ConcreteScenario(Protocol):
+    """One row of X, as the files that are handed over; each is made when it is asked for."""
+
+    @property
+    def storyboard(self) -> OpenScenario:
+        """The OpenSCENARIO file."""
+
+    @property
+    def roads(self) -> OpenDrive:
+        """The road network."""
+
+    @property
+    def road_data(self) -> bytes:
+        """The OpenDRIVE file."""
+
+    @property
+    def individuals(self) -> Individuals | None:
+        """The ontology's; None where it cannot say what somebody else's file says."""
+
+
+class Source(Protocol):
+    """Makes the concrete scenarios of a logical one."""
+
+    @property
+    def road(self) -> str:
+        """The road network in words."""
+
+    @property
+    def junction(self) -> str | None:
+        """The junction of a map that it takes place at, if one was chosen."""
+
+    @property
+    def static_names(self) -> tuple[str, ...]:
+        """The parameters that the road network depends on."""
+
+    @property
+    def unused_names(self) -> tuple[str, ...]:
+        """The parameters that nothing depends on: a map tells what they would."""
+
+    @property
+    def bodies(self) -> Mapping[str, str]:
+        """What the entities are, by name: a car, a pedestrian, a cone."""
+
+    @property
+    def constraints(self) -> LogicalScenario | None:
+        """The scenario whose constraints its individuals keep; None: the ontology's alone."""
+
+    def roads(self, values: Mapping[str, float]) -> OpenDrive:
+        """Return the road network, of the values of ``static_names``."""
+
+    def concrete(self, values: Mapping[str, float], road_file: str = "") -> ConcreteScenario:
+        """Return one concrete scenario.
+
+        Args:
+            values: of every parameter, by name.
+            road_file: what its OpenDRIVE file will be called; a map's own name by default.
+        """
+
+
+def source_of(scenario: SearchedScenario, driver: str, road_map: RoadMap | None = None) -> Source:
+    """Return what makes a scenario's concrete ones.
+
+    Args:
+        scenario: of any kind.
+        driver: the ego's, by name.
+        road_map: the map that it takes place on, instead of its own roads.
+    """
+    if isinstance(scenario, LogicalScenario):
+        return OntologySource(scenario, driver, road_map)
+    raise TypeError(f"nothing makes scenarios of {type(scenario).__name__}")
+
+
+class OntologySource:
+    """A `Source` by way of the ontology: parameters to individuals to files.
+
+    Args:
+        scenario: of five layers.
+        driver: the ego's, by name.
+        road_map: the map that it takes place on; by default the network is generated.
+    """
+
+    def __init__(
+        self, scenario: LogicalScenario, driver: str, road_map: RoadMap | None = None
+    ) -> None:
+        self.constraints = self._scenario = scenario
+        self._driver, self._map = driver, road_map
+        static = tuple(name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC)
+        self.static_names = () if road_map else static
+        self.unused_names = static if road_map else ()
+
+    @property
+    def road(self) -> str:
+        """See `Source`."""
+        if self._map is None:
+            return f"generated {self._scenario.roads.template}"
+        return f"{self._map.site.name}, junction {self._map.site.junction_id}"
+
+    @property
+    def junction(self) -> str | None:
+        """See `Source`."""
+        return self._map.site.junction_id if self._map else None
+
+    @property
+    def bodies(self) -> Mapping[str, str]:
+        """See `Source`."""
+        types = {one.name: str(one.type) for one in self._scenario.participants}
+        for works in self._scenario.story.works:
+            types |= {f"{works.name}_cone_{k}": "cone" for k in range(1, len(works.cones) + 1)}
+            types[f"{works.name}_sign"] = "sign"
+        return types
+
+    def roads(self, values: Mapping[str, float]) -> OpenDrive:
+        """See `Source`."""
+        if self._map is not None:
+            return self._map.model
+        return opendrive_from_owl(build_static(dict(values), self._scenario.roads))
+
+    def concrete(self, values: Mapping[str, float], road_file: str = "") -> ConcreteScenario:
+        """See `Source`."""
+        site = self._map.site if self._map else None
+        if site and road_file:
+            site = replace(site, map_file=road_file)
+        individuals = build(self._scenario, values, driver=self._driver, site=site)
+        return _OfOntology(individuals, road_file or f"{self._scenario.name}.xodr", self._map)
+
+
+@dataclass(frozen=True)
+class _OfOntology:
+    individuals: Individuals
+    road_file: str
+    road_map: RoadMap | None
+
+    @cached_property
+    def storyboard(self) -> OpenScenario:
+        return openscenario_from_owl(self.individuals, self.road_file)
+
+    @cached_property
+    def roads(self) -> OpenDrive:
+        return self.road_map.model if self.road_map else opendrive_from_owl(self.individuals)
+
+    @property
+    def road_data(self) -> bytes:
+        return self.road_map.data if self.road_map else road_xml(self.roads)
