@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numba.extending
 
 
 @lru_cache(maxsize=1)
@@ -54,6 +55,40 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     A kernel never raises, does not check its arguments (its wrapper does), divides by zero as
     IEEE 754 says, and is not reordered (no fastmath), so its result is the same in any batch.
     """
+    return _compile(function, cache=True)
+
+
+def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a part of a kernel: as ``kernel`` does, but into each kernel that calls it.
+
+    For what runs at every instant and takes many arrays, whose descriptions a call would copy.
+    """
+    return _compile(function, inline="always")
+
+
+def _compile(function: Callable[..., Any], **options: bool | str) -> Callable[..., Any]:
     numba.config.CACHE_DIR = str(cache_folder())
-    compiled: Callable[..., Any] = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    compiled: Callable[..., Any] = numba.njit(nogil=True, error_model="numpy", **options)(function)
     return compiled
+
+
+def _borrowed(_: Any, array: Any) -> Any:
+    """In a kernel: the same array, not counted as a reference to its memory.
+
+    Its owner must outlive it. Every reading of an array out of a tuple counts a reference up and
+    down, atomically; with one that is borrowed, the compiler sees that there is nothing to count.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        view = context.make_array(signature.args[0])(context, builder, arguments[0])
+        view.meminfo = view.meminfo.type(None)
+        return view._getvalue()
+
+    return array(array), generate
+
+
+def _itself(array: Any) -> Any:
+    return array
+
+
+borrowed = _itself if numba.config.DISABLE_JIT else numba.extending.intrinsic(_borrowed)

@@ -68,12 +68,15 @@ def holds(c, conditions, history, k):
     edge, j = conditions[c, 5], k - conditions[c, 6]
     if j < 0:
         return False
+    depth = history.shape[1]
+    then = history[c, j % depth]
     if edge == NONE:
-        return history[c, j]
+        return then
     if j == 0:
         return False
-    rises = history[c, j] and not history[c, j - 1]
-    falls = history[c, j - 1] and not history[c, j]
+    before = history[c, (j - 1) % depth]
+    rises = then and not before
+    falls = before and not then
     return (edge != FALLING and rises) or (edge != RISING and falls)
 
 

@@ -116,7 +116,7 @@ class Program:
         acts: ``(A,)`` start trigger.
         events: ``(·, 4)`` act, trigger, first and past-the-last action.
         actions: ``(·, 7)`` entity, kind, shape, dimension, slot of the target, slot of its
-            dynamics, path; see ``_rollout_kernels`` and ``_motion_kernels``.
+            dynamics, path; see ``_action_kernels`` and ``_motion_kernels``.
         lights: the traffic lights that are set.
         first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
         friction_slot: of the road's friction scale factor, -1 if the file has none.

@@ -1,0 +1,31 @@
+"""How actions begin; what they do from then on: ``_speed_kernels`` and ``_travel_kernels``."""
+
+import numpy as np
+
+from bridgegen.compiled import kernel
+from bridgegen.simulation.embedded._memory_kernels import FRICTION
+from bridgegen.simulation.embedded._speed_kernels import begin_speed_change
+from bridgegen.simulation.embedded._start_kernels import DRY_FRICTION, GRAVITY
+from bridgegen.simulation.embedded._travel_kernels import begin_lane_change
+
+SPEED_CHANGE, LANE_CHANGE, FRICTION_CHANGE, LIGHT = 0, 1, 2, 3
+
+
+@kernel
+def begin(j, k, plan, roads, state, record):
+    """Begin action j at instant k: a branch per kind.
+
+    What is over at once says so in ``action_ended``. Not inlined: it runs once in a scenario.
+    """
+    kind = plan.actions[j, 1]
+    if kind == SPEED_CHANGE:
+        begin_speed_change(j, k, plan, state)
+    elif kind == LANE_CHANGE:
+        begin_lane_change(j, k, plan, roads, state, record)
+    elif kind == FRICTION_CHANGE:
+        scale = state.slots[plan.actions[j, 4]]
+        state.weather[FRICTION] = DRY_FRICTION * GRAVITY * scale
+        state.action_ended[j] = True
+    else:
+        state.lights[plan.actions[j, 0]] = np.int8(state.slots[plan.actions[j, 4]])
+        state.action_ended[j] = True

@@ -1,0 +1,47 @@
+"""The ego: what its driver demands, and what its tyres give."""
+
+from bridgegen.compiled import inlined_kernel
+from bridgegen.ego._path_kernels import project
+from bridgegen.ego._reference_kernels import drive
+from bridgegen.ego._route_follower_kernels import hold_speed, steer
+from bridgegen.simulation.embedded._memory_kernels import FRICTION
+from bridgegen.simulation.embedded._motion_kernels import bicycle
+
+
+@inlined_kernel
+def demand(k, plan, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m].
+
+    A driver that is compiled is a branch here; one in Python gives the same two numbers.
+    """
+    path, n, ds, s = roads.paths[0], roads.counts[0], roads.steps[0], state.station[0]
+    v = record.v[0, k]
+    curvature = steer(path, n, ds, s, record.x[0, k], record.y[0, k], record.h[0, k], v)
+    if plan.driver == 0:
+        return hold_speed(v, state.command[0]), curvature
+    demanded = drive(
+        path, n, ds, v, state.command[0], state.weather[FRICTION], plan.bodies, state.station,
+        record.v, k, roads.zones, state.on, state.to, state.foot,
+    )  # fmt: skip
+    return demanded, curvature
+
+
+@inlined_kernel
+def move_ego(k, demanded, curvature, plan, roads, state, record):
+    """Move the ego on from instant k; return its new x, y [m] and heading [rad]."""
+    v, dt = record.v[0, k], plan.dt
+    x, y, h, after, given = bicycle(
+        record.x[0, k], record.y[0, k], record.h[0, k], v, demanded, curvature,
+        plan.bodies[0, 3:7], state.weather[FRICTION], dt,
+    )  # fmt: skip
+    step = 0.5 * (v + after) * dt
+    record.a[0, k] = given
+    state.travelled[0] += step
+    state.stood[0] = state.stood[0] + dt if after == 0.0 else 0.0
+    if k < record.x.shape[1] - 1:
+        record.x[0, k + 1], record.y[0, k + 1] = x, y
+        record.h[0, k + 1], record.v[0, k + 1] = h, after
+        state.station[0], record.offset[0, k + 1] = project(
+            roads.paths[0], roads.counts[0], roads.steps[0], state.station[0] + step, x, y
+        )
+    return x, y, h

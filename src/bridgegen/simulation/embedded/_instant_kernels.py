@@ -1,0 +1,51 @@
+"""One instant of one scenario, in two halves: what comes before the ego's driver, and after it."""
+
+import math
+
+from bridgegen.compiled import inlined_kernel
+from bridgegen.simulation.embedded._ego_kernels import move_ego
+from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
+from bridgegen.simulation.embedded._speed_kernels import command_speeds
+from bridgegen.simulation.embedded._storyboard_kernels import decide, observe
+from bridgegen.simulation.embedded._travel_kernels import move_along_path, move_along_timetable
+
+
+@inlined_kernel
+def before_driver(k, plan, roads, state, record):
+    """Do at instant k what the storyboard says, up to what it asks of the ego."""
+    observe(k, plan, roads, state, record)
+    decide(k, plan, roads, state, record)
+    command_speeds(k, plan, state)
+    for i in range(state.lights.shape[0]):
+        record.lights[i, k] = state.lights[i]
+
+
+@inlined_kernel
+def after_driver(k, demanded, curvature, plan, roads, state, record):
+    """Move everybody on to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
+    x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
+    first = 0
+    if plan.timed[0] < 0:
+        x, y, h = move_ego(k, demanded, curvature, plan, roads, state, record)
+        first = 1
+    for e in range(first, record.x.shape[0]):
+        if plan.timed[e] >= 0:
+            move_along_timetable(e, k, plan, roads, state, record)
+        else:
+            move_along_path(e, k, plan, roads, state, record)
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):
+        state.ending[STATUS], state.ending[STOPS] = NOT_FINITE, 1
+    if state.ending[STOPS]:
+        _repeat(k, record)
+    if state.ending[STOPS] or k == record.x.shape[1] - 1:
+        state.ending[N_STEPS] = k + 1
+
+
+@inlined_kernel
+def _repeat(k, record):
+    """Repeat instant k up to the end of the record."""
+    for array in (record.x, record.y, record.h, record.v, record.a, record.offset):
+        for e in range(array.shape[0]):
+            array[e, k + 1 :] = array[e, k]
+    for i in range(record.lights.shape[0]):
+        record.lights[i, k + 1 :] = record.lights[i, k]

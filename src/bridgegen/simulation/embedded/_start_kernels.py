@@ -1,0 +1,51 @@
+"""The first instant: where every entity is, and how fast."""
+
+import math
+
+from bridgegen.compiled import inlined_kernel
+from bridgegen.ego._path_kernels import pose
+from bridgegen.simulation.embedded._memory_kernels import FRICTION, N_STEPS, OFF_ROUTE, STATUS
+from bridgegen.simulation.embedded._motion_kernels import shifted
+
+GRAVITY = 9.81  # m/s²
+DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground Vehicles, table 1.3
+
+
+@inlined_kernel
+def start(plan, roads, state, record):
+    """Set the state and the record's first instant; who moves by a timetable is recorded whole."""
+    n_entities, n_steps = record.x.shape
+    state.weather[FRICTION] = DRY_FRICTION * GRAVITY
+    if plan.friction_slot >= 0:
+        state.weather[FRICTION] *= state.slots[plan.friction_slot]
+    for i in range(state.lights.shape[0]):
+        state.lights[i] = plan.first_states[i]
+    for e in range(n_entities):
+        state.on[e], state.to[e] = e, -1
+        state.lane_action[e] = state.speed_action[e] = -1
+        state.rate[e] = math.inf
+        m = plan.timed[e]
+        if m >= 0:
+            for k in range(n_steps):
+                record.x[e, k] = roads.tracks[m, k, 0]
+                record.y[e, k] = roads.tracks[m, k, 1]
+                record.h[e, k] = roads.tracks[m, k, 2]
+                record.v[e, k] = roads.tracks[m, k, 3]
+                record.a[e, k] = roads.tracks[m, k, 4]
+                record.offset[e, k] = 0.0
+            state.command[e] = state.target[e] = record.v[e, 0]
+            state.station[e] = roads.tracks[m, 0, 5]
+            continue
+        length = (roads.counts[e] - 1) * roads.steps[e]
+        if not (0.0 <= state.station[e] <= length):
+            for array in (record.x, record.y, record.h, record.v, record.a, record.offset):
+                array[:] = 0.0
+            record.lights[:] = 0
+            state.ending[N_STEPS], state.ending[STATUS] = 1, OFF_ROUTE
+            return
+        x, y, h = pose(roads.paths[e], roads.counts[e], roads.steps[e], state.station[e])
+        record.x[e, 0], record.y[e, 0] = shifted(x, y, h, state.aside[e])
+        record.h[e, 0] = h
+        record.v[e, 0] = min(state.slots[plan.init[e]], plan.bodies[e, 3])
+        record.offset[e, 0] = 0.0
+        state.command[e] = state.target[e] = record.v[e, 0]

@@ -1,0 +1,182 @@
+"""N rows of one compiled storyboard: set up, rolled out at once, or by one instant at a time."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.errors import InputError
+from bridgegen.simulation.embedded import _memory_kernels as memory
+from bridgegen.simulation.embedded import _rollout_kernels as kernels
+from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.rollout import Rollout
+
+
+class Batch:
+    """N rows between their first instant and their last.
+
+    Either ``run`` once, with the compiled driver; or, for a driver in Python, ``start``, and then,
+    at every instant k from 0 on while rows run, ``before_driver(k)`` and ``after_driver(k, …)``.
+    Both give the same bits for the same demands.
+
+    Args:
+        program: the compiled storyboard.
+        roads: P road networks, made ready for it.
+        rows: ``(N,)`` int64 in 0..P-1, the road network of each row.
+        values: ``(N,)`` float64 per parameter; see `Simulator.run`.
+
+    Attributes:
+        record: x, y, h, v, a, offset ``(N, E, T)`` and more, up to the present instant.
+        state: all else that a driver may look at; see ``_memory_kernels.State``.
+
+    Raises:
+        InputError: a road network that is not there, or a value that is not finite.
+    """
+
+    def __init__(
+        self, program: Program, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]
+    ) -> None:
+        n = len(rows)
+        if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
+            raise InputError(f"rows must name one of {roads.n_networks} road networks")
+        self._program, self._rows = program, rows
+        self._plan = _plan(program)
+        self._networks = _networks(roads)
+        self.state = _state(program, roads, rows, program.fill(values, n))
+        self.record = _record(program, n)
+
+    @property
+    def running(self) -> Bool:
+        """``(N,)`` which rows have not ended."""
+        running: Bool = self.state.ending[:, memory.N_STEPS] == 0
+        return running
+
+    def run(self) -> Rollout:
+        """Roll all rows out with the compiled driver; runs without the GIL."""
+        kernels.simulate_rows(*self._all)
+        return self.rollout()
+
+    def start(self) -> None:
+        """Set the first instant."""
+        kernels.start_rows(*self._all)
+
+    def before_driver(self, k: int) -> None:
+        """Do at instant k what the storyboard says, up to what it asks of the ego.
+
+        ``state.command[:, 0]`` is then the speed that it is asked to drive at [m/s].
+        """
+        kernels.before_drivers(k, *self._all)
+
+    def demand(self, k: int) -> tuple[Float, Float]:
+        """Return what the compiled driver demands: ``(N,)`` [m/s²] and ``(N,)`` [1/m]."""
+        demanded, curvature = np.zeros((2, len(self._rows)))
+        kernels.demand_rows(k, *self._all, demanded, curvature)
+        return demanded, curvature
+
+    def after_driver(self, k: int, demanded: Float, curvature: Float) -> None:
+        """Move all rows that run on to instant k + 1, or end them.
+
+        Args:
+            k: the instant.
+            demanded: ``(N,)`` float64, the ego's acceleration [m/s²].
+            curvature: ``(N,)`` float64, of its path [1/m], left positive.
+        """
+        kernels.after_drivers(k, demanded, curvature, *self._all)
+
+    def rollout(self) -> Rollout:
+        """Return what is recorded; all rows must have ended."""
+        program, record = self._program, self.record
+        return Rollout(
+            time_step=program.time_step,
+            names=program.names,
+            box=program.box,
+            x=record.x, y=record.y, h=record.h, v=record.v, a=record.a, offset=record.offset,
+            light_names=program.lights,
+            lights=record.lights,
+            event_names=program.event_names,
+            began=record.began,
+            n_steps=self.state.ending[:, memory.N_STEPS].copy(),
+            status=self.state.ending[:, memory.STATUS].astype(np.int8),
+        )  # fmt: skip
+
+    @property
+    def _all(self) -> tuple[object, ...]:
+        return self._plan, self._networks, self._rows, self.state, self.record
+
+
+def _plan(program: Program) -> memory.Plan:
+    return memory.Plan(
+        bodies=program.bodies,
+        init=program.init,
+        timed=program.timed,
+        triggers=program.triggers,
+        groups=program.groups,
+        conditions=program.conditions,
+        acts=program.acts,
+        events=program.events,
+        actions=program.actions,
+        first_states=program.first_states,
+        friction_slot=program.friction_slot,
+        driver=program.driver.code,
+        dt=program.time_step,
+    )
+
+
+def _networks(roads: Network) -> memory.Roads:
+    return memory.Roads(
+        paths=roads.paths,
+        counts=roads.counts,
+        steps=roads.steps,
+        zones=roads.zones,
+        points=roads.points,
+        tracks=roads.tracks,
+    )
+
+
+def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.State:
+    """Return the state of N rows before they start; ``start`` sets what is not 0."""
+    n, n_entities = len(rows), len(program.names)
+
+    def zeros(*shape: int) -> Float:
+        return np.zeros((n, *shape))
+
+    def numbers(*shape: int) -> Int:
+        return np.zeros((n, *shape), dtype=np.int64)
+
+    def flags(*shape: int) -> Bool:
+        return np.zeros((n, *shape), dtype=np.bool_)
+
+    e = n_entities
+    a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
+    at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
+    varied = slots[:, np.maximum(program.aside_slots, 0)]
+    longest_delay = int(program.conditions[:, 6].max(initial=0))
+    return memory.State(
+        slots=slots,
+        weather=zeros(1),
+        ending=numbers(3),
+        history=flags(len(program.conditions), longest_delay + 2),
+        act_runs=flags(len(program.acts)),
+        event_ended=flags(len(program.events)),
+        action_ended=flags(len(program.actions)),
+        lights=np.zeros((n, len(program.lights)), dtype=np.int8),
+        travelled=zeros(e), stood=zeros(e),
+        on=numbers(e), station=np.ascontiguousarray(a + b * at),
+        aside=np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
+        to=numbers(e), foot=zeros(e),
+        lane_action=numbers(e), lane_began=zeros(e), lane_lasts=zeros(e), lane_from=zeros(e),
+        speed_action=numbers(e), speed_began=zeros(e), speed_lasts=zeros(e),
+        command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
+    )  # fmt: skip
+
+
+def _record(program: Program, n: int) -> memory.Record:
+    shape = (n, len(program.names), program.n_steps)
+    x, y, h, v, a, offset = (np.empty(shape) for _ in range(6))
+    return memory.Record(
+        x=x, y=y, h=h, v=v, a=a, offset=offset,
+        lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
+        began=np.full((n, len(program.events)), -1, dtype=np.int64),
+    )  # fmt: skip
