@@ -5,7 +5,7 @@ else here prepares it.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -77,12 +77,14 @@ class Pipeline:
         space: SearchSpace,
         *,
         ego: str | None = None,
+        ideal: Iterable[str] = (),
         road_map: RoadMap | None = None,
     ) -> None:
         self.scenario = scenario
         self.space = space
-        self.driver = egos.get(ego or scenario.driver)
-        self.source = source_of(scenario, self.driver.name, road_map)
+        self.driver = egos.get(ego or scenario.driver, ideal)
+        stages = egos.join(self.driver.ideal)
+        self.source = source_of(scenario, self.driver.name, road_map, stages)
         self.metrics = tuple(measures.METRICS)
         nominal = self.concrete(space.row({}))
         self.simulator: Simulator[Network] = EmbeddedSimulator(nominal.storyboard, scenario.name)
@@ -230,6 +232,7 @@ def simulate_file(
     path: Path,
     *,
     ego: str | None = None,
+    ideal: Iterable[str] | None = None,
     metrics: Sequence[str] | None = None,
     time_step: float | None = None,
 ) -> FileResult:
@@ -238,14 +241,16 @@ def simulate_file(
     Args:
         path: the ``.xosc`` file.
         ego: the ego's driver; what the file's controller says by default.
+        ideal: stages of the driver to be ideal; what the file's controller says by default, none
+            with another ``ego``.
         metrics: names; all by default.
         time_step: [s]; what the file's header says by default.
 
     Raises:
-        InputError: a time step out of range.
+        InputError: a time step out of range, or a stage that the driver has not.
         FileFormatError: a file is missing, malformed or inconsistent.
         UnsupportedError: an element that the simulator cannot run, by name and line.
-        UnknownNameError: no such driver or metric.
+        UnknownNameError: no such driver, stage or metric.
     """
     names = tuple(metrics or measures.METRICS)
     driver = egos.get(ego) if ego else None
@@ -254,7 +259,9 @@ def simulate_file(
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    simulator = EmbeddedSimulator(scenario, str(path), driver=driver, time_step=time_step)
+    simulator = EmbeddedSimulator(
+        scenario, str(path), driver=driver, ideal=ideal, time_step=time_step
+    )
     rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = measures.evaluate(rollout, names)[0]
     return FileResult(

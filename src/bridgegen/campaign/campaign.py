@@ -49,6 +49,7 @@ def run_search(
     budget: int = 1000,
     seed: int = 0,
     ego: str | None = None,
+    ideal: Iterable[str] = (),
     axes: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
     road_map: Path | str | None = None,
@@ -69,6 +70,7 @@ def run_search(
         budget: evaluations, exactly.
         seed: the same seed gives the same result.
         ego: a name of the ego's drivers; the scenario's own choice by default.
+        ideal: stages of the driver to be ideal: perception, prediction, control.
         axes: the axes of the search space; the scenario's own by default.
         fixed: parameters to hold at a value, by name.
         road_map: an OpenDRIVE map, or the ``.owl`` that it was imported as; by default the
@@ -104,7 +106,7 @@ def run_search(
     values = resolve(method, space.n_var, 1, seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
-    pipeline = Pipeline(logical, space, ego=ego, road_map=roads)
+    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal, road_map=roads)
     watch.stage("compile")
     pipeline.warm_up()
     chosen = pipeline.choose_objective(seed=seed)
@@ -117,6 +119,7 @@ def run_search(
         budget=budget,
         seed=seed,
         ego=pipeline.driver.name,
+        ideal=tuple(sorted(pipeline.driver.ideal)),
         axes=tuple(str(axis) for axis in space.axes),
         fixed=dict(fixed or {}),
         map=str(roads.path.resolve()) if roads else None,
@@ -147,7 +150,9 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
     with Store.open(folder, write=True) as store:
         settings = Settings.from_dict(store.settings, store.folder)
         space, roads = searched(settings, Path(folder))
-        pipeline = Pipeline(space.scenario, space, ego=settings.ego, road_map=roads)
+        pipeline = Pipeline(
+            space.scenario, space, ego=settings.ego, ideal=settings.ideal, road_map=roads
+        )
         watch.stage("compile")
         pipeline.warm_up()
         pipeline.choose_objective(Objective.from_dict(settings.objective))

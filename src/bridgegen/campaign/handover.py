@@ -144,7 +144,7 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:
         "name": name,
         "evaluation": int(rows.id[i]),
         "scenario": pipeline.scenario.name,
-        "ego": pipeline.driver.name,
+        "ego": pipeline.driver.label,
         "critical": bool(rows.critical[i]),
         "parameters": _named(pipeline.facts(rows.X[i]), units),
         "metrics": _named(

@@ -22,6 +22,7 @@ class Settings:
         budget: evaluations.
         seed: of the whole run.
         ego: the ego's driver.
+        ideal: its stages that are ideal.
         axes: what is searched.
         fixed: parameters held at a value.
         map: the absolute path of an OpenDRIVE map, or None for the generated crossroads.
@@ -40,6 +41,7 @@ class Settings:
     budget: int
     seed: int
     ego: str
+    ideal: tuple[str, ...]
     axes: tuple[str, ...]
     fixed: Mapping[str, float]
     map: str | None
@@ -65,12 +67,14 @@ class Settings:
                 f"{place}: a run's settings must be those of this version; unknown or missing: "
                 f"{', '.join(sorted(odd))}"
             )
-        return cls(**{**data, "axes": tuple(data["axes"])})
+        return cls(**{**data, "axes": tuple(data["axes"]), "ideal": tuple(data["ideal"])})
 
     def command(self, folder: Path) -> str:
         """Return the command line that makes the same run."""
         words = ["bridgegen", "search", self.scenario, "--algorithm", self.algorithm]
         words += ["--budget", str(self.budget), "--seed", str(self.seed), "--ego", self.ego]
+        if self.ideal:
+            words += ["--ideal", ",".join(self.ideal)]
         words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
         for name, value in self.algorithm_settings.items():
             words += ["--set", f"{name}={json.dumps(value)}"]

@@ -7,7 +7,17 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli.app import Json, app
+from bridgegen.ego import split
 from bridgegen.errors import InputError
+
+Ideal = Annotated[
+    str | None,
+    typer.Option(
+        help="Stages of the driver that work without fault: perception, prediction, control, "
+        "separated by commas.",
+        show_default="none of them",
+    ),
+]
 
 
 @app.command()
@@ -26,6 +36,7 @@ def search(
             help="Who drives: route-follower or reference.", show_default="the scenario's choice"
         ),
     ] = None,
+    ideal: Ideal = None,
     axes: Annotated[
         str | None,
         typer.Option(help="What to search, e.g. static,participants,weather."),
@@ -65,6 +76,7 @@ def search(
             budget=budget,
             seed=seed,
             ego=ego,
+            ideal=split(ideal or ""),
             axes=axes.split(",") if axes else None,
             fixed=fixed,
             road_map=road_map,
@@ -129,6 +141,7 @@ def simulate(
     ego: Annotated[
         str | None, typer.Option(help="Who drives; what the file says by default.")
     ] = None,
+    ideal: Ideal = None,
     dt: Annotated[
         float | None,
         typer.Option(help="Time step [s].", show_default="what the file's header says, or 0.05"),
@@ -144,7 +157,8 @@ def simulate(
     from bridgegen.screen import print_file_result
     from bridgegen.simulation.trace import write_trace
 
-    result = simulate_file(file, ego=ego, time_step=dt)
+    stages = None if ideal is None else split(ideal)
+    result = simulate_file(file, ego=ego, ideal=stages, time_step=dt)
     if trace is not None:
         write_trace(trace, result.rollout)
     if as_json:

@@ -27,6 +27,7 @@ def build(
     values: Mapping[str, float],
     *,
     driver: str,
+    ideal: str = "",
     site: Site | None = None,
 ) -> Individuals:
     """Return the individuals of one concrete scenario.
@@ -36,6 +37,7 @@ def build(
         values: every parameter of it by name, derived ones included: a row of X. The static ones
             may be absent where ``site`` is given.
         driver: the ego's driver.
+        ideal: its stages that are ideal, separated by commas.
         site: the intersection of a map that was made elsewhere; by default a crossroads is
             generated from the static parameters.
 
@@ -57,7 +59,7 @@ def build(
     place = site or site_of(scenario.roads, values)
     put(top, "has_road_network", add_road_network(builder, place))
     for participant in story.participants:
-        put(top, "has_participant", add_participant(builder, participant, place, driver))
+        put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
     for event in story.events:
         put(top, "has_event", add_event(builder, event, declared))
     for jam in story.jams:

@@ -224,6 +224,13 @@ def _any_of(speaker: _Speaker, node: Subject) -> str:
     return " or ".join(map(speaker.node, speaker.links(node, "has_condition"))) or "?"
 
 
+def _driver(speaker: _Speaker, node: Subject) -> str:
+    name: str = speaker.value(node, "has_driver")
+    if not speaker.members.values(node).get(bg("has_ideal_stages")):
+        return name
+    return f"{name}, ideal {speaker.value(node, 'has_ideal_stages')}"
+
+
 _SAYINGS: dict[str, Saying] = {
     "SpeedAction": _speed,
     "LaneChangeAction": _lane_change,
@@ -237,7 +244,7 @@ _SAYINGS: dict[str, Saying] = {
     "Route": lambda speaker, node: (
         f"{speaker.inner(node, 'has_start')} → {speaker.inner(node, 'has_destination')}"
     ),
-    "Controller": lambda speaker, node: speaker.value(node, "has_driver"),
+    "Controller": _driver,
     "Trigger": _any_of,
     "ConditionGroup": _all_of,
     "SimulationTimeCondition": _compared("time", "s", "≥"),

@@ -58,7 +58,9 @@ EGO = "ego"
 # -- layer 4 ---------------------------------------------------------------------------------------
 
 
-def add_participant(builder: Builder, one: Participant, site: Site, driver: str) -> ox.NamedNode:
+def add_participant(
+    builder: Builder, one: Participant, site: Site, driver: str, ideal: str
+) -> ox.NamedNode:
     """Add a participant with its body, route and init actions; the ego with its driver."""
     put, name = builder.put, one.name
     node = builder.node(name, CLASSES[one.type])
@@ -68,6 +70,8 @@ def add_participant(builder: Builder, one: Participant, site: Site, driver: str)
         controller = builder.node(f"{name}_controller", "Controller")
         put(controller, "has_name", f"{name}_driver")
         put(controller, "has_driver", driver)
+        if ideal:
+            put(controller, "has_ideal_stages", ideal)
         put(node, "has_controller", controller)
     start = add_position(builder, f"{name}_start", one.start, site)
     teleport = builder.node(f"{name}_teleport", "TeleportAction")

@@ -76,16 +76,19 @@ class Source(Protocol):
         """
 
 
-def source_of(scenario: SearchedScenario, driver: str, road_map: RoadMap | None = None) -> Source:
+def source_of(
+    scenario: SearchedScenario, driver: str, road_map: RoadMap | None = None, ideal: str = ""
+) -> Source:
     """Return what makes a scenario's concrete ones.
 
     Args:
         scenario: of any kind.
         driver: the ego's, by name.
         road_map: the map that it takes place on, instead of its own roads.
+        ideal: the driver's stages that are ideal, separated by commas.
     """
     if isinstance(scenario, LogicalScenario):
-        return OntologySource(scenario, driver, road_map)
+        return OntologySource(scenario, driver, road_map, ideal)
     raise TypeError(f"nothing makes scenarios of {type(scenario).__name__}")
 
 
@@ -96,13 +99,18 @@ class OntologySource:
         scenario: of five layers.
         driver: the ego's, by name.
         road_map: the map that it takes place on; by default the network is generated.
+        ideal: the driver's stages that are ideal, separated by commas.
     """
 
     def __init__(
-        self, scenario: LogicalScenario, driver: str, road_map: RoadMap | None = None
+        self,
+        scenario: LogicalScenario,
+        driver: str,
+        road_map: RoadMap | None = None,
+        ideal: str = "",
     ) -> None:
         self.constraints = self._scenario = scenario
-        self._driver, self._map = driver, road_map
+        self._driver, self._ideal, self._map = driver, ideal, road_map
         static = tuple(name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC)
         self.static_names = () if road_map else static
         self.unused_names = static if road_map else ()
@@ -139,7 +147,9 @@ class OntologySource:
         site = self._map.site if self._map else None
         if site and road_file:
             site = replace(site, map_file=road_file)
-        individuals = build(self._scenario, values, driver=self._driver, site=site)
+        individuals = build(
+            self._scenario, values, driver=self._driver, ideal=self._ideal, site=site
+        )
         return _OfOntology(individuals, road_file or f"{self._scenario.name}.xodr", self._map)
 
 

@@ -69,7 +69,7 @@ def build_report(
         title=scenario.title,
         description=scenario.description.strip(),
         road=pipeline.source.road,
-        ego=pipeline.driver.name,
+        ego=pipeline.driver.label,
         algorithm=algorithm,
         seed=seed,
         budget=budget,

@@ -17,7 +17,7 @@ class Simulator(Protocol[Roads]):
 
     @property
     def driver(self) -> str:
-        """Who drives the ego."""
+        """Who drives the ego, and which of its stages are ideal."""
 
     @property
     def time_step(self) -> float:

@@ -19,6 +19,12 @@ TIME_STEP = "time_step"
 DEFAULT_TIME_STEP = 0.05
 """[s], where a header does not say it."""
 
+DRIVER = "driver"
+"""Property of a controller: the driver's name."""
+
+IDEAL = "ideal"
+"""Property of a controller: the stages of the driver that are ideal, separated by commas."""
+
 
 @dataclass(frozen=True)
 class Property(Element):

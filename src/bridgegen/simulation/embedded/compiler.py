@@ -1,13 +1,19 @@
 """From an OpenSCENARIO file to a `Program`, or to all that the rollout cannot do with it."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
-from bridgegen.ego import DRIVERS, TRAJECTORY, Driver
+from bridgegen.ego import DRIVERS, TRAJECTORY, Driver, split
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP, TIME_STEP
+from bridgegen.openx.openscenario.declarations import (
+    DEFAULT_TIME_STEP,
+    DRIVER,
+    IDEAL,
+    TIME_STEP,
+)
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.program import (
@@ -32,6 +38,7 @@ def compile_storyboard(
     place: str,
     *,
     driver: Driver | None = None,
+    ideal: Iterable[str] | None = None,
     time_step: float | None = None,
 ) -> Program:
     """Compile a scenario file.
@@ -40,13 +47,14 @@ def compile_storyboard(
         scenario: the file, validated.
         place: its name, for messages.
         driver: who drives the ego, whatever the file says.
+        ideal: its stages that are ideal, whatever the driver or the file says.
         time_step: [s], whatever the file says.
 
     Raises:
         UnsupportedError: what the rollout cannot do, by name and line, all of it at once.
-        InputError: an entity without a start, or no entity at all.
+        InputError: an entity without a start, or no entity at all; stages that the driver has not.
     """
-    return _Compiler(scenario, place).compile(driver, time_step)
+    return _Compiler(scenario, place).compile(driver, ideal, time_step)
 
 
 class _Compiler:
@@ -57,7 +65,9 @@ class _Compiler:
         self.paths: list[PathSpec] = []
         self.actions = Actions(self.tables, self.paths)
 
-    def compile(self, driver: Driver | None, time_step: float | None) -> Program:
+    def compile(
+        self, driver: Driver | None, ideal: Iterable[str] | None, time_step: float | None
+    ) -> Program:
         if not self.tables.objects:
             raise InputError(f"{self.place}: a scenario needs at least one entity, got none")
         step = self._declared_time_step() if time_step is None else time_step
@@ -94,6 +104,7 @@ class _Compiler:
             )
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
+        chosen = driver or self._declared_driver()
         return Program(
             place=self.place,
             names=self.tables.names,
@@ -114,7 +125,7 @@ class _Compiler:
             friction_slot=friction,
             lights=tuple(self.actions.lights),
             first_states=np.array(self.actions.first_states, dtype=np.int8),
-            driver=driver or self._declared_driver(),
+            driver=chosen if ideal is None else chosen.idealised(ideal),
             time_step=step,
             n_steps=n_steps,
             fixed=self.tables.fixed,
@@ -148,14 +159,20 @@ class _Compiler:
             return TRAJECTORY
         for controller in self.tables.objects[0].object_controllers:
             properties = controller.controller.properties
-            name = properties.get("driver") if properties else None
+            name = properties.get(DRIVER) if properties else None
             if name is not None:
                 if str(name) not in DRIVERS:
                     raise UnsupportedError(
                         f"{self.place}, line {controller.line}: unknown ego driver '{name}'; "
                         f"known: {', '.join(DRIVERS)} (choose one with --ego)"
                     )
-                return DRIVERS[str(name)]
+                stages = split(str(properties.get(IDEAL) or "")) if properties else ()
+                try:
+                    return DRIVERS[str(name)].idealised(stages)
+                except InputError as error:
+                    raise InputError(
+                        f"{self.place}, line {controller.line}: property {IDEAL}: {error}"
+                    ) from None
         return DRIVERS["route-follower"]
 
     def _body(self, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """The embedded simulator: N rows of parameters against one compiled storyboard."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy.typing as npt
@@ -24,6 +24,7 @@ class EmbeddedSimulator:
         storyboard: the scenario file, validated.
         place: its name, for messages.
         driver: who drives the ego; what the file says by default.
+        ideal: stages of the driver that are ideal; what the driver says by default.
         time_step: [s]; what the file says by default.
 
     Attributes:
@@ -40,14 +41,17 @@ class EmbeddedSimulator:
         place: str,
         *,
         driver: Driver | None = None,
+        ideal: Iterable[str] | None = None,
         time_step: float | None = None,
     ) -> None:
-        self.program = compile_storyboard(storyboard, place, driver=driver, time_step=time_step)
+        self.program = compile_storyboard(
+            storyboard, place, driver=driver, ideal=ideal, time_step=time_step
+        )
 
     @property
     def driver(self) -> str:
         """See `Simulator`."""
-        return self.program.driver.name
+        return self.program.driver.label
 
     @property
     def time_step(self) -> float:

@@ -6,6 +6,7 @@ from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.values import format_double
 
 CATEGORIES = {
@@ -28,9 +29,6 @@ OBJECTS = {
 }
 MAX_SPEED = "max_speed"
 """Property of somebody on foot: how fast they can go [m/s]; the standard has it for vehicles."""
-
-DRIVER = "driver"
-"""Property of a controller: the driver's name."""
 
 _ESMINI_CONTROLLER = "ExternalController"
 # An axle as on a mid-size saloon; the ontology has no more of it than the wheelbase.
@@ -169,9 +167,10 @@ def _controller(individuals: Individuals, node: Subject) -> osc.ObjectController
     does not know would be an error in its log.
     """
     driver = plain_text(individuals, node, "has_driver")
-    properties = osc.Properties(
-        (osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER))
-    )
+    said = [osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER)]
+    if individuals.optional_text(node, "has_ideal_stages") is not None:
+        said.append(osc.Property(IDEAL, plain_text(individuals, node, "has_ideal_stages")))
+    properties = osc.Properties(tuple(said))
     name = plain_text(individuals, node, "has_name")
     return osc.ObjectController(osc.Controller(name, properties))
 

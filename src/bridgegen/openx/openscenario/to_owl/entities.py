@@ -3,9 +3,9 @@
 import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.from_owl.entities import (
     CATEGORIES,
-    DRIVER,
     MAX_SPEED,
     OBJECTS,
     WALKERS,
@@ -148,6 +148,9 @@ def _add_controller(
     controller = builder.node(f"{name}_controller", "Controller")
     builder.put(controller, "has_name", builder.text(one.name))
     builder.put(controller, "has_driver", builder.text(driver))
+    ideal = None if one.properties is None else one.properties.get(IDEAL)
+    if ideal is not None:
+        builder.put(controller, "has_ideal_stages", builder.text(ideal))
     builder.put(node, "has_controller", controller)
 
 

@@ -1,0 +1,79 @@
+"""The drivers by name, and which of their stages are ideal."""
+
+from pathlib import Path
+
+import pytest
+
+from bridgegen import ego
+from bridgegen.campaign import run_search
+from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.settings import Settings
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.reader import load
+from bridgegen.openx.convert import roads_of
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.openscenario.to_owl.scenario import individuals_from_openscenario
+from bridgegen.pipeline import Pipeline, simulate_file
+
+
+def test_stages_are_told_in_the_order_of_the_work() -> None:
+    driver = ego.get("reference", ["control", "perception"])
+    assert driver.ideal == {"perception", "control"}
+    assert driver.label == "reference (ideal perception,control)"
+    assert ego.split(" control,, perception ") == ("control", "perception")
+
+
+def test_an_unknown_stage_is_refused_with_a_hint() -> None:
+    with pytest.raises(UnknownNameError, match="'percepton'; did you mean 'perception'"):
+        ego.get("reference", ["percepton"])
+
+
+def test_a_driver_without_stages_refuses_them() -> None:
+    with pytest.raises(InputError, match="route-follower', which has no stages; got control"):
+        ego.get("route-follower", ["control"])
+
+
+def test_a_run_keeps_them(tmp_path: Path) -> None:
+    run = run_search(
+        "pedestrian-behind-parked", algorithm="random", budget=4, ego="reference",
+        ideal=["prediction", "perception"], keep=0, out=tmp_path / "run",
+    )  # fmt: skip
+    assert set(run.settings.ideal) == {"perception", "prediction"}
+    assert "--ideal perception,prediction" in run.settings.command(tmp_path)
+    assert Settings.from_dict(run.settings.to_dict(), tmp_path) == run.settings
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scenario file, with its map, that says which stages are ideal."""
+    scenario = load("lead-brakes")
+    space = scenario.space()
+    pipeline = Pipeline(scenario, space, ego="reference", ideal=["control", "perception"])
+    folder = tmp_path_factory.mktemp("written")
+    return next(
+        p for p in write_scenario(pipeline, space.row({}), folder, "a") if p.suffix == ".xosc"
+    )
+
+
+def test_a_file_says_them(written: Path) -> None:
+    assert b'<Property name="ideal" value="perception,control"/>' in written.read_bytes()
+    label = "reference (ideal perception,control)"
+    assert simulate_file(written, metrics=["d_min"]).driver == label
+    assert simulate_file(written, ideal=[], metrics=["d_min"]).driver == "reference"
+    assert simulate_file(written, ego="route-follower", metrics=["d_min"]).driver == (
+        "route-follower"
+    )
+
+
+def test_they_come_back_from_the_file(written: Path) -> None:
+    scenario = read(written)
+    individuals, _ = individuals_from_openscenario(scenario, roads_of(scenario, written), "a.xodr")
+    assert openscenario_from_owl(individuals, "a.xodr").entities == scenario.entities
+
+
+def test_a_file_with_an_unknown_stage_is_refused_by_line(written: Path) -> None:
+    broken = written.with_name("broken.xosc")
+    broken.write_bytes(written.read_bytes().replace(b"perception,control", b"thinking"))
+    with pytest.raises(InputError, match=r"broken.xosc, line \d+: property ideal: .*'thinking'"):
+        simulate_file(broken)
