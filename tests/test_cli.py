@@ -76,10 +76,20 @@ def test_simulate_prints_what_the_store_holds(cli, finished):
     recorded = json.loads(path.with_suffix(".json").read_text("utf-8"))
     assert code == 0
     assert facts["status"] == "ok"
-    assert facts["metrics"] == {name: one["value"] for name, one in recorded["metrics"].items()}
+    kept = {name: one["value"] for name, one in recorded["metrics"].items()}
+    assert {name: facts["metrics"][name] for name in kept} == kept
     code, out, _ = cli("simulate", path)
     assert code == 0
     assert repr(facts["metrics"]["d_min"]) in out
+
+
+def test_simulate_some_metrics(cli, finished):
+    path = finished.scenarios[0]
+    code, out, _ = cli("simulate", path, "--metrics", "v_d, d_min", "--json")
+    assert (code, list(json.loads(out)["metrics"])) == (0, ["v_d", "d_min"])
+    refused(cli("simulate", path, "--metrics", "dmin"), "unknown metric 'dmin'; did you mean")
+    result = cli("simulate", path, "--ego", "route-follower", "--metrics", "map")
+    refused(result, "the metric 'map' needs detections, and the driver 'route-follower' has none")
 
 
 @pytest.mark.parametrize("flavour", ["1.2", "1.3", "resolved", "recorded"])
@@ -247,6 +257,11 @@ def test_a_run_folder_is_never_overwritten(cli, finished):
         (["search", "crossroads-s4", "--budget", "-3"], ["budget", "-3"]),
         (["search", "nowhere.yaml"], ["nowhere.yaml"]),
         (["search", "crossroads-s4", "--map", "nowhere.xodr"], ["nowhere.xodr"]),
+        (["search", "crossroads-s4", "--ego", "route-follower", "--metrics", "pit"], ["'pit'"]),
+        (
+            ["search", "crossroads-s4", "--ego", "route-follower", "--objective", "iou=1"],
+            ["the metric 'iou' needs detections, and the driver 'route-follower' has none"],
+        ),
         (["simulate", "nowhere.xosc"], ["nowhere.xosc"]),
         (["convert", "nowhere.owl"], ["nowhere.owl"]),
         (["validate", "nowhere.xodr"], ["nowhere.xodr"]),

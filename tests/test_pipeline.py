@@ -1,9 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bridgegen import ego as egos
+from bridgegen import metrics
 from bridgegen import pipeline as module
-from bridgegen.errors import UnknownNameError
+from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.odd.scenario import Term
 from bridgegen.pipeline import Pipeline
 
 ALL_AXES = ("static", "participants", "weather")
@@ -87,3 +92,34 @@ def test_an_unknown_driver_is_named():
     scenario = load("crossroads-s4")
     with pytest.raises(UnknownNameError, match="did you mean 'reference'"):
         Pipeline(scenario, scenario.space(), ego="refrence")
+
+
+BLIND = tuple(name for name in metrics.TABLE_I if name not in ("iou", "e_position", "map"))
+
+
+def with_objective(*terms):
+    scenario = load("crossroads-s4")
+    spec = replace(scenario.objective, terms=tuple(Term(name, 1.0) for name in terms))
+    return replace(scenario, objective=spec)
+
+
+def test_the_paper_s_metrics_are_recorded_as_far_as_the_driver_gives_rise_to_them(monkeypatch):
+    assert made().metrics == BLIND
+    seeing = replace(egos.get("reference"), perceives=True)
+    assert module.metrics_of(load("crossroads-s4"), seeing) == metrics.TABLE_I
+
+
+def test_a_metric_that_the_driver_gives_no_rise_to_is_refused(monkeypatch):
+    drivers = {
+        **egos.DRIVERS,
+        "seeing": replace(egos.get("reference"), name="seeing", perceives=True),
+    }
+    monkeypatch.setattr("bridgegen.metrics.choice.DRIVERS", drivers)
+    scenario = with_objective("map", "ttc", "iou")
+    with pytest.raises(InputError) as caught:
+        Pipeline(scenario, scenario.space(), ego="route-follower")
+    first, second = caught.value.problems
+    assert first.startswith("the metric 'map' needs detections, and the driver 'route-follower' ")
+    assert "perceive (--ego): " in first
+    assert "seeing" in first
+    assert "'iou'" in second

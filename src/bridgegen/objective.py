@@ -20,6 +20,9 @@ Weights = Literal["fixed", "entropy"]
 Scale = Literal["raw", "standardised"]
 Objectives = Literal["one", "many"]
 
+CLASSIFYING = ("n_collision", "d_min", "v_d")
+"""The metrics that tell critical scenarios from others."""
+
 # The unit of a metric in the paper's fitness, as a factor on ours: its v_d is in km/h.
 PAPER_FACTOR = {"v_d": 3.6}
 
@@ -166,7 +169,7 @@ class Objective:
     @property
     def needed_metrics(self) -> tuple[str, ...]:
         """The metrics that F and the thresholds read, each once, the terms' first."""
-        return tuple(dict.fromkeys((*self.names, "n_collision", "d_min", "v_d")))
+        return tuple(dict.fromkeys((*self.names, *CLASSIFYING)))
 
     def F(self, metrics: npt.ArrayLike, names: Sequence[str]) -> tuple[Float, Bool]:
         """Return F and which rows of it are results.
@@ -202,9 +205,7 @@ class Objective:
             ValueError: a column is missing.
         """
         values = as_float("metrics", metrics, (None, len(names)), finite=False)
-        n_collision, d_min, v_d = (
-            values[:, _column(names, name)] for name in ("n_collision", "d_min", "v_d")
-        )
+        n_collision, d_min, v_d = (values[:, _column(names, name)] for name in CLASSIFYING)
         limit = self.thresholds
         close = (d_min < limit.d_min_below) & (v_d >= limit.v_d_at_least)
         critical: Bool = (n_collision > limit.n_collision_above) | close

@@ -17,7 +17,7 @@ from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.errors import FileFormatError
-from bridgegen.objective import Objective, Thresholds, needs_sample
+from bridgegen.objective import CLASSIFYING, Objective, Thresholds, needs_sample
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.rules import speed_bounds
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
@@ -65,7 +65,8 @@ class Pipeline:
         driver: the ego's driver.
         source: makes its concrete scenarios.
         objective: set by ``choose_objective``.
-        metrics: the names of all metrics that are recorded.
+        metrics: the names of all metrics that are recorded: what was asked for and what the
+            objective and the thresholds need.
         simulator: holds the scenario's storyboard.
     """
 
@@ -79,13 +80,29 @@ class Pipeline:
         ego: str | None = None,
         ideal: Iterable[str] = (),
         road_map: RoadMap | None = None,
+        metrics: Sequence[str] | None = None,
     ) -> None:
+        """Prepare a scenario.
+
+        Args:
+            scenario: the logical scenario.
+            space: its search space.
+            ego: the driver; the scenario's choice by default.
+            ideal: stages of the driver to be ideal.
+            road_map: the map that it takes place on; its own road network by default.
+            metrics: the names of all to record, CLASSIFYING and the objective's among them;
+                what ``metrics_of`` says by default.
+
+        Raises:
+            UnknownNameError: no such driver or metric.
+            InputError: a metric does not exist with this driver.
+        """
         self.scenario = scenario
         self.space = space
         self.driver = egos.get(ego or scenario.driver, ideal)
         stages = egos.join(self.driver.ideal)
         self.source = source_of(scenario, self.driver.name, road_map, stages)
-        self.metrics = tuple(measures.METRICS)
+        self.metrics = metrics_of(scenario, self.driver) if metrics is None else tuple(metrics)
         nominal = self.concrete(space.row({}))
         self.simulator: Simulator[Network] = EmbeddedSimulator(nominal.storyboard, scenario.name)
         self._roads: Network | None = None
@@ -207,6 +224,19 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     return replace(here, bounds=(*here.bounds, *slower))
 
 
+def metrics_of(
+    scenario: SearchedScenario, driver: egos.Driver, also: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """Return the metrics that a search records; see `bridgegen.metrics.to_record`.
+
+    Raises:
+        UnknownNameError: no such metric.
+        InputError: a metric does not exist with this driver.
+    """
+    terms = (term.metric for term in scenario.objective.terms)
+    return measures.to_record(driver, (*terms, *CLASSIFYING, *also))
+
+
 @dataclass(frozen=True)
 class FileResult:
     """What one scenario file came to.
@@ -243,7 +273,7 @@ def simulate_file(
         ego: the ego's driver; what the file's controller says by default.
         ideal: stages of the driver to be ideal; what the file's controller says by default, none
             with another ``ego``.
-        metrics: names; all by default.
+        metrics: names; all that the driver gives rise to by default.
         time_step: [s]; what the file's header says by default.
 
     Raises:
@@ -252,7 +282,6 @@ def simulate_file(
         UnsupportedError: an element that the simulator cannot run, by name and line.
         UnknownNameError: no such driver, stage or metric.
     """
-    names = tuple(metrics or measures.METRICS)
     driver = egos.get(ego) if ego else None
     scenario = read_scenario(path)
     roads = roads_of(scenario, path)
@@ -262,6 +291,10 @@ def simulate_file(
     simulator = EmbeddedSimulator(
         scenario, str(path), driver=driver, ideal=ideal, time_step=time_step
     )
+    held = measures.held_by(simulator.program.driver)
+    names = measures.existing(tuple(measures.METRICS), held)
+    if metrics:
+        names = measures.require(metrics, held, f"the driver '{simulator.driver}'")
     rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = measures.evaluate(rollout, names)[0]
     return FileResult(

@@ -70,9 +70,7 @@ class Screen:
         self._progress.update(self._task, description=_STAGES[stage])
 
     def _batch(self, progress: "LoopProgress") -> None:
-        from bridgegen.metrics import METRICS
-
-        column = progress.result.metrics[:, list(METRICS).index("d_min")]
+        column = progress.result.metrics[:, progress.metrics.index("d_min")]
         self._critical += int(progress.result.critical.sum())
         good = column[progress.result.status == 0]
         self._best = min(self._best, float(good.min())) if len(good) else self._best

@@ -2,6 +2,7 @@ import json
 import os
 import shlex
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -62,11 +63,41 @@ def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, 
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         result = bg.simulate_file(path)
         recorded = rows.metrics[facts["evaluation"]]
-        assert list(result.metrics.values()) == recorded.tolist()
+        assert [result.metrics[name] for name in facts["metrics"]] == recorded.tolist()
         assert result.driver == run.settings.ego
         assert facts["critical"]
         for name, one in facts["metrics"].items():
             assert one["value"] in (result.metrics[name], None)
+
+
+FIRST_SEVEN = ("n_collision", "ttc", "d_min", "v_d", "l_offset", "a_change", "n_brake")
+
+
+def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monkeypatch):
+    """It holds seven metrics, in another order, and says nothing of more."""
+    with monkeypatch.context() as patch:
+        patch.setattr("bridgegen.campaign.campaign.metrics_of", lambda *_: FIRST_SEVEN)
+        patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
+        bg.run_search("crossroads-s4", budget=80, out=tmp_path / "run")
+    with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
+        ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
+        settings = json.loads(text)
+        del settings["chosen"]["metrics"]
+        connection.execute(
+            "UPDATE run SET value = ? WHERE key = 'settings'", (json.dumps(settings),)
+        )
+        connection.execute("DELETE FROM evaluations WHERE id >= 40")
+    run = bg.resume(tmp_path / "run")
+    assert len(run.frame()) == 80
+    assert {"ttc", "n_brake"} < set(run.frame().columns)
+    assert "r_red" not in run.frame().columns
+    assert run.scenarios
+    assert run.report.exists()
+
+
+def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):
+    run = bg.run_search("crossroads-s4", budget=40, out=tmp_path / "run", metrics=["d_min"])
+    assert "--metrics d_min" in run.settings.command(run.folder)
 
 
 @pytest.mark.checkers

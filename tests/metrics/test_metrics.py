@@ -1,8 +1,9 @@
-"""Every metric but ttc (which has its own file), by hand and against plain NumPy."""
+"""The metrics of motion by hand and against plain NumPy, and the laws that all metrics keep."""
 
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -186,8 +187,9 @@ def test_padding_is_not_read(driven):
     before = metrics.evaluate(rollout, ALL)
     spoiled = driven()
     for i, n in enumerate(spoiled.n_steps):
-        for name in ("x", "y", "h", "v", "a", "offset"):
+        for name in ("x", "y", "h", "v", "a", "offset", "detections"):
             getattr(spoiled, name)[i, :, n:] = 1e3 * (i + 1)
+        spoiled.lights[i, :, n:] = 1
     np.testing.assert_array_equal(metrics.evaluate(spoiled, ALL), before)
 
 
@@ -218,29 +220,30 @@ def test_failed_scenarios_and_no_others_are_nan(driven):
 
 
 @given(turn=st.floats(-7, 7), dx=st.floats(-1e3, 1e3), dy=st.floats(-1e3, 1e3))
-def test_turning_and_moving_the_scene_changes_nothing(rollout_of, driven, turn, dx, dy):
+def test_turning_and_moving_the_scene_changes_nothing(driven, moved, turn, dx, dy):
     scene = driven(30)
-    c, s = np.cos(turn), np.sin(turn)
-    moved = rollout_of(
-        box=scene.box,
-        x=scene.x * c - scene.y * s + dx,
-        y=scene.x * s + scene.y * c + dy,
-        h=scene.h + turn,
-        v=scene.v,
-        a=scene.a,
-        offset=scene.offset,
-        n_steps=scene.n_steps,
-    )
-    here, there = (metrics.evaluate(r, ALL) for r in (scene, moved))
+    here, there = (metrics.evaluate(r, ALL) for r in (scene, moved(scene, turn, dx, dy)))
     for j, name in enumerate(ALL):
         np.testing.assert_allclose(there[:, j], here[:, j], rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_order_of_the_others_does_not_matter(driven, seed):
+    scene = driven(40, 5, seed=seed)
+    order = np.r_[0, 1 + np.random.default_rng(seed).permutation(4)]
+    names = ("x", "y", "h", "v", "a", "offset", "detections")
+    arrays = {name: getattr(scene, name)[:, order] for name in names}
+    other = replace(scene, box=scene.box[order], kinds=scene.kinds[order], **arrays)
+    here, there = (metrics.evaluate(r, ALL) for r in (scene, other))
+    for j, name in enumerate(ALL):
+        np.testing.assert_allclose(there[:, j], here[:, j], rtol=1e-12, err_msg=name)
 
 
 # Parity with plain NumPy.
 
 
 def plain(rollout, i):
-    """All metrics of scenario i except ttc, the slow and obvious way."""
+    """The metrics of motion of scenario i, the slow and obvious way."""
     n = rollout.n_steps[i]
     gap = rollout.distance[i, 1:, :n]
     a, step = rollout.a[i, 0, :n], rollout.time_step
@@ -264,7 +267,7 @@ def plain(rollout, i):
 @pytest.mark.parametrize("shape", [(40, 2, 120), (10, 5, 33), (3, 64, 7), (5, 2, 1)])
 def test_kernels_agree_with_plain_numpy(driven, shape):
     rollout = driven(*shape, seed=shape[1])
-    names = [name for name in ALL if name != "ttc"]
+    names = ["d_min", "v_d", "n_collision", "l_offset", "a_change", "n_brake"]
     got = metrics.evaluate(rollout, names)
     expected = [[plain(rollout, i)[name] for name in names] for i in range(shape[0])]
     np.testing.assert_array_equal(got, np.array(expected, dtype=float))
@@ -303,13 +306,29 @@ def test_unknown_metric_suggests_the_nearest(driven):
             call()
 
 
-def test_metrics_of_the_first_version_and_their_units():
-    assert {name: m.unit for name, m in metrics.METRICS.items()} == {
-        "n_collision": "count", "ttc": "s", "d_min": "m", "v_d": "m/s", "l_offset": "m",
-        "a_change": "m/s²", "n_brake": "count",
+def test_the_paper_s_eleven_and_their_units():
+    assert {name: metrics.get(name).unit for name in metrics.TABLE_I} == {
+        "r_red": "count", "n_collision": "count", "ttc": "s", "d_min": "m", "v_d": "m/s",
+        "l_offset": "m", "iou": "1", "e_position": "m", "map": "1", "a_change": "m/s²",
+        "n_brake": "count",
     }  # fmt: skip
     assert all(m.name == name and m.description for name, m in metrics.METRICS.items())
-    assert {name for name, m in metrics.METRICS.items() if m.sense == "smaller"} == {"ttc", "d_min"}
+    smaller = {name for name in metrics.TABLE_I if metrics.get(name).sense == "smaller"}
+    assert smaller == {"ttc", "d_min", "iou", "map"}
+
+
+def test_which_metrics_exist_depends_on_what_a_rollout_holds():
+    table = metrics.TABLE_I
+    assert metrics.existing(table, ("detections", "lights", "offset")) == table
+    blind = metrics.existing(table, ("lights", "offset"))
+    assert set(table) - set(blind) == {"iou", "e_position", "map"}
+    assert set(blind) - set(metrics.existing(table, ())) == {"r_red", "l_offset"}
+
+
+def test_what_a_rollout_does_not_hold_is_refused(rollout_of):
+    for name in ("iou", "e_position", "map"):
+        with pytest.raises(ValueError, match=r"rollout\.detections must have shape"):
+            metrics.get(name).compute(rollout_of(x=np.zeros((1, 2, 3))))
 
 
 def test_columns_come_in_the_order_asked_for(driven):

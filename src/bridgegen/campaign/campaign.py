@@ -1,10 +1,11 @@
 """A campaign from start to finish: search, hand over, report; and going on with one."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from bridgegen import ego as egos
 from bridgegen import search as toolkit
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
@@ -16,7 +17,7 @@ from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import ObjectiveSpec, Term
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
-from bridgegen.pipeline import Pipeline, on_map
+from bridgegen.pipeline import Pipeline, metrics_of, on_map
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
 from bridgegen.search.algorithm import Value, resolve
@@ -59,6 +60,7 @@ def run_search(
     objective: dict[str, float | None] | None = None,
     weights: str | None = None,
     scale: str | None = None,
+    metrics: Sequence[str] = (),
     watch: Watch | None = None,
 ) -> Run:
     """Search a logical scenario for its critical concrete ones, and hand them over.
@@ -82,6 +84,7 @@ def run_search(
             scenario's.
         weights: "fixed", or "entropy" of a random sample, instead of the scenario's way.
         scale: "raw", or "standardised" by a random sample, instead of the scenario's.
+        metrics: names of those to record besides the objective's and the paper's.
         watch: told how it is getting on.
 
     Returns:
@@ -106,7 +109,8 @@ def run_search(
     values = resolve(method, space.n_var, 1, seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
-    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal, road_map=roads)
+    recorded = metrics_of(logical, egos.get(ego or logical.driver), metrics)
+    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal, road_map=roads, metrics=recorded)
     watch.stage("compile")
     pipeline.warm_up()
     chosen = pipeline.choose_objective(seed=seed)
@@ -127,7 +131,12 @@ def run_search(
         junction=roads.site.junction_id if roads else None,
         keep=keep,
         objective=chosen.to_dict(),
-        chosen={"objective": objective, "weights": weights, "scale": scale},
+        chosen={
+            "objective": objective,
+            "weights": weights,
+            "scale": scale,
+            "metrics": list(metrics),
+        },
     )
     with Store.create(
         folder, made_with.to_dict(), space.names, pipeline.metrics,
@@ -151,7 +160,12 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
         settings = Settings.from_dict(store.settings, store.folder)
         space, roads = searched(settings, Path(folder))
         pipeline = Pipeline(
-            space.scenario, space, ego=settings.ego, ideal=settings.ideal, road_map=roads
+            space.scenario,
+            space,
+            ego=settings.ego,
+            ideal=settings.ideal,
+            road_map=roads,
+            metrics=store.metrics,
         )
         watch.stage("compile")
         pipeline.warm_up()

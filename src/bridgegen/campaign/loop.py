@@ -42,6 +42,7 @@ class Progress:
         budget: what the loop goes up to.
         seconds: [s] since the start of the run.
         result: the evaluations that came with this batch, at least one.
+        metrics: the names of the result's metrics.
         replayed: whether they were read from the store instead of simulated.
     """
 
@@ -49,6 +50,7 @@ class Progress:
     budget: int
     seconds: float
     result: Evaluated
+    metrics: tuple[str, ...]
     replayed: bool
 
 
@@ -239,7 +241,10 @@ class _Session:
 
     def _report(self, evaluations: int, result: Evaluated, *, replayed: bool) -> None:
         if self._on_batch:
-            self._on_batch(Progress(evaluations, self._budget, self.seconds, result, replayed))
+            names = self._store.metrics
+            self._on_batch(
+                Progress(evaluations, self._budget, self.seconds, result, names, replayed)
+            )
 
     def _nothing_new(self, reason: Reason) -> Reason:
         if len(self._known) < self._recorded:

@@ -31,7 +31,8 @@ class Settings:
         keep: how many scenarios are handed over.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
         chosen: what the user chose of the objective instead of the scenario's: metrics with
-            weights, way of weighting, scale; None each where nothing.
+            weights, way of weighting, scale; None each where nothing; and the metrics to be
+            recorded besides.
     """
 
     scenario: str
@@ -86,6 +87,8 @@ class Settings:
         for option in ("weights", "scale"):
             if self.chosen[option]:
                 words += [f"--{option}", self.chosen[option]]
+        if also := self.chosen.get("metrics"):  # not in runs of the first versions
+            words += ["--metrics", ",".join(also)]
         if self.map:
             words += ["--map", self.map, "--junction", str(self.junction)]
         return shlex.join([*words, "--out", str(folder)])

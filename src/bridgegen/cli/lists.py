@@ -34,11 +34,18 @@ def list_algorithms(as_json: Json = False) -> None:
 @listing.command("metrics")
 def list_metrics(as_json: Json = False) -> None:
     """The criticality metrics."""
-    from bridgegen.metrics import METRICS
+    from bridgegen.metrics import METRICS, TABLE_I
     from bridgegen.screen import print_table
 
-    rows = [(m.name, m.unit, m.sense, m.description) for m in METRICS.values()]
-    print_table(("metric", "unit", "more critical if", "description"), rows, as_json=as_json)
+    rows = [
+        (
+            m.name, m.unit, m.sense, m.description, m.needs,
+            "always" if m.name in TABLE_I else "if asked for",
+        )
+        for m in METRICS.values()
+    ]  # fmt: skip
+    head = ("metric", "unit", "more critical if", "description", "needs", "recorded")
+    print_table(head, rows, as_json=as_json)
 
 
 @listing.command("parameters")

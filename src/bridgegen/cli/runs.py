@@ -55,6 +55,10 @@ def search(
         str | None, typer.Option(help="fixed, or entropy (from a random sample).")
     ] = None,
     scale: Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")] = None,
+    metrics: Annotated[
+        str | None,
+        typer.Option(help="Record these as well, e.g. pet,drac; see 'bridgegen list metrics'."),
+    ] = None,
     road_map: Annotated[
         Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
     ] = None,
@@ -86,6 +90,7 @@ def search(
             objective=terms,
             weights=weights,
             scale=scale,
+            metrics=_names(metrics),
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)
@@ -150,6 +155,9 @@ def simulate(
         Path | None,
         typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
     ] = None,
+    metrics: Annotated[
+        str | None, typer.Option(help="Only these, e.g. pet,drac.", show_default="all there are")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
@@ -158,13 +166,13 @@ def simulate(
     from bridgegen.simulation.trace import write_trace
 
     stages = None if ideal is None else split(ideal)
-    result = simulate_file(file, ego=ego, ideal=stages, time_step=dt)
+    result = simulate_file(file, ego=ego, ideal=stages, metrics=_names(metrics), time_step=dt)
     if trace is not None:
         write_trace(trace, result.rollout)
     if as_json:
         facts = {"file": str(file), "ego": result.driver, "status": result.status}
-        metrics = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
-        print(json.dumps({**facts, "parameters": result.parameters, "metrics": metrics}, indent=2))
+        values = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
+        print(json.dumps({**facts, "parameters": result.parameters, "metrics": values}, indent=2))
     else:
         print_file_result(file, result)
 
@@ -174,6 +182,11 @@ def _terms(text: str) -> dict[str, float | None]:
     pairs = [pair.strip() for pair in text.split(",")]
     weighted = _numbers([pair for pair in pairs if "=" in pair], "--objective")
     return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
+
+
+def _names(text: str | None) -> list[str]:
+    """Read ``name,…``; nothing is none."""
+    return [name.strip() for name in text.split(",")] if text else []
 
 
 def _settings(pairs: list[str]) -> dict[str, bool | int | float | str]:

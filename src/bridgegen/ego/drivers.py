@@ -20,6 +20,7 @@ class Driver:
         description: one sentence.
         stages: those of `STAGES` that it has, and that can be made ideal.
         ideal: those that are.
+        perceives: whether it has sensors, whose detections a rollout then holds.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Driver:
     description: str
     stages: frozenset[str] = frozenset()
     ideal: frozenset[str] = frozenset()
+    perceives: bool = False
 
     @property
     def label(self) -> str:

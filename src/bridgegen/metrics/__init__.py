@@ -3,7 +3,19 @@
 ``registry`` knows them by name. A metric is the same whichever simulator made the rollout.
 """
 
-from bridgegen.metrics.metric import Metric
-from bridgegen.metrics.registry import METRICS, evaluate, get
+from bridgegen.metrics.choice import existing, held_by, require, to_record
+from bridgegen.metrics.metric import Metric, Need
+from bridgegen.metrics.registry import METRICS, TABLE_I, evaluate, get
 
-__all__ = ["METRICS", "Metric", "evaluate", "get"]
+__all__ = [
+    "METRICS",
+    "TABLE_I",
+    "Metric",
+    "Need",
+    "evaluate",
+    "existing",
+    "get",
+    "held_by",
+    "require",
+    "to_record",
+]

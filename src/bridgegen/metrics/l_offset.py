@@ -30,4 +30,5 @@ METRIC = Metric(
     sense="larger",
     cap=0.0,
     compute=l_offset,
+    needs="offset",
 )

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -11,19 +11,25 @@ from bridgegen.arrays import Float, Int, as_float
 from bridgegen.simulation.boxes import as_steps
 from bridgegen.simulation.rollout import Rollout
 
+Derived = TypeVar("Derived")
+Need = Literal["detections", "lights", "offset"]
+"""What not every rollout holds: detections only if its ego perceives; traffic lights and the offset
+from the route only if a simulator made it, not a recording of somebody else's."""
+
 
 @dataclass(frozen=True)
 class Metric:
     """A number per scenario that says how critical it was.
 
     Attributes:
-        name: as in Table I of the paper.
+        name: as in Table I of the paper, or the field's abbreviation in small letters.
         unit: "m", "m/s" …; "count" for whole numbers.
         description: one line for people.
         sense: which values are more critical, "smaller" or "larger" ones.
         cap: the value, finite, that counts as "not critical at all"; in an objective every value
             that is less critical still, +inf for one, counts as this. The metric is not capped.
         compute: rollout → ``(N,)`` float64, NaN exactly where the scenario failed.
+        needs: what a rollout must hold for the metric to exist; None where the motion is enough.
     """
 
     name: str
@@ -32,6 +38,7 @@ class Metric:
     sense: Literal["smaller", "larger"]
     cap: float
     compute: Callable[[Rollout], Float]
+    needs: Need | None = None
 
     def __post_init__(self) -> None:
         if self.sense not in ("smaller", "larger"):
@@ -43,6 +50,14 @@ class Metric:
     def sign(self) -> float:
         """+1 if larger values are more critical, −1 if smaller ones are."""
         return 1.0 if self.sense == "larger" else -1.0
+
+
+def shared(rollout: Rollout, derive: Callable[[Rollout], Derived]) -> Derived:
+    """Return ``derive(rollout)``, worked out once however many metrics ask for it."""
+    if derive not in rollout.derived:
+        rollout.derived[derive] = derive(rollout)
+    derived: Derived = rollout.derived[derive]
+    return derived
 
 
 def recorded(rollout: Rollout, field: str) -> Float:

@@ -7,17 +7,34 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import UnknownNameError
-from bridgegen.metrics import a_change, d_min, l_offset, n_brake, n_collision, ttc, v_d
+from bridgegen.metrics import (
+    a_change,
+    d_min,
+    e_position,
+    iou,
+    l_offset,
+    mean_average_precision,
+    n_brake,
+    n_collision,
+    r_red,
+    ttc,
+    v_d,
+)
 from bridgegen.metrics.metric import Metric
 from bridgegen.simulation.rollout import Rollout
 
-# In the order of Table I.
+_TABLE_I = (
+    r_red, n_collision, ttc, d_min, v_d, l_offset, iou, e_position, mean_average_precision,
+    a_change, n_brake,
+)  # fmt: skip
+
 METRICS: Mapping[str, Metric] = MappingProxyType(
-    {
-        module.METRIC.name: module.METRIC
-        for module in (n_collision, ttc, d_min, v_d, l_offset, a_change, n_brake)
-    }
+    {module.METRIC.name: module.METRIC for module in _TABLE_I}
 )
+"""In the order of Table I."""
+
+TABLE_I = tuple(module.METRIC.name for module in _TABLE_I)
+"""The names of the paper's eleven, which every run records as far as its rollouts hold them."""
 
 
 def get(name: str) -> Metric:
@@ -40,6 +57,7 @@ def evaluate(rollout: Rollout, names: Sequence[str]) -> Float:
 
     Raises:
         UnknownNameError: a name is not a metric's.
+        ValueError: the rollout does not hold what a metric needs, or what it holds is malformed.
     """
     metrics = [get(name) for name in names]
     out = np.empty((rollout.shape[0], len(metrics)))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +52,7 @@ class Rollout:
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where the ego's
             route crosses the stop line of a traffic light, the heading in travel direction.
         stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
+        derived: what several metrics start from, worked out once; see `metrics.metric.shared`.
     """
 
     time_step: float
@@ -72,6 +74,7 @@ class Rollout:
     detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
     stop_lights: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def shape(self) -> tuple[int, int, int]:

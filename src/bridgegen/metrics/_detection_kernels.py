@@ -1,0 +1,119 @@
+"""Compiled comparison of detections with the truth; public wrappers: ``iou``, ``e_position``."""
+
+import math
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.compiled import kernel
+from bridgegen.simulation.detections import HEADING, LENGTH, NOBODY, SEEN_BY, WIDTH, X, Y
+
+
+@kernel
+def cut(points: Float, n: int, axis: int, side: float, limit: float, out: Float) -> int:
+    """Write the part of a convex polygon where side · coordinate ≤ limit; return its corners.
+
+    ``points`` and ``out`` are ``(8, 2)``: four cuts of a rectangle leave eight corners at most.
+    Source: Sutherland, Hodgman, Reentrant polygon clipping, Comm. ACM 17 (1974) 32.
+    """
+    m = 0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        here = limit - side * points[i, axis]
+        there = limit - side * points[j, axis]
+        if here >= 0.0:
+            out[m, 0], out[m, 1] = points[i, 0], points[i, 1]
+            m += 1
+        if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
+            f = here / (here - there)
+            out[m, 0] = points[i, 0] + f * (points[j, 0] - points[i, 0])
+            out[m, 1] = points[i, 1] + f * (points[j, 1] - points[i, 1])
+            m += 1
+    return m
+
+
+@kernel
+def overlap(
+    dx: float, dy: float, turn: float, la: float, wa: float, lb: float, wb: float,
+    one: Float, other: Float,
+) -> float:  # fmt: skip
+    """Return the area [m²] that boxes A and B share.
+
+    In A's frame, B's centre is at (dx, dy) and its heading is ``turn``; la, wa, lb, wb are half
+    lengths and widths. ``one`` and ``other`` are ``(8, 2)`` to work in.
+    """
+    c, s = math.cos(turn), math.sin(turn)
+    one[0, 0], one[0, 1] = dx + (lb * c - wb * s), dy + (lb * s + wb * c)
+    one[1, 0], one[1, 1] = dx - (lb * c + wb * s), dy - (lb * s - wb * c)
+    one[2, 0], one[2, 1] = dx - (lb * c - wb * s), dy - (lb * s + wb * c)
+    one[3, 0], one[3, 1] = dx + (lb * c + wb * s), dy + (lb * s - wb * c)
+    n = cut(one, 4, 0, 1.0, la, other)
+    n = cut(other, n, 0, -1.0, la, one)
+    n = cut(one, n, 1, 1.0, wa, other)
+    n = cut(other, n, 1, -1.0, wa, one)
+    twice = 0.0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        twice += one[i, 0] * one[j, 1] - one[j, 0] * one[i, 1]
+    return 0.5 * twice
+
+
+@kernel
+def mean_iou(
+    box: Float, x: Float, y: Float, h: Float, kinds: Int, detections: Float, n_steps: Int,
+    class_of_kind: Int, ranges: Float, out: Float,
+) -> None:  # fmt: skip
+    """Write each scenario's mean intersection over union; +inf without any truth in range."""
+    n_rows, n_entities, _ = x.shape
+    one, other = np.empty((8, 2)), np.empty((8, 2))
+    for i in range(n_rows):
+        total, count = 0.0, 0
+        for e in range(1, n_entities):
+            reach = ranges[class_of_kind[kinds[e]]] ** 2
+            la, wa, ahead = 0.5 * box[e, 0], 0.5 * box[e, 1], box[e, 2]
+            for k in range(n_steps[i]):
+                seen = detections[i, e, k]
+                if seen[SEEN_BY] < NOBODY:
+                    continue
+                c, s = math.cos(h[i, e, k]), math.sin(h[i, e, k])
+                px, py = x[i, e, k] + ahead * c, y[i, e, k] + ahead * s
+                gx, gy = px - x[i, 0, k], py - y[i, 0, k]
+                if gx * gx + gy * gy >= reach:
+                    continue
+                count += 1
+                if seen[SEEN_BY] == NOBODY:
+                    continue
+                dx, dy = seen[X] - px, seen[Y] - py
+                lb, wb = 0.5 * seen[LENGTH], 0.5 * seen[WIDTH]
+                common = overlap(
+                    dx * c + dy * s, dy * c - dx * s, seen[HEADING] - h[i, e, k],
+                    la, wa, lb, wb, one, other,
+                )  # fmt: skip
+                total += common / (4.0 * (la * wa + lb * wb) - common)
+        out[i] = total / count if count else np.inf
+
+
+@kernel
+def mean_error(
+    box: Float, x: Float, y: Float, h: Float, kinds: Int, detections: Float, n_steps: Int,
+    class_of_kind: Int, ranges: Float, out: Float,
+) -> None:  # fmt: skip
+    """Write each scenario's mean distance of detections from the truth; 0 without any."""
+    n_rows, n_entities, _ = x.shape
+    for i in range(n_rows):
+        total, count = 0.0, 0
+        for e in range(1, n_entities):
+            reach = ranges[class_of_kind[kinds[e]]] ** 2
+            ahead = box[e, 2]
+            for k in range(n_steps[i]):
+                seen = detections[i, e, k]
+                if seen[SEEN_BY] <= NOBODY:
+                    continue
+                px = x[i, e, k] + ahead * math.cos(h[i, e, k])
+                py = y[i, e, k] + ahead * math.sin(h[i, e, k])
+                gx, gy = px - x[i, 0, k], py - y[i, 0, k]
+                if gx * gx + gy * gy >= reach:
+                    continue
+                total += math.hypot(seen[X] - px, seen[Y] - py)
+                count += 1
+        out[i] = total / count if count else 0.0

@@ -1,0 +1,61 @@
+"""Which metrics there are to be: a driver that perceives nothing gives rise to no mean IoU."""
+
+from collections.abc import Collection, Sequence
+
+from bridgegen.ego import DRIVERS, Driver
+from bridgegen.errors import InputError
+from bridgegen.metrics.metric import Need
+from bridgegen.metrics.registry import TABLE_I, get
+
+
+def held_by(driver: Driver) -> tuple[Need, ...]:
+    """Return what a simulator's rollouts of a driver hold beside motion."""
+    return ("detections", "lights", "offset") if driver.perceives else ("lights", "offset")
+
+
+def existing(names: Sequence[str], held: Collection[Need]) -> tuple[str, ...]:
+    """Return those of the named metrics that exist where rollouts hold ``held``.
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+    """
+    return tuple(name for name in names if get(name).needs in (None, *held))
+
+
+def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str, ...]:
+    """Return the names, all of which must exist where rollouts hold ``held``.
+
+    Args:
+        names: of metrics.
+        held: what the rollouts hold.
+        who: whose rollouts they are, for the message.
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+        InputError: those that do not exist there, all at once.
+    """
+    perceive = ", ".join(one.name for one in DRIVERS.values() if one.perceives)
+    hints = {"detections": f"; drivers that perceive (--ego): {perceive}" if perceive else ""}
+    needs = {name: get(name).needs for name in names}
+    problems = [
+        f"the metric '{name}' needs {need}, and {who} has none{hints.get(need, '')}"
+        for name, need in needs.items()
+        if need is not None and need not in held
+    ]
+    if problems:
+        raise InputError(*problems)
+    return tuple(names)
+
+
+def to_record(driver: Driver, asked: Sequence[str]) -> tuple[str, ...]:
+    """Return what a search records: Table I's metrics, as far as they exist, and those asked for.
+
+    The others wait until somebody asks: together they take longer than the paper's.
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+        InputError: one that is asked for does not exist with this driver.
+    """
+    held = held_by(driver)
+    chosen = require(asked, held, f"the driver '{driver.name}'")
+    return tuple(dict.fromkeys((*existing(TABLE_I, held), *chosen)))

@@ -1,0 +1,40 @@
+"""e_position: how far off the ego saw the others."""
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.metric import Metric, without_failed
+from bridgegen.metrics.perceived import CLASS_OF_KIND, RANGES, perceived
+from bridgegen.simulation.rollout import Rollout
+
+
+def e_position(rollout: Rollout) -> Float:
+    """Return the mean distance of detected box centres from the true ones.
+
+    The mean is over the detections of all other entities within their class's range. A detection
+    is matched with the entity that caused it.
+
+    Returns:
+        ``(N,)`` float64 [m], ≥ 0; 0 where nothing was detected; NaN where the scenario failed.
+
+    Source: paper, Table I.
+    """
+    from bridgegen.metrics import _detection_kernels
+
+    p = perceived(rollout)
+    out = np.empty(len(p.n_steps))
+    _detection_kernels.mean_error(
+        p.box, p.x, p.y, p.h, p.kinds, p.detections, p.n_steps, CLASS_OF_KIND, RANGES, out
+    )
+    return without_failed(rollout, out)
+
+
+METRIC = Metric(
+    name="e_position",
+    unit="m",
+    description="mean distance of detected box centres from the true ones",
+    sense="larger",
+    cap=0.0,
+    compute=e_position,
+    needs="detections",
+)

@@ -1,0 +1,46 @@
+"""map: how precise and complete the ego's detections were, mean average precision."""
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.metric import Metric, without_failed
+from bridgegen.metrics.perceived import CLASS_OF_KIND, RANGES, THRESHOLDS, perceived
+from bridgegen.simulation.rollout import Rollout
+
+
+def mean_average_precision(rollout: Rollout) -> Float:
+    """Return the mean average precision of the detections over classes and distance thresholds.
+
+    As in nuScenes. Per class and threshold all frames' detections are taken by falling confidence;
+    each is a hit if the nearest box of its class and frame that no earlier one took is nearer than
+    the threshold, centre to centre. Precision is read off at recalls of 0.11, 0.12 … 1, linearly
+    between detections and 0 beyond the last; precision below 0.1 counts as 0, and 0.1 is the zero
+    of the scale. Classes are those that had an entity within range. Detections of equal confidence
+    are taken in the order of their frames, then of their distance from their own entity.
+
+    Returns:
+        ``(N,)`` float64 in 0..1; +inf where there was nothing to see; NaN where the scenario
+        failed.
+
+    Source: paper, Table I; Caesar et al., nuScenes, CVPR 2020, Section 3.1.
+    """
+    from bridgegen.metrics import _precision_kernels
+
+    p = perceived(rollout)
+    out = np.empty(len(p.n_steps))
+    _precision_kernels.mean_average_precision(
+        p.box, p.x, p.y, p.h, p.kinds, p.detections, p.n_steps, CLASS_OF_KIND, RANGES, THRESHOLDS,
+        out,
+    )  # fmt: skip
+    return without_failed(rollout, out)
+
+
+METRIC = Metric(
+    name="map",
+    unit="1",
+    description="mean average precision of the detections, as nuScenes has it",
+    sense="smaller",
+    cap=1.0,
+    compute=mean_average_precision,
+    needs="detections",
+)
