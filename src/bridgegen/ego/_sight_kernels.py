@@ -1,0 +1,113 @@
+"""How far one sees in this weather: the distance at which half of the frames show a thing.
+
+The table is filled once a weather (`fill_sight`), by thing and by angle to the sun; `sight` reads
+it.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego import _camera_kernels as camera
+from bridgegen.ego import _lidar_kernels as lidar
+from bridgegen.ego._physics_kernels import (
+    CULL,
+    ENOUGH_RETURNS,
+    IDENTIFY,
+    LAMPS,
+    NOTICE,
+    REFLECTANCE,
+    SIGNAL_LAMP,
+    SIGNAL_SIZE,
+    veil,
+)
+from bridgegen.ego._weather_kernels import (
+    ATTENUATION,
+    GLARE,
+    N_GLARES,
+    SIGHT,
+    SUN_X,
+    SUN_Y,
+)
+from bridgegen.ego.kinds import CAR, PEDESTRIAN
+
+LIGHT, REAR, WALKER = 0, 1, 2
+"""What is looked for: a traffic light, a car from behind, a pedestrian."""
+
+CAR_WIDTH, CAR_HEIGHT = 1.8, 1.5  # m
+WALKER_WIDTH, WALKER_HEIGHT = 0.5, 1.7  # m
+NEAREST = 1.0  # m
+_HALVINGS = 24  # of the logarithm of the distance: to 1e-6 of itself
+
+
+@kernel
+def camera_sight(weather, size, lamp, need, dazzle):
+    """Return where a target of a size [m] straight ahead has ``need`` pixels, up to `CULL`."""
+    low, high = math.log(NEAREST), math.log(CULL)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        d = math.exp(middle)
+        clear = camera.clarity(weather, d, dazzle, lamp, 1.0)
+        if camera.pixels(size, d, clear) >= need:
+            low = middle
+        else:
+            high = middle
+    return math.exp(low)
+
+
+@kernel
+def lidar_sight(weather, area, reflectance):
+    """Return where a target of an area [m²] sends back half of enough returns, up to `CULL`."""
+    low, high = math.log(NEAREST), math.log(CULL)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        found, _ = lidar.returns(area, reflectance, weather[ATTENUATION], math.exp(middle))
+        if found >= ENOUGH_RETURNS:
+            low = middle
+        else:
+            high = middle
+    return math.exp(low)
+
+
+@kernel
+def glare_of(weather, i):
+    """Return the veiling luminance of column i: 64°, 32° … 1° off the sun."""
+    return veil(weather[GLARE], math.cos(math.radians(2.0 ** (N_GLARES - 1 - i))))
+
+
+@kernel
+def fill_sight(weather):
+    """Fill the table of sight, by camera or LiDAR, whichever sees farther."""
+    walker = math.sqrt(WALKER_WIDTH * WALKER_HEIGHT)
+    rear = math.sqrt(CAR_WIDTH * CAR_HEIGHT)
+    tail = LAMPS[CAR] / (rear * rear)
+    signal = SIGNAL_LAMP / (0.25 * math.pi * SIGNAL_SIZE * SIGNAL_SIZE)
+    by_lidar = lidar_sight(weather, rear * rear, REFLECTANCE[CAR])
+    walker_by_lidar = lidar_sight(weather, walker * walker, REFLECTANCE[PEDESTRIAN])
+    for i in range(N_GLARES):
+        dazzle = glare_of(weather, i)
+        light = camera_sight(weather, SIGNAL_SIZE, signal, NOTICE, dazzle)
+        car = camera_sight(weather, rear, tail, IDENTIFY, dazzle)
+        person = camera_sight(weather, walker, 0.0, IDENTIFY, dazzle)
+        weather[SIGHT + LIGHT * N_GLARES + i] = light
+        weather[SIGHT + REAR * N_GLARES + i] = max(car, by_lidar)
+        weather[SIGHT + WALKER * N_GLARES + i] = max(person, walker_by_lidar)
+
+
+@kernel
+def sight(weather, thing, cosine, sine):
+    """Return how far [m] a thing is seen in the direction (cosine, sine), at most `CULL`.
+
+    Args:
+        weather: ``(W,)``, after `fill_sight`.
+        thing: `LIGHT`, `REAR` or `WALKER`.
+        cosine: of the heading in which one looks.
+        sine: of it.
+    """
+    row = SIGHT + thing * N_GLARES
+    if weather[GLARE] <= 0.0:
+        return weather[row]
+    angle = math.acos(min(max(weather[SUN_X] * cosine + weather[SUN_Y] * sine, -1.0), 1.0))
+    halvings = N_GLARES - 1 - math.log2(min(max(math.degrees(angle), 1.0), 64.0))
+    i = min(int(halvings), N_GLARES - 2)
+    share = halvings - i
+    return weather[row + i] + share * (weather[row + i + 1] - weather[row + i])

@@ -1,0 +1,118 @@
+"""From the weather that a file states to the numbers that sensors and tyres feel.
+
+``weather`` ``(WEATHER,)`` float64 is one scenario's, now: what is stated (up to
+``FRICTION_SCALE``), what follows from it (from ``EXTINCTION`` on), and how far one sees in it (from
+``SIGHT`` on, see ``_sight_kernels``). An environment is a row ``(STATED,)`` of slots, −1 for what
+it leaves as it was.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._physics_kernels import (
+    AT_CIVIL,
+    AT_HORIZON,
+    AT_NAUTICAL,
+    AT_NIGHT,
+    CLEAR_DEPTH,
+    CLEAR_NORMAL,
+    CLOUD_POWER,
+    CLOUD_SHADE,
+    DRY_FRICTION,
+    GRAVITY,
+    GROUND_ALBEDO,
+    KOSCHMIEDER,
+    RAIN_EXTINCTION,
+    RAIN_ON_GLASS,
+    RAIN_POWER,
+    SNOW_EXTINCTION,
+    SNOW_POWER,
+)
+
+VISUAL_RANGE = 0  # m, meteorological optical range
+RAIN, SNOW = 1, 2  # mm/h of water
+SUN_AZIMUTH, SUN_ELEVATION = 3, 4  # rad, clockwise from north (+y); above the horizon
+ILLUMINANCE = 5  # lx, of the sun on the ground without clouds; negative: as the sun stands
+CLOUD = 6  # share of the sky
+FRICTION_SCALE = 7  # of dry friction
+STATED = 8
+EXTINCTION = 8  # 1/m, of contrast
+ATTENUATION = 9  # 1/m, of a LiDAR's beam, one way
+BACKGROUND = 10  # cd/m², luminance of what is behind a target
+GLARE = 11  # lx, of the sun at the lens
+GLASS = 12  # share of contrast that wet glass leaves
+FRICTION = 13  # m/s², what the tyres can give: μ·g
+SUN_X, SUN_Y = 14, 15  # horizontal components of the direction to the sun
+SIGHT = 16
+N_THINGS, N_GLARES = 3, 7  # the table of sight: what is looked for, and how far off the sun
+WEATHER = SIGHT + N_THINGS * N_GLARES
+
+CLEAR_DAY = (10_000.0, 0.0, 0.0, math.pi, math.radians(45.0), -1.0, 0.0, 1.0)
+"""What is stated where a file states nothing: WMO's clear air, the sun in the south at 45°."""
+
+
+@kernel
+def set_clear(weather):
+    """Set what is stated to a clear day."""
+    for i in range(STATED):
+        weather[i] = CLEAR_DAY[i]
+
+
+@kernel
+def change(weather, environment, slots):
+    """Set what an environment states to its slots' values, and what follows from it."""
+    for i in range(STATED):
+        if environment[i] >= 0:
+            weather[i] = slots[environment[i]]
+    derive(weather)
+
+
+@kernel
+def derive(weather):
+    """Set the numbers from ``EXTINCTION`` to ``SUN_Y`` by what is stated."""
+    rain = RAIN_EXTINCTION * max(weather[RAIN], 0.0) ** RAIN_POWER
+    snow = SNOW_EXTINCTION * max(weather[SNOW], 0.0) ** SNOW_POWER
+    # The drops of fog, too, are larger than either wavelength: Kim, McArthur, Korevaar, SPIE 4214
+    # (2001), find no difference below 500 m of visibility.
+    weather[EXTINCTION] = KOSCHMIEDER / max(weather[VISUAL_RANGE], 1.0) + rain + snow
+    weather[ATTENUATION] = weather[EXTINCTION]
+    weather[GLASS] = 1.0 / (1.0 + RAIN_ON_GLASS * max(weather[RAIN], 0.0))
+    weather[FRICTION] = DRY_FRICTION * GRAVITY * weather[FRICTION_SCALE]
+    cosine, sine = math.cos(weather[SUN_ELEVATION]), math.sin(weather[SUN_ELEVATION])
+    weather[SUN_X] = cosine * math.sin(weather[SUN_AZIMUTH])
+    weather[SUN_Y] = cosine * math.cos(weather[SUN_AZIMUTH])
+    altitude = math.degrees(math.asin(min(max(sine, -1.0), 1.0)))
+    cloud = min(max(weather[CLOUD], 0.0), 1.0)
+    stated = weather[ILLUMINANCE]
+    ground = stated if stated >= 0.0 else 100_000.0 * max(sine, 0.0)
+    lit = ground * (1.0 - CLOUD_SHADE * cloud**CLOUD_POWER) + skylight(altitude)
+    weather[BACKGROUND] = GROUND_ALBEDO * lit / math.pi
+    weather[GLARE] = 0.0
+    if altitude > 0.0:
+        beam = min(sunbeam(altitude), ground / max(sine, 0.01))
+        weather[GLARE] = beam * (1.0 - cloud)
+
+
+@kernel
+def sunbeam(altitude):
+    """Return the illuminance [lx] of the sun at an altitude [deg] ≥ 0, square to its rays.
+
+    Source: IES RP-21-84, Calculation of Daylight Availability, clear sky; air mass by Kasten and
+    Young, Applied Optics 28 (1989) 4735.
+    """
+    mass = 1.0 / (math.sin(math.radians(altitude)) + 0.50572 * (altitude + 6.07995) ** -1.6364)
+    return CLEAR_NORMAL * math.exp(-CLEAR_DEPTH * mass)
+
+
+@kernel
+def skylight(altitude):
+    """Return the illuminance [lx] of the sky alone, the sun at an altitude [deg]."""
+    if altitude >= 0.0:
+        return AT_HORIZON
+    if altitude >= -6.0:
+        return AT_HORIZON * (AT_CIVIL / AT_HORIZON) ** (-altitude / 6.0)
+    if altitude >= -12.0:
+        return AT_CIVIL * (AT_NAUTICAL / AT_CIVIL) ** ((-altitude - 6.0) / 6.0)
+    if altitude >= -18.0:
+        return AT_NAUTICAL * (AT_NIGHT / AT_NAUTICAL) ** ((-altitude - 12.0) / 6.0)
+    return AT_NIGHT

@@ -1,0 +1,40 @@
+import math
+
+import numpy as np
+import pytest
+
+from bridgegen.ego import _tracking_kernels as track
+from bridgegen.ego._perception_kernels import BOTH, NO_FRAME, SEEN_BY, H, X, Y
+from bridgegen.ego.kinds import CAR, PEDESTRIAN
+
+from .scenes import Scene, ahead, weather
+
+
+def test_ideal_perception_is_the_truth():
+    scene = Scene((0, 0, 0.3, 8, CAR), (30, 5, 2.0, 6, CAR), (900, -5, -1.0, 1, PEDESTRIAN))
+    detections, tracks = scene.perceive(weather(visual_range=20.0), ideal=True)
+    frames = np.arange(scene.n_steps) % 2 == 0
+    for e in (1, 2):
+        x, y = scene.centre(e)
+        assert (detections[e, frames, SEEN_BY] == BOTH).all()
+        assert (detections[e, ~frames, SEEN_BY] == NO_FRAME).all()
+        assert (detections[e, frames, X] == x[frames]).all()
+        assert (tracks[:, e, track.X] == x).all()
+        assert (tracks[:, e, track.Y] == y).all()
+        assert (tracks[:, e, track.VX] == scene.v[e] * np.cos(scene.h[e])).all()
+        assert (tracks[:, e, track.STATE] == track.CONFIRMED).all()
+    assert (detections[0] == 0.0).all()
+
+
+def test_a_car_close_by_on_a_clear_day_is_tracked_where_it_is():
+    scene = ahead(20.0, speed=5.0)
+    detections, tracks = scene.perceive(weather())
+    x, _ = scene.centre(1)
+    assert (tracks[10:, 1, track.STATE] >= track.CONFIRMED).all()
+    assert tracks[40:, 1, track.X] == pytest.approx(x[40:], abs=0.5)
+    assert tracks[40:, 1, track.VX] == pytest.approx(5.0, abs=0.7)
+    assert tracks[40:, 1, track.Y] == pytest.approx(0.0, abs=0.5)
+    assert detections[1, ::2, H] == pytest.approx(0.0, abs=4 * 0.1)
+    assert math.isfinite(detections[1:].sum())
+    assert (detections[1, 1::2, SEEN_BY] == NO_FRAME).all()
+    assert (detections[1, 1::2, Y] == 0.0).all()
