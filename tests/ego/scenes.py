@@ -64,7 +64,7 @@ class Scene:
 
 
 def ahead(distance: float, kind: int = CAR, *, n_steps: int = 101, speed: float = 0.0) -> Scene:
-    """Return an ego at the origin, heading +x, and one body whose centre is ahead of its sensors."""
+    """Return an ego at the origin, heading +x, and one body that far ahead, centre to centre."""
     x = distance + BOX[CAR][2] - BOX[kind][2]
     return Scene((0.0, 0.0, 0.0, 0.0, CAR), (x, 0.0, 0.0, speed, kind), n_steps=n_steps)
 
