@@ -92,6 +92,7 @@ class Batch:
             time_step=program.time_step,
             names=program.names,
             box=program.box,
+            kinds=program.kinds,
             x=record.x, y=record.y, h=record.h, v=record.v, a=record.a, offset=record.offset,
             light_names=program.lights,
             lights=record.lights,

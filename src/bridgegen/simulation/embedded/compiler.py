@@ -1,6 +1,5 @@
 """From an OpenSCENARIO file to a `Program`, or to all that the rollout cannot do with it."""
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -16,6 +15,7 @@ from bridgegen.openx.openscenario.declarations import (
 )
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded.actions import Actions
+from bridgegen.simulation.embedded.bodies import kind, measures
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -79,7 +79,8 @@ class _Compiler:
         storyboard = self.scenario.storyboard
         event_names = [str(one.name) for one in _events(storyboard)]
         self.triggers = Triggers(self.tables, step, event_names)
-        bodies = np.array([self._body(one.entity_object) for one in self.tables.objects])
+        objects = [one.entity_object for one in self.tables.objects]
+        bodies = np.array([measures(self.tables, one) for one in objects])
         init, friction = self._init()
         if driver and self.actions.is_timed(0):
             self.tables.problems.append(
@@ -109,6 +110,7 @@ class _Compiler:
             place=self.place,
             names=self.tables.names,
             bodies=bodies,
+            kinds=np.array([kind(one) for one in objects], dtype=np.int64),
             parameters=self.tables.parameters,
             slots=self.tables.slots,
             init=np.array(init, dtype=np.int64),
@@ -174,30 +176,6 @@ class _Compiler:
                         f"{self.place}, line {controller.line}: property {IDEAL}: {error}"
                     ) from None
         return DRIVERS["route-follower"]
-
-    def _body(self, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> tuple[float, ...]:
-        box = body.bounding_box
-        measures = (
-            self.tables.literal(box.dimensions, "length", box.dimensions.length),
-            self.tables.literal(box.dimensions, "width", box.dimensions.width),
-            self.tables.literal(box.center, "x", box.center.x),
-        )
-        if not isinstance(body, osc.Vehicle):
-            return (*measures, math.inf, math.inf, math.inf, math.inf)
-        limits, axles = body.performance, body.axles
-        rear = self.tables.literal(axles.rear, "positionX", axles.rear.position_x)
-        front = axles.front or axles.rear
-        wheelbase = self.tables.literal(front, "positionX", front.position_x) - rear
-        lock = self.tables.literal(front, "maxSteering", front.max_steering)
-        if wheelbase <= 0.0:
-            self.tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
-        return (
-            *measures,
-            self.tables.literal(limits, "maxSpeed", limits.max_speed),
-            self.tables.literal(limits, "maxAcceleration", limits.max_acceleration),
-            self.tables.literal(limits, "maxDeceleration", limits.max_deceleration),
-            math.tan(min(lock, 1.5)) / max(wheelbase, 0.1),
-        )
 
     def _init(self) -> tuple[list[int], int]:
         """Compile the start; return the slots of the entities' speeds, and of the friction."""

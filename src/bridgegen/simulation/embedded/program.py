@@ -100,8 +100,9 @@ class Program:
     Attributes:
         place: the file, for messages.
         names: E entities, the ego first.
-        bodies: ``(E, 7)``: length, width, centre ahead of the reference point [m], maximum speed
-            [m/s], acceleration and deceleration [m/s²], curvature at full lock [1/m].
+        bodies: ``(E, 8)``: length, width, centre ahead of the reference point [m], maximum speed
+            [m/s], acceleration and deceleration [m/s²], curvature at full lock [1/m], height [m].
+        kinds: ``(E,)``: what they are, see `bridgegen.ego.kinds`.
         parameters: the numeric parameters with their declared values.
         slots: S distinct values.
         init: ``(E,)`` slot of each entity's initial speed.
@@ -130,6 +131,7 @@ class Program:
     place: str
     names: tuple[str, ...]
     bodies: Float
+    kinds: Int
     parameters: Mapping[str, float]
     slots: tuple[Value, ...]
     init: Int

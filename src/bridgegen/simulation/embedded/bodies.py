@@ -1,0 +1,72 @@
+"""The bodies of entities: how large they are, what they can do, and what they are."""
+
+import math
+
+from bridgegen.ego.kinds import (
+    ANIMAL,
+    BICYCLE,
+    BUS,
+    CAR,
+    MOTORBIKE,
+    OTHER,
+    PEDESTRIAN,
+    TRUCK,
+)
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.simulation.embedded.tables import Tables
+
+_VEHICLES = {
+    osc.VehicleCategory.BICYCLE: BICYCLE,
+    osc.VehicleCategory.BUS: BUS,
+    osc.VehicleCategory.CAR: CAR,
+    osc.VehicleCategory.MOTORBIKE: MOTORBIKE,
+    osc.VehicleCategory.SEMITRAILER: TRUCK,
+    osc.VehicleCategory.TRAILER: TRUCK,
+    osc.VehicleCategory.TRAIN: OTHER,
+    osc.VehicleCategory.TRAM: BUS,
+    osc.VehicleCategory.TRUCK: TRUCK,
+    osc.VehicleCategory.VAN: CAR,
+}
+
+_STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
+
+
+def kind(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> int:
+    """Return what an entity is, see `bridgegen.ego.kinds`."""
+    if isinstance(body, osc.Vehicle):
+        category = body.vehicle_category
+        return OTHER if isinstance(category, osc.ParameterRef) else _VEHICLES.get(category, OTHER)
+    if isinstance(body, osc.Pedestrian):
+        is_animal = body.pedestrian_category is osc.PedestrianCategory.ANIMAL
+        return ANIMAL if is_animal else PEDESTRIAN
+    return OTHER
+
+
+def measures(
+    tables: Tables, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject
+) -> tuple[float, ...]:
+    """Return a row of ``Program.bodies``; who has no limits has infinite ones."""
+    box = body.bounding_box
+    height = tables.literal(box.dimensions, "height", box.dimensions.height)
+    size = (
+        tables.literal(box.dimensions, "length", box.dimensions.length),
+        tables.literal(box.dimensions, "width", box.dimensions.width),
+        tables.literal(box.center, "x", box.center.x),
+    )
+    if not isinstance(body, osc.Vehicle):
+        return (*size, math.inf, math.inf, math.inf, math.inf, height)
+    limits, axles = body.performance, body.axles
+    rear = tables.literal(axles.rear, "positionX", axles.rear.position_x)
+    front = axles.front or axles.rear
+    wheelbase = tables.literal(front, "positionX", front.position_x) - rear
+    lock = tables.literal(front, "maxSteering", front.max_steering)
+    if wheelbase <= 0.0:
+        tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
+    return (
+        *size,
+        tables.literal(limits, "maxSpeed", limits.max_speed),
+        tables.literal(limits, "maxAcceleration", limits.max_acceleration),
+        tables.literal(limits, "maxDeceleration", limits.max_deceleration),
+        math.tan(min(lock, _STEEPEST)) / max(wheelbase, 0.1),
+        height,
+    )
