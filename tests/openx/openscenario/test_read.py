@@ -16,8 +16,8 @@ def line_of(data: bytes, text: bytes) -> int:
     ("old", "new", "error", "text", "at"),
     [
         # outside the model
-        (b"<TeleportAction>", b"<VisibilityAction/><TeleportAction>", UnsupportedError,
-         "VisibilityAction in PrivateAction is not supported", b"<VisibilityAction"),
+        (b"<TeleportAction>", b"<HoverAction/><TeleportAction>", UnsupportedError,
+         "HoverAction in PrivateAction is not supported", b"<HoverAction"),
         (b'priority="override"', b'priority="override" colour="red"', UnsupportedError,
          "attribute colour of Event is not supported", b"<Event "),
         (b' delay="0.0"', b' dellay="0.0" delay="0.0"', UnsupportedError, "did you mean delay?",

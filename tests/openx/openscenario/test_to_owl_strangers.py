@@ -290,7 +290,7 @@ RELATIVE = (
         # what the reader does not know goes with the event, the action or the trigger around it
         (TARGET, TARGET + "<Wheels/>", "Wheels in SpeedAction is not supported", True),
         ('rule="lessThan"', 'rule="lessThan" colour="red"', "attribute colour", False),
-        ("<TeleportAction>", "<VisibilityAction/><TeleportAction>", "VisibilityAction", True),
+        ("<TeleportAction>", "<HoverAction/><TeleportAction>", "HoverAction", True),
     ],
 )  # fmt: skip
 def test_each_thing_is_named_and_in_part_left_out(plain, folder, old, new, text, gone):

@@ -38,7 +38,7 @@ def test_ours_stays_but_for_the_number(s4, version):
 
 
 @_SLOW
-@given(elements(osc.OpenScenario))
+@given(elements(osc.OpenScenario, 10))
 def test_once_is_enough(scenario):
     made = to_version(scenario, "1.3", "any")
     assert to_version(made, "1.3", "any") == made
@@ -52,7 +52,7 @@ def test_whatever_the_model_holds_is_valid_by_the_version_s_schema(checkers, ver
     schema = checkers.schema("qc_openscenario", f"{xsd}/OpenSCENARIO.xsd")
 
     @_SLOW
-    @given(elements(osc.OpenScenario))
+    @given(elements(osc.OpenScenario, 10))
     def check(scenario):
         try:
             made = to_version(_whole(scenario), version, "any")

@@ -1,145 +1,43 @@
-"""What happens: the actions of the storyboard."""
+"""What happens: the actions of the storyboard, of one entity, of all, and of the user's own."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import ENTITY, Element, Range, Tag
-from bridgegen.openx.openscenario.enumerations import (
-    DynamicsDimension,
-    DynamicsShape,
-    FollowingMode,
-    SpeedTargetValueType,
-)
-from bridgegen.openx.openscenario.environment import Environment
+from bridgegen.openx.openscenario.appearance import AppearanceAction
+from bridgegen.openx.openscenario.catalog_files import CATALOG
+from bridgegen.openx.openscenario.controllers import ActivateControllerAction, ControllerAction
+from bridgegen.openx.openscenario.element import ENTITY, TEXT, AtLeast, Element, Range, Tag
+from bridgegen.openx.openscenario.enumerations import SpeedTargetValueType
+from bridgegen.openx.openscenario.global_actions import GlobalAction
+from bridgegen.openx.openscenario.lateral import LateralAction
+from bridgegen.openx.openscenario.longitudinal import LongitudinalAction
 from bridgegen.openx.openscenario.positions import Position, Route
 from bridgegen.openx.openscenario.trajectories import FollowTrajectoryAction
-from bridgegen.openx.openscenario.values import Boolean, Double, Int, ParameterRef, String
+from bridgegen.openx.openscenario.values import Boolean, Double, ParameterRef, String
 
 
 @dataclass(frozen=True)
-class TransitionDynamics(Element):
-    """How a value changes: at once (``step``), or by a shape over a time, distance or rate."""
+class SensorReference(Element):
+    """A sensor by its name."""
 
-    dynamics_shape: DynamicsShape | ParameterRef
-    dynamics_dimension: DynamicsDimension | ParameterRef
-    value: Annotated[Double, Range(0.0)]
-    following_mode: FollowingMode | ParameterRef | None = None
+    name: String
 
 
 @dataclass(frozen=True)
-class AbsoluteTargetSpeed(Element):
-    """A speed to reach [m/s]."""
+class SensorReferenceSet(Element):
+    """The sensors that are meant."""
 
-    value: Double
-
-
-@dataclass(frozen=True)
-class RelativeTargetSpeed(Element):
-    """A speed to reach, by another entity's: so much more [m/s], or so many times."""
-
-    entity_ref: Annotated[String, ENTITY]
-    value: Double
-    speed_target_value_type: SpeedTargetValueType | ParameterRef
-    continuous: Boolean
+    sensor_references: Annotated[tuple[SensorReference, ...], AtLeast(1)]
 
 
 @dataclass(frozen=True)
-class SpeedActionTarget(Element):
-    """The speed to reach."""
+class VisibilityAction(Element):
+    """Being seen or not: in pictures, by sensors, by other traffic."""
 
-    target: AbsoluteTargetSpeed | RelativeTargetSpeed
-
-
-@dataclass(frozen=True)
-class SpeedAction(Element):
-    """A change of speed."""
-
-    dynamics: Annotated[TransitionDynamics, Tag("SpeedActionDynamics")]
-    speed_action_target: SpeedActionTarget
-
-
-@dataclass(frozen=True)
-class LongitudinalAction(Element):
-    """One of the actions along the road."""
-
-    action: SpeedAction
-
-
-@dataclass(frozen=True)
-class AbsoluteTargetLane(Element):
-    """A lane of the present road by its id."""
-
-    value: String
-
-
-@dataclass(frozen=True)
-class RelativeTargetLane(Element):
-    """A lane by how many lanes it lies to the left of an entity's, in that one's direction."""
-
-    entity_ref: Annotated[String, ENTITY]
-    value: Int
-
-
-@dataclass(frozen=True)
-class LaneChangeTarget(Element):
-    """The lane to change to."""
-
-    target: AbsoluteTargetLane | RelativeTargetLane
-
-
-@dataclass(frozen=True)
-class LaneChangeAction(Element):
-    """A change of lane."""
-
-    dynamics: Annotated[TransitionDynamics, Tag("LaneChangeActionDynamics")]
-    lane_change_target: LaneChangeTarget
-    target_lane_offset: Double | None = None
-
-
-@dataclass(frozen=True)
-class LaneOffsetActionDynamics(Element):
-    """How an offset is reached: its course, and the most lateral acceleration [m/s²]."""
-
-    dynamics_shape: DynamicsShape | ParameterRef
-    max_lateral_acc: Annotated[Double | None, Range(0.0)] = None
-
-
-@dataclass(frozen=True)
-class AbsoluteTargetLaneOffset(Element):
-    """A distance from the centre of the present lane [m]."""
-
-    value: Double
-
-
-@dataclass(frozen=True)
-class RelativeTargetLaneOffset(Element):
-    """A distance from another entity's [m]."""
-
-    entity_ref: Annotated[String, ENTITY]
-    value: Double
-
-
-@dataclass(frozen=True)
-class LaneOffsetTarget(Element):
-    """The offset to reach."""
-
-    target: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
-
-
-@dataclass(frozen=True)
-class LaneOffsetAction(Element):
-    """A move aside within the lane; ``continuous``: kept until something else moves the entity."""
-
-    continuous: Boolean
-    dynamics: Annotated[LaneOffsetActionDynamics, Tag("LaneOffsetActionDynamics")]
-    lane_offset_target: LaneOffsetTarget
-
-
-@dataclass(frozen=True)
-class LateralAction(Element):
-    """One of the actions across the road."""
-
-    action: LaneChangeAction | LaneOffsetAction
+    graphics: Boolean
+    sensors: Boolean
+    traffic: Boolean
+    sensor_reference_set: SensorReferenceSet | None = None
 
 
 @dataclass(frozen=True)
@@ -153,14 +51,64 @@ class TeleportAction(Element):
 class AssignRouteAction(Element):
     """Being given a route."""
 
-    route: Route
+    route: Annotated[Route, CATALOG]
+
+
+@dataclass(frozen=True)
+class AcquirePositionAction(Element):
+    """Being sent to a position, by the shortest route."""
+
+    position: Position
+
+
+@dataclass(frozen=True)
+class RandomRouteAction(Element):
+    """Being sent anywhere."""
 
 
 @dataclass(frozen=True)
 class RoutingAction(Element):
     """One of the actions that say where to go."""
 
-    action: AssignRouteAction | FollowTrajectoryAction
+    action: AssignRouteAction | FollowTrajectoryAction | AcquirePositionAction | RandomRouteAction
+
+
+@dataclass(frozen=True)
+class TargetDistanceSteadyState(Element):
+    """The speed is reached so far before the target [m]."""
+
+    distance: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class TargetTimeSteadyState(Element):
+    """The speed is reached so long before the target [s]."""
+
+    time: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class AbsoluteSpeed(Element):
+    """A speed at the target [m/s]."""
+
+    value: Double
+    steady_state: TargetDistanceSteadyState | TargetTimeSteadyState | None = None
+
+
+@dataclass(frozen=True)
+class RelativeSpeedToMaster(Element):
+    """A speed at the target, by the master's: so much more [m/s], or so many times."""
+
+    speed_target_value_type: SpeedTargetValueType | ParameterRef
+    value: Double
+    steady_state: TargetDistanceSteadyState | TargetTimeSteadyState | None = None
+
+
+@dataclass(frozen=True)
+class FinalSpeed(Element):
+    """The speed at the target."""
+
+    speed: AbsoluteSpeed | RelativeSpeedToMaster
 
 
 @dataclass(frozen=True)
@@ -170,79 +118,61 @@ class SynchronizeAction(Element):
     master_entity_ref: Annotated[String, ENTITY]
     target_position_master: Annotated[Position, Tag("TargetPositionMaster")]
     target_position: Annotated[Position, Tag("TargetPosition")]
+    final_speed: FinalSpeed | None = field(default=None, kw_only=True)
     target_tolerance: Annotated[Double | None, Range(0.0)] = None
     target_tolerance_master: Annotated[Double | None, Range(0.0)] = None
+
+
+@dataclass(frozen=True)
+class ConnectTrailerAction(Element):
+    """A trailer is coupled."""
+
+    trailer_ref: Annotated[String, ENTITY]
+
+
+@dataclass(frozen=True)
+class DisconnectTrailerAction(Element):
+    """The trailer is uncoupled."""
+
+
+@dataclass(frozen=True)
+class TrailerAction(Element):
+    """One of the actions on a trailer."""
+
+    action: ConnectTrailerAction | DisconnectTrailerAction
 
 
 @dataclass(frozen=True)
 class PrivateAction(Element):
     """One of the actions of an entity."""
 
-    action: LongitudinalAction | LateralAction | SynchronizeAction | TeleportAction | RoutingAction
+    action: (
+        LongitudinalAction
+        | LateralAction
+        | VisibilityAction
+        | SynchronizeAction
+        | ActivateControllerAction
+        | ControllerAction
+        | TeleportAction
+        | RoutingAction
+        | AppearanceAction
+        | TrailerAction
+    )
 
 
 @dataclass(frozen=True)
-class EnvironmentAction(Element):
-    """A change of the environment."""
+class CustomCommandAction(Element):
+    """A command that only its own simulator knows."""
 
-    environment: Environment
-
-
-@dataclass(frozen=True)
-class TrafficSignalStateAction(Element):
-    """A traffic light takes up a state, one word for each lamp, top to bottom."""
-
-    name: String
-    state: String
+    type: String
+    text: Annotated[str, TEXT] = ""
 
 
 @dataclass(frozen=True)
-class TrafficSignalControllerAction(Element):
-    """A controller of traffic lights takes up a phase."""
+class UserDefinedAction(Element):
+    """One of the actions that the standard leaves to the user."""
 
-    traffic_signal_controller_ref: String
-    phase: String
-
-
-@dataclass(frozen=True)
-class TrafficSignalAction(Element):
-    """One of the actions of traffic lights."""
-
-    action: TrafficSignalStateAction | TrafficSignalControllerAction
-
-
-@dataclass(frozen=True)
-class InfrastructureAction(Element):
-    """One of the actions of what stands beside the road."""
-
-    traffic_signal_action: TrafficSignalAction
-
-
-@dataclass(frozen=True)
-class AddEntityAction(Element):
-    """An entity comes into the scenario, at a position."""
-
-    position: Position
-
-
-@dataclass(frozen=True)
-class DeleteEntityAction(Element):
-    """An entity leaves the scenario."""
-
-
-@dataclass(frozen=True)
-class EntityAction(Element):
-    """One of the actions on the presence of an entity."""
-
-    entity_ref: Annotated[String, ENTITY]
-    action: AddEntityAction | DeleteEntityAction
-
-
-@dataclass(frozen=True)
-class GlobalAction(Element):
-    """One of the actions that concern all."""
-
-    action: EnvironmentAction | EntityAction | InfrastructureAction
+    custom_command_action: CustomCommandAction
 
 
 @dataclass(frozen=True)
@@ -250,4 +180,4 @@ class Action(Element):
     """An action of an event, by its name."""
 
     name: String
-    action: PrivateAction | GlobalAction
+    action: PrivateAction | GlobalAction | UserDefinedAction

@@ -1,13 +1,13 @@
-"""The head of a file: its header, parameters, properties, and the files that it names."""
+"""What a file declares: its header, parameters, variables, monitors and properties."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 from bridgegen.openx.openscenario.element import TEXT, AtLeast, Element, Tag
 from bridgegen.openx.openscenario.enumerations import ParameterType, Rule
 from bridgegen.openx.openscenario.values import (
+    Boolean,
     DateTime,
-    Double,
     LiteralString,
     String,
     UnsignedShort,
@@ -117,50 +117,31 @@ class ParameterDeclarations(Element):
 
 
 @dataclass(frozen=True)
-class CatalogLocations(Element):
-    """Where catalogues lie; this version reads none."""
+class VariableDeclaration(Element):
+    """A variable, which actions set, and its first value."""
+
+    name: LiteralString
+    variable_type: ParameterType
+    value: String
 
 
 @dataclass(frozen=True)
-class TrafficSignalState(Element):
-    """A traffic light's state during a phase, one word for each lamp, top to bottom."""
+class VariableDeclarations(Element):
+    """The variables of a scenario."""
 
-    traffic_signal_id: String
-    state: String
-
-
-@dataclass(frozen=True)
-class Phase(Element):
-    """A phase of a controller [s]."""
-
-    name: String
-    duration: Double
-    traffic_signal_states: Annotated[tuple[TrafficSignalState, ...], Tag("TrafficSignalState")] = ()
+    variables: tuple[VariableDeclaration, ...] = ()
 
 
 @dataclass(frozen=True)
-class TrafficSignalController(Element):
-    """Traffic lights that go through phases together, again and again."""
+class MonitorDeclaration(Element):
+    """A monitor, which actions set, and its first value."""
 
-    name: String
-    phases: tuple[Phase, ...] = ()
-    delay: Double | None = None
-    reference: String | None = None
+    name: LiteralString
+    value: Boolean
 
 
 @dataclass(frozen=True)
-class TrafficSignals(Element):
-    """The controllers of a road network's traffic lights."""
+class MonitorDeclarations(Element):
+    """The monitors of a scenario."""
 
-    controllers: Annotated[tuple[TrafficSignalController, ...], Tag("TrafficSignalController")] = ()
-
-
-@dataclass(frozen=True)
-class RoadNetwork(Element):
-    """The OpenDRIVE file, what to draw it with, and how its lights change."""
-
-    logic_file: Annotated[File | None, Tag("LogicFile")] = None
-    scene_graph_file: Annotated[File | None, Tag("SceneGraphFile")] = field(
-        default=None, kw_only=True
-    )
-    traffic_signals: TrafficSignals | None = field(default=None, kw_only=True)
+    monitors: tuple[MonitorDeclaration, ...] = ()

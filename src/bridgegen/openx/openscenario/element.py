@@ -7,7 +7,12 @@ One declaration serves reading, writing and checking. A field's annotation says 
 - an ``Element`` class: a child of that tag; a union of classes: a choice of one of them;
 - ``tuple[X, ...]``: any number of them, ``Annotated[…, AtLeast(1)]`` one or more;
 - ``… | None``: optional;
-- ``Annotated[X, Tag("StartTrigger")]``: the tag, where it is not the class's name;
+- ``Annotated[X, Tag("StartTrigger")]``: the tag, where it is not the class's name, one for each
+  class of a choice; ``Alias("…")``: another tag that files have for it;
+- ``Annotated[X, OrInFiles(Y)]``: a file may have a ``Y`` there; `bridgegen.openx.openscenario.read`
+  puts an ``X`` in its place;
+- ``Annotated[X, BARE]``: what ``X`` holds may stand there without it, and is read as if in it;
+- ``Annotated[X, ENTITY]`` and the like: the name of something that is declared elsewhere;
 - ``Annotated[str, TEXT]``: the element's own text.
 """
 
@@ -56,15 +61,36 @@ class Range:
     high: float = float("inf")
 
 
+@dataclass(frozen=True)
+class Alias:
+    """Another tag of a child, which is read and never written."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class OrInFiles:
+    """A class that may stand for a child in a file, and does in no scenario that was read."""
+
+    cls: type[Element]
+
+
 class Meaning(StrEnum):
-    """What a text means beyond its type."""
+    """What a field means beyond its type."""
 
     TEXT = "the element's text"
     ENTITY = "the name of an entity"
+    ROAD = "the id of a road"
+    PARAMETER = "the name of a parameter, with or without $"
+    VARIABLE = "the name of a variable, with or without $"
+    MONITOR = "the name of a monitor, with or without $"
+    BARE = "the children of the child may stand in its place"
 
 
-TEXT = Meaning.TEXT
-ENTITY = Meaning.ENTITY
+TEXT, ENTITY, ROAD = Meaning.TEXT, Meaning.ENTITY, Meaning.ROAD
+PARAMETER, VARIABLE, MONITOR = Meaning.PARAMETER, Meaning.VARIABLE, Meaning.MONITOR
+BARE = Meaning.BARE
+_DECLARED_NAMES = (PARAMETER, VARIABLE, MONITOR)
 
 
 @dataclass(frozen=True)
@@ -79,7 +105,7 @@ class Attribute:
         required: whether the element must have it.
         is_literal: whether it takes no reference to a parameter.
         limits: the standard's range, if it gives one.
-        is_entity: whether it names an entity.
+        means: what it names, if anything.
     """
 
     field: str
@@ -89,7 +115,17 @@ class Attribute:
     required: bool
     is_literal: bool
     limits: Range | None
-    is_entity: bool
+    means: Meaning | None
+
+    @property
+    def is_entity(self) -> bool:
+        """Whether it names an entity."""
+        return self.means is ENTITY
+
+    @property
+    def is_declared_name(self) -> bool:
+        """Whether it names a parameter, a variable or a monitor, which files do with ``$``, too."""
+        return self.means in _DECLARED_NAMES
 
 
 @dataclass(frozen=True)
@@ -98,10 +134,11 @@ class Child:
 
     Attributes:
         field: the dataclass field.
-        options: tag → class.
-        tags: class → tag.
+        options: tag → class, all that a file may have.
+        tags: class → tag, all that the model may hold.
         at_least: how many there must be.
         many: whether there may be more than one.
+        wrapper: the class that holds an option where the file has it bare.
     """
 
     field: str
@@ -109,6 +146,15 @@ class Child:
     tags: dict[type[Element], str]
     at_least: int
     many: bool
+    wrapper: type[Element] | None = None
+
+    def wrapped(self, element: Element) -> Element:
+        """Return what the model holds for an element that a file has there."""
+        if self.wrapper is None or isinstance(element, self.wrapper):
+            return element
+        (child,) = declaration(self.wrapper).children
+        held: dict[str, Any] = {child.field: element, "line": element.line}
+        return self.wrapper(**held)
 
 
 @dataclass(frozen=True)
@@ -165,21 +211,32 @@ def _declare(cls: type[Element]) -> Declaration:
                 field=item.name, name=name, kind=kinds[0] if kinds else Kind.STRING,
                 enum=enums[0] if enums else None, required=required,
                 is_literal=ParameterRef not in options,
-                limits=limits[0] if limits else None, is_entity=ENTITY in marks,
+                limits=limits[0] if limits else None,
+                means=next((mark for mark in marks if isinstance(mark, Meaning)), None),
             )  # fmt: skip
         elif options and all(isinstance(o, type) and issubclass(o, Element) for o in options):
-            tags = [mark.name for mark in marks if isinstance(mark, Tag)]
-            names = tags if tags else [option.__name__ for option in options]
-            counts = [mark.count for mark in marks if isinstance(mark, AtLeast)]
-            at_least = counts[0] if counts else int(required and not many)
-            by_name = dict(zip(names, options, strict=True))
-            children.append(
-                Child(item.name, by_name, {c: t for t, c in by_name.items()}, at_least, many)
-            )
+            children.append(_child(item.name, options, marks, many, required))
         else:
             raise TypeError(f"{cls.__name__}.{item.name} declares neither attribute nor child")
     by_tag = {tag: child for child in children for tag in child.options}
     return Declaration(attributes, tuple(children), by_tag, text)
+
+
+def _child(
+    field_name: str, options: list[type[Element]], marks: list[Any], many: bool, required: bool
+) -> Child:
+    tags = [mark.name for mark in marks if isinstance(mark, Tag)]
+    names = tags if tags else [option.__name__ for option in options]
+    by_name = dict(zip(names, options, strict=True))
+    by_name |= {mark.cls.__name__: mark.cls for mark in marks if isinstance(mark, OrInFiles)}
+    by_class = {cls: tag for tag, cls in by_name.items()}
+    by_name |= {mark.name: options[0] for mark in marks if isinstance(mark, Alias)}
+    wrapper = options[0] if BARE in marks else None
+    if wrapper is not None:
+        by_name |= declaration(wrapper).children[0].options
+    counts = [mark.count for mark in marks if isinstance(mark, AtLeast)]
+    at_least = counts[0] if counts else int(required and not many)
+    return Child(field_name, by_name, by_class, at_least, many, wrapper)
 
 
 def _unfold(hint: Any) -> tuple[list[Any], list[Any], bool]:
@@ -203,7 +260,7 @@ def _unfold(hint: Any) -> tuple[list[Any], list[Any], bool]:
 
 
 def _camel_case(name: str) -> str:
-    return re.sub(r"_([a-z0-9])", lambda match: match[1].upper(), name)
+    return re.sub(r"_([a-z0-9])", lambda match: match[1].upper(), name.rstrip("_"))
 
 
 def children_of(element: Element) -> Iterator[tuple[str, Element]]:

@@ -1,13 +1,15 @@
 """Who takes part: vehicles with their boxes and limits, and who drives them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from bridgegen.openx.openscenario.declarations import Properties
+from bridgegen.openx.openscenario.catalog_files import CATALOG
+from bridgegen.openx.openscenario.declarations import ParameterDeclarations, Properties
 from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range, Tag
 from bridgegen.openx.openscenario.enumerations import (
     ControllerType,
     MiscObjectCategory,
+    ObjectType,
     PedestrianCategory,
     Role,
     TriggeringEntitiesRule,
@@ -76,9 +78,26 @@ class Axles(Element):
 
 
 @dataclass(frozen=True)
+class TrailerHitch(Element):
+    """Where a trailer is coupled, from the reference point [m]."""
+
+    dx: Double
+    dz: Double | None = None
+
+
+@dataclass(frozen=True)
+class TrailerCoupler(Element):
+    """Where a trailer couples itself, from the reference point [m]."""
+
+    dx: Double
+    dz: Double | None = None
+
+
+@dataclass(frozen=True)
 class Vehicle(Element):
     """A vehicle; its reference point is the rear axle's middle on the ground."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     vehicle_category: VehicleCategory | ParameterRef
     bounding_box: BoundingBox
@@ -88,12 +107,16 @@ class Vehicle(Element):
     role: Role | ParameterRef | None = None
     mass: Annotated[Double | None, _NOT_NEGATIVE] = None
     model3d: String | None = None
+    trailer_hitch: TrailerHitch | None = None
+    trailer_coupler: TrailerCoupler | None = None
+    trailer: "Trailer | None" = None
 
 
 @dataclass(frozen=True)
 class Pedestrian(Element):
     """Somebody on foot, or an animal; the reference point is the middle, on the ground."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     pedestrian_category: PedestrianCategory | ParameterRef
     mass: Annotated[Double, _NOT_NEGATIVE]
@@ -101,12 +124,14 @@ class Pedestrian(Element):
     properties: Properties | None = None
     model: String | None = None
     model3d: String | None = None
+    role: Role | ParameterRef | None = None
 
 
 @dataclass(frozen=True)
 class MiscObject(Element):
     """Anything else that stands somewhere."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     misc_object_category: MiscObjectCategory | ParameterRef
     mass: Annotated[Double, _NOT_NEGATIVE]
@@ -119,6 +144,7 @@ class MiscObject(Element):
 class Controller(Element):
     """Who drives; the properties say how."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     properties: Properties | None = None
     controller_type: ControllerType | ParameterRef | None = None
@@ -128,8 +154,15 @@ class Controller(Element):
 class ObjectController(Element):
     """The controller that an entity starts with."""
 
-    controller: Controller
+    controller: Annotated[Controller, CATALOG]
     name: String | None = None
+
+
+@dataclass(frozen=True)
+class ExternalObjectReference(Element):
+    """A body that another file describes."""
+
+    name: String
 
 
 @dataclass(frozen=True)
@@ -137,15 +170,8 @@ class ScenarioObject(Element):
     """A participant by its name."""
 
     name: String
-    entity_object: Vehicle | Pedestrian | MiscObject
+    entity_object: Annotated[Vehicle | Pedestrian | MiscObject | ExternalObjectReference, CATALOG]
     object_controllers: tuple[ObjectController, ...] = ()
-
-
-@dataclass(frozen=True)
-class Entities(Element):
-    """All participants."""
-
-    scenario_objects: tuple[ScenarioObject, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -153,6 +179,43 @@ class EntityRef(Element):
     """A participant that is meant."""
 
     entity_ref: Annotated[String, ENTITY]
+
+
+@dataclass(frozen=True)
+class Trailer(Element):
+    """What a vehicle pulls at the start."""
+
+    trailer: Annotated[ScenarioObject | EntityRef, Tag("Trailer"), Tag("TrailerRef")]
+
+
+@dataclass(frozen=True)
+class ByType(Element):
+    """All participants of a kind."""
+
+    object_type: ObjectType | ParameterRef
+
+
+@dataclass(frozen=True)
+class SelectedEntities(Element):
+    """Some participants, by name or by kind."""
+
+    members: Annotated[tuple[EntityRef | ByType, ...], AtLeast(1)]
+
+
+@dataclass(frozen=True)
+class EntitySelection(Element):
+    """A name for several participants together."""
+
+    name: String
+    members: Annotated[SelectedEntities, Tag("Members")]
+
+
+@dataclass(frozen=True)
+class Entities(Element):
+    """All participants."""
+
+    scenario_objects: tuple[ScenarioObject, ...] = ()
+    entity_selections: tuple[EntitySelection, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -262,3 +262,148 @@ class StoryboardElementType(StrEnum):
     MANEUVER = "maneuver"
     MANEUVER_GROUP = "maneuverGroup"
     STORY = "story"
+
+
+class ObjectType(StrEnum):
+    """Kinds of participants."""
+
+    MISCELLANEOUS = "miscellaneous"
+    PEDESTRIAN = "pedestrian"
+    VEHICLE = "vehicle"
+    EXTERNAL = "external"
+
+
+class LongitudinalDisplacement(StrEnum):
+    """Before or behind the other one."""
+
+    ANY = "any"
+    TRAILING_REFERENCED_ENTITY = "trailingReferencedEntity"
+    LEADING_REFERENCED_ENTITY = "leadingReferencedEntity"
+
+
+class LateralDisplacement(StrEnum):
+    """To the left or right of the other one."""
+
+    ANY = "any"
+    LEFT_TO_REFERENCED_ENTITY = "leftToReferencedEntity"
+    RIGHT_TO_REFERENCED_ENTITY = "rightToReferencedEntity"
+
+
+class DirectionalDimension(StrEnum):
+    """Along which of an entity's axes."""
+
+    LONGITUDINAL = "longitudinal"
+    LATERAL = "lateral"
+    VERTICAL = "vertical"
+
+
+class AngleType(StrEnum):
+    """Which angle of an entity."""
+
+    HEADING = "heading"
+    PITCH = "pitch"
+    ROLL = "roll"
+
+
+class AutomaticGearType(StrEnum):
+    """Positions of an automatic gearbox."""
+
+    N = "n"
+    P = "p"
+    R = "r"
+    D = "d"
+
+
+class LightMode(StrEnum):
+    """What a light does."""
+
+    ON = "on"
+    OFF = "off"
+    FLASHING = "flashing"
+
+
+class ColorType(StrEnum):
+    """Names of colours."""
+
+    OTHER = "other"
+    RED = "red"
+    YELLOW = "yellow"
+    GREEN = "green"
+    BLUE = "blue"
+    VIOLET = "violet"
+    ORANGE = "orange"
+    BROWN = "brown"
+    BLACK = "black"
+    GREY = "grey"
+    WHITE = "white"
+
+
+class VehicleLightType(StrEnum):
+    """Lights of a vehicle."""
+
+    DAYTIME_RUNNING_LIGHTS = "daytimeRunningLights"
+    LOW_BEAM = "lowBeam"
+    HIGH_BEAM = "highBeam"
+    FOG_LIGHTS = "fogLights"
+    FOG_LIGHTS_FRONT = "fogLightsFront"
+    FOG_LIGHTS_REAR = "fogLightsRear"
+    BRAKE_LIGHTS = "brakeLights"
+    WARNING_LIGHTS = "warningLights"
+    INDICATOR_LEFT = "indicatorLeft"
+    INDICATOR_RIGHT = "indicatorRight"
+    REVERSING_LIGHTS = "reversingLights"
+    LICENSE_PLATE_ILLUMINATION = "licensePlateIllumination"
+    SPECIAL_PURPOSE_LIGHTS = "specialPurposeLights"
+
+
+class VehicleComponentType(StrEnum):
+    """Moving parts of a vehicle."""
+
+    HOOD = "hood"
+    TRUNK = "trunk"
+    DOOR_FRONT_RIGHT = "doorFrontRight"
+    DOOR_FRONT_LEFT = "doorFrontLeft"
+    DOOR_REAR_RIGHT = "doorRearRight"
+    DOOR_REAR_LEFT = "doorRearLeft"
+    WINDOW_FRONT_RIGHT = "windowFrontRight"
+    WINDOW_FRONT_LEFT = "windowFrontLeft"
+    WINDOW_REAR_RIGHT = "windowRearRight"
+    WINDOW_REAR_LEFT = "windowRearLeft"
+    SIDE_MIRRORS = "sideMirrors"
+    SIDE_MIRROR_RIGHT = "sideMirrorRight"
+    SIDE_MIRROR_LEFT = "sideMirrorLeft"
+
+
+class PedestrianMotionType(StrEnum):
+    """Ways of moving on foot."""
+
+    STANDING = "standing"
+    SITTING = "sitting"
+    LYING = "lying"
+    SQUATTING = "squatting"
+    WALKING = "walking"
+    RUNNING = "running"
+    REELING = "reeling"
+    CRAWLING = "crawling"
+    CYCLING = "cycling"
+    JUMPING = "jumping"
+    DUCKING = "ducking"
+    BENDING_DOWN = "bendingDown"
+
+
+class PedestrianGestureType(StrEnum):
+    """What the arms do."""
+
+    PHONE_CALL_RIGHT_HAND = "phoneCallRightHand"
+    PHONE_CALL_LEFT_HAND = "phoneCallLeftHand"
+    PHONE_TEXT_RIGHT_HAND = "phoneTextRightHand"
+    PHONE_TEXT_LEFT_HAND = "phoneTextLeftHand"
+    WAVING_RIGHT_ARM = "wavingRightArm"
+    WAVING_LEFT_ARM = "wavingLeftArm"
+    UMBRELLA_RIGHT_HAND = "umbrellaRightHand"
+    UMBRELLA_LEFT_HAND = "umbrellaLeftHand"
+    CROSS_ARMS = "crossArms"
+    COFFEE_RIGHT_HAND = "coffeeRightHand"
+    COFFEE_LEFT_HAND = "coffeeLeftHand"
+    SANDWICH_RIGHT_HAND = "sandwichRightHand"
+    SANDWICH_LEFT_HAND = "sandwichLeftHand"

@@ -1,11 +1,11 @@
 """The weather, the light and the road's state."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi
 from typing import Annotated
 
-from bridgegen.openx.openscenario.declarations import Properties
-from bridgegen.openx.openscenario.element import Element, Range
+from bridgegen.openx.openscenario.declarations import File, ParameterDeclarations, Properties
+from bridgegen.openx.openscenario.element import Element, Range, Tag
 from bridgegen.openx.openscenario.entities import BoundingBox
 from bridgegen.openx.openscenario.enumerations import (
     CloudState,
@@ -67,6 +67,14 @@ class Wind(Element):
 
 
 @dataclass(frozen=True)
+class DomeImage(Element):
+    """A picture of the sky, turned [rad]."""
+
+    dome_file: Annotated[File, Tag("DomeFile")]
+    azimuth_offset: Annotated[Double | None, _TURN] = None
+
+
+@dataclass(frozen=True)
 class Weather(Element):
     """Pressure in [Pa], temperature in [K]; ``cloud_state`` is up to 1.1."""
 
@@ -78,6 +86,7 @@ class Weather(Element):
     fog: Fog | None = None
     precipitation: Precipitation | None = None
     wind: Wind | None = None
+    dome_image: DomeImage | None = None
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,7 @@ class RoadCondition(Element):
 class Environment(Element):
     """Weather, light and road; what is missing stays as it was."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     time_of_day: TimeOfDay | None = None
     weather: Weather | None = None

@@ -1,11 +1,27 @@
-"""Where something is, and the route there."""
+"""Where something is, and the lines that lead there: routes and trajectories."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import AtLeast, Element, Range
+from bridgegen.openx.openscenario.catalog_files import CATALOG
+from bridgegen.openx.openscenario.declarations import ParameterDeclarations
+from bridgegen.openx.openscenario.element import (
+    ENTITY,
+    ROAD,
+    AtLeast,
+    Element,
+    Range,
+    Tag,
+)
 from bridgegen.openx.openscenario.enumerations import ReferenceContext, RouteStrategy
-from bridgegen.openx.openscenario.values import Boolean, Double, ParameterRef, String
+from bridgegen.openx.openscenario.values import (
+    Boolean,
+    Double,
+    Int,
+    ParameterRef,
+    String,
+    UnsignedInt,
+)
 
 
 @dataclass(frozen=True)
@@ -34,6 +50,48 @@ class WorldPosition(Element):
 
 
 @dataclass(frozen=True)
+class RelativeWorldPosition(Element):
+    """A point so far from an entity's, along the axes of the world [m]."""
+
+    entity_ref: Annotated[String, ENTITY]
+    dx: Double
+    dy: Double
+    dz: Double | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class RelativeObjectPosition(Element):
+    """A point so far from an entity's, along the axes of that entity [m]: ahead, left, up."""
+
+    entity_ref: Annotated[String, ENTITY]
+    dx: Double
+    dy: Double
+    dz: Double | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class RoadPosition(Element):
+    """A point by its road's coordinates [m]: along the reference line, and left of it."""
+
+    road_id: Annotated[String, ROAD]
+    s: Annotated[Double, Range(0.0)]
+    t: Double
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class RelativeRoadPosition(Element):
+    """A point so far from an entity's in its road's coordinates [m]."""
+
+    entity_ref: Annotated[String, ENTITY]
+    ds: Double
+    dt: Double
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
 class LanePosition(Element):
     """A point on a lane [m]: along the road's reference line, and left of the lane's centre.
 
@@ -41,7 +99,7 @@ class LanePosition(Element):
     esmini reads it).
     """
 
-    road_id: String
+    road_id: Annotated[String, ROAD]
     lane_id: String
     s: Annotated[Double, Range(0.0)]
     offset: Double | None = None
@@ -49,10 +107,68 @@ class LanePosition(Element):
 
 
 @dataclass(frozen=True)
-class Position(Element):
-    """One of the ways to say where."""
+class RelativeLanePosition(Element):
+    """A point so many lanes to the left of an entity's, and so far along [m].
 
-    position: LanePosition | WorldPosition
+    Either ``ds`` along the road's reference line or ``ds_lane`` along the lane's centre.
+    """
+
+    entity_ref: Annotated[String, ENTITY]
+    d_lane: Int
+    ds: Double | None = None
+    ds_lane: Double | None = None
+    offset: Double | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class GeoPosition(Element):
+    """A point on the globe [°, m]; those without ``_deg`` [rad] are 1.1's."""
+
+    latitude_deg: Annotated[Double | None, Range(-90.0, 90.0)] = None
+    longitude_deg: Annotated[Double | None, Range(-180.0, 180.0)] = None
+    altitude: Double | None = None
+    vertical_road_selection: Int | None = None
+    latitude: Double | None = None
+    longitude: Double | None = None
+    height: Double | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class PositionOfCurrentEntity(Element):
+    """Where an entity is on the route."""
+
+    entity_ref: Annotated[String, ENTITY]
+
+
+@dataclass(frozen=True)
+class PositionInRoadCoordinates(Element):
+    """So far along the route, and left of its roads' reference lines [m]."""
+
+    path_s: Annotated[Double, Range(0.0)]
+    t: Double
+
+
+@dataclass(frozen=True)
+class PositionInLaneCoordinates(Element):
+    """So far along the route, on a lane, and left of its centre [m]."""
+
+    path_s: Annotated[Double, Range(0.0)]
+    lane_id: String
+    lane_offset: Double | None = None
+
+
+@dataclass(frozen=True)
+class InRoutePosition(Element):
+    """One of the ways to say where on a route."""
+
+    position: Annotated[
+        PositionOfCurrentEntity | PositionInRoadCoordinates | PositionInLaneCoordinates,
+        Tag("FromCurrentEntity"),
+        Tag("FromRoadCoordinates"),
+        Tag("FromLaneCoordinates"),
+    ]
 
 
 @dataclass(frozen=True)
@@ -60,13 +176,161 @@ class Waypoint(Element):
     """A point that a route passes, and how it gets there."""
 
     route_strategy: RouteStrategy | ParameterRef
-    position: Position
+    position: "Position"
 
 
 @dataclass(frozen=True)
 class Route(Element):
     """A way along roads through two waypoints or more."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     closed: Boolean
     waypoints: Annotated[tuple[Waypoint, ...], AtLeast(2)]
+
+
+@dataclass(frozen=True)
+class RouteRef(Element):
+    """The route that is meant."""
+
+    route: Annotated[Route, CATALOG]
+
+
+@dataclass(frozen=True)
+class RoutePosition(Element):
+    """A point on a route."""
+
+    route_ref: RouteRef
+    in_route_position: InRoutePosition
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class Vertex(Element):
+    """A point of a polyline, and when to be there [s]."""
+
+    position: "Position"
+    time: Double | None = None
+
+
+@dataclass(frozen=True)
+class Polyline(Element):
+    """Straight lines from vertex to vertex."""
+
+    vertices: Annotated[tuple[Vertex, ...], AtLeast(2)]
+
+
+@dataclass(frozen=True)
+class Clothoid(Element):
+    """A curve whose curvature [1/m] changes evenly over its length [m], and when [s].
+
+    ``curvature_dot`` is 1.0's name of ``curvature_prime`` [1/m²].
+    """
+
+    curvature: Double
+    length: Annotated[Double, Range(0.0)]
+    position: "Position"
+    curvature_prime: Double | None = None
+    curvature_dot: Double | None = None
+    start_time: Double | None = None
+    stop_time: Double | None = None
+
+
+@dataclass(frozen=True)
+class ClothoidSplineSegment(Element):
+    """A clothoid between two curvatures [1/m]; it begins where the last one ends.
+
+    ``h_offset`` [rad] is a kink at its start.
+    """
+
+    curvature_start: Double
+    curvature_end: Double
+    length: Annotated[Double, Range(0.0)]
+    h_offset: Double | None = None
+    time_start: Double | None = None
+    position_start: Annotated["Position | None", Tag("PositionStart")] = None
+
+
+@dataclass(frozen=True)
+class ClothoidSpline(Element):
+    """Clothoids one after the other, and when the last one ends [s]."""
+
+    segments: Annotated[tuple[ClothoidSplineSegment, ...], AtLeast(1)]
+    time_end: Double | None = None
+
+
+@dataclass(frozen=True)
+class ControlPoint(Element):
+    """A control point of a NURBS curve."""
+
+    position: "Position"
+    time: Double | None = None
+    weight: Double | None = None
+
+
+@dataclass(frozen=True)
+class Knot(Element):
+    """A knot of a NURBS curve."""
+
+    value: Double
+
+
+@dataclass(frozen=True)
+class Nurbs(Element):
+    """A non-uniform rational B-spline."""
+
+    order: Annotated[UnsignedInt, Range(2)]
+    control_points: Annotated[tuple[ControlPoint, ...], AtLeast(2)]
+    knots: Annotated[tuple[Knot, ...], AtLeast(2)]
+
+
+@dataclass(frozen=True)
+class Shape(Element):
+    """The line of a trajectory."""
+
+    shape: Polyline | Clothoid | ClothoidSpline | Nurbs
+
+
+@dataclass(frozen=True)
+class Trajectory(Element):
+    """A line by its name."""
+
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
+    name: String
+    closed: Boolean
+    shape: Shape
+
+
+@dataclass(frozen=True)
+class TrajectoryRef(Element):
+    """The trajectory that is meant."""
+
+    trajectory: Annotated[Trajectory, CATALOG]
+
+
+@dataclass(frozen=True)
+class TrajectoryPosition(Element):
+    """A point on a trajectory [m]: along it, and left of it."""
+
+    trajectory_ref: TrajectoryRef
+    s: Double
+    t: Double | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True)
+class Position(Element):
+    """One of the ways to say where."""
+
+    position: (
+        WorldPosition
+        | RelativeWorldPosition
+        | RelativeObjectPosition
+        | RoadPosition
+        | RelativeRoadPosition
+        | LanePosition
+        | RelativeLanePosition
+        | RoutePosition
+        | GeoPosition
+        | TrajectoryPosition
+    )

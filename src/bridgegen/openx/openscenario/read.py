@@ -4,6 +4,7 @@ What the model does not declare is refused by name and line, never skipped: a sc
 is a scenario that is understood.
 """
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -14,6 +15,7 @@ from lxml import etree
 
 from bridgegen.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.catalog_files import CatalogReference
 from bridgegen.openx.openscenario.element import Attribute, Declaration, Element, declaration
 from bridgegen.openx.openscenario.pruning import prune
 from bridgegen.openx.openscenario.storyboard import OpenScenario
@@ -55,8 +57,32 @@ def read(
         raise FileFormatError(
             f"{place}: the root element must be OpenSCENARIO, got {_tag(root)} (line 1)"
         )
+    scenario = verbatim(root, place, skipped, Reader.self_contained)
+    if problems := parameters.problems(scenario):
+        raise FileFormatError(*_shorten([f"{place}: {problem}" for problem in problems]))
+    return scenario
+
+
+def verbatim(
+    root: etree._Element,
+    place: str = "document",
+    skipped: list[str] | None = None,
+    reader_of: Callable[[], "Reader"] | None = None,
+) -> OpenScenario:
+    """Return a file's model as it stands there, with references to catalogues and local parameters.
+
+    Args:
+        root: of the document.
+        place: what to call it in messages.
+        skipped: as of `read`.
+        reader_of: makes the reader.
+
+    Raises:
+        FileFormatError: as of `read`, but for parameters, which are not checked.
+        UnsupportedError: as of `read`.
+    """
     while True:
-        reader = _Reader()
+        reader = (reader_of or Reader)()
         scenario: Element | None = None
         with suppress(_EnoughError):
             scenario = reader.element(OpenScenario, root)
@@ -68,8 +94,6 @@ def read(
     reader.raise_problems(place)
     scenario = cast(OpenScenario, scenario)
     _check_version(scenario, place)
-    if problems := parameters.problems(scenario):
-        raise FileFormatError(*_shorten([f"{place}: {problem}" for problem in problems]))
     return scenario
 
 
@@ -96,12 +120,18 @@ class _EnoughError(Exception):
 
 
 @dataclass
-class _Reader:
+class Reader:
     """Turns XML elements into model elements and collects what is wrong with them."""
 
     malformed: list[tuple[int, str]] = field(default_factory=list)
     unsupported: list[tuple[int, str]] = field(default_factory=list)
     culprits: list[tuple[etree._Element, str | None]] = field(default_factory=list)
+    refused: frozenset[type[Element]] = frozenset()
+
+    @classmethod
+    def self_contained(cls) -> "Reader":
+        """Return one that refuses what refers to catalogues or to parameters of its own."""
+        return cls(refused=frozenset({CatalogReference}))
 
     def raise_problems(self, place: str) -> None:
         """Raise one error with all problems in the order of the file, if there are any."""
@@ -112,9 +142,11 @@ class _Reader:
             raise error(*_shorten(texts))
 
     def wrong(self, node: etree._Element, text: str) -> None:
+        """Note what is malformed at a node."""
         self._note(self.malformed, node, text)
 
     def unknown(self, node: etree._Element, text: str, attribute: str | None = None) -> None:
+        """Note what the model has no place for: a node, or an attribute of it."""
         self._note(self.unsupported, node, text)
         self.culprits.append((node, attribute))
 
@@ -151,6 +183,8 @@ class _Reader:
                         node, f"attribute {name} of {_tag(node)} is not supported{hint}", name
                     )
             else:
+                if attribute.is_declared_name:
+                    text = text.removeprefix("$")
                 try:
                     value = values[attribute.field] = _value(attribute, text)
                 except FileFormatError as error:
@@ -170,13 +204,15 @@ class _Reader:
         for sub in node:
             tag = _tag(sub)
             child = declared.by_tag.get(tag)
-            if child is None and tag == _LOCAL and not len(sub):
+            local = tag == _LOCAL and _tag(node) != "OpenSCENARIO"
+            if local and self.refused and not len(sub):
                 continue
-            if child is None:
+            if child is None or (self.refused and local) or child.options[tag] in self.refused:
                 self.unknown(sub, f"{tag} in {_tag(node)} is not supported")
                 complete = False
             else:
-                found[child.field].append(self.element(child.options[tag], sub))
+                element = self.element(child.options[tag], sub)
+                found[child.field].append(element and child.wrapped(element))
         values: dict[str, Any] = {}
         for child in declared.children:
             got = found[child.field]

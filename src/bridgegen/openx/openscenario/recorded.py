@@ -19,7 +19,7 @@ from bridgegen.openx.openscenario.versions import at, at_once
 
 _TURNING = "plineInterpolation"
 
-Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject
+Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReference
 
 SAME_SPEED = 1e-9  # m/s, recorded speeds that differ by less are one
 
@@ -77,6 +77,8 @@ def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenar
 
 def _turning(body: Body) -> Body:
     """Return a body that esmini, too, turns steadily from vertex to vertex, not at corners only."""
+    if isinstance(body, osc.ExternalObjectReference):
+        return body
     held = body.properties or osc.Properties()
     if held.get(_TURNING) is not None:
         return body

@@ -3,17 +3,26 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from bridgegen.openx.openscenario.actions import Action, GlobalAction, PrivateAction
+from bridgegen.openx.openscenario.actions import Action, PrivateAction, UserDefinedAction
+from bridgegen.openx.openscenario.catalog_files import CATALOG, CatalogLocations
 from bridgegen.openx.openscenario.conditions import Trigger
 from bridgegen.openx.openscenario.declarations import (
-    CatalogLocations,
     FileHeader,
+    MonitorDeclarations,
     ParameterDeclarations,
-    RoadNetwork,
+    VariableDeclarations,
 )
-from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range, Tag
+from bridgegen.openx.openscenario.element import (
+    ENTITY,
+    AtLeast,
+    Element,
+    Range,
+    Tag,
+)
 from bridgegen.openx.openscenario.entities import Actors, Entities
 from bridgegen.openx.openscenario.enumerations import Priority
+from bridgegen.openx.openscenario.global_actions import GlobalAction
+from bridgegen.openx.openscenario.road_network import RoadNetwork
 from bridgegen.openx.openscenario.values import ParameterRef, String, UnsignedInt
 
 
@@ -32,6 +41,7 @@ class Event(Element):
 class Maneuver(Element):
     """Events that belong together."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     events: Annotated[tuple[Event, ...], AtLeast(1)]
 
@@ -43,7 +53,7 @@ class ManeuverGroup(Element):
     name: String
     maximum_execution_count: Annotated[UnsignedInt, Range(1)]
     actors: Actors
-    maneuvers: tuple[Maneuver, ...] = ()
+    maneuvers: Annotated[tuple[Maneuver, ...], CATALOG] = ()
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,7 @@ class Act(Element):
 class Story(Element):
     """Acts that belong together."""
 
+    parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
     acts: Annotated[tuple[Act, ...], AtLeast(1)]
 
@@ -77,6 +88,7 @@ class InitActions(Element):
     """What is done at the start."""
 
     global_actions: tuple[GlobalAction, ...] = ()
+    user_defined_actions: tuple[UserDefinedAction, ...] = field(default=(), kw_only=True)
     privates: tuple[Private, ...] = ()
 
 
@@ -102,6 +114,8 @@ class OpenScenario(Element):
 
     file_header: FileHeader
     parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
+    variable_declarations: VariableDeclarations | None = field(default=None, kw_only=True)
+    monitor_declarations: MonitorDeclarations | None = field(default=None, kw_only=True)
     catalog_locations: CatalogLocations = field(default_factory=CatalogLocations, kw_only=True)
     road_network: RoadNetwork
     entities: Entities

@@ -1,50 +1,12 @@
-"""Trajectories: lines to follow, with or without times."""
+"""Following a trajectory, with or without times."""
 
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import AtLeast, Element, Range, Tag
+from bridgegen.openx.openscenario.element import BARE, Element, Range, Tag
 from bridgegen.openx.openscenario.enumerations import FollowingMode, ReferenceContext
-from bridgegen.openx.openscenario.positions import Position
-from bridgegen.openx.openscenario.values import Boolean, Double, ParameterRef, String
-
-
-@dataclass(frozen=True)
-class Vertex(Element):
-    """A point of a polyline, and when to be there [s]."""
-
-    position: Position
-    time: Double | None = None
-
-
-@dataclass(frozen=True)
-class Polyline(Element):
-    """Straight lines from vertex to vertex."""
-
-    vertices: Annotated[tuple[Vertex, ...], AtLeast(2)]
-
-
-@dataclass(frozen=True)
-class Shape(Element):
-    """The line of a trajectory."""
-
-    shape: Polyline
-
-
-@dataclass(frozen=True)
-class Trajectory(Element):
-    """A line by its name."""
-
-    name: String
-    closed: Boolean
-    shape: Shape
-
-
-@dataclass(frozen=True)
-class TrajectoryRef(Element):
-    """The trajectory that is meant."""
-
-    trajectory: Trajectory
+from bridgegen.openx.openscenario.positions import TrajectoryRef
+from bridgegen.openx.openscenario.values import Double, ParameterRef
 
 
 @dataclass(frozen=True)
@@ -77,9 +39,12 @@ class TrajectoryFollowingMode(Element):
 
 @dataclass(frozen=True)
 class FollowTrajectoryAction(Element):
-    """Moving along a trajectory."""
+    """Moving along a trajectory, from so far on it [m].
+
+    1.0 has no ``TrajectoryRef``: the trajectory stands in the action itself.
+    """
 
     time_reference: TimeReference
     trajectory_following_mode: TrajectoryFollowingMode
-    trajectory_ref: TrajectoryRef
+    trajectory_ref: Annotated[TrajectoryRef, BARE]
     initial_distance_offset: Annotated[Double | None, Range(0.0)] = None

@@ -26,6 +26,26 @@ _RENAMED: dict[Any, Any] = {
 }
 
 
+_LATER = (
+    osc.AngleCondition,
+    osc.ClothoidSpline,
+    osc.MonitorDeclarations,
+    osc.RandomRouteAction,
+    osc.RelativeAngleCondition,
+    osc.SetMonitorAction,
+    osc.TrafficAreaAction,
+    osc.TrafficDistribution,
+    osc.Trailer,
+    osc.TrailerAction,
+    osc.TrailerCoupler,
+    osc.TrailerHitch,
+    # 1.2 has them, but its schema asks for a light and an animation at once, and for an odd tag
+    osc.AppearanceAction,
+    osc.TrafficSignalGroupState,
+)
+_LATER_ATTRIBUTES = ((osc.GeoPosition, "vertical_road_selection", "verticalRoadSelection"),)
+
+
 def to_version(scenario: osc.OpenScenario, version: str, place: str) -> osc.OpenScenario:
     """Return a scenario of version 1.0 to 1.3 as one of another version that means the same.
 
@@ -54,7 +74,21 @@ def to_version(scenario: osc.OpenScenario, version: str, place: str) -> osc.Open
 
 def _only_later(element: Element) -> list[str]:
     """Return what of an element there is from 1.3 on only."""
-    found = []
+    found = [
+        f"{name} of {cls.__name__}"
+        for cls, field, name in _LATER_ATTRIBUTES
+        if isinstance(element, cls) and getattr(element, field) is not None
+    ]
+    if isinstance(element, _LATER):
+        found.append(type(element).__name__)
+    if isinstance(element, osc.AssignControllerAction) and isinstance(
+        element.controller, osc.ObjectController
+    ):
+        found.append("AssignControllerAction with an ObjectController")
+    if isinstance(element, osc.TrafficSourceAction | osc.TrafficSwarmAction) and (
+        element.traffic_definition is None
+    ):
+        found.append(f"{type(element).__name__} without a TrafficDefinition")
     if isinstance(element, osc.Axles) and element.front is None:
         found.append("Axles without a FrontAxle")
     if getattr(element, "coordinate_system", None) is osc.CoordinateSystem.WORLD:
@@ -87,6 +121,10 @@ def _complete(element: Element) -> Element:
         return replace(element, stop_trigger=osc.Trigger())
     if isinstance(element, osc.ObjectController):
         return replace(element, name=None)
+    if isinstance(element, osc.ActivateControllerAction) and element.object_controller_ref:
+        return replace(
+            element, object_controller_ref=None, controller_ref=element.object_controller_ref
+        )
     owners = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.Controller
     if isinstance(element, owners) and element.properties is None:
         return replace(element, properties=osc.Properties())

@@ -54,10 +54,13 @@ class Actions:
         if isinstance(action, osc.EntityAction):
             self._tables.unsupported(action, type(action.action).__name__)
             return
-        if not isinstance(action, osc.EnvironmentAction):
+        if isinstance(action, osc.InfrastructureAction):
             light, state = self.light(action)
             slot = self._tables.slot(float(state))
             self.rows.append((max(light, 0), _LIGHT, 0, 0, slot, slot, 0))
+            return
+        if not isinstance(action, osc.EnvironmentAction):
+            self._tables.unsupported(action, type(action).__name__)
             return
         road = action.environment.road_condition
         if road is not None:
@@ -88,6 +91,9 @@ class Actions:
             what = f"{type(action).__name__} of one that follows a trajectory with times"
             self._tables.unsupported(action, what)
         elif isinstance(action, osc.LongitudinalAction):
+            if not isinstance(action.action, osc.SpeedAction):
+                self._tables.unsupported(action.action, type(action.action).__name__)
+                return
             shape, dimension, value = self._dynamics(action.action.dynamics)
             target = self.speed(action.action.speed_action_target)
             self.rows.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))

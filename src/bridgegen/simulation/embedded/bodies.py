@@ -15,6 +15,8 @@ from bridgegen.ego.kinds import (
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded.tables import Tables
 
+Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReference
+
 _VEHICLES = {
     osc.VehicleCategory.BICYCLE: BICYCLE,
     osc.VehicleCategory.BUS: BUS,
@@ -31,7 +33,7 @@ _VEHICLES = {
 _STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
 
 
-def kind(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> int:
+def kind(body: Body) -> int:
     """Return what an entity is, see `bridgegen.ego.kinds`."""
     if isinstance(body, osc.Vehicle):
         category = body.vehicle_category
@@ -42,10 +44,11 @@ def kind(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> int:
     return OTHER
 
 
-def measures(
-    tables: Tables, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject
-) -> tuple[float, ...]:
+def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     """Return a row of ``Program.bodies``; who has no limits has infinite ones."""
+    if isinstance(body, osc.ExternalObjectReference):
+        tables.unsupported(body, "ExternalObjectReference")
+        return (0.0,) * 8
     box = body.bounding_box
     height = tables.literal(box.dimensions, "height", box.dimensions.height)
     size = (
@@ -55,6 +58,8 @@ def measures(
     )
     if not isinstance(body, osc.Vehicle):
         return (*size, math.inf, math.inf, math.inf, math.inf, height)
+    if body.trailer is not None:
+        tables.unsupported(body.trailer, "Trailer")
     limits, axles = body.performance, body.axles
     rear = tables.literal(axles.rear, "positionX", axles.rear.position_x)
     front = axles.front or axles.rear

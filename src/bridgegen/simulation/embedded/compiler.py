@@ -181,11 +181,16 @@ class _Compiler:
         """Compile the start; return the slots of the entities' speeds, and of the friction."""
         actions = self.scenario.storyboard.init.actions
         friction = -1
+        for command in actions.user_defined_actions:
+            self.tables.unsupported(command, "UserDefinedAction")
         for one in actions.global_actions:
             if isinstance(one.action, osc.EntityAction):
                 self.tables.unsupported(one.action, type(one.action.action).__name__)
                 continue
-            if not isinstance(one.action, osc.EnvironmentAction):
+            if not isinstance(one.action, osc.EnvironmentAction | osc.InfrastructureAction):
+                self.tables.unsupported(one.action, type(one.action).__name__)
+                continue
+            if isinstance(one.action, osc.InfrastructureAction):
                 light, state = self.actions.light(one.action)
                 if light >= 0:
                     self.actions.first_states[light] = state
@@ -207,20 +212,19 @@ class _Compiler:
                         aside = self.tables.literal(action.position.position, "offset", aside)
                     if point is not None:
                         starts[name] = point, aside
-                elif isinstance(action, osc.LongitudinalAction):
-                    dynamics = action.action.dynamics
+                    continue
+                inner = getattr(action, "action", action)
+                if isinstance(inner, osc.SpeedAction):
+                    dynamics = inner.dynamics
                     if dynamics.dynamics_shape is not osc.DynamicsShape.STEP:
                         self.tables.unsupported(dynamics, "an initial SpeedAction other than step")
-                    init[name] = self.actions.speed(action.action.speed_action_target)
-                elif isinstance(action, osc.LateralAction):
-                    what = type(action.action).__name__
-                    self.tables.unsupported(action.action, f"an initial {what}")
-                elif isinstance(action, osc.SynchronizeAction):
-                    self.tables.unsupported(action, "an initial SynchronizeAction")
-                elif isinstance(action.action, osc.FollowTrajectoryAction):
-                    tracks[name] = compile_trajectory(self.tables, action.action)
+                    init[name] = self.actions.speed(inner.speed_action_target)
+                elif isinstance(inner, osc.FollowTrajectoryAction):
+                    tracks[name] = compile_trajectory(self.tables, inner)
+                elif isinstance(inner, osc.AssignRouteAction):
+                    routes[name] = inner.route.waypoints
                 else:
-                    routes[name] = action.action.route.waypoints
+                    self.tables.unsupported(inner, f"an initial {type(inner).__name__}")
         missing = [name for name in self.tables.names if name not in starts]
         if missing and not self.tables.problems:
             raise InputError(
@@ -275,6 +279,9 @@ class _Compiler:
         for one in event.actions:
             if isinstance(one.action, osc.GlobalAction):
                 self.actions.add_global(one.action)
+                continue
+            if not isinstance(one.action, osc.PrivateAction):
+                self.tables.unsupported(one.action, type(one.action).__name__)
                 continue
             if not group.actors.entity_refs:
                 self.tables.unsupported(group.actors, "Actors without an EntityRef")

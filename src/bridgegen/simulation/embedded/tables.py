@@ -73,6 +73,9 @@ class Tables:
             x, y = (self.literal(where, name, getattr(where, name)) for name in ("x", "y"))
             h = None if where.h is None else self.literal(where, "h", where.h)
             return WorldPoint(x, y, where.line, h), 0.0
+        if not isinstance(where, osc.LanePosition):
+            self.unsupported(where, f"{type(where).__name__} here")
+            return None, 0.0
         return self._on_lane(where), where.offset or 0.0
 
     def lane_point(self, position: osc.Position, aside: Value = 0.0) -> LanePoint | None:

@@ -33,7 +33,11 @@ def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> Al
     trajectory = action.trajectory_ref.trajectory
     if trajectory.closed is not False:
         tables.unsupported(trajectory, 'a Trajectory with closed="true"')
-    vertices = trajectory.shape.shape.vertices
+    line = trajectory.shape.shape
+    if not isinstance(line, osc.Polyline):
+        tables.unsupported(line, type(line).__name__)
+        return AlongTrajectory((), action.line)
+    vertices = line.vertices
     points: list[Point] = []
     for vertex in vertices:
         point, aside = tables.point(vertex.position)

@@ -18,6 +18,11 @@ _EDGES = {
 }  # fmt: skip
 _SIMULATION_TIME, _RELATIVE_DISTANCE, _REACH_POSITION, _TIME_TO_COLLISION, _TIME_HEADWAY = range(5)
 _SPEED, _TRAVELED_DISTANCE, _STAND_STILL, _EVENT_ENDED = range(5, 9)
+_PAIRS = (
+    osc.RelativeDistanceCondition,
+    osc.TimeHeadwayCondition,
+    osc.TimeToCollisionCondition,
+)
 _ENDED = (osc.StoryboardElementState.COMPLETE_STATE, osc.StoryboardElementState.END_TRANSITION)
 
 
@@ -102,6 +107,8 @@ class Triggers:
             self._append(_REACH_POSITION, entity, 0, 0, inner.tolerance, edge, delay, point)
             return
         if isinstance(inner, osc.SpeedCondition):
+            if inner.direction is not None:
+                self._tables.unsupported(inner, f'direction="{inner.direction}"')
             rule = self._rule(inner, inner.rule)
             self._append(_SPEED, entity, 0, rule, inner.value, edge, delay)
         elif isinstance(inner, osc.TraveledDistanceCondition):
@@ -110,8 +117,10 @@ class Triggers:
             self._append(_STAND_STILL, entity, 0, 0, inner.duration, edge, delay)
         elif isinstance(inner, osc.CollisionCondition):
             self._tables.unsupported(inner, "CollisionCondition")
-        else:
+        elif isinstance(inner, _PAIRS):
             self._pair(inner, entity, edge, delay)
+        else:
+            self._tables.unsupported(inner, type(inner).__name__)
 
     def _pair(
         self,

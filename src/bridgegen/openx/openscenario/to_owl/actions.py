@@ -24,7 +24,7 @@ def add_action(
     event: str,
     name: str,
     who: tuple[str, ...],
-    wrapped: osc.PrivateAction | osc.GlobalAction,
+    wrapped: osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction,
 ) -> ox.NamedNode:
     """Add an action of an event.
 
@@ -40,7 +40,10 @@ def add_action(
     """
     if isinstance(wrapped, osc.GlobalAction):
         return _global(builder, event, name, wrapped)
+    if isinstance(wrapped, osc.UserDefinedAction):
+        raise UnsayableError(wrapped, "UserDefinedAction")
     action = wrapped.action
+    inner = getattr(action, "action", action)
     if not who:
         raise UnsayableError(wrapped, "a PrivateAction of nobody")
     if isinstance(action, osc.TeleportAction):
@@ -53,17 +56,19 @@ def add_action(
         put_place(builder, node, "has_position", f"{name}_place", action.target_position)
         there = action.target_position_master
         put_place(builder, node, "has_master_position", f"{name}_master_place", there)
-    elif isinstance(action, osc.LongitudinalAction):
+    elif isinstance(inner, osc.SpeedAction):
         node = builder.node(name, "SpeedAction")
-        put_speed(builder, node, action.action)
-    elif isinstance(action, osc.LateralAction):
-        node = _lateral(builder, name, who, action.action)
-    elif isinstance(action.action, osc.FollowTrajectoryAction):
+        put_speed(builder, node, inner)
+    elif isinstance(inner, osc.LaneChangeAction | osc.LaneOffsetAction):
+        node = _lateral(builder, name, who, inner)
+    elif isinstance(inner, osc.FollowTrajectoryAction):
         node = builder.node(name, "FollowTrajectoryAction")
-        add_trajectory(builder, name, node, action.action, None)
-    else:
+        add_trajectory(builder, name, node, inner, None)
+    elif isinstance(inner, osc.AssignRouteAction):
         node = builder.node(name, "AssignRouteAction")
-        builder.put(node, "has_route", add_route(builder, name, action.action.route, None))
+        builder.put(node, "has_route", add_route(builder, name, inner.route, None))
+    else:
+        raise UnsayableError(inner, type(inner).__name__)
     return node
 
 
@@ -158,6 +163,8 @@ def add_trajectory(
     builder.put(node, "has_trajectory", trajectory)
     builder.put(trajectory, "has_name", builder.text(one.name))
     timed = isinstance(action.time_reference.reference, osc.Timing)
+    if not isinstance(one.shape.shape, osc.Polyline):
+        raise UnsayableError(one.shape.shape, type(one.shape.shape).__name__)
     vertices = one.shape.shape.vertices
     for k, (number, vertex) in enumerate(zip(numbered(len(vertices)), vertices, strict=True)):
         point = builder.node(f"{name}_vertex_{number}", "Vertex")
@@ -224,6 +231,8 @@ def _global(
             put_place(builder, node, "has_position", f"{name}_place", place)
         builder.put(node, "has_entity_ref", entity)
         return node
+    if not isinstance(action, osc.InfrastructureAction):
+        raise UnsayableError(action, type(action).__name__)
     set_ = action.traffic_signal_action.action
     if not isinstance(set_, osc.TrafficSignalStateAction):
         raise UnsayableError(set_, type(set_).__name__)

@@ -11,6 +11,16 @@ from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableErr
 Relative = osc.RelativeDistanceCondition | osc.TimeHeadwayCondition | osc.TimeToCollisionCondition
 
 
+_SAYABLE = (
+    Relative
+    | osc.CollisionCondition
+    | osc.ReachPositionCondition
+    | osc.SpeedCondition
+    | osc.StandStillCondition
+    | osc.TraveledDistanceCondition
+)
+
+
 def add_trigger(
     builder: StoryBuilder, event: str, who: tuple[str, ...], trigger: osc.Trigger | None
 ) -> ox.NamedNode:
@@ -60,6 +70,8 @@ def _add_condition(
     elif isinstance(one, osc.TrafficSignalCondition):
         builder.put(node, "has_signal", builder.light(one.name, one))
         builder.put(node, "has_signal_state", signal_state(builder, one.state, one))
+    elif not isinstance(one, osc.StoryboardElementStateCondition):
+        raise UnsayableError(one, type(one).__name__)
     else:
         event = builder.text(one.storyboard_element_ref)
         kind = builder.text(one.storyboard_element_type)
@@ -83,11 +95,15 @@ def _by_entity(
             wrapped.triggering_entities, f"a condition on {len(refs)} TriggeringEntities"
         )
     one = wrapped.entity_condition.condition
+    if not isinstance(one, _SAYABLE):
+        raise UnsayableError(one, type(one).__name__)
     node = builder.node(name, type(one).__name__)
     subject = builder.entity(refs[0].entity_ref, refs[0])
     if who != (builder.text(refs[0].entity_ref),):
         builder.put(node, "has_subject", subject)
     if isinstance(one, osc.CollisionCondition):
+        if not isinstance(one.target, osc.EntityRef):
+            raise UnsayableError(one.target, "ByType")
         builder.put(node, "has_entity_ref", builder.entity(one.target.entity_ref, one.target))
     elif isinstance(one, osc.StandStillCondition):
         builder.number(node, "has_value", one.duration, one)

@@ -144,7 +144,13 @@ def _is_nothing(one: Element) -> bool:
     """Say whether an element says nothing by being there."""
     if isinstance(one, osc.Precipitation):
         return one.precipitation_type == osc.PrecipitationType.DRY
-    silent = osc.Properties | osc.TrafficSignals | osc.ParameterDeclarations
+    silent = (
+        osc.Properties
+        | osc.TrafficSignals
+        | osc.ParameterDeclarations
+        | osc.VariableDeclarations
+        | osc.MonitorDeclarations
+    )
     return isinstance(one, silent) and not list(children_of(one))
 
 

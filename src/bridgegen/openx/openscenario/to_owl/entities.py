@@ -71,10 +71,19 @@ def add_element(
     node = _add_body(builder, one, name, cls)
     place = add_position(builder, f"{name}_place", _teleport(one, actions).position)
     builder.put(node, "has_position", place)
+    for wrapped in actions:
+        if not isinstance(wrapped.action, osc.TeleportAction):
+            text = f"an initial {type(wrapped.action).__name__} of {name}"
+            builder.problems.append((wrapped.line, text))
     return node
 
 
-def _class_of(builder: StoryBuilder, body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> str:
+Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReference
+
+
+def _class_of(builder: StoryBuilder, body: Body) -> str:
+    if isinstance(body, osc.ExternalObjectReference):
+        raise UnsayableError(body, f"the ExternalObjectReference {body.name}")
     if isinstance(body, osc.MiscObject):
         return "Misc"
     if isinstance(body, osc.Pedestrian):
@@ -91,6 +100,8 @@ def _class_of(builder: StoryBuilder, body: osc.Vehicle | osc.Pedestrian | osc.Mi
 
 def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: str) -> ox.NamedNode:
     body, now = one.entity_object, builder.now
+    if isinstance(body, osc.ExternalObjectReference):
+        raise UnsayableError(body, f"the ExternalObjectReference {body.name}")
     box = body.bounding_box
     values = {
         "has_box_length": now(box.dimensions.length, box.dimensions),

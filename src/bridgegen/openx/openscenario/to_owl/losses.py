@@ -40,6 +40,8 @@ def losses(
         yield from compare(declaration, declared.get(declaration.name))
     if here.road_network.scene_graph_file is not None:
         yield here.road_network.scene_graph_file.line, "SceneGraphFile"
+    for element in _unsaid(here):
+        yield from compare(element, None)
     others = {str(one.name): one for one in _controllers(again)}
     for controller in _controllers(here):
         if (name := builder.text(controller.name)) in controllers:
@@ -53,6 +55,14 @@ def losses(
     stop = here.storyboard.stop_trigger
     if stop is not None:
         yield from compare(stop, again.storyboard.stop_trigger)
+
+
+def _unsaid(here: osc.OpenScenario) -> Iterator[Element]:
+    """Yield the parts of a file that no individual stands for."""
+    parts = (here.variable_declarations, here.monitor_declarations, here.road_network.used_area)
+    yield from (one for one in parts if one is not None)
+    yield from here.entities.entity_selections
+    yield from here.storyboard.init.actions.user_defined_actions
 
 
 def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) -> Iterator[Problem]:

@@ -41,11 +41,14 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
         position: on a lane of the map, or a point of the world.
 
     Raises:
-        UnsayableError: it is off the map, or given by an expression that is no distance.
+        UnsayableError: it is off the map, given by an expression that is no distance, or of
+            another kind.
     """
     where = position.position
     if isinstance(where, osc.WorldPosition):
         return _world_position(builder, name, where)
+    if not isinstance(where, osc.LanePosition):
+        raise UnsayableError(where, type(where).__name__)
     road, lane_id = _lane_of(builder, where)
     now = builder.now(where.s, where)
     try:

@@ -1,0 +1,232 @@
+"""Conditions on the state of entities."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from bridgegen.openx.openscenario.element import ENTITY, Element, Range, Tag
+from bridgegen.openx.openscenario.entities import EntityRef
+from bridgegen.openx.openscenario.enumerations import (
+    AngleType,
+    CoordinateSystem,
+    DirectionalDimension,
+    ObjectType,
+    RelativeDistanceType,
+    RoutingAlgorithm,
+    Rule,
+)
+from bridgegen.openx.openscenario.positions import Position
+from bridgegen.openx.openscenario.values import Boolean, Double, Int, ParameterRef, String
+
+
+@dataclass(frozen=True)
+class DistanceCondition(Element):
+    """Compares the distance to a position [m], from the box if ``freespace``.
+
+    ``along_route`` is 1.0's ``relative_distance_type``: longitudinal if true, else euclidian.
+    """
+
+    value: Double
+    freespace: Boolean
+    rule: Rule | ParameterRef
+    position: Position
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+    relative_distance_type: RelativeDistanceType | ParameterRef | None = None
+    routing_algorithm: RoutingAlgorithm | ParameterRef | None = None
+    along_route: Boolean | None = None
+
+
+@dataclass(frozen=True)
+class RelativeDistanceCondition(Element):
+    """Compares the distance to an entity [m], between boxes if ``freespace``."""
+
+    entity_ref: Annotated[String, ENTITY]
+    relative_distance_type: RelativeDistanceType | ParameterRef
+    value: Double
+    freespace: Boolean
+    rule: Rule | ParameterRef
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+    routing_algorithm: RoutingAlgorithm | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class ReachPositionCondition(Element):
+    """True within ``tolerance`` [m] of a position."""
+
+    tolerance: Annotated[Double, Range(0.0)]
+    position: Position
+
+
+@dataclass(frozen=True)
+class TimeHeadwayCondition(Element):
+    """Compares the time [s] that the entity needs to where another one is now.
+
+    ``along_route`` is as in `DistanceCondition`.
+    """
+
+    entity_ref: Annotated[String, ENTITY]
+    freespace: Boolean
+    rule: Rule | ParameterRef
+    value: Double
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+    relative_distance_type: RelativeDistanceType | ParameterRef | None = None
+    routing_algorithm: RoutingAlgorithm | ParameterRef | None = None
+    along_route: Boolean | None = None
+
+
+@dataclass(frozen=True)
+class TimeToCollisionConditionTarget(Element):
+    """With whom, or where."""
+
+    target: EntityRef | Position
+
+
+@dataclass(frozen=True)
+class TimeToCollisionCondition(Element):
+    """Compares the time [s] until a contact at present speeds.
+
+    ``along_route`` is as in `DistanceCondition`.
+    """
+
+    target: TimeToCollisionConditionTarget
+    freespace: Boolean
+    rule: Rule | ParameterRef
+    value: Double
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+    relative_distance_type: RelativeDistanceType | ParameterRef | None = None
+    routing_algorithm: RoutingAlgorithm | ParameterRef | None = None
+    along_route: Boolean | None = None
+
+
+@dataclass(frozen=True)
+class SpeedCondition(Element):
+    """Compares the entity's speed [m/s], or its part along one of its axes."""
+
+    rule: Rule | ParameterRef
+    value: Double
+    direction: DirectionalDimension | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class RelativeSpeedCondition(Element):
+    """Compares the entity's speed less another one's [m/s], or its part along one of its axes."""
+
+    entity_ref: Annotated[String, ENTITY]
+    rule: Rule | ParameterRef
+    value: Double
+    direction: DirectionalDimension | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class AccelerationCondition(Element):
+    """Compares the entity's acceleration [m/s²], or its part along one of its axes."""
+
+    rule: Rule | ParameterRef
+    value: Double
+    direction: DirectionalDimension | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class TraveledDistanceCondition(Element):
+    """True once the entity has travelled so far [m]."""
+
+    value: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class StandStillCondition(Element):
+    """True once the entity has stood for so long [s]."""
+
+    duration: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class EndOfRoadCondition(Element):
+    """True once the entity has been at the end of a road for so long [s]."""
+
+    duration: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class OffroadCondition(Element):
+    """True once the entity has been off the road for so long [s]."""
+
+    duration: Annotated[Double, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class ByObjectType(Element):
+    """Any entity of a kind."""
+
+    type: ObjectType | ParameterRef
+
+
+@dataclass(frozen=True)
+class CollisionCondition(Element):
+    """True while the entity touches another."""
+
+    target: Annotated[EntityRef | ByObjectType, Tag("EntityRef"), Tag("ByType")]
+
+
+@dataclass(frozen=True)
+class RelativeLaneRange(Element):
+    """Lanes from the entity's own, counted to the left; an end that is missing is open."""
+
+    from_: Int | None = None
+    to: Int | None = None
+
+
+@dataclass(frozen=True)
+class RelativeClearanceCondition(Element):
+    """True while nobody is so far ahead or behind [m], on some lanes."""
+
+    opposite_lanes: Boolean
+    free_space: Boolean
+    distance_forward: Annotated[Double | None, Range(0.0)] = None
+    distance_backward: Annotated[Double | None, Range(0.0)] = None
+    relative_lane_ranges: tuple[RelativeLaneRange, ...] = ()
+    entity_refs: tuple[EntityRef, ...] = ()
+
+
+@dataclass(frozen=True)
+class AngleCondition(Element):
+    """True while an angle of the entity is as given [rad]."""
+
+    angle_type: AngleType | ParameterRef
+    angle: Double
+    angle_tolerance: Annotated[Double, Range(0.0)]
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class RelativeAngleCondition(Element):
+    """True while an angle of the entity is so much more than another one's [rad]."""
+
+    entity_ref: Annotated[String, ENTITY]
+    angle_type: AngleType | ParameterRef
+    angle: Double
+    angle_tolerance: Annotated[Double, Range(0.0)]
+    coordinate_system: CoordinateSystem | ParameterRef | None = None
+
+
+@dataclass(frozen=True)
+class EntityCondition(Element):
+    """One of the conditions on an entity."""
+
+    condition: (
+        EndOfRoadCondition
+        | CollisionCondition
+        | OffroadCondition
+        | TimeHeadwayCondition
+        | TimeToCollisionCondition
+        | AccelerationCondition
+        | StandStillCondition
+        | SpeedCondition
+        | RelativeSpeedCondition
+        | TraveledDistanceCondition
+        | ReachPositionCondition
+        | DistanceCondition
+        | RelativeDistanceCondition
+        | RelativeClearanceCondition
+        | AngleCondition
+        | RelativeAngleCondition
+    )
