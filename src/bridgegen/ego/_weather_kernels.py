@@ -2,8 +2,7 @@
 
 ``weather`` ``(WEATHER,)`` float64 is one scenario's, now: what is stated (up to
 ``FRICTION_SCALE``), what follows from it (from ``EXTINCTION`` on), and how far one sees in it (from
-``SIGHT`` on, see ``_sight_kernels``). An environment is a row ``(STATED,)`` of slots, −1 for what
-it leaves as it was.
+``SIGHT`` on, see ``_sight_kernels``).
 """
 
 import math
@@ -59,11 +58,18 @@ def set_clear(weather):
 
 
 @kernel
-def change(weather, environment, slots):
-    """Set what an environment states to its slots' values, and what follows from it."""
+def change(weather, environments, row, slots):
+    """Set what an environment states to its slots' values, and what follows from it.
+
+    Args:
+        weather: as above.
+        environments: ``(·, STATED)`` slots, −1 for what an environment leaves as it was.
+        row: of the environment.
+        slots: ``(S,)`` the scenario's values.
+    """
     for i in range(STATED):
-        if environment[i] >= 0:
-            weather[i] = slots[environment[i]]
+        if environments[row, i] >= 0:
+            weather[i] = slots[environments[row, i]]
     derive(weather)
 
 

@@ -3,12 +3,11 @@
 import numpy as np
 
 from bridgegen.compiled import kernel
-from bridgegen.simulation.embedded._memory_kernels import FRICTION
+from bridgegen.ego._weather_kernels import change
 from bridgegen.simulation.embedded._speed_kernels import begin_speed_change
-from bridgegen.simulation.embedded._start_kernels import DRY_FRICTION, GRAVITY
 from bridgegen.simulation.embedded._travel_kernels import begin_lane_change
 
-SPEED_CHANGE, LANE_CHANGE, FRICTION_CHANGE, LIGHT = 0, 1, 2, 3
+SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT = 0, 1, 2, 3
 
 
 @kernel
@@ -22,9 +21,8 @@ def begin(j, k, plan, roads, state, record):
         begin_speed_change(j, k, plan, state)
     elif kind == LANE_CHANGE:
         begin_lane_change(j, k, plan, roads, state, record)
-    elif kind == FRICTION_CHANGE:
-        scale = state.slots[plan.actions[j, 4]]
-        state.weather[FRICTION] = DRY_FRICTION * GRAVITY * scale
+    elif kind == WEATHER_CHANGE:
+        change(state.weather, plan.weathers, plan.actions[j, 6], state.slots)
         state.action_ended[j] = True
     else:
         state.lights[plan.actions[j, 0]] = np.int8(state.slots[plan.actions[j, 4]])

@@ -4,7 +4,7 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._reference_kernels import drive
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
-from bridgegen.simulation.embedded._memory_kernels import FRICTION
+from bridgegen.ego._weather_kernels import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle
 
 

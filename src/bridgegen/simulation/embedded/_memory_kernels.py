@@ -15,7 +15,6 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import borrowed, inlined_kernel
 
 N_STEPS, STATUS, STOPS = 0, 1, 2  # columns of State.ending
-FRICTION = 0  # column of State.weather
 
 OK, NOT_FINITE, OFF_ROUTE, NO_LANE = 0, 1, 2, 3  # see rollout.STATUS_MESSAGES
 
@@ -33,7 +32,7 @@ class Plan(NamedTuple):
     events: Int
     actions: Int
     first_states: npt.NDArray[np.int8]
-    friction_slot: int
+    weathers: Int
     driver: int
     dt: float
 
@@ -54,7 +53,7 @@ class State(NamedTuple):
 
     Attributes:
         slots: ``(S,)`` the row's values.
-        weather: ``(1,)`` what the tyres can give [m/s²].
+        weather: ``(WEATHER,)`` what sensors and tyres feel, see ``ego/_weather_kernels``.
         ending: ``(3,)`` int64: recorded instants, 0 while it runs; status; whether it stops now.
         history: ``(C, D)`` bool, the conditions at the last D instants; instant k is in k mod D.
         act_runs: ``(A,)`` bool.

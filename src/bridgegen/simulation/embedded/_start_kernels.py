@@ -4,20 +4,17 @@ import math
 
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._path_kernels import pose
-from bridgegen.simulation.embedded._memory_kernels import FRICTION, N_STEPS, OFF_ROUTE, STATUS
+from bridgegen.ego._weather_kernels import change, set_clear
+from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS
 from bridgegen.simulation.embedded._motion_kernels import shifted
-
-GRAVITY = 9.81  # m/s²
-DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground Vehicles, table 1.3
 
 
 @inlined_kernel
 def start(plan, roads, state, record):
     """Set the state and the record's first instant; who moves by a timetable is recorded whole."""
     n_entities, n_steps = record.x.shape
-    state.weather[FRICTION] = DRY_FRICTION * GRAVITY
-    if plan.friction_slot >= 0:
-        state.weather[FRICTION] *= state.slots[plan.friction_slot]
+    set_clear(state.weather)
+    change(state.weather, plan.weathers, 0, state.slots)
     for i in range(state.lights.shape[0]):
         state.lights[i] = plan.first_states[i]
     for e in range(n_entities):

@@ -1,10 +1,11 @@
 """The actions of a storyboard, at the start and in events, as rows of integers."""
 
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.simulation.embedded.environments import Environments
 from bridgegen.simulation.embedded.program import AlongTrajectory, BesideLanes, PathSpec
 from bridgegen.simulation.embedded.tables import Tables
 
-_SPEED_CHANGE, _LANE_CHANGE, _FRICTION, _LIGHT = 0, 1, 2, 3
+_SPEED_CHANGE, _LANE_CHANGE, _WEATHER, _LIGHT = 0, 1, 2, 3
 
 LIGHT_STATES = {
     "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
@@ -26,6 +27,7 @@ class Actions:
 
     Attributes:
         rows: as ``Program.actions`` has them.
+        environments: the weathers, of the start and of events.
         lights: the traffic lights that are set.
         first_states: their states at the start.
 
@@ -38,6 +40,7 @@ class Actions:
         self._tables, self._paths = tables, paths
         self._lane_paths: dict[int, int] = {}
         self.rows: list[tuple[int, ...]] = []
+        self.environments = Environments(tables)
         self.lights: list[str] = []
         self.first_states: list[int] = []
 
@@ -62,10 +65,8 @@ class Actions:
         if not isinstance(action, osc.EnvironmentAction):
             self._tables.unsupported(action, type(action).__name__)
             return
-        road = action.environment.road_condition
-        if road is not None:
-            slot = self._tables.slot(road.friction_scale_factor)
-            self.rows.append((0, _FRICTION, 0, 0, slot, slot, 0))
+        row, slot = self.environments.add(action.environment), self._tables.slot(0.0)
+        self.rows.append((0, _WEATHER, 0, 0, slot, slot, row))
 
     def light(self, action: osc.InfrastructureAction) -> tuple[int, int]:
         """Return the number of the light that an action sets, and its state; -1 if it sets none."""

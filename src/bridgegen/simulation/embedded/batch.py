@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.ego._weather_kernels import WEATHER
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
@@ -119,7 +120,7 @@ def _plan(program: Program) -> memory.Plan:
         events=program.events,
         actions=program.actions,
         first_states=program.first_states,
-        friction_slot=program.friction_slot,
+        weathers=program.weathers,
         driver=program.driver.code,
         dt=program.time_step,
     )
@@ -156,7 +157,7 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
     longest_delay = int(program.conditions[:, 6].max(initial=0))
     return memory.State(
         slots=slots,
-        weather=zeros(1),
+        weather=zeros(WEATHER),
         ending=numbers(3),
         history=flags(len(program.conditions), longest_delay + 2),
         act_runs=flags(len(program.acts)),

@@ -81,7 +81,7 @@ class _Compiler:
         self.triggers = Triggers(self.tables, step, event_names)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
-        init, friction = self._init()
+        init = self._init()
         if driver and self.actions.is_timed(0):
             self.tables.problems.append(
                 f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
@@ -124,7 +124,7 @@ class _Compiler:
             acts=np.array(acts, dtype=np.int64),
             events=table(events, 4),
             actions=table(self.actions.rows, 7),
-            friction_slot=friction,
+            weathers=self.actions.environments.rows,
             lights=tuple(self.actions.lights),
             first_states=np.array(self.actions.first_states, dtype=np.int8),
             driver=chosen if ideal is None else chosen.idealised(ideal),
@@ -177,10 +177,9 @@ class _Compiler:
                     ) from None
         return DRIVERS["route-follower"]
 
-    def _init(self) -> tuple[list[int], int]:
-        """Compile the start; return the slots of the entities' speeds, and of the friction."""
+    def _init(self) -> list[int]:
+        """Compile the start; return the slots of the entities' speeds."""
         actions = self.scenario.storyboard.init.actions
-        friction = -1
         for command in actions.user_defined_actions:
             self.tables.unsupported(command, "UserDefinedAction")
         for one in actions.global_actions:
@@ -195,9 +194,7 @@ class _Compiler:
                 if light >= 0:
                     self.actions.first_states[light] = state
                 continue
-            road = one.action.environment.road_condition
-            if road is not None:
-                friction = self.tables.slot(road.friction_scale_factor)
+            self.actions.environments.begin_with(one.action.environment)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
         starts: dict[str, tuple[Point, Value]] = {}
         routes: dict[str, tuple[osc.Waypoint, ...]] = dict.fromkeys(self.tables.names, ())
@@ -248,7 +245,7 @@ class _Compiler:
                     f"{self.place}, line {point.line}: a WorldPosition is supported for an entity "
                     "that follows a trajectory, and for no other"
                 )
-        return [init[name] for name in self.tables.names], friction
+        return [init[name] for name in self.tables.names]
 
     def _stories(self, storyboard: osc.Storyboard) -> tuple[list[int], list[tuple[int, ...]]]:
         acts: list[int] = []

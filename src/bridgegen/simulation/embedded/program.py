@@ -117,10 +117,11 @@ class Program:
         acts: ``(A,)`` start trigger.
         events: ``(·, 4)`` act, trigger, first and past-the-last action.
         actions: ``(·, 7)`` entity, kind, shape, dimension, slot of the target, slot of its
-            dynamics, path; see ``_action_kernels`` and ``_motion_kernels``.
+            dynamics, path or row of ``weathers``; see ``_action_kernels``, ``_motion_kernels``.
         lights: the traffic lights that are set.
         first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
-        friction_slot: of the road's friction scale factor, -1 if the file has none.
+        weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
+            see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
         time_step: [s].
         n_steps: recorded instants at most.
@@ -145,7 +146,7 @@ class Program:
     acts: Int
     events: Int
     actions: Int
-    friction_slot: int
+    weathers: Int
     lights: tuple[str, ...]
     first_states: npt.NDArray[np.int8]
     driver: Driver

@@ -1,15 +1,19 @@
 """What all parts of the compiler share: the slots, the entities' numbers, and the complaints."""
 
 from collections.abc import Sequence
+from enum import StrEnum
+from typing import TypeVar
 
 import numpy as np
 
 from bridgegen.arrays import Int
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.parameters import numbers
+from bridgegen.openx.openscenario.parameters import numbers, values
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.program import LanePoint, Point, WorldPoint
+
+Choice = TypeVar("Choice", bound=StrEnum)
 
 
 class Tables:
@@ -30,6 +34,7 @@ class Tables:
         self.objects = sorted(objects, key=lambda one: str(one.name).lower() != "ego")
         self.names = tuple(str(one.name) for one in self.objects)
         self.parameters = numbers(scenario)
+        self._declared = values(scenario)
         self.problems: list[str] = []
         self.fixed: dict[str, str] = {}
         self._slots: dict[tuple[type, Value], int] = {}
@@ -65,6 +70,14 @@ class Tables:
         if isinstance(value, osc.ParameterRef | Expr):
             return float(value.resolve(self.parameters))
         return float(value)
+
+    def text(self, value: str | osc.ParameterRef) -> str:
+        """Return a text; a parameter of text has the same value in every row."""
+        return str(self._declared[value.name] if isinstance(value, osc.ParameterRef) else value)
+
+    def choice(self, enum: type[Choice], value: str | osc.ParameterRef) -> Choice:
+        """Return which of an enumeration's values is meant."""
+        return enum(self.text(value))
 
     def point(self, position: osc.Position) -> tuple[Point | None, Value]:
         """Return a position and how far it is aside of its lane's centre [m]."""
