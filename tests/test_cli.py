@@ -203,6 +203,7 @@ def test_an_edited_ontology_converts_to_an_edited_scenario(cli, finished, tmp_pa
     [
         (["scenarios"], "crossroads-s1"),
         (["algorithms"], "pso"),
+        (["drivers"], "un-r157"),
         (["metrics"], "d_min"),
         (["parameters", "crossroads-s4"], "bv_trigger_distance"),
     ],

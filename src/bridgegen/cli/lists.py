@@ -31,6 +31,17 @@ def list_algorithms(as_json: Json = False) -> None:
     print_table(("algorithm", "description", "settings", "source"), rows, as_json=as_json)
 
 
+@listing.command("drivers")
+def list_drivers(as_json: Json = False) -> None:
+    """The drivers that an ego can have."""
+    from bridgegen.ego import DRIVERS
+    from bridgegen.ego.drivers import join
+    from bridgegen.screen import print_table
+
+    rows = [(one.name, one.description, join(one.stages)) for one in DRIVERS.values()]
+    print_table(("driver", "description", "can be ideal"), rows, as_json=as_json)
+
+
 @listing.command("metrics")
 def list_metrics(as_json: Json = False) -> None:
     """The criticality metrics."""

@@ -33,7 +33,7 @@ def search(
     ego: Annotated[
         str | None,
         typer.Option(
-            help="Who drives: route-follower or reference.", show_default="the scenario's choice"
+            help="Who drives; see 'bridgegen list drivers'.", show_default="the scenario's choice"
         ),
     ] = None,
     ideal: Ideal = None,

@@ -65,10 +65,22 @@ REFERENCE = Driver(
     "distance, stops at red, yields and brakes by predicted conflict.",
     frozenset(STAGES),
 )
+UN_R157 = Driver(
+    "un-r157",
+    2,
+    "The competent and careful human driver of UN Regulation 157: reacts to a risk after 0.75 s, "
+    "then brakes by up to 0.774 g; sees everybody.",
+)
+FSM = Driver(
+    "fsm",
+    3,
+    "The fuzzy safety model: brakes in anticipation, up to 6 m/s², by how unsafe its distances "
+    "are; sees everybody.",
+)
 TRAJECTORY = Driver("trajectory", 0, "Nobody: the file's own timetable moves the ego.")
 """What an ego without a driver says it is driven by; not to be chosen."""
 
-DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE)}
+DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE, UN_R157, FSM)}
 
 
 def get(name: str, ideal: Iterable[str] = ()) -> Driver:

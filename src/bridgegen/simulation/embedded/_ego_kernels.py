@@ -1,9 +1,11 @@
 """The ego: what its driver demands, and what its tyres give."""
 
 from bridgegen.compiled import inlined_kernel
+from bridgegen.ego._fsm_kernels import drive_fsm
 from bridgegen.ego._path_kernels import project
-from bridgegen.ego._reference_kernels import drive
+from bridgegen.ego._reference_kernels import drive, plan_speed
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
+from bridgegen.ego._un_r157_kernels import drive_un_r157
 from bridgegen.ego._weather_kernels import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle
 
@@ -19,9 +21,22 @@ def demand(k, plan, roads, state, record):
     curvature = steer(path, n, ds, s, record.x[0, k], record.y[0, k], record.h[0, k], v)
     if plan.driver == 0:
         return hold_speed(v, state.command[0]), curvature
-    demanded = drive(
-        path, n, ds, v, state.command[0], state.weather[FRICTION], plan.bodies, state.station,
-        record.v, k, roads.zones, state.on, state.to, state.foot,
+    if plan.driver == 1:
+        demanded = drive(
+            path, n, ds, v, state.command[0], state.weather[FRICTION], plan.bodies, state.station,
+            record.v, k, roads.zones, state.on, state.to, state.foot,
+        )  # fmt: skip
+        return demanded, curvature
+    planned = plan_speed(path, n, ds, s, v, state.command[0], state.weather[FRICTION])
+    if plan.driver == 2:
+        demanded = drive_un_r157(
+            k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
+            planned, record.x, record.y, record.h, record.v, plan.bodies, state.attention,
+        )  # fmt: skip
+        return demanded, curvature
+    demanded = drive_fsm(
+        k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
+        planned, record.x, record.y, record.h, record.v, plan.bodies, state.attention,
     )  # fmt: skip
     return demanded, curvature
 

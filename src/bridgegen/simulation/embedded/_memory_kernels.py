@@ -78,6 +78,7 @@ class State(NamedTuple):
         origin: ``(E,)`` [m/s], the one that it comes from,
         target: ``(E,)`` [m/s], the one that it is on its way to,
         rate: ``(E,)`` [m/s²], how fast at most.
+        attention: ``(E, 3)``, what a careful driver keeps of each body; see its kernel.
     """
 
     slots: Float
@@ -106,6 +107,7 @@ class State(NamedTuple):
     origin: Float
     target: Float
     rate: Float
+    attention: Float
 
 
 class Record(NamedTuple):

@@ -171,6 +171,7 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
         lane_action=numbers(e), lane_began=zeros(e), lane_lasts=zeros(e), lane_from=zeros(e),
         speed_action=numbers(e), speed_began=zeros(e), speed_lasts=zeros(e),
         command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
+        attention=zeros(e, 3),
     )  # fmt: skip
 
 
