@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from bridgegen.ego import _sight_kernels, _weather_kernels
+from bridgegen.ego import _weather_kernels
 from bridgegen.ego import _weather_kernels as column
 from bridgegen.ego._perception_kernels import DETECTION, MEMORY, perceive
 from bridgegen.ego._tracking_kernels import TRACK
@@ -23,7 +23,6 @@ def weather(**stated: float) -> np.ndarray:
     for name, value in stated.items():
         numbers[getattr(column, name.upper())] = value
     _weather_kernels.derive(numbers)
-    _sight_kernels.fill_sight(numbers)
     return numbers
 
 

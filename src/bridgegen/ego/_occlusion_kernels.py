@@ -3,9 +3,10 @@
 Bodies are boxes that stand on the ground, as high as they are. A ray that another body cuts before
 it reaches its target hides the target up to where the line of sight over that body meets it.
 
-The geometry of this frame stands in columns of ``memory`` ``(E, MEMORY)``, relative to the sensors:
-of each body its centre's x, y and distance d [m], bearing, half the angle that it takes up [rad],
-cosine and sine of its heading.
+This frame's geometry stands in columns of ``memory`` ``(E, MEMORY)``, relative to the sensors: of
+each body its centre's x, y and distance d [m], bearing, the angles from there to its right and left
+edge [rad], cosine and sine of its heading; and of each ray at it the direction, where it meets the
+body [m], and the share of the body's height that is hidden there.
 """
 
 import math
@@ -14,29 +15,28 @@ from bridgegen.compiled import kernel
 from bridgegen.ego import _tracking_kernels as tracking
 
 FIRST = tracking.MEMORY  # the columns before are the tracker's
-DX, DY, D, BEARING, HALF, COS, SIN = range(FIRST, FIRST + 7)
+DX, DY, D, BEARING, LOW, HIGH, COS, SIN = range(FIRST, FIRST + 8)
 RAYS = 5  # across a target
+RAY_X, RAY_Y, REACH, HIDDEN = range(SIN + 1, SIN + 1 + 4 * RAYS, RAYS)
+LAST = HIDDEN + RAYS
 
 
 @kernel
-def half_angle(memory, e, length, width):
-    """Return half the angle that a box takes up, seen from the sensors; π where they are inside.
-
-    The wider side counts for both: a few pairs more are looked at, none is missed.
-    """
+def span(memory, e, length, width):
+    """Return the angles from its bearing to a box's right and left edge; ±π from inside of it."""
     ux, uy = memory[e, DX] / memory[e, D], memory[e, DY] / memory[e, D]
     c, s = memory[e, COS], memory[e, SIN]
     forward, left = ux * c + uy * s, uy * c - ux * s
-    widest = 0.0
+    low = high = 0.0
     for i in range(4):
         a = 0.5 * length if i < 2 else -0.5 * length
         b = 0.5 * width if i % 2 else -0.5 * width
         along = memory[e, D] + a * forward + b * left
-        across = abs(b * forward - a * left)
         if along <= 1e-6:
-            return math.pi
-        widest = max(widest, across / along)
-    return math.atan(widest)
+            return -math.pi, math.pi
+        across = (b * forward - a * left) / along
+        low, high = min(low, across), max(high, across)
+    return math.atan(low), math.atan(high)
 
 
 @kernel
@@ -63,6 +63,19 @@ def entry(memory, e, length, width, ux, uy):
 
 
 @kernel
+def cast(e, memory, bodies):
+    """Aim the rays at body e, and note where each meets it."""
+    low, high = memory[e, LOW], memory[e, HIGH]
+    for ray in range(RAYS):
+        angle = memory[e, BEARING] + low + (high - low) * (ray + 0.5) / RAYS
+        ux, uy = math.cos(angle), math.sin(angle)
+        memory[e, RAY_X + ray], memory[e, RAY_Y + ray] = ux, uy
+        own = entry(memory, e, bodies[e, 0], bodies[e, 1], ux, uy)
+        memory[e, REACH + ray] = min(own, memory[e, D])
+        memory[e, HIDDEN + ray] = 0.0
+
+
+@kernel
 def visible_share(e, memory, bodies, height):
     """Return the share of body e that no other body hides, 0 to 1.
 
@@ -72,35 +85,34 @@ def visible_share(e, memory, bodies, height):
         bodies: ``(E, 8)``: length and width first, height last [m].
         height: of the sensors [m].
     """
-    half = min(memory[e, HALF], 0.5 * math.pi)
-    reach = memory[e, D] + 0.5 * math.hypot(bodies[e, 0], bodies[e, 1])
-    hidden0 = hidden1 = hidden2 = hidden3 = hidden4 = 0.0
+    far = memory[e, D] + 0.5 * (bodies[e, 0] + bodies[e, 1])
+    is_cast = False
     for o in range(1, memory.shape[0]):
-        if o == e or memory[o, D] - 0.5 * (bodies[o, 0] + bodies[o, 1]) > reach:
+        if o == e or memory[o, D] - 0.5 * (bodies[o, 0] + bodies[o, 1]) > far:
             continue
         turn = memory[o, BEARING] - memory[e, BEARING]
-        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-        if abs(turn) > half + memory[o, HALF]:
+        if turn > math.pi:
+            turn -= 2.0 * math.pi
+        elif turn < -math.pi:
+            turn += 2.0 * math.pi
+        if turn + memory[o, LOW] > memory[e, HIGH] or turn + memory[o, HIGH] < memory[e, LOW]:
             continue
+        if not is_cast:
+            cast(e, memory, bodies)
+            is_cast = True
         for ray in range(RAYS):
-            angle = memory[e, BEARING] + half * ((2.0 * ray + 1.0) / RAYS - 1.0)
-            ux, uy = math.cos(angle), math.sin(angle)
-            before = entry(memory, o, bodies[o, 0], bodies[o, 1], ux, uy)
-            if before == math.inf:
-                continue
-            own = min(entry(memory, e, bodies[e, 0], bodies[e, 1], ux, uy), memory[e, D])
-            if before >= own:
-                continue
-            shadow = height + (bodies[o, 7] - height) * own / max(before, 0.1)
-            share = min(max(shadow / bodies[e, 7], 0.0), 1.0)
-            if ray == 0:
-                hidden0 = max(hidden0, share)
-            elif ray == 1:
-                hidden1 = max(hidden1, share)
-            elif ray == 2:
-                hidden2 = max(hidden2, share)
-            elif ray == 3:
-                hidden3 = max(hidden3, share)
-            else:
-                hidden4 = max(hidden4, share)
-    return 1.0 - (hidden0 + hidden1 + hidden2 + hidden3 + hidden4) / RAYS
+            ux, uy = memory[e, RAY_X + ray], memory[e, RAY_Y + ray]
+            before, own = (
+                entry(memory, o, bodies[o, 0], bodies[o, 1], ux, uy),
+                memory[e, REACH + ray],
+            )
+            if before < own:
+                shadow = height + (bodies[o, 7] - height) * own / max(before, 0.1)
+                share = min(max(shadow / bodies[e, 7], 0.0), 1.0)
+                memory[e, HIDDEN + ray] = max(memory[e, HIDDEN + ray], share)
+    if not is_cast:
+        return 1.0
+    hidden = 0.0
+    for ray in range(RAYS):
+        hidden += memory[e, HIDDEN + ray]
+    return 1.0 - hidden / RAYS

@@ -17,10 +17,12 @@ from bridgegen.ego._occlusion_kernels import (
     COS,
     DX,
     DY,
-    HALF,
+    HIGH,
+    LAST,
+    LOW,
     SIN,
     D,
-    half_angle,
+    span,
     visible_share,
 )
 from bridgegen.ego._physics_kernels import (
@@ -48,7 +50,7 @@ NO_FRAME, NOBODY, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
 # Columns of ``memory`` ``(E, MEMORY)`` after the tracker's and the geometry's: 0 until the body's
 # random numbers have been drawn; the three persistent uniform numbers; the six errors in standard
 # deviations.
-DRAWN = SIN + 1
+DRAWN = LAST
 BY_CAMERA, BY_LIDAR, BY_CLASS = DRAWN + 1, DRAWN + 2, DRAWN + 3
 CAMERA_ALONG, CAMERA_ACROSS, LIDAR_ALONG, LIDAR_ACROSS, SIZE, TURN = range(DRAWN + 4, DRAWN + 10)
 MEMORY = DRAWN + 10
@@ -205,7 +207,7 @@ def place(k, x, y, h, bodies, memory):
         for e in range(1, x.shape[0]):
             if memory[e, D] < math.inf:
                 memory[e, BEARING] = math.atan2(memory[e, DY], memory[e, DX])
-                memory[e, HALF] = half_angle(memory, e, bodies[e, 0], bodies[e, 1])
+                memory[e, LOW], memory[e, HIGH] = span(memory, e, bodies[e, 0], bodies[e, 1])
     return near
 
 

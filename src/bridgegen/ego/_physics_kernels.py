@@ -11,7 +11,7 @@ from bridgegen.compiled import kernel
 # The air.
 KOSCHMIEDER = 2.996  # −ln 0.05: contrast is 5 % at the meteorological optical range; WMO-No. 8
 RAIN_EXTINCTION, RAIN_POWER = 3.65e-4, 0.63  # of R [mm/h]: 1/m; Mie, Marshall–Palmer drops
-SNOW_EXTINCTION, SNOW_POWER = 1.265e-3, 1.38  # of dry snow, water [mm/h]; ITU-R P.1814, 5.5 dB/km
+SNOW_EXTINCTION, SNOW_POWER = 1.277e-3, 1.38  # dry snow, mm/h of water; ITU-R P.1814, 5.55 dB/km
 RAIN_ON_GLASS = 0.01  # h/mm, of the light that wet glass scatters over the picture: 1/3 at 50 mm/h
 
 # The light.

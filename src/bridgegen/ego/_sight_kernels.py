@@ -1,7 +1,7 @@
 """How far one sees in this weather: the distance at which half of the frames show a thing.
 
-The table is filled once a weather (`fill_sight`), by thing and by angle to the sun; `sight` reads
-it.
+`sight` reads it from a table by thing and angle to the sun, which it fills first if the weather is
+new.
 """
 
 import math
@@ -98,11 +98,13 @@ def sight(weather, thing, cosine, sine):
     """Return how far [m] a thing is seen in the direction (cosine, sine), at most `CULL`.
 
     Args:
-        weather: ``(W,)``, after `fill_sight`.
+        weather: ``(WEATHER,)``.
         thing: `LIGHT`, `REAR` or `WALKER`.
         cosine: of the heading in which one looks.
         sine: of it.
     """
+    if weather[SIGHT] == 0.0:
+        fill_sight(weather)
     row = SIGHT + thing * N_GLARES
     if weather[GLARE] <= 0.0:
         return weather[row]

@@ -42,8 +42,8 @@ GLARE = 11  # lx, of the sun at the lens
 GLASS = 12  # share of contrast that wet glass leaves
 FRICTION = 13  # m/s², what the tyres can give: μ·g
 SUN_X, SUN_Y = 14, 15  # horizontal components of the direction to the sun
-SIGHT = 16
-N_THINGS, N_GLARES = 3, 7  # the table of sight: what is looked for, and how far off the sun
+SIGHT = 16  # the table of sight, 0 here until it is asked for
+N_THINGS, N_GLARES = 3, 7  # of the table: what is looked for, and how far off the sun
 WEATHER = SIGHT + N_THINGS * N_GLARES
 
 CLEAR_DAY = (10_000.0, 0.0, 0.0, math.pi, math.radians(45.0), -1.0, 0.0, 1.0)
@@ -75,7 +75,8 @@ def change(weather, environments, row, slots):
 
 @kernel
 def derive(weather):
-    """Set the numbers from ``EXTINCTION`` to ``SUN_Y`` by what is stated."""
+    """Set the numbers from ``EXTINCTION`` to ``SUN_Y`` by what is stated; forget ``SIGHT``."""
+    weather[SIGHT] = 0.0
     rain = RAIN_EXTINCTION * max(weather[RAIN], 0.0) ** RAIN_POWER
     snow = SNOW_EXTINCTION * max(weather[SNOW], 0.0) ** SNOW_POWER
     # The drops of fog, too, are larger than either wavelength: Kim, McArthur, Korevaar, SPIE 4214
