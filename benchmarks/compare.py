@@ -15,7 +15,8 @@ from scipy.stats import mannwhitneyu
 from bridgegen.campaign.loop import run_loop
 from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.road_map import load_map
-from bridgegen.pipeline import Pipeline, on_map
+from bridgegen.openx.source import on_map
+from bridgegen.pipeline import Pipeline
 from bridgegen.search import get
 from bridgegen.store import Store
 from bridgegen.store.summary import Summary, summarise

@@ -7,7 +7,7 @@ else here prepares it.
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,17 +16,15 @@ import numpy.typing as npt
 from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.errors import FileFormatError
+from bridgegen.errors import FileFormatError, InputError
 from bridgegen.objective import CLASSIFYING, Objective, Thresholds, needs_sample
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.rules import speed_bounds
-from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
+from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.convert import roads_of
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.read import read as read_scenario
-from bridgegen.openx.source import ConcreteScenario, source_of
+from bridgegen.openx.source import ConcreteScenario, Source, source_of
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
@@ -81,6 +79,7 @@ class Pipeline:
         ideal: Iterable[str] = (),
         road_map: RoadMap | None = None,
         metrics: Sequence[str] | None = None,
+        also: Sequence[str] = (),
     ) -> None:
         """Prepare a scenario.
 
@@ -92,6 +91,7 @@ class Pipeline:
             road_map: the map that it takes place on; its own road network by default.
             metrics: the names of all to record, CLASSIFYING and the objective's among them;
                 what ``metrics_of`` says by default.
+            also: the names of metrics to record besides, by default.
 
         Raises:
             UnknownNameError: no such driver or metric.
@@ -99,12 +99,20 @@ class Pipeline:
         """
         self.scenario = scenario
         self.space = space
-        self.driver = egos.get(ego or scenario.driver, ideal)
-        stages = egos.join(self.driver.ideal)
-        self.source = source_of(scenario, self.driver.name, road_map, stages)
-        self.metrics = metrics_of(scenario, self.driver) if metrics is None else tuple(metrics)
+        name = ego or scenario.driver
+        if name is None and tuple(ideal):
+            raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
+        driver = egos.get(name, ideal) if name else None
+        self.source = _source(scenario, driver, road_map)
         nominal = self.concrete(space.row({}))
-        self.simulator: Simulator[Network] = EmbeddedSimulator(nominal.storyboard, scenario.name)
+        simulator = EmbeddedSimulator(nominal.storyboard, scenario.name, driver=driver)
+        self.simulator: Simulator[Network] = simulator
+        self.driver = simulator.program.driver
+        if driver is None and self.driver != egos.TRAJECTORY:  # the file's choice is written, too
+            self.source = _source(scenario, self.driver, road_map)
+        recorded = metrics_of(scenario, self.driver, also) if metrics is None else metrics
+        self.metrics = tuple(recorded)
+        _refuse_fixed(scenario, space, self.simulator.fixed)
         self._roads: Network | None = None
         if not {*self.source.static_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
@@ -200,28 +208,24 @@ class Pipeline:
         return self.simulator.roads(models), rows.reshape(-1).astype(np.int64)
 
 
-def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
-    """Return a scenario whose static parameters are what a map says.
+def _source(
+    scenario: SearchedScenario, driver: egos.Driver | None, road_map: RoadMap | None
+) -> Source:
+    if driver is None:
+        return source_of(scenario, None, road_map)
+    return source_of(scenario, driver.name, road_map, egos.join(driver.ideal))
 
-    A start that is searched stays on the road that touches the junction: a position in an
-    OpenSCENARIO file is on one road, whatever its parameter's value. The map's lowest speed limit
-    bounds speeds, too.
-    """
-    moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
-    static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
-    found = road_map.site.measures([start.leg for start in moving])
-    here = scenario.measured({one.name: found.get(one.name, one.default) for one in static})
-    limits = [
-        road.speed_limit
-        for leg in road_map.site.legs
-        for road in leg.roads
-        if road.speed_limit is not None
-    ]
-    if not limits:
-        return here
-    story = scenario.story
-    slower = speed_bounds(min(limits), story, here.parameters, story.later_weathers, scenario.place)
-    return replace(here, bounds=(*here.bounds, *slower))
+
+def _refuse_fixed(scenario: SearchedScenario, space: SearchSpace, fixed: Mapping[str, str]) -> None:
+    """Refuse a search of parameters that must be the same in every row."""
+    moving = {*space.variables}
+    moving |= {one.name for one in scenario.derived if one.names & moving}
+    if problems := [
+        f"{scenario.place}: parameter '{name}' cannot vary: it is used for {use}"
+        for name, use in fixed.items()
+        if name in moving
+    ]:
+        raise InputError(*problems)
 
 
 def metrics_of(

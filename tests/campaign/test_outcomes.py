@@ -21,7 +21,8 @@ from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.pipeline import Pipeline, on_map
+from bridgegen.openx.source import on_map
+from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.outcomes import with_outcomes
 
 

@@ -5,19 +5,20 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bridgegen import ego as egos
 from bridgegen import search as toolkit
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.run import REPORT, Run
+from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
+from bridgegen.ego import TRAJECTORY
 from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import ObjectiveSpec, Term
+from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
-from bridgegen.pipeline import Pipeline, metrics_of, on_map
+from bridgegen.openx.source import on_map
+from bridgegen.pipeline import Pipeline
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
 from bridgegen.search.algorithm import Value, resolve
@@ -45,10 +46,11 @@ class Watch:
 def run_search(
     scenario: str | Path,
     *,
+    distribution: Path | str | None = None,
     algorithm: str = "pso",
     settings: Mapping[str, Value] | None = None,
-    budget: int = 1000,
-    seed: int = 0,
+    budget: int | None = None,
+    seed: int | None = None,
     ego: str | None = None,
     ideal: Iterable[str] = (),
     axes: Iterable[str] | None = None,
@@ -66,11 +68,13 @@ def run_search(
     """Search a logical scenario for its critical concrete ones, and hand them over.
 
     Args:
-        scenario: a name of the catalogue, or the path of a YAML file.
+        scenario: a name of the catalogue, or the path of a YAML file or of an OpenSCENARIO file.
+        distribution: of the parameters of an OpenSCENARIO file, a file itself.
         algorithm: a name of ``bridgegen list algorithms``.
         settings: of the algorithm, where they are not to be its defaults.
-        budget: evaluations, exactly.
-        seed: the same seed gives the same result.
+        budget: evaluations, exactly; 1000, or what a stochastic distribution says, by default.
+        seed: the same seed gives the same result; 0, or what a stochastic distribution says, by
+            default.
         ego: a name of the ego's drivers; the scenario's own choice by default.
         ideal: stages of the driver to be ideal: perception, prediction, control.
         axes: the axes of the search space; the scenario's own by default.
@@ -96,27 +100,26 @@ def run_search(
         Interrupted: Ctrl-C; ``resume`` goes on.
     """
     watch = watch or Watch()
+    catalogue = load(scenario, distribution)
+    budget = catalogue.budget if budget is None else budget
+    seed = catalogue.seed if seed is None else seed
     _check_numbers(budget, seed, keep)
-    catalogue = load(scenario)
     logical = replace(catalogue, objective=_choose(catalogue.objective, objective, weights, scale))
     method = toolkit.get(algorithm)
-    roads = load_map(Path(road_map), junction, logical) if road_map is not None else None
-    if roads:
-        logical = on_map(logical, roads)
+    logical, roads = _placed(logical, road_map, junction)
     space = logical.space(axes, fixed)
     if space.n_var == 0:
-        raise InputError(f"{logical.name}: nothing to search, every parameter is fixed")
+        refuse_standstill(logical)
     values = resolve(method, space.n_var, 1, seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
-    recorded = metrics_of(logical, egos.get(ego or logical.driver), metrics)
-    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal, road_map=roads, metrics=recorded)
+    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal, road_map=roads, also=metrics)
     watch.stage("compile")
     pipeline.warm_up()
     chosen = pipeline.choose_objective(seed=seed)
-    is_file = Path(scenario).suffix in (".yaml", ".yml")
     made_with = Settings(
-        scenario=str(Path(scenario).resolve()) if is_file else str(scenario),
+        scenario=str(Path(scenario).resolve()) if is_file(scenario) else str(scenario),
+        distribution=str(Path(distribution).resolve()) if distribution is not None else None,
         fingerprint=catalogue.fingerprint,
         algorithm=method.name,
         algorithm_settings=values,
@@ -162,7 +165,7 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
         pipeline = Pipeline(
             space.scenario,
             space,
-            ego=settings.ego,
+            ego=_ego(settings),
             ideal=settings.ideal,
             road_map=roads,
             metrics=store.metrics,
@@ -173,6 +176,11 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
         return _go(pipeline, store, settings, watch)
 
 
+def _ego(settings: Settings) -> str | None:
+    """Return the driver to ask for; None where the file's own timetable moves the ego."""
+    return None if settings.ego == TRAJECTORY.name else settings.ego
+
+
 def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | None]:
     """Return the search space that a run was made with, and its map if it has one.
 
@@ -180,21 +188,33 @@ def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | N
         StorageError: the scenario or the map is not what it was.
         InputError: the scenario or the map is missing.
     """
-    logical = load(settings.scenario)
+    logical = load(settings.scenario, settings.distribution)
     if logical.fingerprint != settings.fingerprint:
+        what = " or its distribution" if settings.distribution else ""
         raise StorageError(
-            f"{folder}: scenario {settings.scenario} is not what it was when the run began; "
+            f"{folder}: scenario {settings.scenario}{what} is not what it was when the run began; "
             "its results can still be read"
         )
-    roads: RoadMap | None = None
-    if settings.map:
-        roads = load_map(Path(settings.map), settings.junction, logical)
-        if hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
-            raise StorageError(
-                f"{folder}: map {settings.map} is not what it was when the run began"
-            )
-        logical = on_map(logical, roads)
-    return logical.space(settings.axes, settings.fixed), roads
+    placed, roads = _placed(logical, settings.map, settings.junction)
+    if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
+        raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
+    return placed.space(settings.axes, settings.fixed), roads
+
+
+def _placed(
+    scenario: SearchedScenario, road_map: Path | str | None, junction: str | None
+) -> tuple[SearchedScenario, RoadMap | None]:
+    """Return a scenario as it is on a map, and the map; as it was, without one.
+
+    Raises:
+        InputError: a scenario that brings its own map, or a map that it cannot take place on.
+    """
+    if road_map is None:
+        return scenario, None
+    if not isinstance(scenario, LogicalScenario):
+        raise InputError(f"{scenario.name}: a scenario file names its map, it takes no other")
+    roads = load_map(Path(road_map), junction, scenario)
+    return on_map(scenario, roads), roads
 
 
 def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> Run:

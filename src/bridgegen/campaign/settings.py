@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
+from bridgegen.ego import TRAJECTORY
 from bridgegen.errors import StorageError
 
 
@@ -15,8 +16,9 @@ class Settings:
     """The settings of a run.
 
     Attributes:
-        scenario: a name of the catalogue, or the absolute path of a YAML file.
-        fingerprint: digest of what the scenario said when the run began.
+        scenario: a name of the catalogue, or the absolute path of a file.
+        distribution: the absolute path of the file that says how its parameters are distributed.
+        fingerprint: digest of what they said when the run began.
         algorithm: the search algorithm.
         algorithm_settings: every setting of it.
         budget: evaluations.
@@ -36,6 +38,7 @@ class Settings:
     """
 
     scenario: str
+    distribution: str | None
     fingerprint: str
     algorithm: str
     algorithm_settings: Mapping[str, Any]
@@ -73,10 +76,14 @@ class Settings:
     def command(self, folder: Path) -> str:
         """Return the command line that makes the same run."""
         words = ["bridgegen", "search", self.scenario, "--algorithm", self.algorithm]
-        words += ["--budget", str(self.budget), "--seed", str(self.seed), "--ego", self.ego]
+        words += ["--budget", str(self.budget), "--seed", str(self.seed)]
+        if self.ego != TRAJECTORY.name:
+            words += ["--ego", self.ego]
         if self.ideal:
             words += ["--ideal", ",".join(self.ideal)]
         words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
+        if self.distribution:
+            words += ["--distribution", self.distribution]
         for name, value in self.algorithm_settings.items():
             words += ["--set", f"{name}={json.dumps(value)}"]
         for name, value in self.fixed.items():

@@ -9,10 +9,12 @@ from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.convert import roads_of, scenario_of
+from bridgegen.openx.file_scenario import load_file_scenario
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.openx.openscenario.distributions import is_distribution, read_distribution
 from bridgegen.pipeline import Pipeline
 
 
@@ -20,8 +22,9 @@ def validate_file(path: Path, *, reason: bool = False) -> list[str]:
     """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
 
     An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
-    ``.xosc`` is checked with the map that it names. A ``.yaml`` is read, and built at its defaults
-    up to the ways that its participants take; its effects are run.
+    ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
+    ``.yaml`` is read, and built at its defaults up to the ways that its participants take; its
+    effects are run.
 
     Args:
         path: the file.
@@ -75,6 +78,10 @@ def _roads(path: Path) -> list[str]:
 
 
 def _storyboard(path: Path) -> list[str]:
+    if is_distribution(path):
+        named = read_distribution(path).scenario_file.filepath
+        load_file_scenario(path.parent / str(named), path)
+        return []
     scenario = openscenario_read.read(path)
     return openscenario_validate.problems(scenario, roads_of(scenario, path))
 

@@ -22,14 +22,34 @@ Ideal = Annotated[
 
 @app.command()
 def search(
-    scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(help="A catalogue name, or the path of a YAML or an OpenSCENARIO file."),
+    ],
+    distribution: Annotated[
+        Path | None,
+        typer.Option(
+            help="How the parameters of an OpenSCENARIO file are distributed: a file with a "
+            "ParameterValueDistribution."
+        ),
+    ] = None,
     algorithm: Annotated[str, typer.Option(help="See 'bridgegen list algorithms'.")] = "pso",
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", help="A setting of the algorithm, NAME=VALUE; may be repeated."),
     ] = None,
-    budget: Annotated[int, typer.Option(help="Evaluations, exactly.")] = 1000,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
+    budget: Annotated[
+        int | None,
+        typer.Option(
+            help="Evaluations, exactly.", show_default="1000, or a distribution's test runs"
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            help="The same seed gives the same result.", show_default="0, or a distribution's"
+        ),
+    ] = None,
     ego: Annotated[
         str | None,
         typer.Option(
@@ -75,6 +95,7 @@ def search(
     with Screen(budget) as screen:
         run = campaign.run_search(
             scenario,
+            distribution=distribution,
             algorithm=algorithm,
             settings=_settings(settings or []),
             budget=budget,

@@ -53,6 +53,38 @@ class Distribution(Protocol):
 
 
 @dataclass(frozen=True)
+class Uniform:
+    """All values of an interval, equally likely.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+
+    Raises:
+        InputError: the ends are not finite, or in the wrong order.
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not -math.inf < self.low <= self.high < math.inf:
+            raise InputError(
+                f"low <= high must hold for a range, got {self.low:g} and {self.high:g}"
+            )
+
+    def value(self, share: Float) -> Float:
+        """See `Distribution`."""
+        value: Float = np.minimum(self.low + share * (self.high - self.low), self.high)
+        return value
+
+    def share(self, value: Float) -> Float:
+        """See `Distribution`."""
+        width = self.high - self.low
+        return (value - self.low) / width if width > 0.0 else np.full(len(value), 0.5)
+
+
+@dataclass(frozen=True)
 class Normal:
     """A normal distribution, cut off at both ends.
 

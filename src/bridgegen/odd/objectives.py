@@ -7,6 +7,9 @@ from bridgegen.odd.plain_yaml import Path
 from bridgegen.odd.scenario import Critical, ObjectiveSpec, Term
 from bridgegen.odd.schema import ObjectiveSection
 
+PAPERS = ObjectiveSpec((Term("d_min", 0.8297), Term("v_d", 0.1703)), "fixed", "raw")
+"""The paper's objective and thresholds (Section V, Table III)."""
+
 _CRITICAL: Path = ("objective", "critical")
 
 

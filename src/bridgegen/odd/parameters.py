@@ -219,12 +219,14 @@ class Derived:
     def __post_init__(self) -> None:
         _refuse(
             [
-                *_name_problems(self.name),
-                *_unit_problems(self.name, self.unit),
+                *self._naming_problems(),
                 *_reason_problems(f"the derived {self.name}", self.why, self.source),
             ],
             self.place,
         )
+
+    def _naming_problems(self) -> list[str]:
+        return [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
 
     @property
     def names(self) -> frozenset[str]:

@@ -81,24 +81,28 @@ class SearchedScenario:
         title: one line.
         description: what happens.
         place: the file that it was read from.
-        driver: who drives the ego unless the user says otherwise.
         axes: what is searched unless the user says otherwise.
         parameters: what may vary, by name.
         bounds: what limits it.
         derived: what follows from it.
         objective: what is optimised.
+        driver: who drives the ego unless the user says otherwise; None leaves it to a file.
+        budget: evaluations, likewise.
+        seed: of the search, likewise.
     """
 
     name: str
     title: str
     description: str
     place: str = field(compare=False, repr=False)
-    driver: str
     axes: tuple[Axis, ...]
     parameters: dict[str, Parameter]
     bounds: tuple[Bound, ...]
     derived: tuple[Derived, ...]
     objective: ObjectiveSpec
+    driver: str | None
+    budget: int = field(default=1000, kw_only=True)
+    seed: int = field(default=0, kw_only=True)
 
     @property
     def fingerprint(self) -> str:
@@ -147,6 +151,7 @@ class LogicalScenario(SearchedScenario):
         time_step: [s].
         roads: the road network.
         story: who takes part, and what happens.
+        driver: who drives the ego unless the user says otherwise.
         effects: the user's functions that add to each scenario, as ``file.py:function`` or the
             name of an entry point.
     """
@@ -156,6 +161,7 @@ class LogicalScenario(SearchedScenario):
     time_step: float
     roads: RoadsSpec
     story: Story
+    driver: str
     effects: tuple[str, ...]
 
     @property

@@ -6,9 +6,11 @@ from functools import cached_property
 from typing import Protocol
 
 from bridgegen.odd.parameters import Axis
+from bridgegen.odd.rules import speed_bounds
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build, build_static
+from bridgegen.openx.file_scenario import FileScenario, FileSource
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
@@ -77,19 +79,48 @@ class Source(Protocol):
 
 
 def source_of(
-    scenario: SearchedScenario, driver: str, road_map: RoadMap | None = None, ideal: str = ""
+    scenario: SearchedScenario,
+    driver: str | None,
+    road_map: RoadMap | None = None,
+    ideal: str = "",
 ) -> Source:
     """Return what makes a scenario's concrete ones.
 
     Args:
         scenario: of any kind.
-        driver: the ego's, by name.
+        driver: the ego's, by name; the scenario's own choice by default.
         road_map: the map that it takes place on, instead of its own roads.
         ideal: the driver's stages that are ideal, separated by commas.
     """
     if isinstance(scenario, LogicalScenario):
-        return OntologySource(scenario, driver, road_map, ideal)
-    raise TypeError(f"nothing makes scenarios of {type(scenario).__name__}")
+        return OntologySource(scenario, driver or scenario.driver, road_map, ideal)
+    if isinstance(scenario, FileScenario):
+        return FileSource(scenario, driver, ideal)
+    raise TypeError(f"nothing makes concrete scenarios of a {type(scenario).__name__}")
+
+
+def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
+    """Return a scenario whose static parameters are what a map says.
+
+    A start that is searched stays on the road that touches the junction: a position in an
+    OpenSCENARIO file is on one road, whatever its parameter's value. The map's lowest speed limit
+    bounds speeds, too.
+    """
+    moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
+    static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
+    found = road_map.site.measures([start.leg for start in moving])
+    here = scenario.measured({one.name: found.get(one.name, one.default) for one in static})
+    limits = [
+        road.speed_limit
+        for leg in road_map.site.legs
+        for road in leg.roads
+        if road.speed_limit is not None
+    ]
+    if not limits:
+        return here
+    story = scenario.story
+    slower = speed_bounds(min(limits), story, here.parameters, story.later_weathers, scenario.place)
+    return replace(here, bounds=(*here.bounds, *slower))
 
 
 class OntologySource:

@@ -78,7 +78,7 @@ def problems(scenario: OpenScenario) -> list[str]:
             found.append((one.line, f"the value of parameter {name} {error}"))
             value = one.value
         else:
-            found += [(one.line, f"parameter {name} {text}") for text in _broken(one, value)]
+            found += [(one.line, f"parameter {name} {text}") for text in broken(one, value)]
         declared[name] = kind, value
     for element in walk(scenario):
         for attribute, value in values_of(element):
@@ -129,7 +129,7 @@ def _fits(want: Kind, have: Kind, value: Literal) -> bool:
     return have.is_integer if want.is_integer else want.is_number and have.is_number
 
 
-def _broken(declaration: ParameterDeclaration, value: Literal) -> list[str]:
+def broken(declaration: ParameterDeclaration, value: Literal) -> list[str]:
     """Return why a value breaks its constraints: none of the groups holds."""
     reasons: list[str] = []
     for group in declaration.constraint_groups:

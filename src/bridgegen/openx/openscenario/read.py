@@ -19,10 +19,11 @@ from bridgegen.openx.openscenario.catalog_files import CatalogReference
 from bridgegen.openx.openscenario.element import Attribute, Declaration, Element, declaration
 from bridgegen.openx.openscenario.pruning import prune
 from bridgegen.openx.openscenario.storyboard import OpenScenario
-from bridgegen.openx.openscenario.values import ParameterRef, parse_value
+from bridgegen.openx.openscenario.values import Expr, ParameterRef, parse_value
 from bridgegen.openx.xml import parse_xml
 
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")
+DISTRIBUTION = "ParameterValueDistribution"
 MAX_PROBLEMS = 50
 _ENOUGH = 1000  # problems; a file with more is not worth reading on
 _LOCAL = "ParameterDeclarations"  # of a story, a vehicle …; an empty list of them says nothing
@@ -56,6 +57,13 @@ def read(
     if _tag(root) != "OpenSCENARIO":
         raise FileFormatError(
             f"{place}: the root element must be OpenSCENARIO, got {_tag(root)} (line 1)"
+        )
+    if (distribution := root.find(DISTRIBUTION)) is not None:
+        named = distribution.find("ScenarioFile")
+        file = "SCENARIO.xosc" if named is None else named.get("filepath", "")
+        raise FileFormatError(
+            f"{place}: is no scenario but says how the parameters of one vary; to search that: "
+            f"bridgegen search {file} --distribution {place}"
         )
     scenario = verbatim(root, place, skipped, Reader.self_contained)
     if problems := parameters.problems(scenario):
@@ -190,7 +198,7 @@ class Reader:
                 except FileFormatError as error:
                     self.wrong(node, f"{name} of {_tag(node)} {error}")
                 else:
-                    if attribute.is_literal and isinstance(value, ParameterRef):
+                    if attribute.is_literal and isinstance(value, ParameterRef | Expr):
                         what = f"a reference as {name} of {_tag(node)}"
                         self.unknown(node, f"{what} is not supported, got {value}", name)
         for attribute in declared.attributes.values():

@@ -53,6 +53,38 @@ def resolved(scenario: osc.OpenScenario, place: str) -> osc.OpenScenario:
     return made
 
 
+def texts_resolved(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, dict[str, str]]:
+    """Return a scenario in which literals stand for all that is no number.
+
+    Its parameters stay declared, and numbers refer to them still; so do properties, which are
+    texts to the standard but may well be numbers to who reads them.
+
+    Args:
+        scenario: as read, so its references are known to fit.
+
+    Returns:
+        The scenario; and the numeric parameters that a text refers to, such as a road's id, with
+        what the first of these is.
+    """
+    declared = scenario.parameter_declarations
+    texts = {one.name: one.value for one in declared.parameters} if declared else {}
+    values, numbers = parameters.values(scenario), parameters.numbers(scenario)
+    used: dict[str, str] = {}
+
+    def change(element: Element) -> Element:
+        changes: dict[str, Any] = {}
+        for attribute, value in () if isinstance(element, osc.Property) else values_of(element):
+            if isinstance(value, osc.ParameterRef) and not attribute.kind.is_number:
+                name = value.name
+                changes[attribute.field] = _literal(attribute, values[name], texts[name])
+                if name in numbers:
+                    line = f" (line {element.line})" if element.line else ""
+                    used.setdefault(name, f'{attribute.name}="{value}"{line}')
+        return replace(element, **changes) if changes else element
+
+    return rewritten(scenario, change), used
+
+
 def _number(expression: osc.Expr, numbers: Mapping[str, float]) -> float:
     with np.errstate(all="ignore"):  # what has no value is told with its place
         return float(expression.resolve(numbers))

@@ -13,6 +13,7 @@ from bridgegen.openx.openscenario.declarations import (
     IDEAL,
     TIME_STEP,
 )
+from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
@@ -59,9 +60,11 @@ def compile_storyboard(
 
 class _Compiler:
     def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
+        scenario, texts = texts_resolved(scenario)
         self.scenario = scenario
         self.place = place
         self.tables = Tables(scenario, place)
+        self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
         self.actions = Actions(self.tables, self.paths)
 

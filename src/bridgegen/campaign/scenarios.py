@@ -1,0 +1,63 @@
+"""What can be searched: a scenario of the catalogue, of a YAML file, or of an OpenSCENARIO file."""
+
+from pathlib import Path
+from typing import NoReturn
+
+from bridgegen.errors import InputError
+from bridgegen.odd import reader
+from bridgegen.odd.scenario import SearchedScenario
+from bridgegen.openx.file_scenario import FileScenario, load_file_scenario
+from bridgegen.openx.openscenario.parameters import values
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
+STORYBOARD = ".xosc"
+
+
+def is_file(scenario: str | Path) -> bool:
+    """Say whether a scenario is named by the path of its file."""
+    return Path(scenario).suffix.lower() in (".yaml", ".yml", STORYBOARD)
+
+
+def load(scenario: str | Path, distribution: str | Path | None = None) -> SearchedScenario:
+    """Read a logical scenario.
+
+    Args:
+        scenario: a name of the catalogue, or the path of a YAML file or of an OpenSCENARIO file.
+        distribution: of the parameters of an OpenSCENARIO file.
+
+    Raises:
+        InputError: a distribution for another kind of scenario; or as the readers say.
+    """
+    if Path(scenario).suffix.lower() == STORYBOARD:
+        return load_file_scenario(Path(scenario), Path(distribution) if distribution else None)
+    if distribution is not None:
+        raise InputError(
+            f"a distribution is for the parameters of an OpenSCENARIO file ({STORYBOARD}), got "
+            f"{scenario}"
+        )
+    return reader.load(scenario)
+
+
+def refuse_standstill(scenario: SearchedScenario) -> NoReturn:
+    """Refuse a search in which nothing varies, and say what could.
+
+    Raises:
+        InputError: always.
+    """
+    if not isinstance(scenario, FileScenario) or scenario.definition is not None:
+        raise InputError(f"{scenario.name}: nothing to search, every parameter is fixed")
+    simulator = EmbeddedSimulator(scenario.storyboard, scenario.place)
+    free, others = [], []
+    for name, value in values(scenario.storyboard).items():
+        if name in simulator.fixed:
+            others.append(f"{name} cannot vary: it is used for {simulator.fixed[name]}")
+        elif name in simulator.parameters:
+            free.append(name)
+        else:
+            others.append(f"{name} cannot vary: it is no number, but '{value}'")
+    could = f"these parameters can vary: {', '.join(free)}" if free else "no parameter can vary"
+    raise InputError(
+        f"{scenario.place}: say what may vary with --distribution FILE, an OpenSCENARIO file with "
+        f"a ParameterValueDistribution; {could}",
+        *(f"{scenario.place}: parameter {text}" for text in others),
+    )

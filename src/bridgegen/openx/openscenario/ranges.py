@@ -1,0 +1,267 @@
+"""The parameters of a scenario file as those of a search: what may vary, and how it is distributed.
+
+What the standard leaves open, and what is chosen here, is in docs/decisions.md.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from bridgegen.arrays import Float
+from bridgegen.errors import FileFormatError, InputError
+from bridgegen.odd.distributions import Discrete, Distribution, Uniform
+from bridgegen.odd.expression import lookup, parse
+from bridgegen.odd.parameters import Axis, Derived, Parameter, nearest
+from bridgegen.openx.openscenario import distributions as dst
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.from_owl.notes import PARAMETER
+from bridgegen.openx.openscenario.parameters import broken, kind_of, numbers
+from bridgegen.openx.openscenario.values import Kind, parse_literal
+
+UNIT = "?"
+"""The unit of a parameter whose file does not say it."""
+
+
+@dataclass(frozen=True)
+class FileParameter(Parameter):
+    """A parameter of a scenario file: of any name, perhaps of no known unit, distributed.
+
+    Attributes:
+        distribution: of its values; None where they are spread evenly.
+    """
+
+    distribution: Distribution | None = None
+
+    def at(self, share: Float, lo: Float | float, hi: Float | float) -> Float:
+        """See `Parameter`."""
+        if self.distribution is None:
+            return super().at(share, lo, hi)
+        return self.distribution.value(share)
+
+    def share(self, value: Float, lo: Float | float, hi: Float | float) -> Float:
+        """See `Parameter`."""
+        if self.distribution is None:
+            return super().share(value, lo, hi)
+        return self.distribution.share(value)
+
+    def _naming_problems(self) -> list[str]:
+        return []
+
+
+@dataclass(frozen=True)
+class DerivedParameter(Derived):
+    """A parameter of a scenario file that follows from others: from the set that is taken, say."""
+
+    def _naming_problems(self) -> list[str]:
+        return []
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What of a scenario file may vary.
+
+    Attributes:
+        parameters: every numeric parameter but the derived ones; what does not vary stands at the
+            value that the file declares. Besides, which of its sets a joint distribution takes.
+        derived: those that value sets give, or a formula.
+    """
+
+    parameters: dict[str, Parameter]
+    derived: tuple[Derived, ...] = ()
+
+
+def ranges_of(
+    scenario: osc.OpenScenario,
+    definition: dst.Deterministic | dst.Stochastic | None = None,
+    place: str = "",
+) -> Ranges:
+    """Return the parameters of a scenario as a distribution lets them vary.
+
+    Args:
+        scenario: the file.
+        definition: the distribution; without one nothing varies.
+        place: the distribution's file, for messages.
+
+    Raises:
+        FileFormatError: what does not fit the scenario's parameters, or is no distribution; all of
+            it at once, with its line.
+    """
+    builder = _Builder(scenario)
+    for one in definition.distributions if definition else ():
+        builder.add(one)
+    if builder.problems:
+        raise FileFormatError(*(f"{place}: {problem}" for problem in builder.problems))
+    return builder.ranges()
+
+
+class _Builder:
+    """Takes in distributions one by one.
+
+    Attributes:
+        problems: why one is none, or does not fit, with its line.
+    """
+
+    def __init__(self, scenario: osc.OpenScenario) -> None:
+        declared = scenario.parameter_declarations
+        self._declared = {one.name: one for one in declared.parameters} if declared else {}
+        self._numbers = numbers(scenario)
+        header = scenario.file_header.properties
+        self._said = {str(one.name): str(one.value) for one in header.properties} if header else {}
+        self._single: dict[str, Distribution] = {}
+        self._joint: list[dict[str, list[float]]] = []
+        self.problems: list[str] = []
+
+    def add(
+        self,
+        one: dst.DeterministicMultiParameterDistribution
+        | dst.DeterministicSingleParameterDistribution
+        | dst.StochasticDistribution,
+    ) -> None:
+        """Take in one distribution, or say why not."""
+        if isinstance(one, dst.DeterministicMultiParameterDistribution):
+            self._add_sets(one.distribution)
+            return
+        name = one.parameter_name
+        with self._saying(one.distribution):
+            kind = self._kind(name)
+            found = dst.distribution_of(one.distribution)
+            if kind.is_integer and not isinstance(found, Discrete | Uniform):
+                raise InputError(
+                    f"parameter {name} is a whole number ({kind.value}), and a "
+                    f"{type(one.distribution).__name__} gives others, too"
+                )
+            if isinstance(found, Discrete):
+                for value in found.values:
+                    self._check(name, kind, value, value)
+            else:
+                self._check(name, kind, found.low, found.high)
+            self._single[name] = found
+
+    def _add_sets(self, given: dst.ValueSetDistribution) -> None:
+        names = dict.fromkeys(one.parameter_ref for each in given.sets for one in each.assignments)
+        columns: dict[str, list[float]] = {}
+        for name in names:
+            with self._saying(given):
+                kind = self._kind(name)
+                columns[name] = [self._of_set(each, name) for each in given.sets]
+                for value in columns[name]:
+                    self._check(name, kind, value, value)
+        self._joint.append(columns)
+
+    def _of_set(self, given: dst.ParameterValueSet, name: str) -> float:
+        """Return a parameter's value in a set; what the scenario declares, if it is not in it."""
+        texts = [str(one.value) for one in given.assignments if one.parameter_ref == name]
+        if len(texts) > 1:
+            raise InputError(f"a set must give {name} one value (line {given.line})")
+        return dst.number(texts[0]) if texts else self._numbers[name]
+
+    def ranges(self) -> Ranges:
+        """Return all that was taken in."""
+        parameters: dict[str, Parameter] = {}
+        joint: list[DerivedParameter] = []
+        for number, columns in enumerate(self._joint, start=1):
+            index = f"value_set_{number}"
+            while index in self._declared:
+                index += "_"
+            last = len(next(iter(columns.values()))) - 1
+            parameters[index] = FileParameter(
+                index, Axis.PARTICIPANTS, "count", 0.0, float(last), 0.0, "integer",
+                "Which of the value sets is taken, from 0.",
+            )  # fmt: skip
+            joint += [
+                DerivedParameter(
+                    name, self._axis(name), self._unit(name), lookup(index, values),
+                    "The values of a set are taken together.", "ParameterValueSet",
+                )
+                for name, values in columns.items()
+            ]  # fmt: skip
+        derived = [*joint, *self._formulas({one.name for one in joint})]
+        following = {one.name for one in derived}
+        own = {name: self._parameter(name) for name in self._numbers if name not in following}
+        return Ranges(own | parameters, tuple(derived))
+
+    def _formulas(self, joint: set[str]) -> Iterator[Derived]:
+        """Yield the parameters that follow from others, as a file of ours says (`from_owl.notes`).
+
+        One that the distribution names does not.
+        """
+        for name in self._numbers:
+            text = self._said.get(f"{PARAMETER}.{name}.expression")
+            if text is None or name in self._single or name in joint:
+                continue
+            formula = parse(text, f"{PARAMETER}.{name}.expression")
+            if formula.names <= self._numbers.keys():
+                yield DerivedParameter(
+                    name, self._axis(name), self._unit(name), formula,
+                    "The file's header says so.", "FileHeader",
+                )  # fmt: skip
+
+    def _parameter(self, name: str) -> Parameter:
+        declared = self._numbers[name]
+        found = self._single.get(name, Uniform(declared, declared))
+        low, high = found.low, found.high
+        whole = kind_of(self._declared[name].parameter_type).is_integer
+        if whole:
+            low, high = float(math.ceil(low)), float(math.floor(high))
+        return FileParameter(
+            name, self._axis(name), self._unit(name), low, high, min(max(declared, low), high),
+            "integer" if whole else "float",
+            distribution=None if isinstance(found, Uniform) else found,
+        )  # fmt: skip
+
+    def _kind(self, name: str) -> Kind:
+        """Return the type of a parameter that is to vary.
+
+        Raises:
+            InputError: there is none of that name, it is no number, or it varies already.
+        """
+        if name not in self._declared:
+            hint = nearest(name, self._declared)
+            raise InputError(f"the scenario declares no parameter '{name}'{hint}")
+        kind = kind_of(self._declared[name].parameter_type)
+        if not kind.is_number:
+            raise InputError(f"parameter {name} is a {kind.value}; only numbers can be searched")
+        if name in self._single or any(name in columns for columns in self._joint):
+            raise InputError(f"parameter {name} must have one distribution, got two")
+        return kind
+
+    def _check(self, name: str, kind: Kind, low: float, high: float) -> None:
+        """Make sure that all from ``low`` to ``high`` is of a parameter's type and is allowed.
+
+        Raises:
+            InputError: it is not.
+        """
+        if kind.is_integer:
+            if low == high != math.floor(low):
+                raise InputError(f"parameter {name} must be a whole number, got {low:g}")
+            low, high = math.ceil(low), math.floor(high)
+            if low > high:
+                raise InputError(f"parameter {name} must be a whole number, and the range has none")
+        try:
+            ends = [parse_literal(kind, repr(end)) for end in (low, high)]
+        except FileFormatError as error:
+            raise InputError(f"parameter {name} {error}") from None
+        declaration = self._declared[name]
+        groups = declaration.constraint_groups
+        alone = [replace(declaration, constraint_groups=(group,)) for group in groups]
+        if groups and not any(all(not broken(one, end) for end in ends) for one in alone):
+            reasons = [text for end in ends for text in broken(declaration, end)]
+            reason = reasons[0] if reasons else f"may not have all values from {low:g} to {high:g}"
+            raise InputError(f"parameter {name} {reason}")
+
+    def _axis(self, name: str) -> Axis:
+        said = self._said.get(f"{PARAMETER}.{name}.axis")
+        return Axis(said) if said in list(Axis) and said != Axis.STATIC else Axis.PARTICIPANTS
+
+    def _unit(self, name: str) -> str:
+        return self._said.get(f"{PARAMETER}.{name}.unit", UNIT)
+
+    @contextmanager
+    def _saying(self, element: Element) -> Iterator[None]:
+        """Take down why something is refused, with its line."""
+        try:
+            yield
+        except InputError as error:
+            self.problems += [f"{text} (line {element.line})" for text in error.problems]
