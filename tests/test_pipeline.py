@@ -10,6 +10,7 @@ from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import Term
 from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.embedded import simulator
 
 ALL_AXES = ("static", "participants", "weather")
 
@@ -31,7 +32,7 @@ def test_a_row_s_result_is_the_same_in_any_batch_and_order(axes, ego, monkeypatc
     pipeline = made(axes, ego)
     X = rows(pipeline, 24)
     whole = pipeline.evaluate(X)
-    monkeypatch.setattr(module, "CHUNK", 5)
+    monkeypatch.setattr(simulator, "CHUNK", 5)
     order = np.random.default_rng(1).permutation(24)
     other = pipeline.evaluate(X[order])
     alone = pipeline.evaluate(X[7:8])

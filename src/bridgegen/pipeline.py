@@ -7,7 +7,7 @@ else here prepares it.
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +33,6 @@ from bridgegen.simulation.simulator import Simulator
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
 
-CHUNK = 128
-"""Rows that one thread rolls out at a time: enough to keep it busy, few enough for its cache."""
-
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -46,12 +43,14 @@ class Evaluation:
         F: ``(N, n_obj)`` float64, minimised; a filler in a failed row.
         critical: ``(N,)`` bool.
         status: ``(N,)`` int8, 0 is success.
+        messages: by row, what else there is to say of its failure.
     """
 
     metrics: Float
     F: Float
     critical: Bool
     status: npt.NDArray[np.int8]
+    messages: Mapping[int, str] = field(default_factory=dict)
 
 
 class Pipeline:
@@ -77,6 +76,7 @@ class Pipeline:
         *,
         ego: str | None = None,
         ideal: Iterable[str] = (),
+        time_limit: float | None = None,
         road_map: RoadMap | None = None,
         metrics: Sequence[str] | None = None,
         also: Sequence[str] = (),
@@ -88,6 +88,7 @@ class Pipeline:
             space: its search space.
             ego: the driver; the scenario's choice by default.
             ideal: stages of the driver to be ideal.
+            time_limit: [s] that one call of a user's own driver may take.
             road_map: the map that it takes place on; its own road network by default.
             metrics: the names of all to record, CLASSIFYING and the objective's among them;
                 what ``metrics_of`` says by default.
@@ -102,7 +103,7 @@ class Pipeline:
         name = ego or scenario.driver
         if name is None and tuple(ideal):
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
-        driver = egos.get(name, ideal) if name else None
+        driver = egos.get(name, ideal, time_limit) if name else None
         self.source = _source(scenario, driver, road_map)
         nominal = self.concrete(space.row({}))
         simulator = EmbeddedSimulator(nominal.storyboard, scenario.name, driver=driver)
@@ -116,7 +117,9 @@ class Pipeline:
         self._roads: Network | None = None
         if not {*self.source.static_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
-        self._threads = ThreadPoolExecutor(os.cpu_count() or 1, "rollout")
+        # The user's driver is one, and has all rows at once.
+        self._n_threads = 1 if self.driver.is_own else os.cpu_count() or 1
+        self._threads = ThreadPoolExecutor(self._n_threads, "rollout")
 
     def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
         """Set the objective: the given one, or the scenario's, sampled where it says so.
@@ -159,10 +162,10 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
         """
-        metrics, status = self._measure(X)
+        metrics, status, messages = self._measure(X)
         F, ok = self.objective.F(metrics, self.metrics)
         critical = self.objective.critical(metrics, self.metrics)
-        return Evaluation(metrics, F, critical & ok, status)
+        return Evaluation(metrics, F, critical & ok, status, messages)
 
     def facts(self, x: Float) -> dict[str, float]:
         """Return the parameters of one row that its scenario depends on, by name."""
@@ -184,18 +187,21 @@ class Pipeline:
         roads, rows = self._roads_of(X)
         return self.simulator.run(roads, rows, columns)
 
-    def _measure(self, X: Float) -> tuple[Float, npt.NDArray[np.int8]]:
+    def _measure(self, X: Float) -> tuple[Float, npt.NDArray[np.int8], dict[int, str]]:
         """Roll out and measure in chunks on all cores; the kernels run without the GIL."""
-        size = max(1, min(CHUNK, -(-len(X) // (os.cpu_count() or 1))))
+        size = max(1, min(self.simulator.rows_at_once, -(-len(X) // self._n_threads)))
         chunks = [X[i : i + size] for i in range(0, len(X), size)]
-        parts = list(self._threads.map(self._measure_chunk, chunks))
-        if not parts:
-            return np.empty((0, len(self.metrics))), np.empty(0, np.int8)
-        return np.concatenate([m for m, _ in parts]), np.concatenate([s for _, s in parts])
+        metrics, status = [np.empty((0, len(self.metrics)))], [np.empty(0, np.int8)]
+        messages: dict[int, str] = {}
+        for i, (values, ended, said) in enumerate(self._threads.map(self._measure_chunk, chunks)):
+            metrics.append(values)
+            status.append(ended)
+            messages |= {i * size + row: text for row, text in said.items()}
+        return np.concatenate(metrics), np.concatenate(status), messages
 
-    def _measure_chunk(self, X: Float) -> tuple[Float, npt.NDArray[np.int8]]:
+    def _measure_chunk(self, X: Float) -> tuple[Float, npt.NDArray[np.int8], Mapping[int, str]]:
         rollout = self.rollout(X)
-        return measures.evaluate(rollout, self.metrics), rollout.status
+        return measures.evaluate(rollout, self.metrics), rollout.status, rollout.messages
 
     def _roads_of(self, X: Float) -> tuple[Network, Int]:
         """Return the compiled road networks of some rows, and which row has which."""
@@ -267,6 +273,7 @@ def simulate_file(
     *,
     ego: str | None = None,
     ideal: Iterable[str] | None = None,
+    time_limit: float | None = None,
     metrics: Sequence[str] | None = None,
     time_step: float | None = None,
 ) -> FileResult:
@@ -277,6 +284,7 @@ def simulate_file(
         ego: the ego's driver; what the file's controller says by default.
         ideal: stages of the driver to be ideal; what the file's controller says by default, none
             with another ``ego``.
+        time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.
         time_step: [s]; what the file's header says by default.
 
@@ -286,7 +294,7 @@ def simulate_file(
         UnsupportedError: an element that the simulator cannot run, by name and line.
         UnknownNameError: no such driver, stage or metric.
     """
-    driver = egos.get(ego) if ego else None
+    driver = egos.get(ego, time_limit=time_limit) if ego else None
     scenario = read_scenario(path)
     roads = roads_of(scenario, path)
     problems = openscenario_validate.problems(scenario, roads)
@@ -303,7 +311,7 @@ def simulate_file(
     values = measures.evaluate(rollout, names)[0]
     return FileResult(
         driver=simulator.driver,
-        status=STATUS_MESSAGES[int(rollout.status[0])],
+        status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
         seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
         parameters=simulator.parameters,
         metrics=dict(zip(names, values.tolist(), strict=True)),

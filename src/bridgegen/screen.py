@@ -29,6 +29,10 @@ _STAGES = {
 }
 
 
+MOST_REASONS = 5
+"""Why evaluations failed is told in so many lines at most."""
+
+
 class Screen:
     """A campaign's live progress on stderr: evaluations, critical so far, best d_min, rate."""
 
@@ -111,6 +115,8 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}"),
         ("report", str(run.report)),
     ]
+    reasons = run.failures.most_common(MOST_REASONS)
+    rows += [("failed", f"{count} × {reason}") for reason, count in reasons]
     for name, value in rows:
         print(f"{name:<22}{value}")
 

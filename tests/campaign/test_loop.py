@@ -43,7 +43,9 @@ class Simulator:
         F = (X[:, :1] - 0.5) ** 2
         status = np.where(X[:, 0] < 0.1, 2, 0)
         F[status == 2] = np.nan
-        return SimpleNamespace(metrics=F * 2, F=F, critical=F[:, 0] < 0.01, status=status)
+        return SimpleNamespace(
+            messages={}, metrics=F * 2, F=F, critical=F[:, 0] < 0.01, status=status
+        )
 
 
 def decode(U):
@@ -314,7 +316,7 @@ def evaluate(X):
     F = ((X - 0.3) ** 2).sum(axis=1, keepdims=True)
     status = np.where(X[:, 0] > 0.8, 1, 0)
     F[status == 1] = np.nan
-    return SimpleNamespace(metrics=F, F=F, critical=F[:, 0] < 0.01, status=status)
+    return SimpleNamespace(messages={}, metrics=F, F=F, critical=F[:, 0] < 0.01, status=status)
 
 if os.path.exists(folder + "/run.sqlite"):
     store = Store.open(folder, write=True)

@@ -52,7 +52,7 @@ def evaluate(X: Float) -> SimpleNamespace:
     F = sphere(X)
     status = np.where(X[:, 0] > 0.9, 1, 0)  # a tenth of the cube cannot be simulated
     F[status == 1] = np.nan
-    return SimpleNamespace(metrics=F, F=F, critical=F[:, 0] < 0.1, status=status)
+    return SimpleNamespace(messages={}, metrics=F, F=F, critical=F[:, 0] < 0.1, status=status)
 
 
 def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed: int = 3):

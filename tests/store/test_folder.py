@@ -23,7 +23,7 @@ from bridgegen.errors import StorageError
 from bridgegen.store import Store
 
 def append(store, n=40, n_x=50):
-    result = SimpleNamespace(metrics=np.zeros((n, 1)), F=np.zeros((n, 1)),
+    result = SimpleNamespace(messages={}, metrics=np.zeros((n, 1)), F=np.zeros((n, 1)),
                              critical=np.zeros(n, bool), status=np.zeros(n, int))
     store.append(np.full((n, 2), 0.1), np.random.random((n, n_x)), result, 0.0)
 
@@ -49,7 +49,11 @@ def create(folder):
 
 def append(store, n=3):
     result = SimpleNamespace(
-        metrics=np.zeros((n, 1)), F=np.zeros((n, 1)), critical=np.zeros(n, bool), status=np.zeros(n)
+        messages={},
+        metrics=np.zeros((n, 1)),
+        F=np.zeros((n, 1)),
+        critical=np.zeros(n, bool),
+        status=np.zeros(n),
     )
     store.append(np.zeros((n, 1)), np.zeros((n, 1)), result, 0.0)
 
@@ -261,7 +265,11 @@ def check_full(folder, said, cause):
         assert len(store) == n
         assert store.read().batch[-1] == n // 40 - 1
         result = SimpleNamespace(
-            metrics=np.zeros((2, 1)), F=np.zeros((2, 1)), critical=np.zeros(2), status=np.zeros(2)
+            messages={},
+            metrics=np.zeros((2, 1)),
+            F=np.zeros((2, 1)),
+            critical=np.zeros(2),
+            status=np.zeros(2),
         )
         store.append(np.zeros((2, 2)), np.zeros((2, 50)), result, 0.0)
         assert len(store) == n + 2

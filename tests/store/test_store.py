@@ -18,6 +18,7 @@ SETTINGS = {"scenario": "crossroads-s4", "seed": 0, "algorithm": {"name": "pso",
 def batch(n, seed=0, n_var=3):
     rng = np.random.default_rng(seed)
     result = SimpleNamespace(
+        messages={},
         metrics=rng.normal(size=(n, 3)),
         F=rng.normal(size=(n, 2)),
         critical=rng.random(n) < 0.5,
@@ -67,7 +68,11 @@ numbers = hnp.arrays(np.float64, (3, 2), elements=st.floats(width=64))
 @settings(max_examples=40)
 def test_every_float_comes_back_bit_for_bit(X, F, U, tmp_path_factory):
     result = SimpleNamespace(
-        metrics=np.hstack([X, F[:, :1]]), F=F, critical=np.zeros(3, bool), status=np.zeros(3, int)
+        messages={},
+        metrics=np.hstack([X, F[:, :1]]),
+        F=F,
+        critical=np.zeros(3, bool),
+        status=np.zeros(3, int),
     )
     with create(tmp_path_factory.mktemp("s") / "run") as store:
         store.append(U, X, result, 0.0)
@@ -148,7 +153,11 @@ def test_any_name_is_a_column(tmp_path):
     n = len(NASTY)
     X = np.arange(2.0 * n).reshape(2, n)
     result = SimpleNamespace(
-        metrics=X[:, :4] + 100, F=np.zeros((2, 1)), critical=np.zeros(2, bool), status=np.zeros(2)
+        messages={},
+        metrics=X[:, :4] + 100,
+        F=np.zeros((2, 1)),
+        critical=np.zeros(2, bool),
+        status=np.zeros(2),
     )
     metrics = ["d_min", "status", "critical_metric", "critical"]
     given = {"parameters": NASTY, "metrics": metrics, "n_obj": 1}

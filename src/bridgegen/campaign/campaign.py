@@ -11,7 +11,7 @@ from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.run import REPORT, Run
 from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
-from bridgegen.ego import TRAJECTORY
+from bridgegen.ego import TRAJECTORY, is_spec
 from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
 from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
@@ -53,6 +53,7 @@ def run_search(
     seed: int | None = None,
     ego: str | None = None,
     ideal: Iterable[str] = (),
+    time_limit: float | None = None,
     axes: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
     road_map: Path | str | None = None,
@@ -75,8 +76,10 @@ def run_search(
         budget: evaluations, exactly; 1000, or what a stochastic distribution says, by default.
         seed: the same seed gives the same result; 0, or what a stochastic distribution says, by
             default.
-        ego: a name of the ego's drivers; the scenario's own choice by default.
+        ego: a name of the ego's drivers, or a driver of your own: ``package.module:Class``,
+            ``file.py:Class`` or ``file.fmu``; the scenario's own choice by default.
         ideal: stages of the driver to be ideal: perception, prediction, control.
+        time_limit: [s] that one call of a driver of your own may take; 10 by default.
         axes: the axes of the search space; the scenario's own by default.
         fixed: parameters to hold at a value, by name.
         road_map: an OpenDRIVE map, or the ``.owl`` that it was imported as; by default the
@@ -113,7 +116,15 @@ def run_search(
     values = resolve(method, space.n_var, 1, seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
-    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal, road_map=roads, also=metrics)
+    pipeline = Pipeline(
+        logical,
+        space,
+        ego=ego,
+        ideal=ideal,
+        time_limit=time_limit,
+        road_map=roads,
+        also=metrics,
+    )
     watch.stage("compile")
     pipeline.warm_up()
     chosen = pipeline.choose_objective(seed=seed)
@@ -127,6 +138,7 @@ def run_search(
         seed=seed,
         ego=pipeline.driver.name,
         ideal=tuple(sorted(pipeline.driver.ideal)),
+        time_limit=time_limit,
         axes=tuple(str(axis) for axis in space.axes),
         fixed=dict(fixed or {}),
         map=str(roads.path.resolve()) if roads else None,
@@ -148,10 +160,16 @@ def run_search(
         return _go(pipeline, store, made_with, watch)
 
 
-def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
+def resume(folder: Path | str, *, ego: str | None = None, watch: Watch | None = None) -> Run:
     """Go on with a run that was interrupted or killed; a finished one gets its files again.
 
     The result is that of an undisturbed run, to the last bit.
+
+    Args:
+        folder: of the run.
+        ego: where a driver of your own drives, that same driver: what a folder names is never
+            imported by itself.
+        watch: told how it is getting on.
 
     Raises:
         StorageError: not a run, in use, made by another version, or not writable.
@@ -161,12 +179,14 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
     watch = watch or Watch()
     with Store.open(folder, write=True) as store:
         settings = Settings.from_dict(store.settings, store.folder)
+        _check_driver(settings, ego, store.folder)
         space, roads = searched(settings, Path(folder))
         pipeline = Pipeline(
             space.scenario,
             space,
             ego=_ego(settings),
             ideal=settings.ideal,
+            time_limit=settings.time_limit,
             road_map=roads,
             metrics=store.metrics,
         )
@@ -179,6 +199,17 @@ def resume(folder: Path | str, *, watch: Watch | None = None) -> Run:
 def _ego(settings: Settings) -> str | None:
     """Return the driver to ask for; None where the file's own timetable moves the ego."""
     return None if settings.ego == TRAJECTORY.name else settings.ego
+
+
+def _check_driver(settings: Settings, ego: str | None, folder: Path) -> None:
+    """Refuse another driver than the run's, and one of the user's that is not named again."""
+    if ego is None and is_spec(settings.ego):
+        raise InputError(
+            f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
+            f"bridgegen resume {folder} --ego {settings.ego}"
+        )
+    if ego not in (None, settings.ego):
+        raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")
 
 
 def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | None]:

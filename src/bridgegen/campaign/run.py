@@ -1,11 +1,15 @@
 """A run on disk, as people and notebooks look at it."""
 
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bridgegen.campaign.handover import FOLDER
 from bridgegen.campaign.settings import Settings
+from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Store
+from bridgegen.store.rows import Rows
 from bridgegen.store.summary import summarise
 
 if TYPE_CHECKING:
@@ -15,7 +19,15 @@ REPORT = "report.html"
 
 
 class Run:
-    """A finished or interrupted run: its folder, its results, its files."""
+    """A finished or interrupted run: its folder, its results, its files.
+
+    Attributes:
+        folder: of the run.
+        settings: what it was made with.
+        finished: whether it has ended.
+        failures: why evaluations failed, and how many for each reason.
+        summary: its figures.
+    """
 
     def __init__(self, folder: Path | str) -> None:
         """Open a run's folder.
@@ -28,6 +40,7 @@ class Run:
             self.settings = Settings.from_dict(store.settings, self.folder)
             self.finished = store.finished is not None
             rows = store.read()
+            self.failures = _in_words(rows, store.failures())
             self.summary = summarise(
                 rows.critical,
                 rows.status == 0,
@@ -54,3 +67,13 @@ class Run:
     def __repr__(self) -> str:
         s = self.summary
         return f"Run({str(self.folder)!r}: {s.critical} critical of {s.evaluations} evaluations)"
+
+
+def _in_words(rows: Rows, said: Mapping[int, str]) -> Counter[str]:
+    """Return why evaluations failed, the most frequent reason first."""
+    reasons = Counter(
+        ": ".join([STATUS_MESSAGES.get(status, f"status {status}"), *filter(None, [said.get(i)])])
+        for i, status in zip(rows.id.tolist(), rows.status.tolist(), strict=True)
+        if status != 0
+    )
+    return Counter(dict(reasons.most_common()))

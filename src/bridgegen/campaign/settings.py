@@ -25,6 +25,7 @@ class Settings:
         seed: of the whole run.
         ego: the ego's driver.
         ideal: its stages that are ideal.
+        time_limit: [s] that one call of a user's own driver may take, or None.
         axes: what is searched.
         fixed: parameters held at a value.
         map: the absolute path of an OpenDRIVE map, or None for the generated crossroads.
@@ -46,6 +47,7 @@ class Settings:
     seed: int
     ego: str
     ideal: tuple[str, ...]
+    time_limit: float | None
     axes: tuple[str, ...]
     fixed: Mapping[str, float]
     map: str | None
@@ -81,6 +83,8 @@ class Settings:
             words += ["--ego", self.ego]
         if self.ideal:
             words += ["--ideal", ",".join(self.ideal)]
+        if self.time_limit is not None:
+            words += ["--time-limit", repr(self.time_limit)]
         words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
         if self.distribution:
             words += ["--distribution", self.distribution]

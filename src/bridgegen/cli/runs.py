@@ -10,6 +10,10 @@ from bridgegen.cli.app import Json, app
 from bridgegen.ego import split
 from bridgegen.errors import InputError
 
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(help="Seconds that one call of a driver of your own may take.", show_default="10"),
+]
 Ideal = Annotated[
     str | None,
     typer.Option(
@@ -53,10 +57,13 @@ def search(
     ego: Annotated[
         str | None,
         typer.Option(
-            help="Who drives; see 'bridgegen list drivers'.", show_default="the scenario's choice"
+            help="Who drives: see 'bridgegen list drivers'; or your own: module:Class, "
+            "file.py:Class, file.fmu.",
+            show_default="the scenario's choice",
         ),
     ] = None,
     ideal: Ideal = None,
+    time_limit: TimeLimit = None,
     axes: Annotated[
         str | None,
         typer.Option(help="What to search, e.g. static,participants,weather."),
@@ -102,6 +109,7 @@ def search(
             seed=seed,
             ego=ego,
             ideal=split(ideal or ""),
+            time_limit=time_limit,
             axes=axes.split(",") if axes else None,
             fixed=fixed,
             road_map=road_map,
@@ -132,13 +140,18 @@ def new(
 
 
 @app.command()
-def resume(folder: Annotated[Path, typer.Argument(help="The folder of a run.")]) -> None:
+def resume(
+    folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    ego: Annotated[
+        str | None, typer.Option(help="The run's driver, where it is one of your own.")
+    ] = None,
+) -> None:
     """Go on with a run that was interrupted; the result is as if it had not been."""
     from bridgegen import campaign
     from bridgegen.screen import Screen, print_summary
 
     with Screen() as screen:
-        run = campaign.resume(folder, watch=screen.watch)
+        run = campaign.resume(folder, ego=ego, watch=screen.watch)
     print_summary(run, screen.seconds)
 
 
@@ -168,6 +181,7 @@ def simulate(
         str | None, typer.Option(help="Who drives; what the file says by default.")
     ] = None,
     ideal: Ideal = None,
+    time_limit: TimeLimit = None,
     dt: Annotated[
         float | None,
         typer.Option(help="Time step [s].", show_default="what the file's header says, or 0.05"),
@@ -187,7 +201,14 @@ def simulate(
     from bridgegen.simulation.trace import write_trace
 
     stages = None if ideal is None else split(ideal)
-    result = simulate_file(file, ego=ego, ideal=stages, metrics=_names(metrics), time_step=dt)
+    result = simulate_file(
+        file,
+        ego=ego,
+        ideal=stages,
+        time_limit=time_limit,
+        metrics=_names(metrics),
+        time_step=dt,
+    )
     if trace is not None:
         write_trace(trace, result.rollout)
     if as_json:

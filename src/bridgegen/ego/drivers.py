@@ -1,5 +1,6 @@
 """The drivers that ship, and how a scenario file names them."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Self
@@ -8,6 +9,12 @@ from bridgegen.errors import InputError, UnknownNameError
 
 STAGES = ("perception", "prediction", "control")
 """What of a driver can be made ideal, in the order of the work; planning is what is left."""
+
+OWN = -1
+"""The code of the user's own drivers, which are no branch of the compiled rollout."""
+
+TIME_LIMIT = 10.0
+"""Seconds that one call of a user's driver may take, where the user says nothing else."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +28,7 @@ class Driver:
         stages: those of `STAGES` that it has, and that can be made ideal.
         ideal: those that are.
         perceives: whether it has sensors, whose detections a rollout then holds.
+        time_limit: [s] that one call of a user's own may take.
     """
 
     name: str
@@ -29,6 +37,12 @@ class Driver:
     stages: frozenset[str] = frozenset()
     ideal: frozenset[str] = frozenset()
     perceives: bool = False
+    time_limit: float = TIME_LIMIT
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is the user's, in Python or a co-simulation unit."""
+        return self.code == OWN
 
     @property
     def label(self) -> str:
@@ -83,18 +97,38 @@ TRAJECTORY = Driver("trajectory", 0, "Nobody: the file's own timetable moves the
 DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE, UN_R157, FSM)}
 
 
-def get(name: str, ideal: Iterable[str] = ()) -> Driver:
+def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -> Driver:
     """Return a driver by name, with some of its stages ideal.
+
+    Args:
+        name: of one that ships, or a user's own: ``package.module:Class``, ``file.py:Class``,
+            ``file.fmu``. It is not looked at before it drives.
+        ideal: stages.
+        time_limit: [s] that one call of a user's own may take.
 
     Raises:
         UnknownNameError: no such driver, or no such stage.
-        InputError: a stage that this driver has not.
+        InputError: a stage that this driver has not, or a time limit that is none.
     """
+    if time_limit is not None and not (is_spec(name) and 0.0 < time_limit < math.inf):
+        raise InputError(
+            "a time limit [s] is for a driver of your own, and must be > 0 and finite, got "
+            f"{time_limit:g} for '{name}'"
+        )
+    if is_spec(name):
+        what = "A driver of the user's own."
+        return Driver(name, OWN, what, time_limit=time_limit or TIME_LIMIT).idealised(ideal)
     try:
         driver = DRIVERS[name]
     except KeyError:
         raise UnknownNameError("ego driver", name, DRIVERS) from None
     return driver.idealised(ideal)
+
+
+def is_spec(name: str) -> bool:
+    """Say whether a name is that of a user's own driver."""
+    where, _, cls = name.rpartition(":")
+    return name.endswith(".fmu") or bool(where and cls.isidentifier())
 
 
 def split(text: str) -> tuple[str, ...]:

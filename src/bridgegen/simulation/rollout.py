@@ -1,6 +1,7 @@
 """What a simulator hands on: the recorded motion of every entity of every scenario of a batch."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +15,14 @@ STATUS_MESSAGES = {
     1: "a state became NaN or infinite",
     2: "a parameter value puts an entity off its route",
     3: "a lane change where there is no such lane",
+    20: "the driver raised an error",
+    21: "the driver did not answer in time",
+    22: "the driver's process ended",
+    23: "the driver answered what is no control",
 }
+
+FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}
+"""The status of a row whose driver failed, by `DriverError.kind`."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,7 @@ class Rollout:
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where the ego's
             route crosses the stop line of a traffic light, the heading in travel direction.
         stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
+        messages: by row, what else there is to say of its failure.
         derived: what several metrics start from, worked out once; see `metrics.metric.shared`.
     """
 
@@ -74,6 +83,7 @@ class Rollout:
     detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
     stop_lights: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    messages: Mapping[int, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -91,3 +101,26 @@ class Rollout:
         from bridgegen.simulation.boxes import box_distance
 
         return box_distance(self.box, self.x, self.y, self.h, self.n_steps)
+
+
+_BY_ROW = (
+    "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
+    "stop_lines",
+)  # fmt: skip
+
+
+def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
+    """Return the rollout of N scenarios from those of parts of them.
+
+    Args:
+        parts: the rows ``(n,)`` of each, every one of 0 … N − 1 once, and its rollout.
+    """
+    rows = np.concatenate([each for each, _ in parts])
+    order = np.argsort(rows)
+    whole: dict[str, Any] = {}
+    for name in _BY_ROW:
+        arrays = [getattr(one, name) for _, one in parts]
+        if len(arrays[0]):  # else nobody records it
+            whole[name] = np.concatenate(arrays)[order]
+    messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}
+    return replace(parts[0][1], **whole, messages=messages)

@@ -20,6 +20,10 @@ class Simulator(Protocol[Roads]):
         """Who drives the ego, and which of its stages are ideal."""
 
     @property
+    def rows_at_once(self) -> int:
+        """How many rows a call of ``run`` had best be given."""
+
+    @property
     def time_step(self) -> float:
         """Between two recorded instants [s]."""
 

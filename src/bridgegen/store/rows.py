@@ -1,6 +1,6 @@
 """The table of evaluations: its columns, and its rows as arrays."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
@@ -33,6 +33,10 @@ class Evaluated(Protocol):
     def status(self) -> npt.NDArray[np.integer[Any]]:
         """``(n,)`` integers, 0 is success."""
 
+    @property
+    def messages(self) -> Mapping[int, str]:
+        """By row, what else there is to say of its failure."""
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -62,6 +66,11 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.id)
+
+    @property
+    def messages(self) -> Mapping[int, str]:
+        """Nothing: what was recorded is in `Store.failures`."""
+        return {}
 
     @classmethod
     def join(cls, parts: Sequence["Rows"]) -> "Rows":

@@ -23,13 +23,17 @@ CHUNK = 4096
 """Rows that are read from SQL at a time."""
 
 
+_FAILURES = "failures (id INTEGER PRIMARY KEY, message TEXT NOT NULL)"
+
+
 class Store:
     """A run's settings and its evaluations, in the order of recording; nothing is ever changed.
 
     Table ``evaluations``: id, batch, seconds, u (the unit-cube row, float64 little endian), one
     column per parameter, metric and objective (f0, f1 …), status, critical. NaN is NULL. SQLite
     keeps no sign of zero: −0.0 comes back as 0.0; every other float64 comes back bit for bit.
-    Table ``run``: key and value (JSON).
+    Table ``run``: key and value (JSON). Table ``failures``, where there is something to say: id,
+    message.
 
     Made by :meth:`create` or :meth:`open`; a context manager.
 
@@ -190,6 +194,10 @@ class Store:
             if self._finished is not None:
                 self._connection.execute("DELETE FROM run WHERE key = 'finished'")
             self._connection.executemany(self.columns.insert_sql(), rows)
+            if result.messages:
+                said = [(start + row, text) for row, text in sorted(result.messages.items())]
+                self._connection.execute(f"CREATE TABLE IF NOT EXISTS {_FAILURES}")
+                self._connection.executemany("INSERT INTO failures VALUES (?, ?)", said)
         self._finished = None
 
     def finish(self, reason: str) -> None:
@@ -210,6 +218,15 @@ class Store:
             raise StorageError(f"{self.folder}: this run was opened for reading only")
         with storage_errors(self.folder / FILE, "written", kept), transaction(self._connection):
             yield
+
+    def failures(self) -> dict[int, str]:
+        """Return what is said of failed evaluations besides their status, by id."""
+        with self._reading():
+            there = self._connection.execute(
+                "SELECT count(*) FROM sqlite_master WHERE name = 'failures'"
+            ).fetchone()[0]
+            found = self._connection.execute("SELECT * FROM failures") if there else ()
+            return dict(found)
 
     @property
     def finished(self) -> str | None:

@@ -10,6 +10,7 @@ from bridgegen.ego._weather_kernels import WEATHER
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
+from bridgegen.simulation.embedded._observation_kernels import observe_rows
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
@@ -47,6 +48,7 @@ class Batch:
         self._networks = _networks(roads)
         self.state = _state(program, roads, rows, program.fill(values, n))
         self.record = _record(program, n)
+        self._messages: dict[int, str] = {}
 
     @property
     def running(self) -> Bool:
@@ -86,6 +88,29 @@ class Batch:
         """
         kernels.after_drivers(k, demanded, curvature, *self._all)
 
+    def observe(self, k: int, step: float, route: Float, tracks: Float) -> None:
+        """Fill what a driver in Python is told of the rows that run; see `Observation`.
+
+        Args:
+            k: the instant.
+            step: between two points of the route [m].
+            route: ``(N, P, 4)`` float64.
+            tracks: ``(N, E − 1, 12)`` float64.
+        """
+        observe_rows(k, *self._all, self._program.kinds, step, route, tracks)
+
+    def fail(self, status: int, message: str) -> None:
+        """End all rows that run, where they are, with a status and what else there is to say."""
+        state, record = self.state, self.record
+        for i in np.flatnonzero(self.running):
+            record.a[i] = 0.0
+            state.ending[i, memory.STATUS] = status
+            state.ending[i, memory.N_STEPS] = 1
+            for array in (record.x, record.y, record.h, record.v, record.offset):
+                array[i, :, 1:] = array[i, :, :1]
+            record.lights[i] = 0
+            self._messages[int(i)] = message
+
     def rollout(self) -> Rollout:
         """Return what is recorded; all rows must have ended."""
         program, record = self._program, self.record
@@ -101,6 +126,7 @@ class Batch:
             began=record.began,
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
+            messages=self._messages,
         )  # fmt: skip
 
     @property

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bridgegen.ego import DRIVERS, TRAJECTORY, Driver, split
+from bridgegen.ego import DRIVERS, TRAJECTORY, Driver, is_spec, split
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -166,6 +166,11 @@ class _Compiler:
             properties = controller.controller.properties
             name = properties.get(DRIVER) if properties else None
             if name is not None:
+                if is_spec(str(name)):
+                    raise UnsupportedError(
+                        f"{self.place}, line {controller.line}: the ego is driven by '{name}', "
+                        f"which is code; to run it, name it: --ego {name}"
+                    )
                 if str(name) not in DRIVERS:
                     raise UnsupportedError(
                         f"{self.place}, line {controller.line}: unknown ego driver '{name}'; "

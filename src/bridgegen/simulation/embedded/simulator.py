@@ -1,12 +1,15 @@
 """The embedded simulator: N rows of parameters against one compiled storyboard."""
 
+import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Int
 from bridgegen.ego import Driver
+from bridgegen.ego.driver_process import DriverProcess
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard
@@ -15,6 +18,13 @@ from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
+
+
+CHUNK = 128
+"""Rows that one thread rolls out at a time: enough to keep it busy, few enough for its cache."""
+
+LOCK_STEP_ROWS = 1024
+"""Rows that a driver in Python drives at a time: a thousand take it little longer than one."""
 
 
 class EmbeddedSimulator:
@@ -47,11 +57,18 @@ class EmbeddedSimulator:
         self.program = compile_storyboard(
             storyboard, place, driver=driver, ideal=ideal, time_step=time_step
         )
+        self._process: DriverProcess | None = None
+        self._turn = threading.Lock()
 
     @property
     def driver(self) -> str:
         """See `Simulator`."""
         return self.program.driver.label
+
+    @property
+    def rows_at_once(self) -> int:
+        """See `Simulator`."""
+        return LOCK_STEP_ROWS if self.program.driver.is_own else CHUNK
 
     @property
     def time_step(self) -> float:
@@ -78,8 +95,32 @@ class EmbeddedSimulator:
         return compile_network(self.program, models)
 
     def run(self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]) -> Rollout:
-        """See `Simulator`; runs without the GIL."""
+        """See `Simulator`; runs without the GIL.
+
+        Raises:
+            InputError: see `Simulator`; or a user's driver that cannot be made.
+        """
+        if self.program.driver.is_own:
+            return self._in_lock_step(roads, rows, values)
         return self.batch(roads, rows, values).run()
+
+    def _in_lock_step(
+        self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]
+    ) -> Rollout:
+        """Roll out with the user's driver, of which there is one."""
+        from bridgegen.simulation.embedded.lock_step import drive
+
+        driver = self.program.driver
+        columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
+
+        def some(at: Int) -> "Batch":
+            taken = {name: column[at] for name, column in columns.items()}
+            return self.batch(roads, rows[at], taken)
+
+        with self._turn:
+            if self._process is None:
+                self._process = DriverProcess(driver.name, driver.time_limit)
+            return drive(self.program, some, len(rows), self._process)
 
     def batch(self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]) -> "Batch":
         """Set N rows up, for a driver that is asked at every instant; arguments as of ``run``."""

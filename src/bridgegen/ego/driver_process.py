@@ -1,0 +1,290 @@
+"""A user's driver in a process of its own, so that what it does cannot end a search.
+
+A driver that raises, that takes too long or that takes its process down with it costs the row that
+it was driving, and nothing else: the process is ended, and another is begun for the next batch.
+"""
+
+import contextlib
+import importlib
+import importlib.util
+import os
+import pickle
+import queue
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import traceback
+import weakref
+from pathlib import Path
+from types import ModuleType
+from typing import IO, Any
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.ego.drivers import TIME_LIMIT, is_spec
+from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
+from bridgegen.errors import InputError
+
+START_SECONDS = 120.0
+"""A driver may take so long to be imported and made: a network to be loaded, say."""
+
+
+class DriverError(Exception):
+    """A driver did not answer, or answered nonsense.
+
+    Attributes:
+        kind: "raised", "timed out", "died" or "answered nonsense".
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+class DriverProcess:
+    """A driver that lives in another process; begun when it is first needed.
+
+    Args:
+        spec: ``package.module:Class``, ``file.py:Class``, or a co-simulation unit, ``file.fmu``.
+        time_limit: seconds that a call may take.
+    """
+
+    def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
+        if not 0.0 < time_limit < float("inf"):
+            raise InputError(f"a driver's time limit [s] must be > 0 and finite, got {time_limit}")
+        if not is_spec(spec):
+            raise InputError(
+                f"a driver is named package.module:Class, file.py:Class or file.fmu, got '{spec}'"
+            )
+        self.spec = spec
+        self.time_limit = time_limit
+        self._process: subprocess.Popen[bytes] | None = None
+        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def start(self) -> None:
+        """Begin the process, if it is not running, and make the driver in it.
+
+        Raises:
+            InputError: there is no such module or class, or it cannot be made.
+        """
+        if self._process is not None:
+            return
+        process = self._process = subprocess.Popen(
+            [sys.executable, "-m", "bridgegen.ego.driver_process", self.spec],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(["", *sys.path])},
+        )  # fmt: skip
+        assert process.stdout is not None
+        self._answers = queue.SimpleQueue()
+        reader = threading.Thread(
+            target=_forward, args=(process.stdout, self._answers), daemon=True
+        )
+        reader.start()
+        self._end = weakref.finalize(self, _end, process, reader)
+        try:
+            self._answer(START_SECONDS)
+        except DriverError as error:
+            self.close()
+            raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
+
+    def reset(self, n: int, scene: Scene) -> None:
+        """See `BatchDriver`.
+
+        Raises:
+            DriverError: it raised, timed out or died.
+            InputError: it cannot be made.
+        """
+        self.start()
+        self._ask("reset", n, scene)
+
+    def act(self, observation: Observation) -> tuple[Float, Float]:
+        """Return what it demands, ``(N,)`` acceleration [m/s²] and curvature [1/m].
+
+        Raises:
+            DriverError: it raised, timed out, died, or answered nonsense: another shape, NaN or an
+                infinite value for a scenario that is running.
+        """
+        demanded: tuple[Float, Float] = self._ask("act", observation)
+        return demanded
+
+    def close(self) -> None:
+        """End the process, if it is running; so does this object's end."""
+        if self._process is not None:
+            self._end()
+        self._process = None
+
+    def _ask(self, *request: Any) -> Any:
+        process = self._process
+        assert process is not None
+        assert process.stdin is not None
+        try:
+            _write(process.stdin, request)
+        except OSError:
+            self.close()
+            raise DriverError("died", "its process has ended") from None
+        return self._answer(self.time_limit)
+
+    def _answer(self, seconds: float) -> Any:
+        try:
+            kind, *rest = self._answers.get(timeout=seconds)
+        except queue.Empty:
+            self.close()
+            raise DriverError("timed out", f"no answer within {seconds:g} s") from None
+        if kind == "answer":
+            return rest[0]
+        if kind == "died":
+            status = self._process.wait() if self._process else None
+            self.close()
+            raise DriverError("died", f"its process ended with status {status}")
+        raise DriverError(kind, rest[0])
+
+
+def _end(process: subprocess.Popen[bytes], reader: threading.Thread) -> None:
+    process.kill()
+    process.wait()
+    reader.join()  # the pipe has ended
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):
+                pipe.close()
+
+
+def _forward(pipe: IO[bytes], answers: "queue.SimpleQueue[Any]") -> None:
+    """Put what comes out of a pipe into a queue: only that can be waited for with a limit."""
+    try:
+        while True:
+            answers.put(_read(pipe))
+    except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+        answers.put(("died",))
+
+
+def _write(pipe: IO[bytes], message: Any) -> None:
+    data = pickle.dumps(message, protocol=5)
+    pipe.write(struct.pack("<q", len(data)))
+    pipe.write(data)
+    pipe.flush()
+
+
+def _read(pipe: IO[bytes]) -> Any:
+    """Return the next message; both ends are ours, and the driver's own process is trusted."""
+    head = pipe.read(8)
+    if len(head) < 8:
+        raise EOFError
+    return pickle.loads(pipe.read(struct.unpack("<q", head)[0]))
+
+
+# --- In the other process -------------------------------------------------------------------------
+
+
+def make(spec: str) -> BatchDriver:
+    """Make a driver.
+
+    Raises:
+        InputError: no such module, file or class, or the class lacks ``reset`` or ``act``.
+    """
+    if spec.endswith(".fmu"):
+        from bridgegen.ego.fmu import FmuDriver
+
+        return FmuDriver(spec)
+    where, _, name = spec.rpartition(":")
+    try:
+        module = _module_of(where)
+    except ImportError as error:
+        raise InputError(f"{where} cannot be imported: {error}") from error
+    found = getattr(module, name, None)
+    if not isinstance(found, type):
+        raise InputError(f"{where} must have a class '{name}'")
+    lacking = [one for one in ("reset", "act") if not callable(getattr(found, one, None))]
+    if lacking:
+        raise InputError(f"{name} must have the methods reset and act, lacks {', '.join(lacking)}")
+    driver: BatchDriver = found()
+    return driver
+
+
+def _module_of(where: str) -> ModuleType:
+    if not where.endswith(".py"):
+        return importlib.import_module(where)
+    path = Path(where)
+    if not path.is_file():
+        raise ImportError("there is no such file")
+    found = importlib.util.spec_from_file_location(path.stem, path)
+    assert found is not None
+    assert found.loader is not None
+    module = importlib.util.module_from_spec(found)
+    sys.modules[path.stem] = module
+    found.loader.exec_module(module)
+    return module
+
+
+def checked(control: Any, running: Any) -> tuple[Float, Float]:
+    """Return a driver's answer as two arrays ``(N,)``; 0 where a scenario has ended.
+
+    Raises:
+        DriverError: another shape, not numbers, or not finite.
+    """
+    pair = (control.acceleration, control.curvature) if isinstance(control, Control) else control
+    try:
+        acceleration, curvature = pair
+        arrays = [np.asarray(one, dtype=np.float64) for one in (acceleration, curvature)]
+    except (TypeError, ValueError) as error:
+        text = f"act must return a Control or (acceleration, curvature): {error}"
+        raise DriverError("answered nonsense", text) from None
+    for what, array in zip(("acceleration", "curvature"), arrays, strict=True):
+        if array.shape != running.shape:
+            raise DriverError(
+                "answered nonsense",
+                f"{what} must have the shape {running.shape}, got {array.shape}",
+            )
+        bad = running & ~np.isfinite(array)
+        if bad.any():
+            raise DriverError("answered nonsense", f"{what} must be finite, got {array[bad][0]}")
+    return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
+
+
+def serve(spec: str, requests: IO[bytes], answers: IO[bytes]) -> None:
+    """Make a driver and answer requests until there are no more."""
+    try:
+        driver = make(spec)
+    except Exception as error:
+        _write(answers, ("raised", _told(error)))
+        return
+    _write(answers, ("answer", None))
+    while True:
+        try:
+            what, *rest = _read(requests)
+        except EOFError:
+            return
+        try:
+            if what == "reset":
+                driver.reset(*rest)
+                message: tuple[str, Any] = ("answer", None)
+            else:
+                message = ("answer", checked(driver.act(*rest), rest[0].running))
+        except DriverError as error:
+            message = (error.kind, str(error))
+        except Exception as error:
+            message = ("raised", _told(error))
+        _write(answers, message)
+
+
+def _told(error: Exception) -> str:
+    """Return an exception in one line, with the line of the driver's that raised it."""
+    if isinstance(error, InputError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+
+
+def main() -> None:
+    """Serve the driver that the command line names."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the search itself ends us
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what the driver prints must not get between our answers
+    serve(sys.argv[1], sys.stdin.buffer, answers)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+"""A learnt policy as a driver: Gymnasium's view of one scenario at a time.
+
+    from stable_baselines3 import PPO
+    from bridgegen.ego.policy import PolicyDriver
+
+    class MyDriver(PolicyDriver):
+        def load(self):
+            return PPO.load("my_policy.zip")
+
+A policy is anything with ``predict(observation, state=None, deterministic=True)`` that returns
+(action, state), as Stable-Baselines3's are; the observation is a vector in ``[-1, 1]``, the action
+a pair there. It is asked for all scenarios of a batch at once.
+"""
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Float
+from bridgegen.ego.interface import Control, Observation, Scene
+
+if TYPE_CHECKING:
+    import gymnasium
+
+NEAREST = 6
+"""So many other participants are told of, the nearest first."""
+
+ROUTE_EVERY = 4
+"""Of the route's points, each so-manieth is told."""
+
+SPEED, ACCELERATION, LENGTH, CURVATURE = 40.0, 10.0, 100.0, 0.2
+"""What counts as 1: m/s, m/s², m, 1/m. What is beyond is told as 1."""
+
+SIZE = 6 + 5 + 10 * 3 + NEAREST * 8
+"""Numbers of an observation."""
+
+
+class PolicyDriver(ABC):
+    """Drives by a policy; derive from it and say how the policy is loaded."""
+
+    @abstractmethod
+    def load(self) -> Any:
+        """Return the policy; called once a process."""
+
+    @staticmethod
+    def spaces() -> "tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]":
+        """Return Gymnasium's spaces of observation and action, to train a policy with."""
+        from gymnasium.spaces import Box
+
+        return Box(-1.0, 1.0, (SIZE,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
+
+    def __init__(self) -> None:
+        self._policy = self.load()
+
+    def reset(self, n: int, scene: Scene) -> None:
+        """See `BatchDriver`."""
+        self._scene = scene
+        self._state: Any = None
+        self._first = np.ones(n, dtype=bool)
+
+    def act(self, observation: Observation) -> Control:
+        """See `BatchDriver`."""
+        seen = vectors(observation)
+        action, self._state = self._policy.predict(
+            seen, state=self._state, episode_start=self._first, deterministic=True
+        )
+        self._first = np.zeros_like(self._first)
+        return control(np.asarray(action, dtype=np.float64), self._scene)
+
+
+def control(action: Float, scene: Scene) -> Control:
+    """Return the control that actions ``(N, 2)`` in [-1, 1] mean: the vehicle's limits are 1."""
+    pedal, wheel = np.clip(action[:, 0], -1.0, 1.0), np.clip(action[:, 1], -1.0, 1.0)
+    most = np.where(pedal > 0.0, scene.max_acceleration, scene.max_deceleration)
+    return Control(pedal * most, wheel * scene.max_curvature)
+
+
+def vectors(observation: Observation) -> npt.NDArray[np.float32]:
+    """Return observations as ``(N, SIZE)`` float32 in [-1, 1], seen from the ego.
+
+    First speed, acceleration, speed asked for, offset from the route, distance to the stop line,
+    whether there is one; then the light's state, one of five; ten points of the route (ahead, left,
+    heading); ``NEAREST`` others (1, ahead, left, heading's cosine and sine, speed ahead and to the
+    left relative to the ego's, width), zeros where there is nobody.
+    """
+    o = observation
+    n = len(o.x)
+    ahead, left = np.cos(o.h)[:, None], np.sin(o.h)[:, None]
+    out = np.zeros((n, SIZE))
+    stop = np.isfinite(o.stop_distance)
+    out[:, 0] = o.v / SPEED
+    out[:, 1] = o.a / ACCELERATION
+    out[:, 2] = o.target_speed / SPEED
+    out[:, 3] = o.offset / 5.0
+    out[:, 4] = np.where(stop, o.stop_distance, LENGTH) / LENGTH
+    out[:, 5] = stop
+    out[np.arange(n), 6 + np.clip(o.light, 0, 4)] = 1.0
+    at = 11
+    route = o.route[:, ::ROUTE_EVERY]
+    dx, dy = route[:, :, 0] - o.x[:, None], route[:, :, 1] - o.y[:, None]
+    turn = route[:, :, 2] - o.h[:, None]
+    for values in (
+        (dx * ahead + dy * left) / LENGTH,
+        (dy * ahead - dx * left) / LENGTH,
+        np.arctan2(np.sin(turn), np.cos(turn)) / np.pi,
+    ):
+        out[:, at : at + values.shape[1]] = values
+        at += values.shape[1]
+    tracks = o.tracks
+    there = tracks[:, :, 0] >= 2.0
+    dx, dy = tracks[:, :, 1] - o.x[:, None], tracks[:, :, 2] - o.y[:, None]
+    distance = np.where(there, np.hypot(dx, dy), np.inf)
+    nearest = np.argsort(distance, axis=1, kind="stable")[:, :NEAREST]
+    turn = tracks[:, :, 3] - o.h[:, None]
+    vx = tracks[:, :, 4] - o.v[:, None] * ahead
+    vy = tracks[:, :, 5] - o.v[:, None] * left
+    told = np.stack(
+        [
+            np.ones_like(dx),
+            (dx * ahead + dy * left) / LENGTH,
+            (dy * ahead - dx * left) / LENGTH,
+            np.cos(turn),
+            np.sin(turn),
+            (vx * ahead + vy * left) / SPEED,
+            (vy * ahead - vx * left) / SPEED,
+            tracks[:, :, 7] / 5.0,
+        ],
+        axis=2,
+    )
+    told = np.where(there[:, :, None], told, 0.0)
+    told = np.take_along_axis(told, nearest[:, :, None], axis=1)
+    out[:, at : at + told[0].size] = told.reshape(n, -1)
+    return np.clip(out, -1.0, 1.0).astype(np.float32)

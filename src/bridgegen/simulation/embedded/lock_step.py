@@ -1,0 +1,100 @@
+"""Rows that a driver in Python drives: all by one instant, then all by the next.
+
+Where the driver fails, the rows that it was driving are halved and begun again, until one is left
+that it cannot drive. So a failure costs the row that it belongs to, whatever the batch.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.ego.driver_process import DriverError, DriverProcess
+from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
+from bridgegen.simulation.embedded.batch import Batch
+from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.rollout import FAILURES, Rollout, joined
+
+TRACK_COLUMNS = 12
+
+
+def drive(
+    program: Program, setup: Callable[[Int], Batch], n: int, driver: DriverProcess
+) -> Rollout:
+    """Roll out rows 0 … n − 1 with a user's driver.
+
+    Args:
+        program: the compiled storyboard.
+        setup: makes a batch of some of the rows.
+        n: how many there are.
+        driver: of the user's own; its process is begun where it is not running.
+
+    Raises:
+        InputError: the driver cannot be made.
+    """
+    parts: list[tuple[Int, Rollout]] = []
+    waiting = [np.arange(n)]
+    while waiting:
+        rows = waiting.pop()
+        batch = setup(rows)
+        try:
+            _together(program, batch, driver)
+        except DriverError as error:
+            if len(rows) > 1:
+                half = len(rows) // 2
+                waiting += [rows[half:], rows[:half]]
+                continue
+            batch.fail(FAILURES[error.kind], str(error))
+        parts.append((rows, batch.rollout()))
+    if len(parts) == 1:
+        return parts[0][1]
+    return joined(parts)
+
+
+def _together(program: Program, batch: Batch, driver: DriverProcess) -> None:
+    """Drive a batch from its first instant to its last.
+
+    Raises:
+        DriverError: the driver failed; the batch stands where it did.
+    """
+    batch.start()
+    n, m = len(batch.running), len(program.names) - 1
+    if not batch.running.any():
+        return
+    driver.reset(n, _scene(program))
+    route, tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK_COLUMNS))
+    for k in range(program.n_steps):
+        running = batch.running
+        if not running.any():
+            return
+        batch.before_driver(k)
+        batch.observe(k, ROUTE_STEP, route, tracks)
+        acceleration, curvature = driver.act(_observation(program, batch, k, route, tracks))
+        batch.after_driver(k, acceleration, curvature)
+
+
+def _scene(program: Program) -> Scene:
+    length, width, centre, *limits = (float(value) for value in program.bodies[0, :7])
+    return Scene(
+        program.time_step, program.n_steps, program.names[1:], program.kinds[1:],
+        length, width, centre, *limits,
+    )  # fmt: skip
+
+
+def _observation(
+    program: Program, batch: Batch, k: int, route: Float, tracks: Float
+) -> Observation:
+    record, state = batch.record, batch.state
+    x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
+    return Observation(
+        time=k * program.time_step,
+        running=batch.running,
+        x=x, y=y, h=h, v=v,
+        a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
+        target_speed=state.command[:, 0],
+        offset=record.offset[:, 0, k],
+        route=route,
+        tracks=tracks,
+        stop_distance=np.full(len(x), np.inf),
+        light=np.zeros(len(x), dtype=np.int8),
+    )  # fmt: skip

@@ -1,0 +1,59 @@
+"""A search with a driver of the user's own, from the command line to the folder."""
+
+from pathlib import Path
+
+import pytest
+
+from bridgegen import campaign
+from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.pipeline import simulate_file
+from bridgegen.store import Store
+
+DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
+
+
+def search(tmp_path, name, budget=30, **kwargs):
+    ego = f"{DRIVERS}:{name}"
+    out = tmp_path / name
+    return campaign.run_search(
+        "crossroads-s1", algorithm="random", budget=budget, ego=ego, out=out, keep=2, **kwargs
+    )
+
+
+def test_a_search_outlives_its_driver(tmp_path):
+    run = search(tmp_path, "FailsFast")
+    assert 0 < run.summary.failed < run.summary.evaluations == 30
+    (reason, count) = next(iter(run.failures.items()))
+    assert reason.startswith("the driver raised an error: ValueError: too fast for me (drivers.py:")
+    assert count == run.summary.failed
+    with Store.open(run.folder) as store:
+        assert len(store.failures()) == count
+
+
+def test_what_a_folder_or_file_names_is_not_imported(tmp_path):
+    run = search(tmp_path, "Cruises")
+    ego = run.settings.ego
+    with pytest.raises(InputError, match=f"--ego {ego}"):
+        campaign.resume(run.folder)
+    with pytest.raises(InputError, match=r"must be .*Cruises, got reference"):
+        campaign.resume(run.folder, ego="reference")
+    assert campaign.resume(run.folder, ego=ego).summary == run.summary
+    assert run.scenarios
+    with pytest.raises(UnsupportedError, match=f"--ego {ego}"):
+        simulate_file(run.scenarios[0])
+    again = simulate_file(run.scenarios[0], ego=ego)
+    kept = run.frame().query("critical").d_min
+    assert again.metrics["d_min"] in kept.to_list()
+
+
+def test_a_driver_that_cannot_be_made_is_told_before_the_search(tmp_path):
+    with pytest.raises(InputError, match="OSError: no weights"):
+        search(tmp_path, "CannotBeMade")
+    assert not (tmp_path / "CannotBeMade").exists()
+
+
+def test_a_time_limit_is_for_drivers_of_ones_own(tmp_path):
+    with pytest.raises(InputError, match="time limit"):
+        campaign.run_search("crossroads-s1", ego="reference", time_limit=1.0, out=tmp_path / "r")
+    with pytest.raises(InputError, match="time limit"):
+        search(tmp_path, "Cruises", time_limit=0.0)

@@ -1,0 +1,111 @@
+"""Drivers of a user's own, good and bad, for the tests."""
+
+import os
+import time
+
+import numpy as np
+
+from bridgegen.ego.interface import Control
+
+
+class Cruises:
+    def reset(self, n, scene):
+        self.n = n
+
+    def act(self, observation):
+        demanded = np.clip(observation.target_speed - observation.v, -3.0, 2.0)
+        return Control(demanded, np.zeros(self.n))
+
+
+class Prints(Cruises):
+    def act(self, observation):
+        print("a word on stdout, which carries the answers")
+        return super().act(observation)
+
+
+class Raises(Cruises):
+    def act(self, observation):
+        raise ValueError("no idea")
+
+
+class Hangs(Cruises):
+    def act(self, observation):
+        time.sleep(60)
+
+
+class Dies(Cruises):
+    def act(self, observation):
+        os._exit(3)
+
+
+class AnswersNaN(Cruises):
+    def act(self, observation):
+        return np.full(self.n, np.nan), np.zeros(self.n)
+
+
+class AnswersOneNumber(Cruises):
+    def act(self, observation):
+        return 1.0, np.zeros(self.n)
+
+
+class AnswersNothing(Cruises):
+    def act(self, observation):
+        return None
+
+
+class CannotBeMade(Cruises):
+    def __init__(self):
+        raise OSError("no weights")
+
+
+class LacksAct:
+    def reset(self, n, scene):
+        pass
+
+
+class FailsFast(Cruises):
+    """Fails where the ego is asked to drive fast, in one of four ways; cruises elsewhere."""
+
+    LIMIT = 7.5
+
+    def act(self, observation):
+        fast = observation.running & (observation.target_speed > self.LIMIT)
+        if fast.any() and observation.time > 1.0:
+            return self.fail(fast)
+        return super().act(observation)
+
+    def fail(self, fast):
+        raise ValueError("too fast for me")
+
+
+class DiesFast(FailsFast):
+    def fail(self, fast):
+        os._exit(3)
+
+
+class HangsFast(FailsFast):
+    def fail(self, fast):
+        time.sleep(60)
+
+
+class NaNFast(FailsFast):
+    def fail(self, fast):
+        return np.where(fast, np.nan, 0.0), np.zeros(self.n)
+
+
+class LooksAhead:
+    """Steers along the route and brakes for who is ahead: all that it is told, it uses."""
+
+    def reset(self, n, scene):
+        self.scene = scene
+
+    def act(self, observation):
+        o = observation
+        dx, dy = o.route[:, 3, 0] - o.x, o.route[:, 3, 1] - o.y
+        left = dy * np.cos(o.h) - dx * np.sin(o.h)
+        curvature = 2.0 * left / np.maximum(dx * dx + dy * dy, 1.0)
+        tx, ty = o.tracks[:, :, 1] - o.x[:, None], o.tracks[:, :, 2] - o.y[:, None]
+        ahead = tx * np.cos(o.h)[:, None] + ty * np.sin(o.h)[:, None]
+        near = (o.tracks[:, :, 0] >= 2.0) & (ahead > 0.0) & (np.hypot(tx, ty) < 2.0 * o.v[:, None])
+        wanted = np.where(near.any(axis=1), -6.0, np.clip(o.target_speed - o.v, -3.0, 2.0))
+        return Control(wanted, curvature)

@@ -1,0 +1,110 @@
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.ego.driver_process import DriverError, DriverProcess
+from bridgegen.ego.drivers import is_spec
+from bridgegen.ego.interface import ROUTE_POINTS, Observation, Scene
+from bridgegen.errors import InputError
+
+DRIVERS = Path(__file__).with_name("drivers.py")
+N = 3
+
+
+def scene():
+    return Scene(0.05, 400, ("bv",), np.zeros(1, np.int64), 4.5, 1.8, 1.4, 50.0, 3.0, 8.0, 0.2)
+
+
+def observation(running=(True, True, True)):
+    one = np.arange(N, dtype=np.float64)
+    return Observation(
+        time=0.0, running=np.array(running), x=one, y=one, h=one, v=one, a=one,
+        target_speed=one + 1.0, offset=one, route=np.zeros((N, ROUTE_POINTS, 4)),
+        tracks=np.zeros((N, 1, 12)), stop_distance=np.full(N, np.inf), light=np.zeros(N, np.int8),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def process():
+    made = []
+
+    def make(name, **kwargs):
+        made.append(DriverProcess(f"{DRIVERS}:{name}", **kwargs))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.mark.parametrize("name", ["Cruises", "Prints"])
+def test_a_driver_answers_again_and_again(process, name):
+    driver = process(name)
+    driver.reset(N, scene())
+    for _ in range(3):
+        acceleration, curvature = driver.act(observation())
+        assert acceleration.tolist() == [1.0, 1.0, 1.0]
+        assert curvature.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "message"),
+    [
+        ("Raises", "raised", r"ValueError: no idea \(drivers.py:\d+\)"),
+        ("Hangs", "timed out", "no answer within 0.5 s"),
+        ("Dies", "died", "ended with status 3"),
+        ("AnswersNaN", "answered nonsense", "acceleration must be finite, got nan"),
+        ("AnswersOneNumber", "answered nonsense", r"must have the shape \(3,\), got \(\)"),
+        ("AnswersNothing", "answered nonsense", "must return a Control"),
+    ],
+)
+def test_a_bad_driver_costs_an_error_and_can_be_asked_again(process, name, kind, message):
+    driver = process(name, time_limit=0.5)
+    for _ in range(2):
+        driver.reset(N, scene())
+        start = time.perf_counter()
+        with pytest.raises(DriverError, match=message) as error:
+            driver.act(observation())
+        assert error.value.kind == kind
+        assert time.perf_counter() - start < 3.0
+
+
+def test_what_is_answered_for_an_ended_scenario_is_not_looked_at(process):
+    driver = process("AnswersNaN")
+    driver.reset(N, scene())
+    acceleration, _ = driver.act(observation(running=(False, False, False)))
+    assert acceleration.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("CannotBeMade", r"OSError: no weights \(drivers.py:\d+\)"),
+        ("LacksAct", "must have the methods reset and act, lacks act"),
+        ("NoSuch", "must have a class 'NoSuch'"),
+    ],
+)
+def test_a_driver_that_cannot_be_made_is_an_error_of_the_users(process, name, message):
+    with pytest.raises(InputError, match=message):
+        process(name).start()
+
+
+@pytest.mark.parametrize("spec", ["no.such.module:Driver", "no_such.py:Driver", "no_such.fmu"])
+def test_a_module_that_is_not_there(spec):
+    with pytest.raises(InputError, match="cannot be made"):
+        DriverProcess(spec).start()
+
+
+@pytest.mark.parametrize("spec", ["", "reference", "a.b", ":Driver", "a:", "a:b c", "a:1"])
+def test_what_is_no_name_of_a_driver(spec):
+    assert not is_spec(spec)
+    with pytest.raises(InputError, match="is named"):
+        DriverProcess(spec)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_time_limit_is_a_time(limit):
+    with pytest.raises(InputError, match="time limit"):
+        DriverProcess("a:B", time_limit=limit)

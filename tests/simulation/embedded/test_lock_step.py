@@ -1,0 +1,84 @@
+"""Drivers of a user's own in the simulator: what they do, and what their failures cost."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.odd.reader import load
+from bridgegen.pipeline import Pipeline
+
+DRIVERS = Path(__file__).parents[2] / "ego" / "drivers.py"
+FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status")
+N = 12
+
+
+def made(name, scenario="crossroads-s1", **kwargs):
+    logical = load(scenario)
+    return Pipeline(logical, logical.space(), ego=f"{DRIVERS}:{name}", **kwargs)
+
+
+def rows(pipeline, n=N):
+    return pipeline.space.decode(np.random.default_rng(4).random((n, pipeline.space.n_var)))
+
+
+def asked_speed(pipeline, X):
+    return X[:, pipeline.space.names.index("ego_speed")]
+
+
+@pytest.mark.parametrize("scenario", ["crossroads-s1", "cut-in", "red-light-runner"])
+def test_a_row_s_result_is_the_same_in_any_batch(scenario):
+    pipeline = made("LooksAhead", scenario)
+    X = rows(pipeline)
+    whole = pipeline.rollout(X)
+    order = np.random.default_rng(1).permutation(N)
+    other, alone = pipeline.rollout(X[order]), pipeline.rollout(X[7:8])
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(other, name), getattr(whole, name)[order])
+        np.testing.assert_array_equal(getattr(alone, name)[0], getattr(whole, name)[7])
+
+
+def test_a_driver_that_looks_stays_on_its_lane():
+    rollout = made("LooksAhead", "crossroads-s4").rollout(rows(made("LooksAhead", "crossroads-s4")))
+    assert (rollout.status == 0).all()
+    assert np.abs(rollout.offset[:, 0]).max() < 0.6
+
+
+@pytest.mark.parametrize(
+    ("name", "status", "message"),
+    [
+        ("FailsFast", 20, "ValueError: too fast for me"),
+        ("HangsFast", 21, "no answer within 0.3 s"),
+        ("DiesFast", 22, "ended with status 3"),
+        ("NaNFast", 23, "acceleration must be finite, got nan"),
+    ],
+)
+def test_a_failure_costs_the_row_that_it_belongs_to(name, status, message):
+    pipeline = made(name, time_limit=0.3)
+    X = rows(pipeline)
+    fast = asked_speed(pipeline, X) > 7.5
+    assert 0 < fast.sum() < N
+    rollout = pipeline.rollout(X)
+    np.testing.assert_array_equal(rollout.status, np.where(fast, status, 0))
+    assert sorted(rollout.messages) == np.flatnonzero(fast).tolist()
+    assert all(message in text for text in rollout.messages.values())
+    good = made("Cruises").rollout(X)
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(rollout, field)[~fast], getattr(good, field)[~fast])
+        assert np.isfinite(getattr(rollout, field)).all()
+
+
+def test_a_batch_of_failures_is_evaluated():
+    pipeline = made("FailsFast")
+    pipeline.choose_objective()
+    X = rows(pipeline)
+    found = pipeline.evaluate(X)
+    fast = asked_speed(pipeline, X) > 7.5
+    np.testing.assert_array_equal(np.isnan(found.metrics).any(axis=1), fast)
+    assert not found.critical[fast].any()
+    assert sorted(found.messages) == np.flatnonzero(fast).tolist()
+
+
+def test_no_rows_at_all():
+    pipeline = made("Cruises")
+    assert pipeline.rollout(rows(pipeline, 0)).shape[0] == 0
