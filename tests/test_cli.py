@@ -205,6 +205,7 @@ def test_an_edited_ontology_converts_to_an_edited_scenario(cli, finished, tmp_pa
         (["algorithms"], "pso"),
         (["drivers"], "un-r157"),
         (["metrics"], "d_min"),
+        (["sight"], "fog 200 m"),
         (["parameters", "crossroads-s4"], "bv_trigger_distance"),
     ],
 )

@@ -31,9 +31,11 @@ def test_the_rated_target_is_just_seen_at_the_rated_range():
 
 
 def test_stiles_holladay():
-    """10·E/θ²: 1000 lx at 10° are 100 cd/m², at 2° 2500; within 1° as at 1°."""
-    assert veil(1000.0, math.cos(math.radians(10.0))) == pytest.approx(100.0)
-    assert veil(1000.0, math.cos(math.radians(2.0))) == pytest.approx(2500.0)
+    """10·E/θ²: 1000 lx on the lens at 10° are 100 cd/m², at 2° 2500; within 1° as at 1°."""
+    for angle, luminance in ((10.0, 100.0), (2.0, 2500.0), (30.0, 100.0 / 9.0)):
+        cosine = math.cos(math.radians(angle))
+        assert veil(1000.0 / cosine, cosine) == pytest.approx(luminance)
+    assert veil(1000.0, -0.1) == 0.0
     assert veil(1000.0, 1.0) == pytest.approx(10_000.0)
 
 

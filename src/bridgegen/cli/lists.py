@@ -59,6 +59,15 @@ def list_metrics(as_json: Json = False) -> None:
     print_table(head, rows, as_json=as_json)
 
 
+@listing.command("sight")
+def list_sight(as_json: Json = False) -> None:
+    """How far the reference driver's sensors detect a car and a pedestrian in each weather [m]."""
+    from bridgegen.ego.sight import HEAD, table
+    from bridgegen.screen import print_table
+
+    print_table(HEAD, list(table()), as_json=as_json)
+
+
 @listing.command("parameters")
 def list_parameters(
     scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],

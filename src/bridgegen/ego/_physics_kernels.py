@@ -92,11 +92,14 @@ def snr(reflectance, attenuation, d):
 def veil(illuminance, cosine):
     """Return the veiling luminance [cd/m²] of a glaring source at an angle; Stiles–Holladay.
 
+    ``illuminance`` is square to the source's rays; the lens, which looks aside, has its cosine.
+
     Source: CIE 146:2002, after Holladay (1926) and Stiles (1929).
     """
-    angle = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
-    angle = max(angle, GLARE_FROM)
-    return GLARE * illuminance / (angle * angle)
+    if cosine <= 0.0:
+        return 0.0
+    angle = max(math.degrees(math.acos(min(cosine, 1.0))), GLARE_FROM)
+    return GLARE * illuminance * cosine / (angle * angle)
 
 
 @kernel
