@@ -1,10 +1,10 @@
-"""Compiled comparison of detections with the truth; public wrappers: ``iou``, ``e_position``."""
+"""Compiled comparison of detections with the truth, of which ``perceived`` says what counts."""
 
 import math
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import kernel
 from bridgegen.simulation.detections import HEADING, LENGTH, NOBODY, SEEN_BY, WIDTH, X, Y
 
@@ -59,31 +59,48 @@ def overlap(
 
 
 @kernel
-def mean_iou(
-    box: Float, x: Float, y: Float, h: Float, kinds: Int, detections: Float, n_steps: Int,
-    class_of_kind: Int, ranges: Float, out: Float,
+def truth(
+    box: Float, x: Float, y: Float, h: Float, detections: Float, n_steps: Int, reach: Float,
+    centre_x: Float, centre_y: Float, counts: Bool,
 ) -> None:  # fmt: skip
-    """Write each scenario's mean intersection over union; +inf without any truth in range."""
+    """Write where the boxes' centres are at the instants with a frame, and which of them count.
+
+    ``reach`` ``(E,)`` [m] is how near to the ego's reference point an entity must be.
+    """
     n_rows, n_entities, _ = x.shape
+    for i in range(n_rows):
+        counts[i] = False
+        for e in range(1, n_entities):
+            for k in range(n_steps[i]):
+                if detections[i, e, k, SEEN_BY] < NOBODY:
+                    continue
+                centre_x[i, e, k] = x[i, e, k] + box[e, 2] * math.cos(h[i, e, k])
+                centre_y[i, e, k] = y[i, e, k] + box[e, 2] * math.sin(h[i, e, k])
+                dx, dy = centre_x[i, e, k] - x[i, 0, k], centre_y[i, e, k] - y[i, 0, k]
+                counts[i, e, k] = dx * dx + dy * dy < reach[e] * reach[e]
+
+
+@kernel
+def mean_iou(
+    half: Float, h: Float, centre_x: Float, centre_y: Float, counts: Bool, detections: Float,
+    n_steps: Int, out: Float,
+) -> None:  # fmt: skip
+    """Write each scenario's mean intersection over union; +inf where no truth counts."""
+    n_rows, n_entities, _ = h.shape
     one, other = np.empty((8, 2)), np.empty((8, 2))
     for i in range(n_rows):
         total, count = 0.0, 0
         for e in range(1, n_entities):
-            reach = ranges[class_of_kind[kinds[e]]] ** 2
-            la, wa, ahead = 0.5 * box[e, 0], 0.5 * box[e, 1], box[e, 2]
+            la, wa = half[e, 0], half[e, 1]
             for k in range(n_steps[i]):
-                seen = detections[i, e, k]
-                if seen[SEEN_BY] < NOBODY:
-                    continue
-                c, s = math.cos(h[i, e, k]), math.sin(h[i, e, k])
-                px, py = x[i, e, k] + ahead * c, y[i, e, k] + ahead * s
-                gx, gy = px - x[i, 0, k], py - y[i, 0, k]
-                if gx * gx + gy * gy >= reach:
+                if not counts[i, e, k]:
                     continue
                 count += 1
+                seen = detections[i, e, k]
                 if seen[SEEN_BY] == NOBODY:
                     continue
-                dx, dy = seen[X] - px, seen[Y] - py
+                c, s = math.cos(h[i, e, k]), math.sin(h[i, e, k])
+                dx, dy = seen[X] - centre_x[i, e, k], seen[Y] - centre_y[i, e, k]
                 lb, wb = 0.5 * seen[LENGTH], 0.5 * seen[WIDTH]
                 common = overlap(
                     dx * c + dy * s, dy * c - dx * s, seen[HEADING] - h[i, e, k],
@@ -95,25 +112,17 @@ def mean_iou(
 
 @kernel
 def mean_error(
-    box: Float, x: Float, y: Float, h: Float, kinds: Int, detections: Float, n_steps: Int,
-    class_of_kind: Int, ranges: Float, out: Float,
-) -> None:  # fmt: skip
+    centre_x: Float, centre_y: Float, counts: Bool, detections: Float, n_steps: Int, out: Float
+) -> None:
     """Write each scenario's mean distance of detections from the truth; 0 without any."""
-    n_rows, n_entities, _ = x.shape
+    n_rows, n_entities, _ = counts.shape
     for i in range(n_rows):
         total, count = 0.0, 0
         for e in range(1, n_entities):
-            reach = ranges[class_of_kind[kinds[e]]] ** 2
-            ahead = box[e, 2]
             for k in range(n_steps[i]):
-                seen = detections[i, e, k]
-                if seen[SEEN_BY] <= NOBODY:
-                    continue
-                px = x[i, e, k] + ahead * math.cos(h[i, e, k])
-                py = y[i, e, k] + ahead * math.sin(h[i, e, k])
-                gx, gy = px - x[i, 0, k], py - y[i, 0, k]
-                if gx * gx + gy * gy >= reach:
-                    continue
-                total += math.hypot(seen[X] - px, seen[Y] - py)
-                count += 1
+                if counts[i, e, k] and detections[i, e, k, SEEN_BY] > NOBODY:
+                    dx = detections[i, e, k, X] - centre_x[i, e, k]
+                    dy = detections[i, e, k, Y] - centre_y[i, e, k]
+                    total += math.sqrt(dx * dx + dy * dy)
+                    count += 1
         out[i] = total / count if count else 0.0

@@ -1,7 +1,5 @@
 """Compiled average precision; public wrapper: ``mean_average_precision``."""
 
-import math
-
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
@@ -25,7 +23,7 @@ def gather(
     wanted: int, centre_x: Float, centre_y: Float, x: Float, y: Float, detections: Float, n: int,
     class_of_kind: Int, reach: float, entity: Int, frame: Int, confidence: Float, error: Float,
 ) -> int:  # fmt: skip
-    """List one class's detections in range by frame and, in it, by their error; return how many."""
+    """List one class's detections in range, in each frame by their error; return how many."""
     m = 0
     for k in range(n):
         first = m
@@ -36,7 +34,8 @@ def gather(
             gx, gy = seen[X] - x[k], seen[Y] - y[k]
             if gx * gx + gy * gy >= reach:
                 continue
-            off = math.hypot(seen[X] - centre_x[e, k], seen[Y] - centre_y[e, k])
+            dx, dy = seen[X] - centre_x[e, k], seen[Y] - centre_y[e, k]
+            off = dx * dx + dy * dy
             at = m
             while at > first and error[at - 1] > off:
                 entity[at], frame[at] = entity[at - 1], k
@@ -59,22 +58,23 @@ def order_of(confidence: Float, n: int) -> Int:
 @kernel
 def mark_hits(
     order: Int, entity: Int, frame: Int, centre_x: Float, centre_y: Float, detections: Float,
-    counts: Bool, threshold: float, taken: Bool, hit: Bool,
+    wanted: Bool, threshold: float, taken: Bool, hit: Bool,
 ) -> None:  # fmt: skip
     """Write which detections, in the order of their confidence, hit a box that is still free.
 
-    ``counts`` and ``taken`` are ``(E, T)``: the boxes of this class within range, and those hit.
+    ``wanted`` and ``taken`` are ``(E, T)``: the boxes of this class within range, and those hit.
     """
-    n_entities = counts.shape[0]
+    n_entities = wanted.shape[0]
     for j in range(len(order)):
         k = frame[order[j]]
         seen = detections[entity[order[j]], k]
-        nearest, at = threshold, -1
+        nearest, at = threshold * threshold, -1
         for e in range(1, n_entities):
-            if counts[e, k] and not taken[e, k]:
-                off = math.hypot(seen[X] - centre_x[e, k], seen[Y] - centre_y[e, k])
-                if off < nearest:
-                    nearest, at = off, e
+            if wanted[e, k] and not taken[e, k]:
+                dx, dy = seen[X] - centre_x[e, k], seen[Y] - centre_y[e, k]
+                squared = dx * dx + dy * dy
+                if squared < nearest:
+                    nearest, at = squared, e
         hit[j] = at >= 0
         if at >= 0:
             taken[at, k] = True
@@ -105,50 +105,43 @@ def average_precision(hit: Bool, n: int, n_truth: int) -> float:
 
 @kernel
 def mean_average_precision(
-    box: Float, x: Float, y: Float, h: Float, kinds: Int, detections: Float, n_steps: Int,
-    class_of_kind: Int, ranges: Float, thresholds: Float, out: Float,
+    x: Float, y: Float, centre_x: Float, centre_y: Float, counts: Bool, classes: Int,
+    detections: Float, n_steps: Int, class_of_kind: Int, ranges: Float, thresholds: Float,
+    out: Float,
 ) -> None:  # fmt: skip
-    """Write each scenario's mean over classes and thresholds; +inf without any truth in range."""
+    """Write each scenario's mean over classes and thresholds; +inf where no truth counts."""
     n_rows, n_entities, n_instants = x.shape
     size = n_entities * n_instants
-    centre_x, centre_y = np.empty((n_entities, n_instants)), np.empty((n_entities, n_instants))
-    counts = np.empty((n_entities, n_instants), dtype=np.bool_)
+    wanted = np.empty((n_entities, n_instants), dtype=np.bool_)
     taken = np.empty((n_entities, n_instants), dtype=np.bool_)
     entity, frame = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
     confidence, error = np.empty(size), np.empty(size)
     hit = np.empty(size, dtype=np.bool_)
     for i in range(n_rows):
         n = n_steps[i]
-        for e in range(1, n_entities):
-            for k in range(n):
-                centre_x[e, k] = x[i, e, k] + box[e, 2] * math.cos(h[i, e, k])
-                centre_y[e, k] = y[i, e, k] + box[e, 2] * math.sin(h[i, e, k])
         total, n_classes = 0.0, 0
-        for wanted in range(len(ranges)):
-            reach = ranges[wanted] ** 2
+        for c in range(len(ranges)):
             n_truth = 0
             for e in range(1, n_entities):
-                if class_of_kind[kinds[e]] != wanted:
-                    counts[e, :n] = False
+                if classes[e] != c:
+                    wanted[e, :n] = False
                     continue
                 for k in range(n):
-                    gx, gy = centre_x[e, k] - x[i, 0, k], centre_y[e, k] - y[i, 0, k]
-                    framed = detections[i, e, k, SEEN_BY] >= NOBODY
-                    counts[e, k] = framed and gx * gx + gy * gy < reach
-                    n_truth += 1 if counts[e, k] else 0
+                    wanted[e, k] = counts[i, e, k]
+                    n_truth += 1 if wanted[e, k] else 0
             if n_truth == 0:
                 continue
             n_classes += 1
             m = gather(
-                wanted, centre_x, centre_y, x[i, 0], y[i, 0], detections[i], n, class_of_kind,
-                reach, entity, frame, confidence, error,
+                c, centre_x[i], centre_y[i], x[i, 0], y[i, 0], detections[i], n, class_of_kind,
+                ranges[c] ** 2, entity, frame, confidence, error,
             )  # fmt: skip
             order = order_of(confidence, m)
             for threshold in thresholds:
                 taken[:, :n] = False
                 mark_hits(
-                    order, entity, frame, centre_x, centre_y, detections[i], counts, threshold,
-                    taken, hit,
+                    order, entity, frame, centre_x[i], centre_y[i], detections[i], wanted,
+                    threshold, taken, hit,
                 )  # fmt: skip
                 total += average_precision(hit, m, n_truth) / len(thresholds)
         out[i] = total / n_classes if n_classes else np.inf

@@ -4,7 +4,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.metrics.metric import Metric, without_failed
-from bridgegen.metrics.perceived import CLASS_OF_KIND, RANGES, perceived
+from bridgegen.metrics.perceived import perceived
 from bridgegen.simulation.rollout import Rollout
 
 
@@ -23,9 +23,7 @@ def e_position(rollout: Rollout) -> Float:
 
     p = perceived(rollout)
     out = np.empty(len(p.n_steps))
-    _detection_kernels.mean_error(
-        p.box, p.x, p.y, p.h, p.kinds, p.detections, p.n_steps, CLASS_OF_KIND, RANGES, out
-    )
+    _detection_kernels.mean_error(p.centre_x, p.centre_y, p.counts, p.detections, p.n_steps, out)
     return without_failed(rollout, out)
 
 

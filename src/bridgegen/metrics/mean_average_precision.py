@@ -29,8 +29,8 @@ def mean_average_precision(rollout: Rollout) -> Float:
     p = perceived(rollout)
     out = np.empty(len(p.n_steps))
     _precision_kernels.mean_average_precision(
-        p.box, p.x, p.y, p.h, p.kinds, p.detections, p.n_steps, CLASS_OF_KIND, RANGES, THRESHOLDS,
-        out,
+        p.x, p.y, p.centre_x, p.centre_y, p.counts, p.classes, p.detections, p.n_steps,
+        CLASS_OF_KIND, RANGES, THRESHOLDS, out,
     )  # fmt: skip
     return without_failed(rollout, out)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int, as_float
+from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.ego import kinds
 from bridgegen.metrics.metric import recorded, shared, steps
 from bridgegen.simulation.rollout import Rollout
@@ -36,32 +36,39 @@ class Perceived:
     """A rollout's detections and the truth, as compiled code takes them.
 
     Attributes:
-        box: ``(E, 3)`` as the rollout has it.
-        x, y, h: ``(N, E, T)`` likewise.
-        kinds: ``(E,)`` int64 likewise.
-        detections: ``(N, E, T, 8)`` likewise.
+        half: ``(E, 2)`` float64 [m], half lengths and half widths.
+        x, y, h: ``(N, E, T)`` as the rollout has them.
+        centre_x, centre_y: ``(N, E, T)`` float64 [m], of the boxes; unset without a frame.
+        counts: ``(N, E, T)`` bool: there is a frame, and the entity is within its class's range.
+        classes: ``(E,)`` int64, an index of `CLASSES`.
+        detections: ``(N, E, T, 8)`` as the rollout has them.
         n_steps: ``(N,)`` int64 likewise.
     """
 
-    box: Float
+    half: Float
     x: Float
     y: Float
     h: Float
-    kinds: Int
+    centre_x: Float
+    centre_y: Float
+    counts: Bool
+    classes: Int
     detections: Float
     n_steps: Int
 
 
 def perceived(rollout: Rollout) -> Perceived:
-    """Check a rollout, once for all metrics.
+    """Check a rollout and look for the truth that counts, once for all metrics.
 
     Raises:
         ValueError: it holds no detections or kinds, or malformed ones.
     """
-    return shared(rollout, _checked)
+    return shared(rollout, _perceived)
 
 
-def _checked(rollout: Rollout) -> Perceived:
+def _perceived(rollout: Rollout) -> Perceived:
+    from bridgegen.metrics import _detection_kernels
+
     n, e, t = rollout.shape
     detections = as_float("rollout.detections", rollout.detections, (n, e, t, 8))
     entities = np.ascontiguousarray(rollout.kinds, dtype=np.int64)
@@ -69,4 +76,11 @@ def _checked(rollout: Rollout) -> Perceived:
         raise ValueError(f"rollout.kinds must be {e} of bridgegen.ego.kinds, got {entities}")
     box = as_float("rollout.box [m]", rollout.box, (e, 3))
     x, y, h = (recorded(rollout, field) for field in ("x", "y", "h"))
-    return Perceived(box, x, y, h, entities, detections, steps(rollout))
+    classes, n_steps = CLASS_OF_KIND[entities], steps(rollout)
+    centre_x, centre_y, counts = np.empty(x.shape), np.empty(x.shape), np.empty(x.shape, np.bool_)
+    _detection_kernels.truth(
+        box, x, y, h, detections, n_steps, RANGES[classes], centre_x, centre_y, counts
+    )
+    return Perceived(
+        0.5 * box[:, :2], x, y, h, centre_x, centre_y, counts, classes, detections, n_steps
+    )

@@ -9,14 +9,21 @@ from bridgegen.arrays import Float
 from bridgegen.errors import UnknownNameError
 from bridgegen.metrics import (
     a_change,
+    btn,
     d_min,
+    drac,
     e_position,
     iou,
     l_offset,
     mean_average_precision,
     n_brake,
     n_collision,
+    pet,
     r_red,
+    rss,
+    tet,
+    thw,
+    tit,
     ttc,
     v_d,
 )
@@ -28,10 +35,12 @@ _TABLE_I = (
     a_change, n_brake,
 )  # fmt: skip
 
+_BEYOND = (pet, drac, btn, thw, tet, tit, rss)
+
 METRICS: Mapping[str, Metric] = MappingProxyType(
-    {module.METRIC.name: module.METRIC for module in _TABLE_I}
+    {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
 )
-"""In the order of Table I."""
+"""In the order of Table I, then those beyond it."""
 
 TABLE_I = tuple(module.METRIC.name for module in _TABLE_I)
 """The names of the paper's eleven, which every run records as far as its rollouts hold them."""

@@ -1,0 +1,61 @@
+"""btn: how much of its brakes the ego would have needed."""
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.drac import MOST
+from bridgegen.metrics.metric import Metric, recorded, without_failed
+from bridgegen.metrics.motion import motion
+from bridgegen.simulation.rollout import Rollout
+
+AVAILABLE = 0.85 * 9.81
+"""[m/s²] What brakes and tyres give on dry asphalt (Wong, Theory of Ground Vehicles, table 1.3)."""
+
+
+def btn(rollout: Rollout, available: float = AVAILABLE) -> Float:
+    """Return the ego's largest brake threat number.
+
+    It is the required longitudinal acceleration over the available one. Required is the least
+    constant deceleration by which the ego, on its present heading, lets the other pass in front of
+    it or stays behind it, if the other keeps its present heading and acceleration until it stops.
+    Where the ego cannot avoid the contact by braking, the one by which it stands when it is
+    touched. 0 where it need not brake, and for those that come from behind.
+
+    For one that follows another this is Jansson's (v₁ − v₂)² / (2 · gap) − a₂, and v₁² / (2 · way)
+    where the other stops first.
+
+    Args:
+        rollout: N scenarios.
+        available: [m/s²] deceleration that is at most available, > 0.
+
+    Returns:
+        ``(N,)`` float64, ≥ 0; from 1 on braking alone did not suffice; a required deceleration of
+        more than 20 m/s² counts as that, and so does a contact. NaN where the scenario failed.
+
+    Raises:
+        ValueError: ``available`` is not a number > 0.
+
+    Source: Jansson, Collision Avoidance Theory, Linköping 2005; Westhofen et al., Criticality
+    metrics for automated driving, Arch. Comput. Methods Eng. 30 (2023) 1.
+    """
+    from bridgegen.metrics import _brake_kernels
+
+    if not 0.0 < available < np.inf:
+        raise ValueError(f"available [m/s²] must be finite and > 0, got {available}")
+    m = motion(rollout)
+    out = np.empty(len(m.n_steps))
+    _brake_kernels.largest_required(
+        m.half, m.x, m.y, m.cosine, m.sine, m.v, recorded(rollout, "a"), m.distance, m.n_steps,
+        MOST, out,
+    )  # fmt: skip
+    return without_failed(rollout, out / available)
+
+
+METRIC = Metric(
+    name="btn",
+    unit="1",
+    description="largest brake threat number: required deceleration over what tyres give",
+    sense="larger",
+    cap=0.0,
+    compute=btn,
+)

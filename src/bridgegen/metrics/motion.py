@@ -1,0 +1,48 @@
+"""What the metrics beyond Table I share: every body's place and direction, worked out once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int, as_float
+from bridgegen.metrics.metric import distance, recorded, shared, steps
+from bridgegen.simulation.rollout import Rollout
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A rollout's bodies, as compiled code takes them; instants from ``n_steps`` on are unset.
+
+    Attributes:
+        half: ``(E, 2)`` float64 [m], half lengths and half widths.
+        x, y: ``(N, E, T)`` float64 [m], the boxes' centres.
+        cosine, sine: ``(N, E, T)`` float64, of the headings.
+        v: ``(N, E, T)`` float64 [m/s].
+        distance: ``(N, E, T)`` float64 [m], from the ego's box; +inf where nobody is.
+        n_steps: ``(N,)`` int64.
+    """
+
+    half: Float
+    x: Float
+    y: Float
+    cosine: Float
+    sine: Float
+    v: Float
+    distance: Float
+    n_steps: Int
+
+
+def motion(rollout: Rollout) -> Motion:
+    """Return a rollout's bodies, worked out once for all metrics."""
+    return shared(rollout, _motion)
+
+
+def _motion(rollout: Rollout) -> Motion:
+    from bridgegen.metrics import _motion_kernels
+
+    box = as_float("rollout.box [m]", rollout.box, (rollout.shape[1], 3))
+    x, y, h, v = (recorded(rollout, field) for field in ("x", "y", "h", "v"))
+    n_steps = steps(rollout)
+    cosine, sine, centre_x, centre_y = (np.empty(rollout.shape) for _ in range(4))
+    _motion_kernels.place(box, x, y, h, n_steps, cosine, sine, centre_x, centre_y)
+    return Motion(0.5 * box[:, :2], centre_x, centre_y, cosine, sine, v, distance(rollout), n_steps)

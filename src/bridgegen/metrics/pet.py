@@ -1,0 +1,42 @@
+"""pet: how much later one came to where the other had been."""
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.metric import Metric, without_failed
+from bridgegen.metrics.motion import motion
+from bridgegen.simulation.rollout import Rollout
+
+
+def pet(rollout: Rollout) -> Float:
+    """Return the smallest post-encroachment time between the ego and any other.
+
+    It is the least time between an instant at which the one covers a point and one at which the
+    other does, whoever came first: between leaving and entering the conflict area for those that
+    cross or merge, and the time gap for one that follows. The bodies are the oriented boxes; the
+    resolution is the time step.
+
+    Returns:
+        ``(N,)`` float64 [s], 0 where they were in contact, +inf where they have no point in
+        common, NaN where the scenario failed.
+
+    Source: Allen, Shin, Cooper, Analysis of traffic conflicts and collisions, Transp. Res. Rec.
+    667 (1978) 67; Westhofen et al., Criticality metrics for automated driving, Arch. Comput.
+    Methods Eng. 30 (2023) 1; the conflict area is all that both bodies cover at some time.
+    """
+    from bridgegen.metrics import _pet_kernels
+
+    m = motion(rollout)
+    out = np.empty(len(m.n_steps))
+    _pet_kernels.encroachment(m.half, m.x, m.y, m.cosine, m.sine, m.distance, m.n_steps, out)
+    return without_failed(rollout, out * rollout.time_step)
+
+
+METRIC = Metric(
+    name="pet",
+    unit="s",
+    description="smallest post-encroachment time: between one and the other at the same point",
+    sense="smaller",
+    cap=10.0,  # conflicts have 1 to 5 s
+    compute=pet,
+)
