@@ -2,7 +2,7 @@
 
 Numba keys its cache by the file of the compiled function alone, so a change in a kernel that it
 calls from another file would go unnoticed. Here the cache folder's name is a digest of the source
-of every kernel: change one, and all are compiled again.
+of every private module, kernels and what they read: change one, and all are compiled again.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ def cache_folder() -> Path:
     serves for as long as the machine keeps it.
     """
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("_*kernels.py")):
+    for source in sorted(Path(__file__).parent.rglob("_[!_]*.py")):
         digest.update(source.read_bytes())
     name = f"kernels-{digest.hexdigest()[:16]}"
     chosen = os.environ.get("NUMBA_CACHE_DIR")

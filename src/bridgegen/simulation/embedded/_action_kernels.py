@@ -2,20 +2,17 @@
 
 import numpy as np
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._weather_kernels import change
-from bridgegen.simulation.embedded._speed_kernels import begin_speed_change
-from bridgegen.simulation.embedded._travel_kernels import begin_lane_change
+from bridgegen.simulation.embedded._speed_kernels import begin_speed_change, stop_speed_change
+from bridgegen.simulation.embedded._travel_kernels import begin_lane_change, stop_lane_change
 
 SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT = 0, 1, 2, 3
 
 
-@kernel
+@inlined_kernel
 def begin(j, k, plan, roads, state, record):
-    """Begin action j at instant k: a branch per kind.
-
-    What is over at once says so in ``action_ended``. Not inlined: it runs once in a scenario.
-    """
+    """Begin action j at instant k: a branch per kind; what is over at once says so."""
     kind = plan.actions[j, 1]
     if kind == SPEED_CHANGE:
         begin_speed_change(j, k, plan, state)
@@ -27,3 +24,13 @@ def begin(j, k, plan, roads, state, record):
     else:
         state.lights[plan.actions[j, 0]] = np.int8(state.slots[plan.actions[j, 4]])
         state.action_ended[j] = True
+
+
+@inlined_kernel
+def stop(j, k, plan, roads, state, record):
+    """Stop action j, which has not ended: whoever it moved goes on as it is."""
+    kind = plan.actions[j, 1]
+    if kind == SPEED_CHANGE:
+        stop_speed_change(j, plan, state)
+    elif kind == LANE_CHANGE:
+        stop_lane_change(j, k, plan, roads, state, record)

@@ -6,13 +6,15 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.simulation.embedded._ego_kernels import move_ego
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
 from bridgegen.simulation.embedded._speed_kernels import command_speeds
-from bridgegen.simulation.embedded._storyboard_kernels import decide, observe
+from bridgegen.simulation.embedded._storyboard_kernels import decide, finish
 from bridgegen.simulation.embedded._travel_kernels import move_along_path, move_along_timetable
+from bridgegen.simulation.embedded._trigger_kernels import observe
 
 
 @inlined_kernel
 def before_driver(k, plan, roads, state, record):
     """Do at instant k what the storyboard says, up to what it asks of the ego."""
+    finish(k, plan, state)
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)
     command_speeds(k, plan, state)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import borrowed, inlined_kernel
 
-N_STEPS, STATUS, STOPS = 0, 1, 2  # columns of State.ending
+N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
 OK, NOT_FINITE, OFF_ROUTE, NO_LANE = 0, 1, 2, 3  # see rollout.STATUS_MESSAGES
 
@@ -28,8 +28,8 @@ class Plan(NamedTuple):
     triggers: Int
     groups: Int
     conditions: Int
-    acts: Int
-    events: Int
+    probes: Int
+    elements: Int
     actions: Int
     first_states: npt.NDArray[np.int8]
     weathers: Int
@@ -54,11 +54,16 @@ class State(NamedTuple):
     Attributes:
         slots: ``(S,)`` the row's values.
         weather: ``(WEATHER,)`` what sensors and tyres feel, see ``ego/_weather_kernels``.
-        ending: ``(3,)`` int64: recorded instants, 0 while it runs; status; whether it stops now.
+        ending: ``(4,)`` int64: recorded instants, 0 while it runs; status; whether it stops now;
+            how many transitions there were.
+        observed: ``(P,)`` bool, what the probes see.
         history: ``(C, D)`` bool, the conditions at the last D instants; instant k is in k mod D.
-        act_runs: ``(A,)`` bool.
-        event_ended: ``(V,)`` bool.
+        phase: ``(X,)`` int64, of the storyboard's elements; see ``_codes``,
+        executions: ``(X,)`` int64, how often each has started or been skipped,
+        stamps: ``(X, 4)`` int64, the number of its last start, end, stop and skip,
+        looked: ``(P, 2)`` int64, the last number when a probe looked: before this instant; at all.
         action_ended: ``(J,)`` bool.
+        selected: ``(E,)`` bool, the entities that made the present event's trigger fire.
         lights: ``(L,)`` int8, the traffic lights' states.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] since it last moved.
@@ -84,10 +89,14 @@ class State(NamedTuple):
     slots: Float
     weather: Float
     ending: Int
+    observed: Bool
     history: Bool
-    act_runs: Bool
-    event_ended: Bool
+    phase: Int
+    executions: Int
+    stamps: Int
+    looked: Int
     action_ended: Bool
+    selected: Bool
     lights: npt.NDArray[np.int8]
     travelled: Float
     stood: Float

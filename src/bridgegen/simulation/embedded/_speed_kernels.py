@@ -27,6 +27,14 @@ def begin_speed_change(j, k, plan, state):
 
 
 @inlined_kernel
+def stop_speed_change(j, plan, state):
+    """Stop action j, a SpeedAction: its entity keeps the speed that it has."""
+    e = plan.actions[j, 0]
+    if state.speed_action[e] == j:
+        state.target[e], state.speed_action[e] = state.command[e], -1
+
+
+@inlined_kernel
 def command_speeds(k, plan, state):
     """Set ``command`` to the speeds [m/s] at the instant after k, by the actions that run."""
     dt = plan.dt

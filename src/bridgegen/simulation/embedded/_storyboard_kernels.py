@@ -1,74 +1,94 @@
-"""What the storyboard does at an instant: conditions are looked at, acts run, events begin."""
+"""The storyboard: stories, acts, groups, maneuvers, events and actions, each in one of four phases.
+
+Elements are in the order of the file, each before its children. In an instant, what is over ends
+first (``finish``, children before parents), then triggers are looked at (``decide``, parents
+before children). Source: ASAM OpenSCENARIO XML 1.3.1, 8.4, storyboard element execution.
+"""
 
 import math
 
 from bridgegen.compiled import inlined_kernel
-from bridgegen.simulation.embedded._action_kernels import begin
-from bridgegen.simulation.embedded._condition_kernels import (
-    EVENT_ENDED,
-    REACH_POSITION,
-    SIMULATION_TIME,
-    SPEED,
-    fires,
-    observe_one,
-    observe_pair,
+from bridgegen.simulation.embedded._codes import (
+    ACT,
+    ACTION,
+    COMPLETE,
+    COUNT,
+    END,
+    ENDED,
+    EVENT,
+    FIRST,
+    GROUP,
+    KIND,
+    LAST,
+    OFF,
+    PARENT,
+    RUNNING,
+    STANDBY,
+    START,
+    STARTED,
+    STOP,
+    STORY,
 )
+from bridgegen.simulation.embedded._event_kernels import enter, stop_element, trigger_event
 from bridgegen.simulation.embedded._memory_kernels import STOPS
+from bridgegen.simulation.embedded._trigger_kernels import fires
 
 
 @inlined_kernel
-def observe(k, plan, roads, state, record):
-    """Take down which conditions hold at instant k.
+def finish(k, plan, state):
+    """End what is over at instant k: an action that says so, an element whose children are.
 
-    Another kind of condition is a branch here, and its function in ``_condition_kernels``.
+    An event or a group that may run again goes back to standby.
     """
-    now, conditions = k * plan.dt, plan.conditions
-    slot = k % state.history.shape[1]
-    for c in range(conditions.shape[0]):
-        kind, e, other = conditions[c, 0], conditions[c, 1], conditions[c, 2]
-        rule, limit = conditions[c, 3], state.slots[conditions[c, 4]]
-        x, y, v = record.x[e, k], record.y[e, k], record.v[e, k]
-        if kind == REACH_POSITION:
-            gap = math.hypot(x - roads.points[c, 0], y - roads.points[c, 1])
-            state.history[c, slot] = gap <= limit
-        elif kind < SPEED and kind != SIMULATION_TIME:
-            state.history[c, slot] = observe_pair(
-                kind, rule, limit, record.x[other, k] - x, record.y[other, k] - y,
-                v, record.h[e, k], record.v[other, k], record.h[other, k],
-            )  # fmt: skip
+    for x in range(plan.elements.shape[0] - 1, -1, -1):
+        if state.phase[x] != RUNNING:
+            continue
+        kind, over = plan.elements[x, KIND], True
+        if kind == ACTION:
+            for j in range(plan.elements[x, FIRST], plan.elements[x, LAST]):
+                over = over and state.action_ended[j]
         else:
-            ended = kind == EVENT_ENDED and state.event_ended[other]
-            state.history[c, slot] = observe_one(
-                kind, rule, limit, now, v, state.travelled[e], state.stood[e], ended
-            )
+            child = x + 1
+            while over and child < plan.elements[x, END]:
+                over = state.phase[child] == COMPLETE
+                child = plan.elements[child, END]
+        if over:
+            again = state.executions[x] < plan.elements[x, COUNT]
+            state.phase[x] = STANDBY if again else COMPLETE
+            enter(x, ENDED, state)
 
 
 @inlined_kernel
 def decide(k, plan, roads, state, record):
-    """Stop the scenario, start acts, end and begin events, as the triggers say at instant k."""
+    """Stop the scenario, start and stop elements, as the triggers say at instant k."""
     ego_end = math.inf
     if plan.timed[0] < 0:
         ego_end = (roads.counts[0] - 1) * roads.steps[0]
-    state.ending[STOPS] = _fires(0, k, plan, state) or state.station[0] >= ego_end
-    for i in range(plan.acts.shape[0]):
-        if not state.act_runs[i] and _fires(plan.acts[i], k, plan, state):
-            state.act_runs[i] = True
-    for i in range(plan.events.shape[0]):
-        act, trigger, first, last = plan.events[i]
-        if record.began[i] >= 0:
-            if not state.event_ended[i]:
-                ended = True
-                for j in range(first, last):
-                    ended = ended and state.action_ended[j]
-                state.event_ended[i] = ended
+    state.ending[STOPS] = fires(0, k, plan, state) or state.station[0] >= ego_end
+    for x in range(plan.elements.shape[0]):
+        phase, kind = state.phase[x], plan.elements[x, KIND]
+        if phase == COMPLETE or kind == ACTION:
             continue
-        if not state.act_runs[act] or not _fires(trigger, k, plan, state):
+        if kind != STORY and state.phase[plan.elements[x, PARENT]] != RUNNING:
             continue
-        record.began[i] = k
-        for j in range(first, last):
-            begin(j, k, plan, roads, state, record)
-
-
-@inlined_kernel
-def _fires(trigger, k, plan, state):
-    return fires(trigger, plan.triggers, plan.groups, plan.conditions, state.history, k)
+        if phase == OFF:
+            state.phase[x] = STANDBY
+        trigger = plan.elements[x, STOP]
+        if kind == ACT and trigger >= 0 and fires(trigger, k, plan, state):
+            stop_element(x, k, plan, roads, state, record)
+            continue
+        if phase == RUNNING:
+            continue
+        # A group's first start is its act's; to start again, it needs the act's trigger again.
+        waits = kind in (ACT, EVENT) or (kind == GROUP and state.executions[x] > 0)
+        if waits and not fires(plan.elements[x, START], k, plan, state):
+            continue
+        if kind == EVENT:
+            trigger_event(x, k, plan, roads, state, record)
+            continue
+        state.phase[x] = RUNNING
+        enter(x, STARTED, state)
+        state.executions[x] += 1
+        if kind == GROUP:
+            for child in range(x + 1, plan.elements[x, END]):
+                state.phase[child], state.executions[child] = OFF, 0

@@ -3,7 +3,7 @@
 import math
 
 from bridgegen.compiled import inlined_kernel
-from bridgegen.ego._path_kernels import pose
+from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE, STATUS, STOPS
 from bridgegen.simulation.embedded._motion_kernels import DISTANCE, between, nearest, shifted
 
@@ -29,6 +29,19 @@ def begin_lane_change(j, k, plan, roads, state, record):
     state.lane_action[e] = j
     state.lane_lasts[e] = max(state.slots[plan.actions[j, 5]], 1e-9)
     state.lane_began[e], state.lane_from[e] = k * plan.dt, state.travelled[e]
+
+
+@inlined_kernel
+def stop_lane_change(j, k, plan, roads, state, record):
+    """Stop action j, a LaneChangeAction: it goes on beside the lane that it was to reach."""
+    e, q = plan.actions[j, 0], state.to[plan.actions[j, 0]]
+    if q < 0 or state.lane_action[e] != j:
+        return
+    state.station[e], state.aside[e] = project(
+        roads.paths[q], roads.counts[q], roads.steps[q], state.foot[e],
+        record.x[e, k], record.y[e, k],
+    )  # fmt: skip
+    state.on[e], state.to[e] = q, -1
 
 
 @inlined_kernel

@@ -1,5 +1,7 @@
 """The actions of a storyboard, at the start and in events, as rows of integers."""
 
+from collections.abc import Sequence
+
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded.environments import Environments
 from bridgegen.simulation.embedded.program import AlongTrajectory, BesideLanes, PathSpec
@@ -51,8 +53,34 @@ class Actions:
             return self._tables.slot(0.0)
         return self._tables.slot(target.target.value)
 
-    def add_global(self, wrapped: osc.GlobalAction) -> None:
-        """Add what a global action of an event does."""
+    def add(self, part: osc.Action, named: Sequence[int], selected: Sequence[int]) -> None:
+        """Add an action of an event; one that cannot be run is taken down and left out.
+
+        Args:
+            part: the action.
+            named: the entities that it moves, if it is a private one.
+            selected: those that it moves if they make the event's trigger fire.
+        """
+        first, known = len(self.rows), len(self._tables.problems)
+        sure = None
+        if isinstance(part.action, osc.GlobalAction):
+            self._global(part.action)
+        elif not isinstance(part.action, osc.PrivateAction):
+            self._tables.unsupported(part.action, type(part.action).__name__)
+        else:
+            if not named and not selected:
+                self._tables.unsupported(part, "a PrivateAction without an actor")
+            for entity in named:
+                self._private(part.action, entity)
+            sure = len(self.rows)
+            for entity in selected:
+                self._private(part.action, entity)
+        if len(self._tables.problems) > known:
+            del self.rows[first:]
+        for i in range(first, len(self.rows)):
+            self.rows[i] = (*self.rows[i], int(sure is not None and i >= sure))
+
+    def _global(self, wrapped: osc.GlobalAction) -> None:
         action = wrapped.action
         if isinstance(action, osc.EntityAction):
             self._tables.unsupported(action, type(action.action).__name__)
@@ -85,8 +113,7 @@ class Actions:
             self.first_states.append(0)
         return self.lights.index(name), state
 
-    def add_private(self, wrapped: osc.PrivateAction, entity: int) -> None:
-        """Add what a private action of an event does to one entity."""
+    def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
         action = wrapped.action
         if self.is_timed(entity):
             what = f"{type(action).__name__} of one that follows a trajectory with times"

@@ -10,6 +10,7 @@ from bridgegen.ego._weather_kernels import WEATHER
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
+from bridgegen.simulation.embedded._codes import DELAY
 from bridgegen.simulation.embedded._observation_kernels import observe_rows
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
@@ -142,8 +143,8 @@ def _plan(program: Program) -> memory.Plan:
         triggers=program.triggers,
         groups=program.groups,
         conditions=program.conditions,
-        acts=program.acts,
-        events=program.events,
+        probes=program.probes,
+        elements=program.elements,
         actions=program.actions,
         first_states=program.first_states,
         weathers=program.weathers,
@@ -180,15 +181,17 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
     a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
     at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
-    longest_delay = int(program.conditions[:, 6].max(initial=0))
+    longest_delay = int(program.conditions[:, DELAY].max(initial=0))
     return memory.State(
         slots=slots,
         weather=zeros(WEATHER),
-        ending=numbers(3),
+        ending=numbers(4),
+        observed=flags(len(program.probes)),
         history=flags(len(program.conditions), longest_delay + 2),
-        act_runs=flags(len(program.acts)),
-        event_ended=flags(len(program.events)),
+        phase=numbers(len(program.elements)), executions=numbers(len(program.elements)),
+        stamps=numbers(len(program.elements), 4), looked=numbers(len(program.probes), 2),
         action_ended=flags(len(program.actions)),
+        selected=flags(e),
         lights=np.zeros((n, len(program.lights)), dtype=np.int8),
         travelled=zeros(e), stood=zeros(e),
         on=numbers(e), station=np.ascontiguousarray(a + b * at),
@@ -207,5 +210,5 @@ def _record(program: Program, n: int) -> memory.Record:
     return memory.Record(
         x=x, y=y, h=h, v=v, a=a, offset=offset,
         lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
-        began=np.full((n, len(program.events)), -1, dtype=np.int64),
+        began=np.full((n, len(program.event_names)), -1, dtype=np.int64),
     )  # fmt: skip

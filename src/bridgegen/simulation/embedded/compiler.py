@@ -15,6 +15,7 @@ from bridgegen.openx.openscenario.declarations import (
 )
 from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.openx.openscenario.values import Value
+from bridgegen.simulation.embedded._codes import EVENT
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
 from bridgegen.simulation.embedded.program import (
@@ -25,6 +26,7 @@ from bridgegen.simulation.embedded.program import (
     Point,
     Program,
 )
+from bridgegen.simulation.embedded.storyboard import elements, nodes
 from bridgegen.simulation.embedded.tables import Tables, table
 from bridgegen.simulation.embedded.trajectories import compile_trajectory
 from bridgegen.simulation.embedded.triggers import Triggers
@@ -80,8 +82,8 @@ class _Compiler:
                 f"{step:g}"
             )
         storyboard = self.scenario.storyboard
-        event_names = [str(one.name) for one in _events(storyboard)]
-        self.triggers = Triggers(self.tables, step, event_names)
+        found = nodes(storyboard)
+        self.triggers = Triggers(self.tables, step, found)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
         init = self._init()
@@ -99,7 +101,7 @@ class _Compiler:
         aside_slots = [-1, *(self._aside_slot(path) for path in self.paths[1:])]
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
-        acts, events = self._stories(storyboard)
+        rows = elements(found, self.tables, self.triggers, self.actions)
         n_steps = round(duration / step) + 1
         if not 2 <= n_steps <= MAX_STEPS:
             self.tables.problems.append(
@@ -122,11 +124,11 @@ class _Compiler:
             aside_slots=np.array(aside_slots, dtype=np.int64),
             triggers=table(self.triggers.triggers, 2),
             groups=table(self.triggers.groups, 2),
-            conditions=table(self.triggers.conditions, 7),
+            conditions=table(self.triggers.conditions, 5),
+            probes=table(self.triggers.probes, 6),
             points=tuple(self.triggers.points),
-            acts=np.array(acts, dtype=np.int64),
-            events=table(events, 4),
-            actions=table(self.actions.rows, 7),
+            elements=table(rows, 10),
+            actions=table(self.actions.rows, 8),
             weathers=self.actions.environments.rows,
             lights=tuple(self.actions.lights),
             first_states=np.array(self.actions.first_states, dtype=np.int8),
@@ -134,7 +136,7 @@ class _Compiler:
             time_step=step,
             n_steps=n_steps,
             fixed=self.tables.fixed,
-            event_names=tuple(event_names),
+            event_names=tuple(one.path[-1] for one in found if one.kind == EVENT),
         )
 
     def _aside_slot(self, path: PathSpec) -> int:
@@ -254,54 +256,3 @@ class _Compiler:
                     "that follows a trajectory, and for no other"
                 )
         return [init[name] for name in self.tables.names]
-
-    def _stories(self, storyboard: osc.Storyboard) -> tuple[list[int], list[tuple[int, ...]]]:
-        acts: list[int] = []
-        events: list[tuple[int, ...]] = []
-        for act in (act for story in storyboard.stories for act in story.acts):
-            acts.append(self.triggers.add(act.start_trigger, always=True))
-            if act.stop_trigger is not None and act.stop_trigger.condition_groups:
-                self.tables.unsupported(act.stop_trigger, "an Act's StopTrigger")
-            for group in act.maneuver_groups:
-                for maneuver in group.maneuvers:
-                    for event in maneuver.events:
-                        events.append(self._event(event, group, len(acts) - 1))
-        return acts, events
-
-    def _event(self, event: osc.Event, group: osc.ManeuverGroup, act: int) -> tuple[int, ...]:
-        if event.maximum_execution_count not in (None, 1):
-            self.tables.unsupported(
-                event, f'maximumExecutionCount="{event.maximum_execution_count}"'
-            )
-        if group.maximum_execution_count != 1:
-            self.tables.unsupported(
-                group, f'maximumExecutionCount="{group.maximum_execution_count}"'
-            )
-        if event.priority is osc.Priority.SKIP or isinstance(event.priority, osc.ParameterRef):
-            self.tables.unsupported(event, f'priority="{event.priority}"')
-        trigger = self.triggers.add(event.start_trigger, always=True)
-        first = len(self.actions.rows)
-        for one in event.actions:
-            if isinstance(one.action, osc.GlobalAction):
-                self.actions.add_global(one.action)
-                continue
-            if not isinstance(one.action, osc.PrivateAction):
-                self.tables.unsupported(one.action, type(one.action).__name__)
-                continue
-            if not group.actors.entity_refs:
-                self.tables.unsupported(group.actors, "Actors without an EntityRef")
-            for actor in group.actors.entity_refs:
-                self.actions.add_private(one.action, self.tables.entity(actor.entity_ref))
-        return act, trigger, first, len(self.actions.rows)
-
-
-def _events(storyboard: osc.Storyboard) -> list[osc.Event]:
-    """Return all events in the order in which they are compiled."""
-    return [
-        event
-        for story in storyboard.stories
-        for act in story.acts
-        for group in act.maneuver_groups
-        for maneuver in group.maneuvers
-        for event in maneuver.events
-    ]

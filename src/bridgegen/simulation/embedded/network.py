@@ -27,7 +27,7 @@ class Network:
             its path.
         sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
             against it; what is to its left, then, of what is to the road's.
-        points: ``(P, C, 2)`` float64 [m], the position that a condition names; 0 where none.
+        points: ``(P, Q, 2)`` float64 [m], the positions that conditions name.
         tracks: ``(P, M, T, 6)`` float64, the states of the M entities with a timetable at every
             instant: x, y [m], heading [rad], speed [m/s], acceleration [m/s²], metres travelled.
     """
@@ -62,11 +62,10 @@ def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
     shape = (len(models), len(program.paths))
     n_entities = len(program.names)
     ways = [Ways(program, model) for model in models]
-    points = np.zeros((len(models), len(program.conditions), 2))
+    points = np.zeros((len(models), len(program.points), 2))
     for p, model in enumerate(models):
-        for c, point in enumerate(program.points):
-            if point is not None:
-                points[p, c] = position(program, model, point)
+        for i, point in enumerate(program.points):
+            points[p, i] = position(program, model, point)
     tables = [table for each in ways for table in each.tables]
     counts = np.array([len(table) for table in tables], dtype=np.int64).reshape(shape)
     steps = np.array([each.steps for each in ways]).reshape(shape)

@@ -112,12 +112,14 @@ class Program:
             whose path runs there, and of who is on the centre.
         triggers: ``(·, 2)`` first and past-the-last group; trigger 0 stops the scenario.
         groups: ``(·, 2)`` first and past-the-last condition.
-        conditions: ``(C, 7)`` kind, entity, other entity, rule, slot, edge, delay in steps.
-        points: per condition the position to be reached, or None.
-        acts: ``(A,)`` start trigger.
-        events: ``(·, 4)`` act, trigger, first and past-the-last action.
-        actions: ``(·, 7)`` entity, kind, shape, dimension, slot of the target, slot of its
-            dynamics, path or row of ``weathers``; see ``_action_kernels``, ``_motion_kernels``.
+        conditions: ``(C, 5)`` first and past-the-last probe, quantity, edge, delay in steps.
+        probes: ``(·, 6)`` kind, entity, other entity, rule, slot, point.
+        points: positions that probes name.
+        elements: ``(X, 10)`` of the storyboard: kind, parent, first element after it, start and
+            stop trigger, priority, executions at most, first and past-the-last action, event.
+        actions: ``(·, 8)`` entity, kind, shape, dimension, slot of the target, slot of its
+            dynamics, path or row of ``weathers``, whether the entity is selected by the trigger;
+            see ``_action_kernels`` and ``_motion_kernels``. ``_codes`` names the columns.
         lights: the traffic lights that are set.
         first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
@@ -142,9 +144,9 @@ class Program:
     triggers: Int
     groups: Int
     conditions: Int
-    points: tuple[LanePoint | None, ...]
-    acts: Int
-    events: Int
+    probes: Int
+    points: tuple[LanePoint, ...]
+    elements: Int
     actions: Int
     weathers: Int
     lights: tuple[str, ...]

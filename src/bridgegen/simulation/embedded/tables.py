@@ -13,6 +13,11 @@ from bridgegen.openx.openscenario.parameters import numbers, values
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.program import LanePoint, Point, WorldPoint
 
+_OBJECTS = {
+    osc.ObjectType.VEHICLE: osc.Vehicle, osc.ObjectType.PEDESTRIAN: osc.Pedestrian,
+    osc.ObjectType.MISCELLANEOUS: osc.MiscObject,
+}  # fmt: skip
+
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
@@ -32,6 +37,7 @@ class Tables:
         self.place = place
         objects = scenario.entities.scenario_objects
         self.objects = sorted(objects, key=lambda one: str(one.name).lower() != "ego")
+        self._selections = {str(one.name): one for one in scenario.entities.entity_selections}
         self.names = tuple(str(one.name) for one in self.objects)
         self.parameters = numbers(scenario)
         self._declared = values(scenario)
@@ -50,8 +56,32 @@ class Tables:
         return self._slots.setdefault((type(key), key), len(self._slots))
 
     def entity(self, name: object) -> int:
-        """Return an entity's number."""
+        """Return an entity's number; where several or none are named, that is taken down."""
+        if str(name) not in self.names:
+            self.problems.append(f"{self.place}: '{name}' where one entity is needed")
+            return 0
         return self.names.index(str(name))
+
+    def members(self, name: object) -> tuple[int, ...]:
+        """Return the numbers of an entity, or of the entities of a selection, each once."""
+        selection = self._selections.get(str(name))
+        if selection is None:
+            return (self.entity(name),)
+        found: dict[int, None] = {}
+        for member in selection.members.members:
+            if isinstance(member, osc.EntityRef):
+                found[self.entity(member.entity_ref)] = None
+            else:
+                found |= dict.fromkeys(self.of_type(member, member.object_type))
+        return tuple(found)
+
+    def of_type(self, element: Element, kind: osc.ObjectType | osc.ParameterRef) -> list[int]:
+        """Return the numbers of the entities of a kind."""
+        if kind not in _OBJECTS:
+            self.unsupported(element, f'objectType="{kind}"')
+            return []
+        wanted = _OBJECTS[kind]
+        return [e for e, one in enumerate(self.objects) if isinstance(one.entity_object, wanted)]
 
     def unsupported(self, element: Element, what: str) -> None:
         """Take down what cannot be run, with its line."""

@@ -1,0 +1,101 @@
+"""What a probe sees: one entity, two of them, the time, or an element of the storyboard.
+
+A condition has a probe per triggering entity. Another kind of condition is a branch in ``look``.
+"""
+
+import math
+
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.simulation.embedded._codes import (
+    COMPLETE,
+    ELEMENT_STATE,
+    EQUAL,
+    GREATER,
+    GREATER_EQUAL,
+    LESS,
+    LESS_EQUAL,
+    LIMIT,
+    NEVER_TRUE,
+    OTHER,
+    PLACE,
+    PROBE,
+    REACH_POSITION,
+    RELATIVE_DISTANCE,
+    RULE,
+    SIMULATION_TIME,
+    SPEED,
+    STAND_STILL,
+    TIME_HEADWAY,
+    TRAVELED_DISTANCE,
+    WHO,
+)
+
+
+@inlined_kernel
+def look(p, k, plan, roads, state, record):
+    """Return whether probe p sees at instant k what its condition asks for."""
+    kind, e, other = plan.probes[p, PROBE], plan.probes[p, WHO], plan.probes[p, OTHER]
+    rule, limit = plan.probes[p, RULE], state.slots[plan.probes[p, LIMIT]]
+    if kind == SIMULATION_TIME:
+        return compare(k * plan.dt, rule, limit)
+    if kind == ELEMENT_STATE:
+        return is_in_state(p, plan.probes, state.phase, state.stamps, state.looked)
+    if kind == NEVER_TRUE:
+        return False
+    x, y, v = record.x[e, k], record.y[e, k], record.v[e, k]
+    if kind == SPEED:
+        return compare(v, rule, limit)
+    if kind == TRAVELED_DISTANCE:
+        return state.travelled[e] >= limit
+    if kind == STAND_STILL:
+        return state.stood[e] >= limit
+    if kind == REACH_POSITION:
+        place = plan.probes[p, PLACE]
+        return math.hypot(x - roads.points[place, 0], y - roads.points[place, 1]) <= limit
+    return look_at_pair(
+        kind, rule, limit, record.x[other, k] - x, record.y[other, k] - y, v, record.h[e, k],
+        record.v[other, k], record.h[other, k],
+    )  # fmt: skip
+
+
+@kernel
+def compare(value, rule, limit):
+    """Apply an OpenSCENARIO Rule."""
+    if rule == GREATER:
+        return value > limit
+    if rule == LESS:
+        return value < limit
+    if rule == GREATER_EQUAL:
+        return value >= limit
+    if rule == LESS_EQUAL:
+        return value <= limit
+    if rule == EQUAL:
+        return value == limit
+    return value != limit
+
+
+@kernel
+def look_at_pair(kind, rule, limit, dx, dy, v, h, other_v, other_h):
+    """Return whether a condition on two entities holds; the other one is at (dx, dy) from it."""
+    gap = math.hypot(dx, dy)
+    if kind == RELATIVE_DISTANCE:
+        return compare(gap, rule, limit)
+    if kind == TIME_HEADWAY:
+        return v > 0.0 and compare(gap / v, rule, limit)
+    closing = dx * (v * math.cos(h) - other_v * math.cos(other_h)) + dy * (
+        v * math.sin(h) - other_v * math.sin(other_h)
+    )  # times the gap
+    return closing > 0.0 and compare(gap * gap / closing, rule, limit)
+
+
+@kernel
+def is_in_state(p, probes, phase, stamps, looked):
+    """Return whether an element of the storyboard is in a state, or has passed a transition.
+
+    A transition is seen for one instant: by whom looks at it later in the one in which it happens,
+    else in the next one.
+    """
+    x, wanted = probes[p, WHO], probes[p, OTHER]
+    if wanted <= COMPLETE:
+        return phase[x] == wanted
+    return stamps[x, wanted - COMPLETE - 1] > looked[p, 0]

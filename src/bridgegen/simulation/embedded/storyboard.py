@@ -1,0 +1,133 @@
+"""The storyboard as a table: stories, acts, groups, maneuvers, events, actions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.simulation.embedded import _codes as codes
+from bridgegen.simulation.embedded.actions import Actions
+from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.triggers import Triggers
+
+Part = osc.Story | osc.Act | osc.ManeuverGroup | osc.Maneuver | osc.Event | osc.Action
+
+_KINDS = {
+    osc.Story: codes.STORY, osc.Act: codes.ACT, osc.ManeuverGroup: codes.GROUP,
+    osc.Maneuver: codes.MANEUVER, osc.Event: codes.EVENT, osc.Action: codes.ACTION,
+}  # fmt: skip
+_PRIORITIES = {
+    osc.Priority.OVERWRITE: codes.OVERRIDE, osc.Priority.OVERRIDE: codes.OVERRIDE,
+    osc.Priority.SKIP: codes.SKIP, osc.Priority.PARALLEL: codes.PARALLEL,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Node:
+    """An element of the storyboard: its place in the order of the file, its name and parents.
+
+    Attributes:
+        part: the element.
+        kind: see ``_codes``.
+        path: names from the story's to its own.
+        parent: number of its parent; -1 of a story.
+        end: number of the first element after it that is not in it.
+    """
+
+    part: Part
+    kind: int
+    path: tuple[str, ...]
+    parent: int
+    end: int
+
+
+def nodes(storyboard: osc.Storyboard) -> list[Node]:
+    """Return all elements in the order of the file, each before its children."""
+    found: list[Node] = []
+    for story in storyboard.stories:
+        _append(found, story, (), -1)
+    return found
+
+
+def _append(found: list[Node], part: Part, path: tuple[str, ...], parent: int) -> None:
+    number, path = len(found), (*path, str(part.name))
+    kind = _KINDS[type(part)]
+    found.append(Node(part, kind, path, parent, 0))
+    for child in _children(part):
+        _append(found, child, path, number)
+    found[number] = Node(part, kind, path, parent, len(found))
+
+
+def _children(part: Part) -> Sequence[Part]:
+    match part:
+        case osc.Story():
+            return part.acts
+        case osc.Act():
+            return part.maneuver_groups
+        case osc.ManeuverGroup():
+            return part.maneuvers
+        case osc.Maneuver():
+            return part.events
+        case osc.Event():
+            return part.actions
+    return ()
+
+
+def elements(
+    found: Sequence[Node], tables: Tables, triggers: Triggers, actions: Actions
+) -> list[tuple[int, ...]]:
+    """Compile all elements; return them as ``Program.elements`` has them."""
+    rows: list[list[int]] = []
+    group: osc.ManeuverGroup | None = None
+    act_start = n_events = 0
+    for node in found:
+        part = node.part
+        start = stop = number = -1
+        priority, count, first = 0, 1, len(actions.rows)
+        if isinstance(part, osc.Act):
+            act_start = start = triggers.add(part.start_trigger)
+            if part.stop_trigger is not None and part.stop_trigger.condition_groups:
+                stop = triggers.add(part.stop_trigger)
+        elif isinstance(part, osc.ManeuverGroup):
+            group, start = part, act_start
+            count = _count(tables, part)
+        elif isinstance(part, osc.Event):
+            number, n_events = n_events, n_events + 1
+            priority, count = _priority(tables, part), _count(tables, part)
+            start = act_start if part.start_trigger is None else triggers.add(part.start_trigger)
+        elif isinstance(part, osc.Action):
+            assert group is not None  # actions are in events, events in groups
+            count, event = 0, rows[node.parent]
+            named, selected = _actors(tables, group, triggers.entities(event[codes.START]))
+            actions.add(part, named, selected)
+            event[codes.LAST] = len(actions.rows)
+        last = len(actions.rows)
+        rows.append(
+            [node.kind, node.parent, node.end, start, stop, priority, count, first, last, number]
+        )
+    return [tuple(row) for row in rows]
+
+
+def _count(tables: Tables, part: osc.ManeuverGroup | osc.Event) -> int:
+    """Return how often an element may run; the standard's default is once."""
+    if part.maximum_execution_count is None:
+        return 1
+    return int(tables.literal(part, "maximumExecutionCount", part.maximum_execution_count))
+
+
+def _priority(tables: Tables, event: osc.Event) -> int:
+    if isinstance(event.priority, osc.ParameterRef):
+        tables.unsupported(event, f'priority="{event.priority}"')
+        return codes.PARALLEL
+    return _PRIORITIES[event.priority]
+
+
+def _actors(
+    tables: Tables, group: osc.ManeuverGroup, triggering: Sequence[int]
+) -> tuple[list[int], list[int]]:
+    """Return a group's actors, and those that act only if they make the event's trigger fire."""
+    refs = group.actors.entity_refs
+    named = list(dict.fromkeys(e for ref in refs for e in tables.members(ref.entity_ref)))
+    selects = group.actors.select_triggering_entities
+    if isinstance(selects, osc.ParameterRef):
+        tables.unsupported(group.actors, f'selectTriggeringEntities="{selects}"')
+    return named, [e for e in triggering if e not in named] if selects is True else []
