@@ -132,7 +132,7 @@ class Record(NamedTuple):
     began: Int
 
 
-def _view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:
+def view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:
     """Return the kernel that borrows a tuple's arrays; of N rows' those of row i if at="[i]"."""
     items = ", ".join(
         f"rows.{name}" if type_ in (int, float) else f"borrowed(rows.{name}{at})"
@@ -142,5 +142,5 @@ def _view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:
     return inlined_kernel(eval(code, {"kind": kind, "borrowed": borrowed}))
 
 
-plan_of = _view(Plan)
-roads_of, state_of, record_of = (_view(kind, "[i]") for kind in (Roads, State, Record))
+plan_of = view(Plan)
+roads_of, state_of, record_of = (view(kind, "[i]") for kind in (Roads, State, Record))

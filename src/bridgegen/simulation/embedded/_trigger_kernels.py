@@ -20,7 +20,7 @@ from bridgegen.simulation.embedded._codes import (
     RISING,
     WHO,
 )
-from bridgegen.simulation.embedded._memory_kernels import TICKS
+from bridgegen.simulation.embedded._memory_kernels import TICKS, view
 from bridgegen.simulation.embedded._probe_kernels import is_in_state, look
 
 
@@ -87,6 +87,9 @@ class Checks(NamedTuple):
     ending: Int
 
 
+borrow_checks = view(Checks)
+
+
 @inlined_kernel
 def checks_of(plan, state):
     """Return what triggers read."""
@@ -96,7 +99,7 @@ def checks_of(plan, state):
     )  # fmt: skip
 
 
-@kernel
+@inlined_kernel
 def group_fires(g, k, checks):
     """Return whether a condition group is met as a whole.
 
@@ -120,6 +123,7 @@ def group_fires(g, k, checks):
 @kernel
 def fires_by(trigger, k, checks):
     """Return whether any condition group of a trigger is met."""
+    checks = borrow_checks(checks)
     for g in range(checks.triggers[trigger, 0], checks.triggers[trigger, 1]):
         if group_fires(g, k, checks):
             return True
