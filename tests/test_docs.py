@@ -66,3 +66,19 @@ def test_the_examples_run(tmp_path):
     text = run.scenarios[0].with_suffix(".xosc").read_text("utf-8")
     assert 'frictionScaleFactor="$oil_friction"' in text
     assert 'value="$oil_at"' in text
+
+
+def test_the_driver_of_the_documentation_keeps_the_contract():
+    from bridgegen.campaign.driver_contract import check_driver
+
+    checks = list(check_driver(f"{DOCS / 'examples' / 'my_driver.py'}:MyDriver", ["cut-in"]))
+    assert checks
+    assert not [check for check in checks if check.problem]
+
+
+def test_the_documentation_of_drivers_names_what_there_is():
+    from bridgegen.ego.fmu import _is_known
+
+    text = (DOCS / "drivers.md").read_text("utf-8")
+    names = ("v", "target_speed", "offset", "stop_distance", "light", "route_3_x", "track_1_vx")
+    assert all(f"`{name}`" in text and _is_known(name) for name in names)

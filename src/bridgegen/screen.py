@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +15,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, Watch
+    from bridgegen.campaign.driver_contract import Check
     from bridgegen.campaign.loop import Progress as LoopProgress
     from bridgegen.campaign.settings import Settings
     from bridgegen.odd.coverage import Coverage, ParameterBins
@@ -27,7 +28,6 @@ _STAGES = {
     "hand over": "writing the critical scenarios",
     "report": "writing the report",
 }
-
 
 MOST_REASONS = 5
 """Why evaluations failed is told in so many lines at most."""
@@ -131,6 +131,25 @@ def print_file_result(file: Path, result: "FileResult") -> None:
     width = max(len(name) for name in result.metrics)
     for name, value in result.metrics.items():
         print(f"{name:<{width}}  {value!r} {METRICS[name].unit}")
+
+
+def print_checks(checks: "Iterable[Check]", *, as_json: bool) -> bool:
+    """Print what was tried on a driver as it comes in; return whether it kept everything."""
+    done, scenario = [], ""
+    for check in checks:
+        done.append(check)
+        if as_json:
+            continue
+        if check.scenario != scenario:
+            scenario = check.scenario
+            print(scenario)
+        sign = "no " if check.problem else "   " if check.figure else "ok "
+        print(f"  {sign} {check.rule}" + (f": {check.figure}" if check.figure else ""))
+        if check.problem:
+            print(f"        {check.problem}")
+    if as_json:
+        print(json.dumps([asdict(check) for check in done], indent=2))
+    return not any(check.problem for check in done)
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_json: bool) -> None:

@@ -109,3 +109,25 @@ class LooksAhead:
         near = (o.tracks[:, :, 0] >= 2.0) & (ahead > 0.0) & (np.hypot(tx, ty) < 2.0 * o.v[:, None])
         wanted = np.where(near.any(axis=1), -6.0, np.clip(o.target_speed - o.v, -3.0, 2.0))
         return Control(wanted, curvature)
+
+
+class Mixes(Cruises):
+    """Drives all scenarios at the mean speed of the batch: nobody's result is its own."""
+
+    def act(self, observation):
+        demanded = np.mean(observation.target_speed) - observation.v
+        return Control(np.clip(demanded, -3.0, 2.0), np.zeros(self.n))
+
+
+class Remembers(Cruises):
+    """Drives more slowly in every batch."""
+
+    batches = 0
+
+    def reset(self, n, scene):
+        super().reset(n, scene)
+        self.batches += 1
+
+    def act(self, observation):
+        demanded = np.clip(observation.target_speed / self.batches - observation.v, -3.0, 2.0)
+        return Control(demanded, np.zeros(self.n))

@@ -219,6 +219,25 @@ def simulate(
         print_file_result(file, result)
 
 
+@app.command("check-driver")
+def check_driver(
+    driver: Annotated[str, typer.Argument(help="module:Class, file.py:Class or file.fmu.")],
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(help="Try it in this one; may be repeated.", show_default="four that ship"),
+    ] = None,
+    time_limit: TimeLimit = None,
+    as_json: Json = False,
+) -> None:
+    """Try a driver of your own: does a scenario's result depend on that scenario alone?"""
+    from bridgegen.campaign.driver_contract import SCENARIOS, check_driver
+    from bridgegen.screen import print_checks
+
+    checks = check_driver(driver, scenario or SCENARIOS, time_limit=time_limit)
+    if not print_checks(checks, as_json=as_json):
+        raise typer.Exit(1)
+
+
 def _terms(text: str) -> dict[str, float | None]:
     """Read ``metric=weight,…`` or ``metric,…``."""
     pairs = [pair.strip() for pair in text.split(",")]

@@ -1,0 +1,123 @@
+"""What a user's driver must keep, tried on it: ``bridgegen check-driver module:Class``.
+
+A search is only worth something if a scenario's result depends on that scenario alone. So a driver
+must answer for each scenario the same, whoever else is in the batch, in whatever order, and however
+often it is asked; and it must forget when it is reset.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.odd.reader import load
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+
+SCENARIOS = ("crossroads-s1", "cut-in", "red-light-runner", "pedestrian-behind-parked")
+"""Crossing traffic, a motorway, a traffic light, a pedestrian between parked cars."""
+
+ROWS = 16
+"""Rows per scenario: a few, for every one is driven several times."""
+
+MANY = 512
+"""Rows in the batch that tells the driver's speed."""
+
+_STATES = ("x", "y", "h", "v", "a", "n_steps", "status")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was tried.
+
+    Attributes:
+        scenario: in which.
+        rule: what must hold.
+        problem: how it does not; empty if it does.
+        figure: what was measured, or empty.
+    """
+
+    scenario: str
+    rule: str
+    problem: str = ""
+    figure: str = ""
+
+
+def check_driver(
+    spec: str, scenarios: Sequence[str] = SCENARIOS, *, time_limit: float | None = None
+) -> Iterator[Check]:
+    """Yield what was tried on a driver, one after the other.
+
+    Args:
+        spec: ``package.module:Class``, ``file.py:Class`` or ``file.fmu``.
+        scenarios: names of the catalogue, or paths.
+        time_limit: [s] that one call may take.
+
+    Raises:
+        InputError: the driver cannot be made, or no such scenario.
+    """
+    for name in scenarios:
+        logical = load(name)
+        pipeline = Pipeline(logical, logical.space(), ego=spec, time_limit=time_limit)
+        pipeline.warm_up()
+        rng = np.random.default_rng(0)
+        X = pipeline.space.decode(rng.random((ROWS, pipeline.space.n_var)))
+        yield from _in_one(name, pipeline, X, rng)
+
+
+def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -> Iterator[Check]:
+    whole = pipeline.rollout(X)
+    yield Check(name, "every row is driven to its end", _failures(whole))
+    order = rng.permutation(len(X)).tolist()
+    single = order[0]
+    tries: tuple[tuple[str, Callable[[], Rollout], Sequence[int]], ...] = (
+        ("the same row again gives the same motion", lambda: pipeline.rollout(X), range(len(X))),
+        ("the order of the rows does not matter", lambda: pipeline.rollout(X[order]), order),
+        (
+            "a row alone moves as it does among others",
+            lambda: pipeline.rollout(X[single : single + 1]),
+            [single],
+        ),
+        (
+            "what it drove before is forgotten",
+            lambda: _after(pipeline, X[::-1], X[: len(X) // 2]),
+            range(len(X) // 2),
+        ),
+    )
+    for rule, run, rows in tries:
+        yield Check(name, rule, _difference(whole, run(), rows))
+    many = np.tile(X, (MANY // len(X), 1))
+    start = time.perf_counter()
+    pipeline.rollout(many)
+    rate = len(many) / (time.perf_counter() - start)
+    yield Check(name, "speed", figure=f"{rate:.0f} scenarios/s in a batch of {len(many)}")
+
+
+def _after(pipeline: Pipeline, before: Float, X: Float) -> Rollout:
+    pipeline.rollout(before)
+    return pipeline.rollout(X)
+
+
+def _failures(rollout: Rollout) -> str:
+    failed = np.flatnonzero(rollout.status)
+    if not len(failed):
+        return ""
+    row = int(failed[0])
+    words = [STATUS_MESSAGES[int(rollout.status[row])], *filter(None, [rollout.messages.get(row)])]
+    return f"{len(failed)} of {len(rollout.status)} rows failed, the first: {': '.join(words)}"
+
+
+def _difference(whole: Rollout, other: Rollout, rows: Sequence[int]) -> str:
+    """Say where rows of a rollout are not what they are in another one."""
+    at = np.asarray(rows)
+    for name in _STATES:
+        one, two = getattr(whole, name)[at], getattr(other, name)
+        if np.array_equal(one, two):
+            continue
+        place = tuple(int(i) for i in np.argwhere(one != two)[0])
+        when = f" at {place[2] * whole.time_step:g} s" if len(place) == 3 else ""
+        row, before, after = at[place[0]], one[place], two[place]
+        return f"row {row} has {name} = {before:.9g}{when}, and then {after:.9g}"
+    return ""

@@ -1,0 +1,48 @@
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from bridgegen.campaign.driver_contract import check_driver
+from bridgegen.cli import app
+
+DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
+
+
+def broken(name):
+    checks = list(check_driver(f"{DRIVERS}:{name}", ["crossroads-s1"], time_limit=0.5))
+    assert len(checks) == 6
+    return {check.rule: check.problem for check in checks if check.problem}
+
+
+@pytest.mark.parametrize("name", ["Cruises", "LooksAhead"])
+def test_a_good_driver_keeps_everything(name):
+    assert broken(name) == {}
+
+
+def test_a_driver_that_mixes_its_scenarios_is_found_out():
+    found = broken("Mixes")
+    assert {"a row alone moves as it does among others", "what it drove before is forgotten"} <= {
+        *found
+    }
+    assert "and then" in next(iter(found.values()))
+
+
+def test_a_driver_that_remembers_is_found_out():
+    assert "the same row again gives the same motion" in broken("Remembers")
+
+
+def test_a_driver_that_fails_is_found_out():
+    found = broken("NaNFast")
+    assert list(found) == ["every row is driven to its end"]
+    assert "acceleration must be finite, got nan" in found["every row is driven to its end"]
+
+
+def test_the_command_says_it_and_ends_with_a_status():
+    run = CliRunner().invoke
+    good = run(app, ["check-driver", f"{DRIVERS}:Cruises", "--scenario", "crossroads-s1"])
+    assert good.exit_code == 0
+    assert "ok  the order of the rows does not matter" in good.output
+    bad = run(app, ["check-driver", f"{DRIVERS}:Mixes", "--scenario", "crossroads-s1", "--json"])
+    assert bad.exit_code == 1
+    assert '"problem": "row ' in bad.output
