@@ -227,6 +227,32 @@ def test_turning_and_moving_the_scene_changes_nothing(driven, moved, turn, dx, d
         np.testing.assert_allclose(there[:, j], here[:, j], rtol=1e-6, atol=1e-9, err_msg=name)
 
 
+def test_who_is_not_there_does_not_count(driven):
+    """Whatever its states are then; and one who never is, is as good as left out."""
+    scene = driven(40, 4, within=10.0)
+    rng = np.random.default_rng(1)
+    present = np.repeat(rng.random((40, 4, 5)) < 0.7, 10, axis=2)
+    present[:, 0] = True
+    present[:, 3] = False
+    detections = scene.detections.copy()
+    detections[~present & (detections[..., 0] > 0), 0] = 0.0  # nothing is seen where nothing is
+    gone = {
+        name: np.where(present, getattr(scene, name), 0.7 + 0.1 * getattr(scene, name))
+        for name in ("x", "y", "h", "v", "a")
+    }
+    expected = metrics.evaluate(replace(scene, present=present, detections=detections), ALL)
+    somewhere = replace(scene, present=present, detections=detections, **gone)
+    np.testing.assert_array_equal(metrics.evaluate(somewhere, ALL), expected)
+    names = ("x", "y", "h", "v", "a", "offset", "detections")
+    first = {name: getattr(somewhere, name)[:, :3] for name in names}
+    without = replace(
+        somewhere, **first, box=scene.box[:3], kinds=scene.kinds[:3], present=present[:, :3],
+        names=scene.names[:3],
+    )  # fmt: skip
+    np.testing.assert_array_equal(metrics.evaluate(without, ALL), expected)
+    assert not np.array_equal(metrics.evaluate(scene, ALL), expected)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_order_of_the_others_does_not_matter(driven, seed):
     scene = driven(40, 5, seed=seed)

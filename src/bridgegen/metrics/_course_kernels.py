@@ -60,8 +60,8 @@ def avoidance_rate(
                 if gap[k] == 0.0:
                     best = most
                     break
-                if (va[k] + vb[k]) ** 2 <= 2.0 * best * gap[k]:
-                    continue  # not even head-on
+                if gap[k] == math.inf or (va[k] + vb[k]) ** 2 <= 2.0 * best * gap[k]:
+                    continue  # it is not there, or not even head-on
                 time, squared = contact(
                     qx[k] - px[k], qy[k] - py[k], ca[k], sa[k], cb[k], sb[k], va[k], vb[k],
                     la, wa, lb, wb, circles,

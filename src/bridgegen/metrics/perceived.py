@@ -39,7 +39,8 @@ class Perceived:
         half: ``(E, 2)`` float64 [m], half lengths and half widths.
         x, y, h: ``(N, E, T)`` as the rollout has them.
         centre_x, centre_y: ``(N, E, T)`` float64 [m], of the boxes; unset without a frame.
-        counts: ``(N, E, T)`` bool: there is a frame, and the entity is within its class's range.
+        counts: ``(N, E, T)`` bool: there is a frame, and the entity is there, within its class's
+            range.
         classes: ``(E,)`` int64, an index of `CLASSES`.
         detections: ``(N, E, T, 8)`` as the rollout has them.
         n_steps: ``(N,)`` int64 likewise.
@@ -81,6 +82,8 @@ def _perceived(rollout: Rollout) -> Perceived:
     _detection_kernels.truth(
         box, x, y, h, detections, n_steps, RANGES[classes], centre_x, centre_y, counts
     )
+    if rollout.present.size:
+        counts &= rollout.present
     return Perceived(
         0.5 * box[:, :2], x, y, h, centre_x, centre_y, counts, classes, detections, n_steps
     )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 
 STATUS_MESSAGES = {
     0: "ok",
@@ -52,6 +52,8 @@ class Rollout:
         lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
         event_names: of the V events of the storyboard, in the order of the file.
         began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
+        present: ``(N, E, T)`` bool, who is there at which instant; where somebody is not, the states
+            are finite but meaningless. ``(0, 0, 0)`` where everybody always is.
         kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
             nobody says.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
@@ -79,6 +81,7 @@ class Rollout:
     lights: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
     event_names: tuple[str, ...] = ()
     began: Int = field(default_factory=lambda: np.zeros((0, 0), np.int64))
+    present: Bool = field(default_factory=lambda: np.zeros((0, 0, 0), np.bool_))
     kinds: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
@@ -96,11 +99,15 @@ class Rollout:
     def distance(self) -> Float:
         """``(N, E, T)`` float64 [m]: from the ego's oriented box to each other's, 0 at contact.
 
-        Row 0 of axis E, the ego's distance to itself, is +inf. Padded instants repeat the last.
+        Row 0 of axis E, the ego's distance to itself, is +inf, and so is that to (or from) who is
+        not present. Padded instants repeat the last.
         """
         from bridgegen.simulation.boxes import box_distance
 
-        return box_distance(self.box, self.x, self.y, self.h, self.n_steps)
+        distance = box_distance(self.box, self.x, self.y, self.h, self.n_steps)
+        if self.present.size:
+            distance[~(self.present & self.present[:, :1])] = np.inf
+        return distance
 
 
 _BY_ROW = (
