@@ -6,8 +6,9 @@ import numpy as np
 
 from bridgegen.ego import _weather_kernels
 from bridgegen.ego import _weather_kernels as column
-from bridgegen.ego._perception_kernels import DETECTION, MEMORY, perceive
+from bridgegen.ego._perception_kernels import MEMORY, perceive
 from bridgegen.ego._tracking_kernels import TRACK
+from bridgegen.ego.detections import DETECTION
 from bridgegen.ego.kinds import CAR, PEDESTRIAN
 
 BOX = {

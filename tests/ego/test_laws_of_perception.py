@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
 from bridgegen.ego import _weather_kernels as column
-from bridgegen.ego._perception_kernels import (
+from bridgegen.ego.detections import (
     BOTH,
     CAMERA,
+    HEADING,
     KIND,
     LIDAR,
     NO_FRAME,
     NOBODY,
     SEEN_BY,
-    H,
     X,
     Y,
 )
@@ -127,11 +127,13 @@ def test_turning_and_moving_the_world_with_its_sun_changes_nothing(turn, dx, dy,
     assert (here[:, :, KIND] == there[:, :, KIND]).all()
     x = np.where(here[:, :, SEEN_BY] > 0, c * here[:, :, X] - s * here[:, :, Y] + dx, 0.0)
     y = np.where(here[:, :, SEEN_BY] > 0, s * here[:, :, X] + c * here[:, :, Y] + dy, 0.0)
-    h = np.where(here[:, :, SEEN_BY] > 0, here[:, :, H] + turn, 0.0)
+    h = np.where(here[:, :, SEEN_BY] > 0, here[:, :, HEADING] + turn, 0.0)
     assert there[:, :, X] == pytest.approx(x, abs=1e-6)
     assert there[:, :, Y] == pytest.approx(y, abs=1e-6)
-    assert there[:, :, H] == pytest.approx(h, abs=1e-9)
-    assert there[:, :, H + 1 : KIND] == pytest.approx(here[:, :, H + 1 : KIND], abs=1e-9)
+    assert there[:, :, HEADING] == pytest.approx(h, abs=1e-9)
+    assert there[:, :, HEADING + 1 : KIND] == pytest.approx(
+        here[:, :, HEADING + 1 : KIND], abs=1e-9
+    )
     assert (moved[:, :, 0] == tracks[:, :, 0]).all()
 
 

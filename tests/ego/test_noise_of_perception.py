@@ -8,7 +8,6 @@ import pytest
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
 from bridgegen.ego import _weather_kernels as column
-from bridgegen.ego._perception_kernels import BOTH, CAMERA, KIND, LENGTH, LIDAR, SEEN_BY, H, X, Y
 from bridgegen.ego._physics_kernels import (
     DROPOUT_TIME,
     ERROR_TIME,
@@ -18,6 +17,7 @@ from bridgegen.ego._physics_kernels import (
     REFLECTANCE,
     veil,
 )
+from bridgegen.ego.detections import BOTH, CAMERA, HEADING, KIND, LENGTH, LIDAR, SEEN_BY, X, Y
 from bridgegen.ego.kinds import CAR, PEDESTRIAN
 
 from .scenes import BOX, Scene, weather
@@ -89,7 +89,7 @@ def test_errors_of_lidar_and_camera_fused_have_their_variance_and_last():
         assert series.mean() == pytest.approx(0.0, abs=5.0 * sigma / math.sqrt(INDEPENDENT))
         assert series.std() == pytest.approx(sigma, rel=0.06)
         assert correlation(series, 3) == pytest.approx(math.exp(-0.3 / ERROR_TIME), abs=0.06)
-    assert found[:, H].std() == pytest.approx(HEADING_ERROR, rel=0.06)
+    assert found[:, HEADING].std() == pytest.approx(HEADING_ERROR, rel=0.06)
 
 
 def test_a_camera_alone_is_unsure_of_distance():

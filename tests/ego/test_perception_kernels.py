@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.ego import _tracking_kernels as track
-from bridgegen.ego._perception_kernels import BOTH, NO_FRAME, SEEN_BY, H, X, Y
+from bridgegen.ego.detections import BOTH, HEADING, NO_FRAME, SEEN_BY, X, Y
 from bridgegen.ego.kinds import CAR, PEDESTRIAN
 
 from .scenes import Scene, ahead, weather
@@ -34,7 +34,7 @@ def test_a_car_close_by_on_a_clear_day_is_tracked_where_it_is():
     assert tracks[40:, 1, track.X] == pytest.approx(x[40:], abs=0.5)
     assert tracks[40:, 1, track.VX] == pytest.approx(5.0, abs=0.7)
     assert tracks[40:, 1, track.Y] == pytest.approx(0.0, abs=0.5)
-    assert detections[1, ::2, H] == pytest.approx(0.0, abs=4 * 0.1)
+    assert detections[1, ::2, HEADING] == pytest.approx(0.0, abs=4 * 0.1)
     assert math.isfinite(detections[1:].sum())
     assert (detections[1, 1::2, SEEN_BY] == NO_FRAME).all()
     assert (detections[1, 1::2, Y] == 0.0).all()

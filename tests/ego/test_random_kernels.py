@@ -29,10 +29,11 @@ def test_philox_gives_the_published_answers(counter, key, result):
 
 
 def test_the_interpreted_generator_is_the_compiled_one():
+    interpreted = getattr(philox, "py_func", philox)  # itself where the compiler is off
     for counter, key, _ in KNOWN_ANSWERS:
         packed = np.uint64(key[0] | key[1] << 32)
         words = list(map(np.uint64, counter))
-        assert philox.py_func(*words, packed) == philox(*words, packed)
+        assert interpreted(*words, packed) == philox(*words, packed)
 
 
 def test_uniform_numbers_are_uniform_along_each_part_of_the_address():

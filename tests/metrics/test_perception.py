@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.ego import kinds
+from bridgegen.ego.detections import BOTH, NO_FRAME, NOBODY
 from bridgegen.metrics import perceived
 from bridgegen.metrics.e_position import e_position
 from bridgegen.metrics.iou import iou
 from bridgegen.metrics.mean_average_precision import mean_average_precision
 from bridgegen.metrics.r_red import r_red
-from bridgegen.simulation.detections import BOTH, NO_FRAME, NOBODY
 
 # r_red. The ego drives along +x; its front bumper is 2 m ahead of its reference point.
 

@@ -41,11 +41,22 @@ from bridgegen.ego._physics_kernels import (
 )
 from bridgegen.ego._random_kernels import block, normal_pair, unit
 from bridgegen.ego._weather_kernels import ATTENUATION, GLARE, SUN_X, SUN_Y
-
-# Columns of a detection, see ``bridgegen.simulation.detections``.
-SEEN_BY, X, Y, H, LENGTH, WIDTH, CONFIDENCE, KIND = range(8)
-DETECTION = 8
-NO_FRAME, NOBODY, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
+from bridgegen.ego.detections import (
+    BOTH,
+    CAMERA,
+    CONFIDENCE,
+    DETECTION,
+    HEADING,
+    KIND,
+    LENGTH,
+    LIDAR,
+    NO_FRAME,
+    NOBODY,
+    SEEN_BY,
+    WIDTH,
+    X,
+    Y,
+)
 
 # Columns of ``memory`` ``(E, MEMORY)`` after the tracker's and the geometry's: 0 until the body's
 # random numbers have been drawn; the three persistent uniform numbers; the six errors in standard
@@ -177,7 +188,7 @@ def observe(memory, e, bodies, kind, weather, heading, height, share, detections
     stretch = max(1.0 + coarse * BOX_ERROR * memory[e, SIZE], 0.5)
     detections[e, k, LENGTH] = bodies[e, 0] * stretch
     detections[e, k, WIDTH] = bodies[e, 1] * stretch
-    detections[e, k, H] = coarse * HEADING_ERROR * memory[e, TURN]
+    detections[e, k, HEADING] = coarse * HEADING_ERROR * memory[e, TURN]
     sure = echoes / (echoes + 20.0) * LIDAR_CONFIDENCE if by_lidar else 0.0
     if by_camera:
         sure = max(sure, recognised(on_target / (2.0 * IDENTIFY)))
@@ -230,7 +241,7 @@ def know(k, dt, x, y, h, v, bodies, kinds, tracks, detections):
             detections[e, k, SEEN_BY] = BOTH
             detections[e, k, X] = tracks[e, tracking.X]
             detections[e, k, Y] = tracks[e, tracking.Y]
-            detections[e, k, H] = h[e, k]
+            detections[e, k, HEADING] = h[e, k]
             detections[e, k, LENGTH], detections[e, k, WIDTH] = bodies[e, 0], bodies[e, 1]
             detections[e, k, CONFIDENCE], detections[e, k, KIND] = 1.0, kinds[e]
 
@@ -261,11 +272,11 @@ def look(k, dt, frame, key, x, y, h, bodies, kinds, weather, memory, tracks, det
             continue
         detections[e, k, X] += sx
         detections[e, k, Y] += sy
-        detections[e, k, H] += h[e, k]
+        detections[e, k, HEADING] += h[e, k]
         ux, uy = memory[e, DX] / memory[e, D], memory[e, DY] / memory[e, D]
         along, across = COLOURED * along, COLOURED * across
         tracking.see(
-            tracks, memory, e, detections[e, k, X], detections[e, k, Y], detections[e, k, H],
+            tracks, memory, e, detections[e, k, X], detections[e, k, Y], detections[e, k, HEADING],
             detections[e, k, LENGTH], detections[e, k, WIDTH], detections[e, k, KIND],
             detections[e, k, CONFIDENCE],
             along * ux * ux + across * uy * uy, along * uy * uy + across * ux * ux,

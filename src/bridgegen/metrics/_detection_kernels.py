@@ -6,7 +6,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import kernel
-from bridgegen.simulation.detections import HEADING, LENGTH, NOBODY, SEEN_BY, WIDTH, X, Y
+from bridgegen.ego.detections import HEADING, LENGTH, NOBODY, SEEN_BY, WIDTH, X, Y
 
 
 @kernel

@@ -4,7 +4,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import kernel
-from bridgegen.simulation.detections import CONFIDENCE, KIND, NOBODY, SEEN_BY, X, Y
+from bridgegen.ego.detections import CONFIDENCE, KIND, NOBODY, SEEN_BY, X, Y
 
 FIRST_RECALL, LAST_RECALL = 11, 100  # per cent; recalls up to 10 % are left out
 LEAST_PRECISION = 0.1

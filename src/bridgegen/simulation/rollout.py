@@ -57,7 +57,7 @@ class Rollout:
         kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
             nobody says.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
-            instant, in the columns of `bridgegen.simulation.detections`; rows of the ego itself
+            instant, in the columns of `bridgegen.ego.detections`; rows of the ego itself
             are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where the ego's
             route crosses the stop line of a traffic light, the heading in travel direction.

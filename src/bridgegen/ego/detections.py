@@ -16,5 +16,8 @@ CONFIDENCE = 6
 KIND = 7
 """What it was taken for, as `bridgegen.ego.kinds` numbers it."""
 
+DETECTION = 8
+"""How many columns."""
+
 NO_FRAME, NOBODY, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
 """No sensor took a frame at this instant; one did and missed the entity; who saw it."""
