@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from bridgegen.ego import _weather_columns as column
 from bridgegen.ego import _weather_kernels
-from bridgegen.ego import _weather_kernels as column
 from bridgegen.ego._perception_kernels import MEMORY, perceive
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego.detections import DETECTION

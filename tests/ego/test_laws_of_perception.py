@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
-from bridgegen.ego import _weather_kernels as column
+from bridgegen.ego import _weather_columns as column
 from bridgegen.ego.detections import (
     BOTH,
     CAMERA,

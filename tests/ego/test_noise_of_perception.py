@@ -7,7 +7,7 @@ import pytest
 
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
-from bridgegen.ego import _weather_kernels as column
+from bridgegen.ego import _weather_columns as column
 from bridgegen.ego._physics_kernels import (
     DROPOUT_TIME,
     ERROR_TIME,

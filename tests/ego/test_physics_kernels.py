@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import _weather_kernels as column
+from bridgegen.ego import _weather_columns as column
 from bridgegen.ego._physics_kernels import recognised, snr, transmission, veil
 from bridgegen.ego._weather_kernels import skylight, sunbeam
 

@@ -6,9 +6,10 @@ from hypothesis import strategies as st
 
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
-from bridgegen.ego import _weather_kernels as column
+from bridgegen.ego import _weather_columns as column
 from bridgegen.ego._physics_kernels import BEST, CULL, IDENTIFY, veil
 from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, camera_sight, lidar_sight, sight
+from bridgegen.ego._weather_kernels import derive
 
 from .scenes import NIGHT, weather
 
@@ -101,5 +102,5 @@ def test_a_change_of_weather_is_noticed():
     numbers = weather()
     before = seen(numbers, WALKER)
     numbers[column.VISUAL_RANGE] = 50.0
-    column.derive(numbers)
+    derive(numbers)
     assert seen(numbers, WALKER) < 0.5 * before

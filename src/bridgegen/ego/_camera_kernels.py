@@ -22,7 +22,7 @@ from bridgegen.ego._physics_kernels import (
     recognised,
     transmission,
 )
-from bridgegen.ego._weather_kernels import BACKGROUND, EXTINCTION, GLASS
+from bridgegen.ego._weather_columns import BACKGROUND, EXTINCTION, GLASS
 
 
 @kernel

@@ -7,26 +7,22 @@ Lengths in metres, angles in radians, extinctions in 1/m, luminances in cd/m², 
 import math
 
 from bridgegen.compiled import kernel
+from bridgegen.ego.kinds import BICYCLE, BUS, MOTORBIKE, PEDESTRIAN, TRUCK
 
 # The air.
 KOSCHMIEDER = 2.996  # −ln 0.05: contrast is 5 % at the meteorological optical range; WMO-No. 8
 RAIN_EXTINCTION, RAIN_POWER = 3.65e-4, 0.63  # of R [mm/h]: 1/m; Mie, Marshall–Palmer drops
 SNOW_EXTINCTION, SNOW_POWER = 1.277e-3, 1.38  # dry snow, mm/h of water; ITU-R P.1814, 5.55 dB/km
-RAIN_ON_GLASS = 0.01  # h/mm, of the light that wet glass scatters over the picture: 1/3 at 50 mm/h
+RAIN_ON_GLASS = 0.01  # h/mm, of light that wet glass scatters over the picture: a third at 50 mm/h
 
 # The light.
-CLEAR_NORMAL, CLEAR_DEPTH = (
-    127_500.0,
-    0.21,
-)  # lx, of the sun outside and per air mass; IES clear sky
+CLEAR_NORMAL = 127_500.0  # lx, of the sun outside the air; IES RP-21-84
+CLEAR_DEPTH = 0.21  # optical depth of a clear sky per air mass; the same
 AT_HORIZON, AT_CIVIL, AT_NAUTICAL, AT_NIGHT = 400.0, 3.4, 0.008, 0.001
 """lx on the ground with the sun at 0, −6, −12 and −18° or below: sunset, the ends of civil and of
 nautical twilight, a moonless night. Source: P. K. Seidelmann (ed.), Explanatory Supplement to the
 Astronomical Almanac, 1992; the last from the RCA Electro-Optics Handbook, 1974."""
-CLOUD_SHADE, CLOUD_POWER = (
-    0.75,
-    3.4,
-)  # of what clouds keep off; Kasten, Czeplak, Sol. Energy 24 (1980)
+CLOUD_SHADE, CLOUD_POWER = 0.75, 3.4  # 1 − 0.75·n^3.4; Kasten, Czeplak, Sol. Energy 24 (1980)
 GROUND_ALBEDO = 0.2  # of the scene behind a target: grey asphalt, walls, trees
 GLARE, GLARE_FROM = 10.0, 1.0  # Stiles–Holladay, L = 10·E/θ² with θ in degrees, from 1° on
 
@@ -36,10 +32,9 @@ DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground
 
 # The camera: a ring of them, 1920 pixels over 77° each.
 FOCAL_LENGTH = 1207.0  # pixels
-IDENTIFY = (
-    12.8  # pixels over the target: 6.4 cycles, Johnson's identification, for the class to tell
-)
-NOTICE = 2.8  # pixels: 1.4 cycles, his orientation, which is enough for a lamp; Johnson (1958)
+IDENTIFY = 12.8  # pixels across a target: 6.4 cycles, his identification, to tell what it is
+NOTICE = 2.8  # pixels: 1.4 cycles, his orientation, which is enough for a lamp
+# His: J. Johnson, Analysis of image forming systems, Image Intensifier Symposium (1958).
 TARGET_CONTRAST = 0.5  # of target and background, close by, in clear air
 DARK_LUMINANCE = 1.0  # cd/m², where noise halves the contrast: dark clothes are seen for some 45 m
 TARGET_ALBEDO = 0.1  # dark clothes
@@ -71,8 +66,14 @@ FRAME = 0.1  # s, between two frames
 DROPOUT_TIME = 0.7  # s, correlation time of being seen or missed; that misses come in runs:
 # Piazzoni et al., Modeling Perception Errors towards Robust Decision Making, IJCAI (2020)
 ERROR_TIME = 0.5  # s, of position and box errors
-BOX_ERROR = 0.06  # of length and width
-HEADING_ERROR = 0.05  # rad
+BOX_ERROR = 0.06  # of length and width, with a LiDAR; twice that by camera alone
+HEADING_ERROR = 0.05  # rad, likewise
+LEAST_CONFIDENCE = 0.3  # of what is detected at all
+LIDAR_CONFIDENCE = 0.6  # at most, without a picture …
+SURE_RETURNS = 20.0  # … of which so many returns give half
+SURE_PIXELS = 25.6  # pixels that give half of a camera's: twice what detection needs
+MISTAKEN_FOR = (TRUCK, BUS, TRUCK, BICYCLE, MOTORBIKE, BICYCLE, PEDESTRIAN, PEDESTRIAN)
+"""What each kind is taken for where its class is not recognised."""
 
 
 @kernel

@@ -20,7 +20,7 @@ from bridgegen.ego._physics_kernels import (
     SIGNAL_SIZE,
     veil,
 )
-from bridgegen.ego._weather_kernels import (
+from bridgegen.ego._weather_columns import (
     ATTENUATION,
     GLARE,
     N_GLARES,

@@ -1,8 +1,6 @@
 """From the weather that a file states to the numbers that sensors and tyres feel.
 
-``weather`` ``(WEATHER,)`` float64 is one scenario's, now: what is stated (up to
-``FRICTION_SCALE``), what follows from it (from ``EXTINCTION`` on), and how far one sees in it (from
-``SIGHT`` on, see ``_sight_kernels``).
+``weather`` ``(WEATHER,)`` float64 is one scenario's, now; ``_weather_columns`` tells its columns.
 """
 
 import math
@@ -27,24 +25,26 @@ from bridgegen.ego._physics_kernels import (
     SNOW_EXTINCTION,
     SNOW_POWER,
 )
-
-VISUAL_RANGE = 0  # m, meteorological optical range
-RAIN, SNOW = 1, 2  # mm/h of water
-SUN_AZIMUTH, SUN_ELEVATION = 3, 4  # rad, clockwise from north (+y); above the horizon
-ILLUMINANCE = 5  # lx, of the sun on the ground without clouds; negative: as the sun stands
-CLOUD = 6  # share of the sky
-FRICTION_SCALE = 7  # of dry friction
-STATED = 8
-EXTINCTION = 8  # 1/m, of contrast
-ATTENUATION = 9  # 1/m, of a LiDAR's beam, one way
-BACKGROUND = 10  # cd/m², luminance of what is behind a target
-GLARE = 11  # lx, of the sun at the lens
-GLASS = 12  # share of contrast that wet glass leaves
-FRICTION = 13  # m/s², what the tyres can give: μ·g
-SUN_X, SUN_Y = 14, 15  # horizontal components of the direction to the sun
-SIGHT = 16  # the table of sight, 0 here until it is asked for
-N_THINGS, N_GLARES = 3, 7  # of the table: what is looked for, and how far off the sun
-WEATHER = SIGHT + N_THINGS * N_GLARES
+from bridgegen.ego._weather_columns import (
+    ATTENUATION,
+    BACKGROUND,
+    CLOUD,
+    EXTINCTION,
+    FRICTION,
+    FRICTION_SCALE,
+    GLARE,
+    GLASS,
+    ILLUMINANCE,
+    RAIN,
+    SIGHT,
+    SNOW,
+    STATED,
+    SUN_AZIMUTH,
+    SUN_ELEVATION,
+    SUN_X,
+    SUN_Y,
+    VISUAL_RANGE,
+)
 
 CLEAR_DAY = (10_000.0, 0.0, 0.0, math.pi, math.radians(45.0), -1.0, 0.0, 1.0)
 """What is stated where a file states nothing: WMO's clear air, the sun in the south at 45°."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.ego import _weather_columns as column
 from bridgegen.ego.kinds import CAR, PEDESTRIAN
 from bridgegen.errors import InputError
 
@@ -47,17 +48,17 @@ class Sky:
                 raise InputError(f"{low:g} <= {name} <= {high:g} [{unit}] must hold, got {value}")
 
     def numbers(self) -> Float:
-        """Return what sensors feel of it, ``(WEATHER,)``; see ``_weather_kernels``."""
-        from bridgegen.ego import _weather_kernels as column
+        """Return what sensors feel of it, ``(WEATHER,)``; see ``_weather_columns``."""
+        from bridgegen.ego._weather_kernels import derive, set_clear
 
         weather = np.zeros(column.WEATHER)
-        column.set_clear(weather)
+        set_clear(weather)
         weather[column.VISUAL_RANGE] = self.visual_range
         weather[column.RAIN], weather[column.SNOW] = self.rain, self.snow
         weather[column.SUN_AZIMUTH] = 0.0
         weather[column.SUN_ELEVATION] = math.radians(self.sun_altitude)
         weather[column.CLOUD] = self.cloud
-        column.derive(weather)
+        derive(weather)
         return weather
 
 
@@ -85,7 +86,6 @@ def detection_range(sky: Sky, kind: int) -> DetectionRange:
     """
     from bridgegen.ego import _camera_kernels as camera
     from bridgegen.ego import _lidar_kernels as lidar
-    from bridgegen.ego import _weather_kernels as column
     from bridgegen.ego._physics_kernels import LAMPS, REFLECTANCE, veil
 
     weather = sky.numbers()

@@ -6,7 +6,7 @@ from bridgegen.ego._path_kernels import project
 from bridgegen.ego._reference_kernels import drive, plan_speed
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
 from bridgegen.ego._un_r157_kernels import drive_un_r157
-from bridgegen.ego._weather_kernels import FRICTION
+from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle
 
 

@@ -7,6 +7,17 @@ import math
 import re
 
 from bridgegen.arrays import Int
+from bridgegen.ego._weather_columns import (
+    CLOUD,
+    FRICTION_SCALE,
+    ILLUMINANCE,
+    RAIN,
+    SNOW,
+    STATED,
+    SUN_AZIMUTH,
+    SUN_ELEVATION,
+    VISUAL_RANGE,
+)
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.tables import Tables, table
@@ -18,9 +29,6 @@ _CLOUDS = {
     osc.CloudState.FREE: 0.0, osc.CloudState.CLOUDY: 0.5,
     osc.CloudState.OVERCAST: 1.0, osc.CloudState.RAINY: 1.0,
 }  # fmt: skip
-# Columns of a row: those of ``_weather_kernels``, which must not be imported to compile a file.
-VISUAL_RANGE, RAIN, SNOW, SUN_AZIMUTH, SUN_ELEVATION, ILLUMINANCE, CLOUD, FRICTION_SCALE = range(8)
-STATED = 8
 _UNSAID = -1
 _TIME = re.compile(r"T(\d\d):(\d\d):(\d\d)")
 
@@ -38,7 +46,7 @@ class Environments:
 
     @property
     def rows(self) -> Int:
-        """``(V, STATED)``, see above."""
+        """``(V, STATED)``, see ``bridgegen.ego._weather_columns``."""
         return table([tuple(row) for row in self._rows], STATED)
 
     def begin_with(self, environment: osc.Environment) -> None:
