@@ -187,7 +187,6 @@ def write_ours(folder: Path) -> None:
     from bridgegen.odd.reader import load, names
     from bridgegen.ontology.files import save
     from bridgegen.openx.opendrive.write import to_xml as road_xml
-    from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
     from bridgegen.openx.openscenario.write import to_xml as scenario_xml
     from bridgegen.pipeline import Pipeline
 
@@ -195,11 +194,11 @@ def write_ours(folder: Path) -> None:
         scenario = load(name)
         space = scenario.space()
         pipeline = Pipeline(scenario, space)
-        individuals = pipeline.individuals(space.values(space.row({})))
-        storyboard = openscenario_from_owl(individuals, f"{name}.xodr")
-        save(individuals, folder / f"{name}.owl")
-        (folder / f"{name}.xodr").write_bytes(road_xml(pipeline.roads(individuals)))
-        (folder / f"{name}.xosc").write_bytes(scenario_xml(storyboard))
+        concrete = pipeline.concrete(space.row({}), f"{name}.xodr")
+        assert concrete.individuals is not None
+        save(concrete.individuals, folder / f"{name}.owl")
+        (folder / f"{name}.xodr").write_bytes(road_xml(concrete.roads))
+        (folder / f"{name}.xosc").write_bytes(scenario_xml(concrete.storyboard))
         text = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_bytes()
         (folder / f"{name}.yaml").write_bytes(text)
 
