@@ -38,3 +38,21 @@ def test_a_car_close_by_on_a_clear_day_is_tracked_where_it_is():
     assert math.isfinite(detections[1:].sum())
     assert (detections[1, 1::2, SEEN_BY] == NO_FRAME).all()
     assert (detections[1, 1::2, Y] == 0.0).all()
+
+
+@pytest.mark.parametrize("size", [(4.5, 1.8, 0.0), (0.0, 0.0, 0.0), (4.5, 0.0, 1.5)])
+def test_bodies_without_extent_break_nothing(size):
+    """Files in circulation have boxes of no height, the ego's own included."""
+    scene = Scene((0, 0, 0.0, 8, CAR), (30, 0, 0.0, 6, CAR), (50, 0, 0.0, 6, CAR))
+    scene.bodies[:, [0, 1, 7]] = size
+    for numbers in (weather(), weather(visual_range=0.0), weather(rain=1e6, snow=1e6)):
+        detections, tracks = scene.perceive(numbers)
+        assert np.isfinite(detections).all()
+        assert np.isfinite(tracks).all()
+
+
+def test_bodies_at_the_same_place_break_nothing():
+    scene = Scene((0, 0, 0.0, 8, CAR), (0, 0, 0.0, 8, CAR), (0, 0, 1.0, 8, PEDESTRIAN))
+    detections, tracks = scene.perceive(weather())
+    assert np.isfinite(detections).all()
+    assert np.isfinite(tracks).all()

@@ -20,7 +20,14 @@ from bridgegen.ego._occlusion_kernels import (
     span,
     visible_share,
 )
-from bridgegen.ego._physics_kernels import CULL, DROPOUT_TIME, ERROR_TIME, FRAME, MOUNT
+from bridgegen.ego._physics_kernels import (
+    CULL,
+    DROPOUT_TIME,
+    ERROR_TIME,
+    FRAME,
+    LEAST_HEIGHT,
+    MOUNT,
+)
 from bridgegen.ego._sensor_kernels import DRAWN, MEMORY, draw, observe
 from bridgegen.ego.detections import (
     BOTH,
@@ -114,7 +121,7 @@ def look(k, dt, frame, key, x, y, h, bodies, kinds, weather, memory, tracks, det
     renew, keep = 1.0 - math.exp(-elapsed / DROPOUT_TIME), math.exp(-elapsed / ERROR_TIME)
     near = place(k, x, y, h, bodies, memory)
     heading = math.cos(h[0, k]), math.sin(h[0, k])
-    height = MOUNT * bodies[0, 7]
+    height = max(MOUNT * bodies[0, 7], LEAST_HEIGHT)
     sx = x[0, k] + bodies[0, 2] * heading[0]
     sy = y[0, k] + bodies[0, 2] * heading[1]
     for e in range(1, x.shape[0]):

@@ -59,7 +59,8 @@ LIDAR_FLOOR = 0.05  # m, of position: the box's fit
 BEAM_ANGLE = 0.0035  # rad, 0.2°
 
 # Both.
-MOUNT = 0.95  # of the ego's height: where the sensors look from
+MOUNT = 0.95  # of the ego's height: where the sensors look from …
+LEAST_HEIGHT = 0.5  # m, … at least
 BEST = 0.99  # of frames, recall close by in clear air; ours, after what detectors reach
 CULL = 250.0  # m, beyond which nobody looks
 FRAME = 0.1  # s, between two frames
