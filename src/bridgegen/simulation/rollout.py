@@ -52,8 +52,8 @@ class Rollout:
         lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
         event_names: of the V events of the storyboard, in the order of the file.
         began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
-        present: ``(N, E, T)`` bool, who is there at which instant; where somebody is not, the states
-            are finite but meaningless. ``(0, 0, 0)`` where everybody always is.
+        present: ``(N, E, T)`` bool, who is there at which instant; where somebody is not, the
+            states are finite but meaningless. ``(0, 0, 0)`` where everybody always is.
         kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
             nobody says.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
