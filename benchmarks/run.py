@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from perception import perception
 
 from bridgegen.campaign.handover import write_scenario
 from bridgegen.odd.reader import load
@@ -64,6 +65,14 @@ def hot_paths() -> list[Row]:
             f"{rate('route-follower', ['static', 'participants', 'weather'], 400):,.0f}",
             "≥ 200",
         ),
+    ]
+
+
+def senses() -> list[Row]:
+    """Time perception and tracking alone, on one core."""
+    return [
+        ("perception of 1 body for 20 s, µs", f"{1e6 * perception(1, 100):.0f}", "≤ 150"),
+        ("perception of 30 bodies for 20 s, µs", f"{1e6 * perception(30, 5):.0f}", "≤ 6,000"),
     ]
 
 
@@ -170,7 +179,7 @@ def town() -> list[Row]:
 
 def main() -> None:
     rows: list[Row] = []
-    for part in (hot_paths, decoder, algorithms, files, town, processes):
+    for part in (hot_paths, senses, decoder, algorithms, files, town, processes):
         rows += part()
     load1 = os.getloadavg()[0]
     print(f"{os.cpu_count()} cores, load {load1:.1f}, Python {sys.version.split()[0]}")
