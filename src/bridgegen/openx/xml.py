@@ -1,5 +1,6 @@
 """Reading XML from strangers: no entities, no DTD, no network, bounded size and depth."""
 
+import stat
 from pathlib import Path
 
 from lxml import etree
@@ -43,16 +44,25 @@ def read_bytes(path: Path, place: str | None = None, limit: int = MAX_BYTES) -> 
     """Return a file's bytes, or one clear error.
 
     Raises:
-        FileFormatError: missing, a folder, not readable, or larger than ``limit`` bytes.
+        FileFormatError: missing, no regular file (a folder, a device, a pipe), not readable, or
+            larger than ``limit`` bytes.
     """
     place = place or str(path)
     try:
-        size = path.stat().st_size
-        if size > limit:
-            raise FileFormatError(f"{place}: may have at most {limit} bytes, got {size}")
-        return path.read_bytes()
-    except OSError as error:
-        raise FileFormatError(f"{place}: cannot be read: {error.strerror}") from None
+        about = path.stat()
+        if not stat.S_ISREG(about.st_mode):
+            what = "is a folder" if stat.S_ISDIR(about.st_mode) else "is no regular file"
+            raise FileFormatError(f"{place}: cannot be read: {what}")
+        if about.st_size > limit:
+            raise FileFormatError(f"{place}: may have at most {limit} bytes, got {about.st_size}")
+        with path.open("rb") as file:
+            data = file.read(limit + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileFormatError(f"{place}: cannot be read: {reason}") from None
+    if len(data) > limit:  # it has grown, or is one of the system's that say 0
+        raise FileFormatError(f"{place}: may have at most {limit} bytes, got more")
+    return data
 
 
 def _check_depth(root: etree._Element, place: str) -> None:

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import FileFormatError, InputError, UnsupportedError
-from bridgegen.openx.openscenario.read import MAX_PROBLEMS, read
+from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.openscenario.reader import MAX_PROBLEMS
 
 
 def line_of(data: bytes, text: bytes) -> int:

@@ -11,7 +11,8 @@ from lxml import etree
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, declaration, walk
-from bridgegen.openx.openscenario.read import Reader, read, verbatim
+from bridgegen.openx.openscenario.read import read, verbatim
+from bridgegen.openx.openscenario.reader import Reader
 from bridgegen.openx.openscenario.values import Kind
 from bridgegen.openx.openscenario.write import _fill, to_xml
 
@@ -65,7 +66,8 @@ def _values(attribute):
     options = [literals, st.just(osc.ParameterRef(reference))]
     if attribute.enum is not None:
         return st.one_of(options)
-    if attribute.kind not in (Kind.STRING, Kind.DATE_TIME):
+    if attribute.takes_expressions:
+        options[0] = literals.filter(lambda value: not str(value).startswith("${"))
         options.append(_EXPRESSIONS.map(osc.Expr))
     return st.one_of(options)
 

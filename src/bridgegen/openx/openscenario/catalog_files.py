@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from bridgegen.openx.openscenario.element import PARAMETER, Element, OrInFiles, Tag
-from bridgegen.openx.openscenario.values import LiteralString, String
+from bridgegen.openx.openscenario.values import AnyValue, LiteralString, String
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class ParameterAssignment(Element):
     """The value that a catalogue's entry gets for one of its parameters."""
 
     parameter_ref: Annotated[LiteralString, PARAMETER]
-    value: String
+    value: AnyValue
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import TEXT, AtLeast, Element, Tag
+from bridgegen.openx.openscenario.element import NAME, RAW, TEXT, AtLeast, Element, Tag
 from bridgegen.openx.openscenario.enumerations import ParameterType, Rule
 from bridgegen.openx.openscenario.values import (
+    AnyValue,
     Boolean,
     DateTime,
     LiteralString,
@@ -101,11 +102,14 @@ class ValueConstraintGroup(Element):
 
 @dataclass(frozen=True)
 class ParameterDeclaration(Element):
-    """A parameter with its value; of its constraint groups one must hold."""
+    """A parameter with its value; of its constraint groups one must hold.
 
-    name: LiteralString
+    In a file the value may refer to other parameters; in a scenario that was read it does not.
+    """
+
+    name: Annotated[LiteralString, NAME]
     parameter_type: ParameterType
-    value: LiteralString
+    value: Annotated[LiteralString, RAW]
     constraint_groups: Annotated[tuple[ValueConstraintGroup, ...], Tag("ConstraintGroup")] = ()
 
 
@@ -120,9 +124,9 @@ class ParameterDeclarations(Element):
 class VariableDeclaration(Element):
     """A variable, which actions set, and its first value."""
 
-    name: LiteralString
+    name: Annotated[LiteralString, NAME]
     variable_type: ParameterType
-    value: String
+    value: AnyValue
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,7 @@ class VariableDeclarations(Element):
 class MonitorDeclaration(Element):
     """A monitor, which actions set, and its first value."""
 
-    name: LiteralString
+    name: Annotated[LiteralString, NAME]
     value: Boolean
 
 

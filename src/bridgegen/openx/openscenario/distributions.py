@@ -6,7 +6,7 @@ Source: ASAM OpenSCENARIO XML 1.1 to 1.3, ``ParameterValueDistribution``.
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated
 
 from bridgegen.errors import FileFormatError, InputError, UnsupportedError
 from bridgegen.odd.distributions import (
@@ -20,7 +20,8 @@ from bridgegen.odd.distributions import Histogram as Bins
 from bridgegen.openx.openscenario.catalog_files import ParameterAssignment
 from bridgegen.openx.openscenario.declarations import File, FileHeader
 from bridgegen.openx.openscenario.element import AtLeast, Element, Tag
-from bridgegen.openx.openscenario.read import DISTRIBUTION, Reader
+from bridgegen.openx.openscenario.read import DISTRIBUTION
+from bridgegen.openx.openscenario.reader import element_of
 from bridgegen.openx.openscenario.values import Kind, LiteralString, parse_literal
 from bridgegen.openx.xml import parse_xml
 
@@ -229,9 +230,7 @@ def read_distribution(path: Path) -> ParameterValueDistribution:
             f"{path}: a file with a distribution must hold a {DISTRIBUTION} in OpenSCENARIO, and "
             "does not"
         )
-    reader = Reader()
-    made = cast(DistributionFile, reader.element(DistributionFile, root))
-    reader.raise_problems(str(path))
+    made = element_of(DistributionFile, root, str(path))
     header = made.file_header
     version = f"{header.rev_major}.{header.rev_minor}"
     if version not in VERSIONS:

@@ -81,6 +81,8 @@ class Meaning(StrEnum):
     TEXT = "the element's text"
     ENTITY = "the name of an entity"
     ROAD = "the id of a road"
+    RAW = "as it stands, even where it begins with $"
+    NAME = "the name of what it declares, with or without $"
     PARAMETER = "the name of a parameter, with or without $"
     VARIABLE = "the name of a variable, with or without $"
     MONITOR = "the name of a monitor, with or without $"
@@ -88,9 +90,10 @@ class Meaning(StrEnum):
 
 
 TEXT, ENTITY, ROAD = Meaning.TEXT, Meaning.ENTITY, Meaning.ROAD
+NAME = Meaning.NAME
 PARAMETER, VARIABLE, MONITOR = Meaning.PARAMETER, Meaning.VARIABLE, Meaning.MONITOR
-BARE = Meaning.BARE
-_DECLARED_NAMES = (PARAMETER, VARIABLE, MONITOR)
+RAW, BARE = Meaning.RAW, Meaning.BARE
+_DECLARED_NAMES = (NAME, PARAMETER, VARIABLE, MONITOR)
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,7 @@ class Attribute:
         enum: the enumeration, if it is one.
         required: whether the element must have it.
         is_literal: whether it takes no reference to a parameter.
+        takes_expressions: whether it takes ``${…}``.
         limits: the standard's range, if it gives one.
         means: what it names, if anything.
     """
@@ -114,6 +118,7 @@ class Attribute:
     enum: type[StrEnum] | None
     required: bool
     is_literal: bool
+    takes_expressions: bool
     limits: Range | None
     means: Meaning | None
 
@@ -211,6 +216,7 @@ def _declare(cls: type[Element]) -> Declaration:
                 field=item.name, name=name, kind=kinds[0] if kinds else Kind.STRING,
                 enum=enums[0] if enums else None, required=required,
                 is_literal=ParameterRef not in options,
+                takes_expressions=Expr in options,
                 limits=limits[0] if limits else None,
                 means=next((mark for mark in marks if isinstance(mark, Meaning)), None),
             )  # fmt: skip

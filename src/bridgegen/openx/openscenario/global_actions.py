@@ -15,7 +15,7 @@ from bridgegen.openx.openscenario.element import (
 from bridgegen.openx.openscenario.environment import Environment
 from bridgegen.openx.openscenario.positions import Position
 from bridgegen.openx.openscenario.traffic import TrafficAction
-from bridgegen.openx.openscenario.values import Boolean, Double, LiteralString, String
+from bridgegen.openx.openscenario.values import AnyValue, Boolean, Double, LiteralString, String
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class EntityAction(Element):
 class ParameterSetAction(Element):
     """A parameter gets a value, which conditions on it see."""
 
-    value: String
+    value: AnyValue
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class ParameterAction(Element):
 class VariableSetAction(Element):
     """A variable gets a value."""
 
-    value: String
+    value: AnyValue
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,25 @@
 
 Source: ASAM OpenSCENARIO XML 1.2, section 9.1. The standard does not say which types may stand
 for which; ours: a number for a number (not a double for a whole one), a boolean for a boolean,
-anything for a text, a text for an enumeration or a date if its value is one.
+anything for a text, a text for an enumeration or a date if its value is one. In a file a text may
+also stand for a number or a boolean if its value is one (see ``scopes``); it is no parameter then.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
 from bridgegen.errors import FileFormatError
 from bridgegen.odd.parameters import slack
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
-from bridgegen.openx.openscenario.element import Attribute, values_of, walk
+from bridgegen.openx.openscenario.element import (
+    Attribute,
+    Element,
+    Meaning,
+    values_of,
+    walk,
+)
 from bridgegen.openx.openscenario.enumerations import ParameterType, Rule
 from bridgegen.openx.openscenario.storyboard import OpenScenario
 from bridgegen.openx.openscenario.values import Expr, Kind, Literal, ParameterRef, parse_literal
@@ -62,15 +69,14 @@ def numbers(scenario: OpenScenario) -> dict[str, float]:
 def problems(scenario: OpenScenario) -> list[str]:
     """Return what is wrong with the parameters, one sentence each, with the line."""
     found: list[tuple[int, str]] = []
+    first: dict[str, ParameterDeclaration] = {}
     declared: dict[str, tuple[Kind, Literal]] = {}
     for one in _declarations(scenario):
         name = one.name
-        if not _NAME.fullmatch(name):
-            found.append((one.line, f"a parameter's name must be an identifier, got '{name}'"))
+        if problem := name_problem(name) or clash(one, first.get(name)):
+            found.append((one.line, problem))
             continue
-        if name in declared:
-            found.append((one.line, f"parameter {name} is declared twice"))
-            continue
+        first[name] = one
         kind = kind_of(one.parameter_type)
         try:
             value = value_of(one)
@@ -80,12 +86,39 @@ def problems(scenario: OpenScenario) -> list[str]:
         else:
             found += [(one.line, f"parameter {name} {text}") for text in broken(one, value)]
         declared[name] = kind, value
+    known = {
+        Meaning.PARAMETER: declared.keys(),
+        Meaning.VARIABLE: _names(scenario.variable_declarations, "variables"),
+        Meaning.MONITOR: _names(scenario.monitor_declarations, "monitors"),
+    }
     for element in walk(scenario):
         for attribute, value in values_of(element):
-            for text in _misfits(attribute, value, declared):
+            if attribute.means in known and value not in known[attribute.means]:
+                what = f"must name a declared {attribute.means.name.lower()}, got '{value}'"
+                tag = type(element).__name__
+                found.append((element.line, f"{attribute.name} of {tag} {what}"))
+            for text in misfits(attribute, value, declared):
                 tag = type(element).__name__
                 found.append((element.line, f"{attribute.name} of {tag} {text}"))
     return [f"{text} (line {line})" for line, text in sorted(found, key=lambda item: item[0])]
+
+
+def _names(declarations: Element | None, field: str) -> Set[str]:
+    return {one.name for one in getattr(declarations, field, ())}
+
+
+def name_problem(name: str) -> str | None:
+    """Return what is wrong with the name of a declared parameter, if anything is."""
+    if _NAME.fullmatch(name):
+        return None
+    return f"a parameter's name must be an identifier, got '{name}'"
+
+
+def clash(one: ParameterDeclaration, other: ParameterDeclaration | None) -> str | None:
+    """Return what is wrong with declaring a parameter twice; saying the same again is not."""
+    if other is None or (one.parameter_type, one.value) == (other.parameter_type, other.value):
+        return None
+    return f"parameter {one.name} is declared twice, as {other.value} and as {one.value}"
 
 
 def _declarations(scenario: OpenScenario) -> tuple[ParameterDeclaration, ...]:
@@ -93,10 +126,21 @@ def _declarations(scenario: OpenScenario) -> tuple[ParameterDeclaration, ...]:
     return () if declarations is None else declarations.parameters
 
 
-def _misfits(
-    attribute: Attribute, value: Any, declared: Mapping[str, tuple[Kind, Literal]]
+def misfits(
+    attribute: Attribute,
+    value: Any,
+    declared: Mapping[str, tuple[Kind, Literal]],
+    *,
+    texts: bool = False,
 ) -> Iterator[str]:
-    """Yield why the references of one attribute do not fit."""
+    """Yield why the references of one attribute do not fit.
+
+    Args:
+        attribute: what takes them.
+        value: as in the file.
+        declared: parameters with their types and values.
+        texts: whether a text may stand for all that it reads as.
+    """
     if not isinstance(value, ParameterRef | Expr):
         return
     for name in sorted(value.names):
@@ -105,7 +149,7 @@ def _misfits(
             continue
         kind, current = declared[name]
         if isinstance(value, Expr):
-            if not kind.is_number:
+            if not kind.is_number and not (texts and _reads_as(Kind.DOUBLE, kind, current)):
                 yield f"computes with ${name}, which is a {kind.value}"
         elif attribute.enum is not None:
             if kind is not Kind.STRING:
@@ -113,7 +157,9 @@ def _misfits(
             elif current not in list(attribute.enum):
                 known = ", ".join(attribute.enum)
                 yield f"must be one of {known}, got ${name} = '{current}'"
-        elif not _fits(attribute.kind, kind, current):
+        elif not _fits(attribute.kind, kind, current) and not (
+            texts and _reads_as(attribute.kind, kind, current)
+        ):
             yield f"must be of type {attribute.kind.value}, ${name} is a {kind.value}"
 
 
@@ -121,22 +167,29 @@ def _fits(want: Kind, have: Kind, value: Literal) -> bool:
     if want is Kind.STRING or want is have:
         return True
     if want is Kind.DATE_TIME and have is Kind.STRING:
-        try:
-            parse_literal(want, str(value))
-        except FileFormatError:
-            return False
-        return True
+        return _reads_as(want, have, value)
     return have.is_integer if want.is_integer else want.is_number and have.is_number
+
+
+def _reads_as(want: Kind, have: Kind, value: Literal) -> bool:
+    """Say whether a text reads as a value of another type."""
+    if have is not Kind.STRING:
+        return False
+    try:
+        parse_literal(want, str(value))
+    except FileFormatError:
+        return False
+    return True
 
 
 def broken(declaration: ParameterDeclaration, value: Literal) -> list[str]:
     """Return why a value breaks its constraints: none of the groups holds."""
     reasons: list[str] = []
     for group in declaration.constraint_groups:
-        broken = [text for one in group.constraints for text in _violates(declaration, one, value)]
-        if not broken:
+        found = [text for one in group.constraints for text in _violates(declaration, one, value)]
+        if not found:
             return []
-        reasons += broken
+        reasons += found
     return reasons
 
 

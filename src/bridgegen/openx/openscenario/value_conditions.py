@@ -10,6 +10,7 @@ from bridgegen.openx.openscenario.enumerations import (
     StoryboardElementType,
 )
 from bridgegen.openx.openscenario.values import (
+    AnyValue,
     DateTime,
     Double,
     LiteralString,
@@ -23,7 +24,7 @@ class ParameterCondition(Element):
     """Compares a parameter with a value of its type."""
 
     parameter_ref: Annotated[LiteralString, PARAMETER]
-    value: String
+    value: AnyValue
     rule: Rule | ParameterRef
 
 
@@ -32,7 +33,7 @@ class VariableCondition(Element):
     """Compares a variable with a value of its type."""
 
     variable_ref: Annotated[LiteralString, VARIABLE]
-    value: String
+    value: AnyValue
     rule: Rule | ParameterRef
 
 

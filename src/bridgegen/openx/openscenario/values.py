@@ -147,6 +147,7 @@ class Expr:
         return self.text
 
 
+AnyValue = Annotated[str | ParameterRef | Expr, Kind.STRING]
 Boolean = Annotated[bool | ParameterRef | Expr, Kind.BOOLEAN]
 DateTime = Annotated[str | ParameterRef, Kind.DATE_TIME]
 Double = Annotated[float | ParameterRef | Expr, Kind.DOUBLE]
@@ -224,15 +225,22 @@ def _checked_date(text: str) -> str:
     return text
 
 
-def parse_value(kind: Kind, text: str) -> Value:
+def parse_value(kind: Kind, text: str, *, expressions: bool | None = None) -> Value:
     """Return an attribute's value: a literal, a ``$name`` or a ``${…}``.
+
+    Args:
+        kind: its data type.
+        text: as in the file.
+        expressions: whether it may be an expression; by default, whether its type may.
 
     Raises:
         FileFormatError: malformed, or an expression where the standard has none.
     """
     if _REFERENCE.fullmatch(text):
         return ParameterRef(text)
-    if text.startswith("${") and kind not in (Kind.STRING, Kind.DATE_TIME):
+    if expressions is None:
+        expressions = kind not in (Kind.STRING, Kind.DATE_TIME)
+    if expressions and text.startswith("${"):
         expression = Expr(text)
         _compile(text)
         return expression

@@ -1,8 +1,17 @@
 """From the model to an OpenSCENARIO file, driven by the model's declaration."""
 
+from typing import Any
+
 from lxml import etree
 
-from bridgegen.openx.openscenario.element import Element, children_of, declaration, values_of
+from bridgegen.openx.openscenario.element import (
+    RAW,
+    Attribute,
+    Element,
+    children_of,
+    declaration,
+    values_of,
+)
 from bridgegen.openx.openscenario.storyboard import OpenScenario
 from bridgegen.openx.openscenario.values import ParameterRef, format_value
 
@@ -21,13 +30,22 @@ def to_xml(scenario: OpenScenario) -> bytes:
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
 
+def _text(attribute: Attribute, value: Any) -> str:
+    if attribute.means is RAW and isinstance(value, str):
+        return value
+    if attribute.enum is not None and not isinstance(value, ParameterRef):
+        value = attribute.enum(value).value
+    text = format_value(attribute.kind, value)
+    if attribute.takes_expressions and isinstance(value, str) and text.startswith("${"):
+        raise ValueError(f"the text '{text}' would be read as an expression")
+    return text
+
+
 def _fill(node: etree._Element, tag: str, element: Element) -> None:
     declared = declaration(type(element))
     try:
         for attribute, value in values_of(element):
-            if attribute.enum is not None and not isinstance(value, ParameterRef):
-                value = attribute.enum(value).value
-            node.set(attribute.name, format_value(attribute.kind, value))
+            node.set(attribute.name, _text(attribute, value))
         if declared.text is not None:
             node.text = getattr(element, declared.text)
     except (TypeError, ValueError) as error:

@@ -1,0 +1,254 @@
+"""From a scenario file that refers elsewhere to a scenario that stands by itself.
+
+All of it happens in this one place, when a file is read, so that whoever has a scenario meets
+
+- no ``CatalogReference``: the entry stands there, with the parameters that it was given;
+- no parameters but the scenario's own, declared with a literal; all others are what they stand for
+  (see ``scopes``), but where an action or a condition names one it is made one of the scenario's;
+- no ``EntitySelection``: its members stand wherever there may be several entities.
+
+Elements that come from a catalogue say so in their lines (`catalogs.CatalogLine`).
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.openx.openscenario.catalog_files import CatalogLocations, CatalogReference
+from bridgegen.openx.openscenario.catalogs import Catalogs, NoEntryError
+from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ParameterDeclarations
+from bridgegen.openx.openscenario.element import (
+    PARAMETER,
+    Child,
+    Element,
+    declaration,
+    values_of,
+    walk,
+)
+from bridgegen.openx.openscenario.reader import shorten
+from bridgegen.openx.openscenario.scopes import Binding, Scope, is_made, reads_as_number
+from bridgegen.openx.openscenario.selections import without_selections
+from bridgegen.openx.openscenario.storyboard import OpenScenario
+from bridgegen.openx.openscenario.values import Value
+from bridgegen.openx.xml import MAX_DEPTH
+
+MAX_ELEMENTS = 200_000
+"""Elements from catalogues, counted wherever they are put."""
+
+_DECLARED = "parameter_declarations"
+
+E = TypeVar("E", bound=Element)
+
+
+def expanded(
+    file: OpenScenario, folder: Path | None, place: str, skipped: list[str] | None = None
+) -> OpenScenario:
+    """Return a scenario that stands by itself.
+
+    Args:
+        file: as `bridgegen.openx.openscenario.read.verbatim` returns it.
+        folder: of the file, from which its catalogues' paths count; None if it has none.
+        place: what to call it in messages.
+        skipped: as of `bridgegen.openx.openscenario.read.read`.
+
+    Raises:
+        FileFormatError: parameters that are malformed or do not fit; catalogues or entries that
+            are not there, or that go round in circles; all of it at once.
+        UnsupportedError: an entry holds what this version does not know.
+    """
+    if not any(map(_refers, walk(file))):
+        return without_selections(file)
+    return without_selections(_Expander(file, folder, place, skipped).result())
+
+
+def _refers(element: Element) -> bool:
+    """Say whether an element makes a file one that does not stand by itself."""
+    if isinstance(element, ParameterDeclaration):
+        return is_made(element) or reads_as_number(element)
+    if getattr(element, _DECLARED, None) is not None:
+        return not isinstance(element, OpenScenario)
+    return isinstance(element, CatalogReference)
+
+
+class _Expander:
+    """Goes down a file with the parameters in scope."""
+
+    def __init__(
+        self, file: OpenScenario, folder: Path | None, place: str, skipped: list[str] | None
+    ) -> None:
+        self._file, self._place = file, place
+        self._problems: list[tuple[int, str]] = []
+        self._elsewhere: list[str] = []
+        self._unsupported: list[str] = []
+        declared = file.parameter_declarations
+        self._declared = () if declared is None else declared.parameters
+        self._skipped = skipped
+        self._scope = Scope.of_scenario(self._declared, self)
+        self._named: dict[int, tuple[Binding, ParameterDeclaration]] = {}
+        self._open: list[Element] = []
+        self._elements = 0
+        self._catalogs = None if folder is None else self._of(folder, skipped)
+
+    def _of(self, folder: Path, skipped: list[str] | None) -> Catalogs:
+        """Return the catalogues by the scenario's own parameters."""
+        locations = self._element(self._file.catalog_locations, self._scope, 0)
+        return Catalogs(locations, folder, skipped)
+
+    def wrong(self, element: Element, text: str) -> None:
+        """Note what is wrong at an element."""
+        self._problems.append((element.line, text))
+
+    def doubtful(self, element: Element, text: str) -> None:
+        """Note what is wrong and can be made sense of, if that is wanted."""
+        if self._skipped is None:
+            self.wrong(element, text)
+        elif (said := f"{self._place}: {text} (line {element.line})") not in self._skipped:
+            self._skipped.append(said)
+
+    def result(self) -> OpenScenario:
+        """Return the scenario, or raise all problems."""
+        made = self._element(replace(self._file, parameter_declarations=None), self._scope, 0)
+        if self._problems or self._elsewhere:
+            problems = sorted(dict.fromkeys(self._problems), key=lambda one: int(one[0]))
+            texts = [f"{self._place}: {text} (line {line})" for line, text in problems]
+            raise FileFormatError(*shorten([*texts, *dict.fromkeys(self._elsewhere)]))
+        if self._unsupported:
+            raise UnsupportedError(*shorten(list(dict.fromkeys(self._unsupported))))
+        literal = [one for one in self._declared if one.name in self._scope.own]
+        declarations = (*literal, *(one for _, one in self._named.values()))
+        return replace(
+            made,
+            parameter_declarations=ParameterDeclarations(declarations) if declarations else None,
+            catalog_locations=CatalogLocations(),
+        )
+
+    def _element(
+        self, element: E, scope: Scope, depth: int, assigned: dict[str, Value] | None = None
+    ) -> E:
+        """Return an element in which nothing refers to anything but the scenario's parameters."""
+        if self._open:
+            self._elements += 1
+        changes: dict[str, Any] = {}
+        declared = getattr(element, _DECLARED, None)
+        if declared is not None:
+            scope = scope.inner(declared.parameters, self, assigned)
+            changes[_DECLARED] = None
+        for attribute, value in values_of(element):
+            try:
+                made = scope.value(attribute, value)
+            except FileFormatError as error:
+                what = f"{attribute.name} of {type(element).__name__}"
+                self.wrong(element, f"{what} {error}")
+                continue
+            if attribute.means is PARAMETER and value in scope.names:
+                made = self._name(scope.names[value])
+            if made is not value:
+                changes[attribute.field] = made
+        for child in declaration(type(element)).children:
+            held = getattr(element, child.field)
+            if child.field == _DECLARED or held is None:
+                continue
+            if child.many:
+                new = tuple(self._child(one, child, scope, depth + 1) for one in held)
+                if any(a is not b for a, b in zip(new, held, strict=True)):
+                    changes[child.field] = new
+            elif (one := self._child(held, child, scope, depth + 1)) is not held:
+                changes[child.field] = one
+        return replace(element, **changes) if changes else element
+
+    def _child(self, element: Element, child: Child, scope: Scope, depth: int) -> Element:
+        if not isinstance(element, CatalogReference):
+            return self._element(element, scope, depth)
+        try:
+            return self._entry(element, child, scope, depth)
+        except UnsupportedError as error:
+            self._unsupported += error.problems
+        except NoEntryError as error:
+            for problem in error.problems:
+                self.wrong(element, problem)
+        except FileFormatError as error:
+            self._elsewhere += error.problems
+        return element
+
+    def _entry(
+        self, reference: CatalogReference, child: Child, scope: Scope, depth: int
+    ) -> Element:
+        """Return an entry of a catalogue with the parameters that it is given.
+
+        Raises:
+            NoEntryError: it is not there, it holds itself, or too much is.
+        FileFormatError: a catalogue's file is malformed.
+            UnsupportedError: it holds what this version does not know.
+        """
+        if self._catalogs is None:
+            raise UnsupportedError(
+                f"{self._place}: a CatalogReference in a document that has no path is not "
+                f"supported (line {reference.line})"
+            )
+        attributes = declaration(CatalogReference).attributes
+        try:
+            catalog = scope.text(attributes["catalogName"], reference.catalog_name)
+            name = scope.text(attributes["entryName"], reference.entry_name)
+            assigned = self._assigned(reference, scope)
+        except FileFormatError as error:
+            raise NoEntryError(*(f"CatalogReference {one}" for one in error.problems)) from None
+        entry = self._catalogs.entry(catalog, name, child.tags)
+        if any(entry is one for one in self._open):
+            raise NoEntryError(f"catalogue '{catalog}': the entry '{name}' holds itself")
+        if depth + _height(entry) > MAX_DEPTH:
+            raise NoEntryError(
+                f"catalogue '{catalog}': with the entry '{name}' elements nest more than "
+                f"{MAX_DEPTH} deep"
+            )
+        if self._elements > MAX_ELEMENTS:
+            raise NoEntryError(
+                f"catalogue '{catalog}': entries may add {MAX_ELEMENTS} elements, there are more"
+            )
+        declared = getattr(entry, _DECLARED, None)
+        known = {one.name for one in declared.parameters} if declared is not None else set()
+        for unknown in sorted(assigned.keys() - known):
+            self.doubtful(
+                reference,
+                f"catalogue '{catalog}': the entry '{name}' has no parameter '{unknown}'",
+            )
+        self._open.append(entry)
+        try:
+            return self._element(entry, scope, depth, assigned)
+        finally:
+            self._open.pop()
+
+    def _assigned(self, reference: CatalogReference, scope: Scope) -> dict[str, Value]:
+        """Return the values that an entry gets, by the scenario's own parameters."""
+        given = reference.parameter_assignments
+        return {
+            one.parameter_ref: scope.value(attribute, value)
+            for one in (() if given is None else given.assignments)
+            for attribute, value in values_of(one)
+            if attribute.field == "value"
+        }
+
+    def _name(self, bound: Binding) -> str:
+        """Return the name that a parameter has among the scenario's own."""
+        name = bound.declaration.name
+        if self._scope.own.get(name) is bound:
+            return name
+        if id(bound) not in self._named:
+            taken = {*self._scope.own, *(one.name for _, one in self._named.values())}
+            number, free = 1, name
+            while free in taken:
+                number += 1
+                free = f"{name}_{number}"
+            self._named[id(bound)] = bound, replace(bound.declaration, name=free)
+        return self._named[id(bound)][1].name
+
+
+def _height(element: Element) -> int:
+    below = [_height(one) for child in declaration(type(element)).children
+             for one in _held(element, child)]  # fmt: skip
+    return 1 + max(below, default=0)
+
+
+def _held(element: Element, child: Child) -> tuple[Element, ...]:
+    held = getattr(element, child.field)
+    return cast(tuple[Element, ...], held if child.many else () if held is None else (held,))

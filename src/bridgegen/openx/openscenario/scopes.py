@@ -1,0 +1,255 @@
+"""What a parameter's name means where it stands: the innermost declaration counts.
+
+A parameter of the whole scenario stays one. One of a story, a maneuver, a vehicle and so on is its
+value: a literal, or what it makes of the scenario's own. So is a parameter of the scenario whose
+value is made of others: it is these that can be varied.
+
+Source: ASAM OpenSCENARIO XML 1.2, section 9.1.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from bridgegen.errors import FileFormatError
+from bridgegen.odd.expression import MAX_LENGTH
+from bridgegen.openx.openscenario.declarations import ParameterDeclaration
+from bridgegen.openx.openscenario.element import Attribute, Element
+from bridgegen.openx.openscenario.enumerations import ParameterType
+from bridgegen.openx.openscenario.parameters import (
+    broken,
+    clash,
+    kind_of,
+    misfits,
+    name_problem,
+)
+from bridgegen.openx.openscenario.values import (
+    Expr,
+    Kind,
+    Literal,
+    ParameterRef,
+    Value,
+    format_double,
+    parse_literal,
+    parse_value,
+)
+
+_TEXTS = (Kind.STRING, Kind.DATE_TIME)
+_NAMES = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)")
+
+_NUMBER = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|true|false)\s*")
+
+
+class Problems(Protocol):
+    """Takes down what is wrong with parameters."""
+
+    def wrong(self, element: Element, text: str) -> None:
+        """Note what is wrong."""
+
+    def doubtful(self, element: Element, text: str) -> None:
+        """Note what is wrong and can be made sense of: the last value counts, as a text."""
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What a parameter is.
+
+    Attributes:
+        declaration: its own, with the value that it has while the scenario's own parameters have
+            their declared ones.
+        kind: its type.
+        now: that value.
+        value: the same, or how it depends on the scenario's own parameters.
+    """
+
+    declaration: ParameterDeclaration
+    kind: Kind
+    now: Literal
+    value: Value
+
+
+@dataclass(frozen=True)
+class Scope:
+    """The parameters that can be referred to.
+
+    Attributes:
+        names: all of them.
+        own: those that the scenario declares with a literal, which stay parameters.
+    """
+
+    names: Mapping[str, Binding] = field(default_factory=dict)
+    own: Mapping[str, Binding] = field(default_factory=dict)
+
+    @classmethod
+    def of_scenario(
+        cls, declarations: Iterable[ParameterDeclaration], problems: Problems
+    ) -> "Scope":
+        """Return the scope of a scenario's declarations; see `inner`."""
+        declarations = list(declarations)
+        literal = [one for one in declarations if not is_made(one)]
+        found = cls().inner(literal, problems).names
+        own = {name: replace(one, value=ParameterRef(f"${name}")) for name, one in found.items()}
+        return cls(own, own).inner([one for one in declarations if is_made(one)], problems)
+
+    def inner(
+        self,
+        declarations: Iterable[ParameterDeclaration],
+        problems: Problems,
+        assigned: Mapping[str, Value] | None = None,
+    ) -> "Scope":
+        """Return the scope within an element that declares parameters.
+
+        Args:
+            declarations: a value may refer to what is in scope around, or declared before.
+            problems: takes what is wrong with them.
+            assigned: values that count instead of the declared ones, by the scenario's own.
+        """
+        names = dict(self.names)
+        made = Scope(names, self.own)
+        seen: dict[str, ParameterDeclaration] = {}
+        for one in declarations:
+            if problem := name_problem(one.name):
+                problems.wrong(one, problem)
+                continue
+            if problem := clash(one, seen.get(one.name)):
+                problems.doubtful(one, problem)
+            seen[one.name] = one
+            is_given = assigned is not None and one.name in assigned
+            value = assigned[one.name] if assigned is not None and is_given else one.value
+            scope = Scope(self.own, self.own) if is_given else made
+            try:
+                names[one.name] = scope._bind(one, value)
+            except FileFormatError as error:
+                problems.doubtful(one, f"the value of parameter {one.name} {error}")
+                as_text = replace(one, parameter_type=ParameterType.STRING)
+                with suppress(FileFormatError):
+                    names[one.name] = scope._bind(as_text, value)
+                continue
+            for text in broken(one, names[one.name].now):
+                problems.wrong(one, f"parameter {one.name} {text}")
+        return made
+
+    def _bind(self, declaration: ParameterDeclaration, value: Value) -> Binding:
+        kind = kind_of(declaration.parameter_type)
+        if isinstance(value, str):
+            declaration = replace(declaration, value=value)
+            value = parse_value(kind, value)
+        if not isinstance(value, ParameterRef | Expr):
+            return Binding(declaration, kind, value, value)
+        attribute = Attribute("value", "value", kind, None, True, False, True, None, None)
+        made = self.value(attribute, value)
+        now = self.now(made, kind)
+        return Binding(replace(declaration, value=text_of(now)), kind, now, made)
+
+    def value(self, attribute: Attribute, value: Any) -> Any:
+        """Return an attribute's value as it depends on nothing but the scenario's own parameters.
+
+        Args:
+            attribute: what takes it.
+            value: as in the file.
+
+        Raises:
+            FileFormatError: what it refers to is not there or does not fit, or has no value.
+        """
+        if not isinstance(value, ParameterRef | Expr):
+            return value
+        bound = {name: self.names[name] for name in value.names if name in self.names}
+        kinds = {name: (one.kind, one.now) for name, one in bound.items()}
+        for text in misfits(attribute, value, kinds, texts=True):
+            raise FileFormatError(text)
+        as_text = attribute.kind in _TEXTS and isinstance(value, ParameterRef)
+        if not as_text:  # a text that reads as a number is that number
+            bound |= {n: replace(b, value=b.now) for n, b in bound.items() if b.kind in _TEXTS}
+        if all(self.own.get(name) is one for name, one in bound.items()):
+            return value
+        if isinstance(value, ParameterRef):
+            one = bound[value.name]
+            made = one.value
+            if not isinstance(made, ParameterRef | Expr):
+                return attribute.enum(str(made)) if attribute.enum else _typed(one, attribute.kind)
+        else:
+            made = _put_in(value, bound)
+        if isinstance(made, ParameterRef) or (made.names and attribute.takes_expressions):
+            return made
+        now = self.now(made, attribute.kind)
+        return text_of(now) if attribute.kind is Kind.STRING else now
+
+    def now(self, value: Value, kind: Kind) -> Literal:
+        """Return a value at the declared values of the scenario's own parameters, by its type.
+
+        Raises:
+            FileFormatError: it has none, or none of that type.
+        """
+        if isinstance(value, ParameterRef):
+            return _typed(self.own[value.name], kind)
+        if not isinstance(value, Expr):
+            return value
+        with np.errstate(all="ignore"):
+            number = float(value.resolve({name: float(self.own[name].now) for name in value.names}))
+        if not np.isfinite(number) or (kind.is_integer and not number.is_integer()):
+            what = "a whole number" if kind.is_integer else "finite"
+            raise FileFormatError(f"must be {what}, got {value} = {number:g}")
+        if kind is Kind.BOOLEAN:
+            return bool(number)
+        return int(number) if kind.is_integer else number
+
+    def text(self, attribute: Attribute, value: Any) -> str:
+        """Return the text that an attribute is at the scenario's declared values.
+
+        Raises:
+            FileFormatError: what it refers to is not there or does not fit.
+        """
+        return text_of(self.now(self.value(attribute, value), Kind.STRING))
+
+
+def is_made(declaration: ParameterDeclaration) -> bool:
+    """Say whether a parameter's value refers to others, or is to be computed."""
+    if kind_of(declaration.parameter_type) in _TEXTS:
+        return _NAMES.fullmatch(declaration.value) is not None
+    return "$" in declaration.value
+
+
+def reads_as_number(declaration: ParameterDeclaration) -> bool:
+    """Say whether a parameter is a text that may stand for a number or a boolean."""
+    return kind_of(declaration.parameter_type) is Kind.STRING and (
+        _NUMBER.fullmatch(declaration.value) is not None
+    )
+
+
+def _put_in(value: Expr, bound: Mapping[str, Binding]) -> Expr:
+    """Return an expression in which parameters stand for what they are."""
+
+    def stands(name: str) -> str:
+        one = bound[name].value
+        if isinstance(one, Expr):
+            return f"({one.text[2:-1]})"
+        return one.text if isinstance(one, ParameterRef) else f"({text_of(one)})"
+
+    text = _NAMES.sub(lambda found: stands(found[1]), value.text)
+    if len(text) > MAX_LENGTH:
+        raise FileFormatError(
+            f"may have {MAX_LENGTH} characters, {value} has {len(text)} with what it refers to"
+        )
+    return Expr(text)
+
+
+def _typed(bound: Binding, kind: Kind) -> Literal:
+    """Return a parameter's value as one of another type that it fits."""
+    if kind in _TEXTS:
+        return bound.declaration.value
+    if isinstance(bound.now, str):
+        return parse_literal(kind, bound.now)
+    if kind is Kind.BOOLEAN:
+        return bool(bound.now)
+    return int(bound.now) if kind.is_integer else float(bound.now)
+
+
+def text_of(value: Literal) -> str:
+    """Return a literal as a file has it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return format_double(value) if isinstance(value, float) else str(value)
