@@ -92,6 +92,22 @@ def test_simulate_some_metrics(cli, finished):
     refused(result, "the metric 'map' needs detections, and the driver 'route-follower' has none")
 
 
+def test_simulate_leaves_out_what_it_must(cli, finished, tmp_path):
+    path = finished.scenarios[0]
+    mine = tmp_path / "mine.xosc"
+    hover = "<GlobalAction><HoverAction/></GlobalAction>"
+    mine.write_text(path.read_text("utf-8").replace("<Actions>", f"<Actions>{hover}", 1), "utf-8")
+    for one in path.parent.glob("*.xodr"):
+        (tmp_path / one.name).write_bytes(one.read_bytes())
+    refused(cli("simulate", mine), "HoverAction in GlobalAction is not supported")
+    code, out, err = cli("simulate", mine, "--lenient", "--json")
+    assert code == 0
+    assert "warning: left out: " in err
+    assert "HoverAction in GlobalAction is not supported (line " in err
+    whole = cli("simulate", path, "--json")[1]
+    assert json.loads(out)["metrics"] == json.loads(whole)["metrics"]
+
+
 @pytest.mark.parametrize("flavour", ["1.2", "1.3", "resolved", "recorded"])
 def test_export_prints_what_it_wrote(cli, finished, flavour):
     code, out, _ = cli("export", finished.folder, "--flavour", flavour, "--scenario", "0001")

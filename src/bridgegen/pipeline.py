@@ -276,6 +276,7 @@ def simulate_file(
     time_limit: float | None = None,
     metrics: Sequence[str] | None = None,
     time_step: float | None = None,
+    skipped: list[str] | None = None,
 ) -> FileResult:
     """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
 
@@ -287,6 +288,8 @@ def simulate_file(
         time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.
         time_step: [s]; what the file's header says by default.
+        skipped: takes a sentence for each thing that the file holds and the model does not, which
+            is left out then instead of refused (`bridgegen.openx.openscenario.read`).
 
     Raises:
         InputError: a time step out of range, or a stage that the driver has not.
@@ -295,7 +298,7 @@ def simulate_file(
         UnknownNameError: no such driver, stage or metric.
     """
     driver = egos.get(ego, time_limit=time_limit) if ego else None
-    scenario = read_scenario(path)
+    scenario = read_scenario(path, skipped=skipped)
     roads = roads_of(scenario, path)
     problems = openscenario_validate.problems(scenario, roads)
     if problems:

@@ -1,6 +1,7 @@
 """The commands that make and look at runs."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -193,6 +194,9 @@ def simulate(
     metrics: Annotated[
         str | None, typer.Option(help="Only these, e.g. pet,drac.", show_default="all there are")
     ] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
@@ -201,6 +205,7 @@ def simulate(
     from bridgegen.simulation.trace import write_trace
 
     stages = None if ideal is None else split(ideal)
+    skipped: list[str] | None = [] if lenient else None
     result = simulate_file(
         file,
         ego=ego,
@@ -208,7 +213,10 @@ def simulate(
         time_limit=time_limit,
         metrics=_names(metrics),
         time_step=dt,
+        skipped=skipped,
     )
+    for one in skipped or ():
+        print(f"bridgegen: warning: left out: {one}", file=sys.stderr)
     if trace is not None:
         write_trace(trace, result.rollout)
     if as_json:

@@ -115,8 +115,8 @@ class _Expander:
             raise FileFormatError(*shorten([*texts, *dict.fromkeys(self._elsewhere)]))
         if self._unsupported:
             raise UnsupportedError(*shorten(list(dict.fromkeys(self._unsupported))))
-        literal = [one for one in self._declared if one.name in self._scope.own]
-        declarations = (*literal, *(one for _, one in self._named.values()))
+        literal = {one.name: one for one in self._declared if one.name in self._scope.own}
+        declarations = (*literal.values(), *(one for _, one in self._named.values()))
         return replace(
             made,
             parameter_declarations=ParameterDeclarations(declarations) if declarations else None,

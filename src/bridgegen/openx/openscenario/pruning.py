@@ -4,7 +4,21 @@ An action that an event cannot do, or a condition that cannot be watched, makes 
 it: the whole event goes. The rest stays as it is.
 """
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any, TypeVar
+
 from lxml import etree
+
+from bridgegen.openx.openscenario.element import (
+    Element,
+    children_of,
+    declaration,
+    values_of,
+    walk,
+)
+from bridgegen.openx.openscenario.entities import ScenarioObject
+from bridgegen.openx.openscenario.storyboard import ManeuverGroup, OpenScenario
 
 _WHOLES = frozenset(
     {
@@ -12,8 +26,12 @@ _WHOLES = frozenset(
         "PrivateAction", "ScenarioObject", "TrafficSignalController",
     }
 )  # fmt: skip
+_ENDS = frozenset({"Event", "ScenarioObject"})
 _NEVER_EMPTY = frozenset({"Act", "Maneuver", "Private", "Story"})
 _LOCAL = "ParameterDeclarations"  # of a story or a maneuver: what is below refers to them
+
+
+E = TypeVar("E", bound=Element)
 
 
 def prune(node: etree._Element, attribute: str | None = None) -> None:
@@ -32,7 +50,7 @@ def prune(node: etree._Element, attribute: str | None = None) -> None:
     while (parent := above.getparent()) is not None:
         if above.tag in _WHOLES:
             whole = above
-            if above.tag in ("Event", "ScenarioObject"):
+            if above.tag in _ENDS:
                 break
         above = parent
     _remove(whole)
@@ -45,3 +63,70 @@ def _remove(node: etree._Element) -> None:
     parent.remove(node)
     if parent.tag in _NEVER_EMPTY and not any(child.tag == node.tag for child in parent):
         _remove(parent)
+
+
+def without(scenario: OpenScenario, culprits: Iterable[Element]) -> OpenScenario:
+    """Return a scenario without some of its elements, and what they are part of.
+
+    Args:
+        scenario: stays as it is.
+        culprits: elements of it, by identity.
+    """
+    wanted = {id(one) for one in culprits}
+    gone: set[int] = set()
+    for path in _paths(scenario):
+        if id(path[-1]) in wanted:
+            gone.add(id(_whole(path)))
+    made = _left(scenario, gone)
+    return scenario if made is None else made
+
+
+def strays(scenario: OpenScenario) -> list[Element]:
+    """Return what names an entity that the scenario does not have, and groups of none but such."""
+    names = {one.name for one in walk(scenario.entities) if isinstance(one, ScenarioObject)}
+    names |= {one.name for one in scenario.entities.entity_selections}
+    found: list[Element] = []
+    for element in walk(scenario):
+        for attribute, value in values_of(element):
+            if attribute.is_entity and isinstance(value, str) and value not in names:
+                found.append(element)
+        refs = element.actors.entity_refs if isinstance(element, ManeuverGroup) else ()
+        if refs and not names & {one.entity_ref for one in refs}:
+            found.append(element)
+    return found
+
+
+def _paths(element: Element, above: tuple[Element, ...] = ()) -> Iterator[tuple[Element, ...]]:
+    path = (*above, element)
+    yield path
+    for _, child in children_of(element):
+        yield from _paths(child, path)
+
+
+def _whole(path: tuple[Element, ...]) -> Element:
+    """Return what goes with the last element of a path from the root."""
+    whole = path[-1]
+    for one in reversed(path[1:]):
+        name = type(one).__name__
+        if name in _WHOLES:
+            whole = one
+            if name in _ENDS:
+                break
+    return whole
+
+
+def _left(element: E, gone: set[int]) -> E | None:
+    """Return what is left of an element; None if nothing, or too little, is."""
+    if id(element) in gone:
+        return None
+    changes: dict[str, Any] = {}
+    for child in declaration(type(element)).children:
+        held = getattr(element, child.field)
+        before = held if child.many else () if held is None else (held,)
+        after = [made for one in before if (made := _left(one, gone)) is not None]
+        if all(a is b for a, b in zip(after, before, strict=False)) and len(after) == len(before):
+            continue
+        if len(after) < child.at_least:
+            return None
+        changes[child.field] = tuple(after) if child.many else after[0] if after else None
+    return replace(element, **changes) if changes else element

@@ -7,6 +7,7 @@ from lxml import etree
 from bridgegen.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.expand import expanded
+from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.reader import element_of, shorten
 from bridgegen.openx.openscenario.storyboard import OpenScenario
 from bridgegen.openx.xml import parse_xml
@@ -52,6 +53,12 @@ def read(
     file = verbatim(root, place, skipped)
     folder = path.parent if isinstance(path, Path) else None
     scenario = expanded(file, folder, place, skipped)
+    while skipped is not None and (astray := strays(scenario)):
+        skipped += [
+            f"{place}: {type(one).__name__} of an entity that is not there (line {one.line})"
+            for one in astray
+        ]
+        scenario = without(scenario, astray)
     if problems := parameters.problems(scenario):
         raise FileFormatError(*shorten([f"{place}: {problem}" for problem in problems]))
     return scenario
@@ -75,6 +82,8 @@ def verbatim(
         raise FileFormatError(
             f"{place}: the root element must be OpenSCENARIO, got {root.tag!s} (line 1)"
         )
+    if root.find("Catalog") is not None:
+        raise FileFormatError(f"{place}: is a catalogue, and no scenario")
     scenario = element_of(OpenScenario, root, place, skipped)
     header = scenario.file_header
     version = f"{header.rev_major}.{header.rev_minor}"
