@@ -109,7 +109,7 @@ class Pipeline:
         simulator = EmbeddedSimulator(nominal.storyboard, scenario.name, driver=driver)
         self.simulator: Simulator[Network] = simulator
         self.driver = simulator.program.driver
-        if driver is None and self.driver != egos.TRAJECTORY:  # the file's choice is written, too
+        if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
             self.source = _source(scenario, self.driver, road_map)
         recorded = metrics_of(scenario, self.driver, also) if metrics is None else metrics
         self.metrics = tuple(recorded)

@@ -11,7 +11,7 @@ from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.run import REPORT, Run
 from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
-from bridgegen.ego import TRAJECTORY, is_spec
+from bridgegen.ego import STORYBOARD, is_spec
 from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
 from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
@@ -197,8 +197,8 @@ def resume(folder: Path | str, *, ego: str | None = None, watch: Watch | None = 
 
 
 def _ego(settings: Settings) -> str | None:
-    """Return the driver to ask for; None where the file's own timetable moves the ego."""
-    return None if settings.ego == TRAJECTORY.name else settings.ego
+    """Return the driver to ask for; None where the file's own actions move the ego."""
+    return None if settings.ego == STORYBOARD.name else settings.ego
 
 
 def _check_driver(settings: Settings, ego: str | None, folder: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
-from bridgegen.ego import TRAJECTORY
+from bridgegen.ego import STORYBOARD
 from bridgegen.errors import StorageError
 
 
@@ -79,7 +79,7 @@ class Settings:
         """Return the command line that makes the same run."""
         words = ["bridgegen", "search", self.scenario, "--algorithm", self.algorithm]
         words += ["--budget", str(self.budget), "--seed", str(self.seed)]
-        if self.ego != TRAJECTORY.name:
+        if self.ego != STORYBOARD.name:
             words += ["--ego", self.ego]
         if self.ideal:
             words += ["--ideal", ",".join(self.ideal)]

@@ -12,6 +12,8 @@ STAGES = ("perception", "prediction", "control")
 
 OWN = -1
 """The code of the user's own drivers, which are no branch of the compiled rollout."""
+NOBODY = -2
+"""The code where the storyboard moves the ego."""
 
 TIME_LIMIT = 10.0
 """Seconds that one call of a user's driver may take, where the user says nothing else."""
@@ -23,7 +25,7 @@ class Driver:
 
     Attributes:
         name: as given to ``--ego`` and written to the file's Controller.
-        code: which branch of the compiled rollout it is.
+        code: which branch of the compiled rollout it is; or ``OWN``, or ``NOBODY``.
         description: one sentence.
         stages: those of `STAGES` that it has, and that can be made ideal.
         ideal: those that are.
@@ -91,7 +93,7 @@ FSM = Driver(
     "The fuzzy safety model: brakes in anticipation, up to 6 m/s², by how unsafe its distances "
     "are; sees everybody.",
 )
-TRAJECTORY = Driver("trajectory", 0, "Nobody: the file's own timetable moves the ego.")
+STORYBOARD = Driver("storyboard", NOBODY, "Nobody: the file's own actions move the ego.")
 """What an ego without a driver says it is driven by; not to be chosen."""
 
 DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE, UN_R157, FSM)}

@@ -19,6 +19,7 @@ STATUS_MESSAGES = {
     21: "the driver did not answer in time",
     22: "the driver's process ended",
     23: "the driver answered what is no control",
+    4: "a position that is not on the road network",
 }
 
 FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}

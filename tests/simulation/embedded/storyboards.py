@@ -155,13 +155,14 @@ def friction(factor: float | str) -> str:
 frictionScaleFactor="{factor}"/></Environment></EnvironmentAction></GlobalAction>"""
 
 
-def simulator(text: str, ego: str = "route-follower") -> EmbeddedSimulator:
-    return EmbeddedSimulator(read(text.encode(), "test.xosc"), "test.xosc", driver=DRIVERS[ego])
+def simulator(text: str, ego: str | None = "route-follower") -> EmbeddedSimulator:
+    driver = DRIVERS[ego] if ego else None
+    return EmbeddedSimulator(read(text.encode(), "test.xosc"), "test.xosc", driver=driver)
 
 
 def run(
     text: str,
-    ego: str = "route-follower",
+    ego: str | None = "route-follower",
     roads: OpenDrive | None = None,
     **values: list[float],
 ) -> Rollout:

@@ -215,14 +215,14 @@ def test_what_cannot_be_run_is_refused_by_name_and_line_all_at_once():
     text = scenario(
         ("ego", "bv"),
         SOUTHBOUND + WAITING,
-        events(("one", "bv", lateral(1, "sinusoidal rate 2"), after(1.0)))
+        events(("one", "ego", lateral(-1, "sinusoidal rate 2", "ego"), after(1.0)))
         + events(("two", "ego", lateral(1, "linear time 2", "ego"), after(1.0))),
     )
     with pytest.raises(UnsupportedError) as error:
         simulator(text)
     assert len(error.value.problems) == 2
     assert "test.xosc, line " in error.value.problems[0]
-    assert "a LaneChangeAction by a rate" in error.value.problems[0]
+    assert "a LaneChangeAction of the ego, which a driver drives" in error.value.problems[0]
 
 
 def test_an_entity_needs_a_start():

@@ -79,7 +79,7 @@ def test_the_ego_too_and_nobody_drives_it():
     assert out.x[0, 0, :41] == pytest.approx(10.0 * STEPS[:41])
     assert out.n_steps[0] == 201  # the end of its line is not the scenario's
     made = EmbeddedSimulator(read(text.encode()), "test")
-    assert made.driver == "trajectory"
+    assert made.driver == "storyboard"
     with pytest.raises(UnsupportedError, match="the driver 'reference' cannot drive an ego"):
         play(text, "reference")
 

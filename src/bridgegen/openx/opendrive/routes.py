@@ -113,6 +113,15 @@ def plan_route(
     steps: list[Step] = []
     for a, b in pairwise(places):
         steps += _leg(model, a, b)
+    return route_along(model, steps)
+
+
+def route_along(model: OpenDrive, steps: Sequence[Step]) -> Route:
+    """Return the centre line of lanes that follow one another.
+
+    Raises:
+        InputError: the lanes have no length, or one folds over in a bend.
+    """
     pieces: list[Piece] = []
     station = 0.0
     for step in steps:
@@ -123,7 +132,10 @@ def plan_route(
             pieces += found
             station = sum((piece.length for piece in found), station)
     if not pieces:
-        raise InputError(f"a route must have a length, got one that ends where it starts: {start}")
+        raise InputError(
+            "a route must have a length, got one that ends where it starts: "
+            f"road {steps[0].road_id}, lane {steps[0].lane_id}, s={steps[0].s:g} m"
+        )
     return Route(tuple(steps), station, tuple(joined(pieces)))
 
 

@@ -4,10 +4,14 @@ import numpy as np
 
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._weather_kernels import change
+from bridgegen.simulation.embedded._across_kernels import (
+    begin_lane_change,
+    begin_lane_offset,
+    stop_lateral,
+)
 from bridgegen.simulation.embedded._speed_kernels import begin_speed_change, stop_speed_change
-from bridgegen.simulation.embedded._travel_kernels import begin_lane_change, stop_lane_change
 
-SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT = 0, 1, 2, 3
+SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = 0, 1, 2, 3, 4
 
 
 @inlined_kernel
@@ -18,6 +22,8 @@ def begin(j, k, plan, roads, state, record):
         begin_speed_change(j, k, plan, state)
     elif kind == LANE_CHANGE:
         begin_lane_change(j, k, plan, roads, state, record)
+    elif kind == LANE_OFFSET:
+        begin_lane_offset(j, k, plan, roads, state, record)
     elif kind == WEATHER_CHANGE:
         change(state.weather, plan.weathers, plan.actions[j, 6], state.slots)
         state.action_ended[j] = True
@@ -32,5 +38,5 @@ def stop(j, k, plan, roads, state, record):
     kind = plan.actions[j, 1]
     if kind == SPEED_CHANGE:
         stop_speed_change(j, plan, state)
-    elif kind == LANE_CHANGE:
-        stop_lane_change(j, k, plan, roads, state, record)
+    elif kind in (LANE_CHANGE, LANE_OFFSET):
+        stop_lateral(j, plan, state)

@@ -7,7 +7,9 @@ from bridgegen.ego._reference_kernels import drive, plan_speed
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
 from bridgegen.ego._un_r157_kernels import drive_un_r157
 from bridgegen.ego._weather_columns import FRICTION
+from bridgegen.ego.drivers import NOBODY
 from bridgegen.simulation.embedded._motion_kernels import bicycle
+from bridgegen.simulation.embedded._travel_kernels import ENDS, pass_end
 
 
 @inlined_kernel
@@ -16,8 +18,10 @@ def demand(k, plan, roads, state, record):
 
     A driver that is compiled is a branch here; one in Python gives the same two numbers.
     """
-    path, n, ds, s = roads.paths[0], roads.counts[0], roads.steps[0], state.station[0]
-    v = record.v[0, k]
+    if plan.driver == NOBODY:
+        return 0.0, 0.0
+    p, s, v = state.on[0], state.station[0], record.v[0, k]
+    path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
     curvature = steer(path, n, ds, s, record.x[0, k], record.y[0, k], record.h[0, k], v)
     if plan.driver == 0:
         return hold_speed(v, state.command[0]), curvature
@@ -42,6 +46,15 @@ def demand(k, plan, roads, state, record):
 
 
 @inlined_kernel
+def ego_is_through(plan, roads, state):
+    """Say whether an ego with a driver is at the end of its route, or of the road."""
+    p = state.on[0]
+    if plan.driver == NOBODY or state.station[0] < (roads.counts[p] - 1) * roads.steps[p]:
+        return False
+    return (p == 0 and state.route[0] > 0) or roads.follows[p] == ENDS
+
+
+@inlined_kernel
 def move_ego(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k; return its new x, y [m] and heading [rad]."""
     v, dt = record.v[0, k], plan.dt
@@ -50,6 +63,7 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
         plan.bodies[0, 3:7], state.weather[FRICTION], dt,
     )  # fmt: skip
     step = 0.5 * (v + after) * dt
+    p = state.on[0]
     record.a[0, k] = given
     state.travelled[0] += step
     state.stood[0] = state.stood[0] + dt if after == 0.0 else 0.0
@@ -57,6 +71,9 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
         record.x[0, k + 1], record.y[0, k + 1] = x, y
         record.h[0, k + 1], record.v[0, k + 1] = h, after
         state.station[0], record.offset[0, k + 1] = project(
-            roads.paths[0], roads.counts[0], roads.steps[0], state.station[0] + step, x, y
+            roads.paths[p], roads.counts[p], roads.steps[p], state.station[0] + step, x, y
         )
+        at_end = state.station[0] >= (roads.counts[p] - 1) * roads.steps[p]
+        if at_end and (p > 0 or state.route[0] == 0):
+            pass_end(0, 0.0, roads, state)
     return x, y, h

@@ -3,6 +3,7 @@
 import math
 
 from bridgegen.compiled import inlined_kernel
+from bridgegen.ego.drivers import NOBODY
 from bridgegen.simulation.embedded._ego_kernels import move_ego
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
 from bridgegen.simulation.embedded._speed_kernels import command_speeds
@@ -27,7 +28,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move everybody on to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
-    if plan.timed[0] < 0:
+    if plan.driver != NOBODY:
         x, y, h = move_ego(k, demanded, curvature, plan, roads, state, record)
         first = 1
     for e in range(first, record.x.shape[0]):

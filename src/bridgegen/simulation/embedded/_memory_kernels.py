@@ -16,7 +16,8 @@ from bridgegen.compiled import borrowed, inlined_kernel
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
-OK, NOT_FINITE, OFF_ROUTE, NO_LANE = 0, 1, 2, 3  # see rollout.STATUS_MESSAGES
+OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE = 0, 1, 2, 3, 4  # see rollout.STATUS_MESSAGES
+UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
 
 class Plan(NamedTuple):
@@ -24,6 +25,7 @@ class Plan(NamedTuple):
 
     bodies: Float
     init: Int
+    routes: Int
     timed: Int
     triggers: Int
     groups: Int
@@ -31,6 +33,7 @@ class Plan(NamedTuple):
     probes: Int
     elements: Int
     actions: Int
+    laterals: Int
     first_states: npt.NDArray[np.int8]
     weathers: Int
     driver: int
@@ -43,9 +46,17 @@ class Roads(NamedTuple):
     paths: Float
     counts: Int
     steps: Float
+    follows: Int
+    spans: Float
+    span_counts: Int
     zones: Float
     points: Float
     tracks: Float
+    nodes: Int
+    ends: Float
+    ways: Int
+    ground: Float
+    ground_nodes: Int
 
 
 class State(NamedTuple):
@@ -67,15 +78,20 @@ class State(NamedTuple):
         lights: ``(L,)`` int8, the traffic lights' states.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] since it last moved.
-        on: ``(E,)`` int64, the path that a body is on,
+        route: ``(E,)`` int64, the route that a body follows where it can; 0: none.
+        on: ``(E,)`` int64, the path that it is on; -1: none, it goes straight along its line,
         station: ``(E,)`` [m] along it,
-        aside: ``(E,)`` [m] to its left.
-        to: ``(E,)`` int64, the path that it changes to, -1 if none,
+        aside: ``(E,)`` [m] to its left,
+        turn: ``(E,)`` [rad], by how much its nose is turned from the path's direction.
+        line: ``(E, 3)`` x, y [m], heading [rad], where its line starts.
+        to: ``(E,)`` int64, the path that it leaves on its way to the lane of its own, -1 if none,
         foot: ``(E,)`` [m], its station there.
-        lane_action: ``(E,)`` int64, the action that changes its lane; -1: none,
-        lane_began: ``(E,)`` [s], since when,
-        lane_lasts: ``(E,)`` [s] or [m], and how long,
-        lane_from: ``(E,)`` [m], what it had travelled when it began.
+        lateral_action: ``(E,)`` int64, the action that moves it across; -1: none,
+        lateral_lasts: ``(E,)`` [s] or [m], how long,
+        lateral_passed: ``(E,)`` [s] or [m], what of it has passed,
+        lateral_origin: ``(E,)`` [m], how far left of its path it began,
+        lateral_target: ``(E,)`` [m], how far left of its path it ends.
+        wanted: ``(2,)`` int64, the route and the node of the way that is not planned yet.
         speed_action: ``(E,)`` int64, the action that changes its speed; -1: none,
         speed_began: ``(E,)`` [s], since when,
         speed_lasts: ``(E,)`` [s], and how long.
@@ -100,15 +116,20 @@ class State(NamedTuple):
     lights: npt.NDArray[np.int8]
     travelled: Float
     stood: Float
+    route: Int
     on: Int
     station: Float
     aside: Float
+    turn: Float
+    line: Float
     to: Int
     foot: Float
-    lane_action: Int
-    lane_began: Float
-    lane_lasts: Float
-    lane_from: Float
+    lateral_action: Int
+    lateral_lasts: Float
+    lateral_passed: Float
+    lateral_origin: Float
+    lateral_target: Float
+    wanted: Int
     speed_action: Int
     speed_began: Float
     speed_lasts: Float

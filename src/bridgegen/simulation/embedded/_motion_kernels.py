@@ -3,7 +3,7 @@
 import math
 
 from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import X, Y, pose, project
+from bridgegen.ego._path_kernels import X, Y, project
 
 STEP, LINEAR, CUBIC, SINUSOIDAL = 0, 1, 2, 3
 RATE, TIME, DISTANCE = 0, 1, 2
@@ -92,22 +92,3 @@ def nearest(path, n, ds, x, y):
     s, _ = project(path, n, ds, at * ds, x, y)
     s, _ = project(path, n, ds, s, x, y)
     return s
-
-
-@kernel
-def between(path, n, ds, s, other, other_n, other_ds, guess, shape, u, rate, aside):
-    """Return (x, y, h, station on the other path) of a body on its way between two paths.
-
-    It leaves ``path``, where it is at station ``s``, for ``other``, where its foot is near
-    ``guess``; ``u`` is the share of the change's time or distance that has passed, ``rate`` how
-    much of it passes per metre travelled [1/m], 0 at standstill; ``aside`` is how far it was to
-    the left of ``path`` [m].
-    """
-    px, py, ph = pose(path, n, ds, s)
-    px, py = shifted(px, py, ph, aside)
-    foot, d = project(other, other_n, other_ds, guess, px, py)
-    qx, qy, qh = pose(other, other_n, other_ds, foot)
-    share, slope = progress(shape, u)
-    turn = qh - ph - 2.0 * math.pi * round((qh - ph) / (2.0 * math.pi))
-    h = ph + share * turn + math.atan(-d * slope * rate)
-    return px + share * (qx - px), py + share * (qy - py), h, foot

@@ -18,8 +18,8 @@ def start(plan, roads, state, record):
     for i in range(state.lights.shape[0]):
         state.lights[i] = plan.first_states[i]
     for e in range(n_entities):
-        state.on[e], state.to[e] = e, -1
-        state.lane_action[e] = state.speed_action[e] = -1
+        state.on[e], state.to[e], state.route[e] = e, -1, plan.routes[e]
+        state.lateral_action[e] = state.speed_action[e] = -1
         state.rate[e] = math.inf
         m = plan.timed[e]
         if m >= 0:

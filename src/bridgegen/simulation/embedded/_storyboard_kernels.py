@@ -5,8 +5,6 @@ first (``finish``, children before parents), then triggers are looked at (``deci
 before children). Source: ASAM OpenSCENARIO XML 1.3.1, 8.4, storyboard element execution.
 """
 
-import math
-
 from bridgegen.compiled import inlined_kernel
 from bridgegen.simulation.embedded._codes import (
     ACT,
@@ -29,6 +27,7 @@ from bridgegen.simulation.embedded._codes import (
     STOP,
     STORY,
 )
+from bridgegen.simulation.embedded._ego_kernels import ego_is_through
 from bridgegen.simulation.embedded._event_kernels import enter, stop_element, trigger_event
 from bridgegen.simulation.embedded._memory_kernels import STOPS
 from bridgegen.simulation.embedded._trigger_kernels import fires
@@ -61,10 +60,8 @@ def finish(k, plan, state):
 @inlined_kernel
 def decide(k, plan, roads, state, record):
     """Stop the scenario, start and stop elements, as the triggers say at instant k."""
-    ego_end = math.inf
-    if plan.timed[0] < 0:
-        ego_end = (roads.counts[0] - 1) * roads.steps[0]
-    state.ending[STOPS] = fires(0, k, plan, state) or state.station[0] >= ego_end
+    if fires(0, k, plan, state) or ego_is_through(plan, roads, state):
+        state.ending[STOPS] = 1
     for x in range(plan.elements.shape[0]):
         phase, kind = state.phase[x], plan.elements[x, KIND]
         if phase == COMPLETE or kind == ACTION:

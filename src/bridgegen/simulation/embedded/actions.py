@@ -1,13 +1,15 @@
 """The actions of a storyboard, at the start and in events, as rows of integers."""
 
+import math
 from collections.abc import Sequence
 
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded.environments import Environments
-from bridgegen.simulation.embedded.program import AlongTrajectory, BesideLanes, PathSpec
+from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, PathSpec
 from bridgegen.simulation.embedded.tables import Tables
 
-_SPEED_CHANGE, _LANE_CHANGE, _WEATHER, _LIGHT = 0, 1, 2, 3
+_SPEED_CHANGE, _LANE_CHANGE, _WEATHER, _LIGHT, _LANE_OFFSET = 0, 1, 2, 3, 4
 
 LIGHT_STATES = {
     "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
@@ -24,6 +26,9 @@ _DIMENSIONS = {
 }  # fmt: skip
 
 
+_BY_TIME = 1
+
+
 class Actions:
     """What events change.
 
@@ -32,15 +37,20 @@ class Actions:
         environments: the weathers, of the start and of events.
         lights: the traffic lights that are set.
         first_states: their states at the start.
+        laterals: as ``Program.laterals`` has them.
+        lane_checks: lane changes that are known to be asked for.
+        has_driver: whether a driver drives the ego, and the storyboard does not; set it first.
 
     Args:
         tables: the compiler's; takes down what cannot be run.
-        paths: of the entities; a lane change adds the one that it leads to.
+        paths: of the entities.
     """
 
     def __init__(self, tables: Tables, paths: list[PathSpec]) -> None:
         self._tables, self._paths = tables, paths
-        self._lane_paths: dict[int, int] = {}
+        self.has_driver = False
+        self.laterals: list[tuple[int, ...]] = []
+        self.lane_checks: list[LaneCheck] = []
         self.rows: list[tuple[int, ...]] = []
         self.environments = Environments(tables)
         self.lights: list[str] = []
@@ -128,6 +138,8 @@ class Actions:
         elif isinstance(action, osc.LateralAction):
             if isinstance(action.action, osc.LaneChangeAction):
                 self._lane_change(action.action, entity)
+            elif isinstance(action.action, osc.LaneOffsetAction):
+                self._lane_offset(action.action, entity)
             else:
                 self._tables.unsupported(action.action, type(action.action).__name__)
         else:
@@ -135,28 +147,54 @@ class Actions:
 
     def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
         shape, dimension, value = self._dynamics(action.dynamics)
-        if dimension == 0 and shape != 0:
-            self._tables.unsupported(action.dynamics, "a LaneChangeAction by a rate")
-        if entity == 0:
-            self._tables.unsupported(action, "a LaneChangeAction of the ego")
-        if action.target_lane_offset not in (None, 0.0):
-            self._tables.unsupported(action, f'targetLaneOffset="{action.target_lane_offset}"')
+        self._refuse_driven(action, entity)
         target = action.lane_change_target.target
-        lanes = lane = None
+        other, lanes, lane = -1, None, None
         if isinstance(target, osc.RelativeTargetLane):
-            if self._tables.entity(target.entity_ref) != entity:
-                self._tables.unsupported(target, "a RelativeTargetLane of another entity")
+            other = self._tables.entity(target.entity_ref)
             lanes = int(self._tables.literal(target, "value", target.value))
         else:
             try:
                 lane = int(str(target.value))
             except ValueError:
                 self._tables.unsupported(target, f'value="{target.value}" (a lane id is needed)')
-        before = self._lane_paths.get(entity, entity)
-        self._lane_paths[entity] = len(self._paths)
-        self._paths.append(BesideLanes(before, lanes, lane, action.line))
-        slot = self._tables.slot(0.0) if shape == 0 else value
-        self.rows.append((entity, _LANE_CHANGE, shape, dimension, slot, slot, len(self._paths) - 1))
+        if other in (-1, entity):
+            self.lane_checks.append(LaneCheck(entity, lanes, lane, action.line))
+        offset = self._tables.slot(action.target_lane_offset or 0.0)
+        row = self._lateral(other, lanes if lane is None else lane)
+        self.rows.append((entity, _LANE_CHANGE, shape, dimension, offset, value, row))
+
+    def _lane_offset(self, action: osc.LaneOffsetAction, entity: int) -> None:
+        self._refuse_driven(action, entity)
+        target, other = action.lane_offset_target.target, -1
+        if isinstance(target, osc.RelativeTargetLaneOffset):
+            other = self._tables.entity(target.entity_ref)
+        dynamics = action.dynamics
+        shape = self._shape(dynamics, dynamics.dynamics_shape)
+        most = dynamics.max_lateral_acc
+        slots = (
+            self._tables.slot(target.value),
+            self._tables.slot(math.inf if most is None else most),
+        )
+        if isinstance(action.continuous, osc.ParameterRef):
+            self._tables.unsupported(action, f'continuous="{action.continuous}"')
+        row = self._lateral(other, 0, continuous=action.continuous is True)
+        self.rows.append((entity, _LANE_OFFSET, shape, _BY_TIME, *slots, row))
+
+    def _lateral(self, other: int, count: int | None, *, continuous: bool = False) -> int:
+        self.laterals.append((other, count or 0, int(continuous)))
+        return len(self.laterals) - 1
+
+    def _refuse_driven(self, action: Element, entity: int) -> None:
+        if entity == 0 and self.has_driver:
+            what = f"a {type(action).__name__} of the ego, which a driver drives,"
+            self._tables.unsupported(action, what)
+
+    def _shape(self, element: Element, shape: osc.DynamicsShape | osc.ParameterRef) -> int:
+        if isinstance(shape, osc.ParameterRef):
+            self._tables.unsupported(element, f'dynamicsShape="{shape}"')
+            return 0
+        return _SHAPES[shape]
 
     def _dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int, int]:
         slot = self._tables.slot(dynamics.value)

@@ -1,6 +1,7 @@
 """N rows of one compiled storyboard: set up, rolled out at once, or by one instant at a time."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -46,7 +47,7 @@ class Batch:
             raise InputError(f"rows must name one of {roads.n_networks} road networks")
         self._program, self._rows = program, rows
         self._plan = _plan(program)
-        self._networks = _networks(roads)
+        self._roads = roads
         self.state = _state(program, roads, rows, program.fill(values, n))
         self.record = _record(program, n)
         self._messages: dict[int, str] = {}
@@ -59,24 +60,27 @@ class Batch:
 
     def run(self) -> Rollout:
         """Roll all rows out with the compiled driver; runs without the GIL."""
-        kernels.simulate_rows(*self._all)
+        self._do(kernels.simulate_rows)
         return self.rollout()
 
     def start(self) -> None:
         """Set the first instant."""
-        kernels.start_rows(*self._all)
+        self._do(kernels.start_rows)
 
     def before_driver(self, k: int) -> None:
         """Do at instant k what the storyboard says, up to what it asks of the ego.
 
         ``state.command[:, 0]`` is then the speed that it is asked to drive at [m/s].
         """
-        kernels.before_drivers(k, *self._all)
+        self._do(kernels.before_drivers, k)
 
     def demand(self, k: int) -> tuple[Float, Float]:
         """Return what the compiled driver demands: ``(N,)`` [m/s²] and ``(N,)`` [1/m]."""
         demanded, curvature = np.zeros((2, len(self._rows)))
-        kernels.demand_rows(k, *self._all, demanded, curvature)
+        tables = self._roads.tables
+        kernels.demand_rows(
+            k, self._plan, tables, self._rows, self.state, self.record, demanded, curvature
+        )
         return demanded, curvature
 
     def after_driver(self, k: int, demanded: Float, curvature: Float) -> None:
@@ -87,7 +91,24 @@ class Batch:
             demanded: ``(N,)`` float64, the ego's acceleration [m/s²].
             curvature: ``(N,)`` float64, of its path [1/m], left positive.
         """
-        kernels.after_drivers(k, demanded, curvature, *self._all)
+        self._do(kernels.after_drivers, k, demanded, curvature)
+
+    def _do(self, kernel: Callable[..., None], *arguments: int | Float) -> None:
+        """Call a kernel; rows for which a way is not planned yet do the same again when it is."""
+        before = _copied(self.state), self.record.began.copy()
+        kernel(*arguments, self._plan, self._roads.tables, self._rows, self.state, self.record)
+        while (
+            again := np.flatnonzero(self.state.ending[:, memory.STATUS] == memory.UNPLANNED)
+        ).size:
+            wanted = np.column_stack((self._rows[again], self.state.wanted[again]))
+            self._roads.plan(tuple(one) for one in wanted.tolist())
+            state = _taken(before[0], again)
+            record = _taken(self.record, again)
+            record.began[:] = before[1][again]
+            mine = (one[again] if isinstance(one, np.ndarray) else one for one in arguments)
+            kernel(*mine, self._plan, self._roads.tables, self._rows[again], state, record)
+            _put_back(self.state, state, again)
+            _put_back(self.record, record, again)
 
     def observe(self, k: int, step: float, route: Float, tracks: Float) -> None:
         """Fill what a driver in Python is told of the rows that run; see `Observation`.
@@ -98,7 +119,10 @@ class Batch:
             route: ``(N, P, 4)`` float64.
             tracks: ``(N, E − 1, 12)`` float64.
         """
-        observe_rows(k, *self._all, self._program.kinds, step, route, tracks)
+        observe_rows(
+            k, self._plan, self._roads.tables, self._rows, self.state, self.record,
+            self._program.kinds, step, route, tracks,
+        )  # fmt: skip
 
     def fail(self, status: int, message: str) -> None:
         """End all rows that run, where they are, with a status and what else there is to say."""
@@ -130,15 +154,12 @@ class Batch:
             messages=self._messages,
         )  # fmt: skip
 
-    @property
-    def _all(self) -> tuple[object, ...]:
-        return self._plan, self._networks, self._rows, self.state, self.record
-
 
 def _plan(program: Program) -> memory.Plan:
     return memory.Plan(
         bodies=program.bodies,
         init=program.init,
+        routes=program.routes,
         timed=program.timed,
         triggers=program.triggers,
         groups=program.groups,
@@ -146,6 +167,7 @@ def _plan(program: Program) -> memory.Plan:
         probes=program.probes,
         elements=program.elements,
         actions=program.actions,
+        laterals=program.laterals,
         first_states=program.first_states,
         weathers=program.weathers,
         driver=program.driver.code,
@@ -153,15 +175,24 @@ def _plan(program: Program) -> memory.Plan:
     )
 
 
-def _networks(roads: Network) -> memory.Roads:
-    return memory.Roads(
-        paths=roads.paths,
-        counts=roads.counts,
-        steps=roads.steps,
-        zones=roads.zones,
-        points=roads.points,
-        tracks=roads.tracks,
-    )
+Rows = TypeVar("Rows", memory.State, memory.Record)
+
+
+def _copied(rows: Rows) -> Rows:
+    arrays: Any = (array.copy() for array in rows)
+    return type(rows)(*arrays)
+
+
+def _taken(rows: Rows, some: Int) -> Rows:
+    """Return a copy of some of the rows."""
+    arrays: Any = (array[some] for array in rows)
+    return type(rows)(*arrays)
+
+
+def _put_back(rows: Rows, part: Rows, some: Int) -> None:
+    arrays: Any = rows
+    for whole, array in zip(arrays, part, strict=True):
+        whole[some] = array
 
 
 def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.State:
@@ -194,10 +225,11 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
         selected=flags(e),
         lights=np.zeros((n, len(program.lights)), dtype=np.int8),
         travelled=zeros(e), stood=zeros(e),
-        on=numbers(e), station=np.ascontiguousarray(a + b * at),
+        route=numbers(e), on=numbers(e), station=np.ascontiguousarray(a + b * at),
         aside=np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
-        to=numbers(e), foot=zeros(e),
-        lane_action=numbers(e), lane_began=zeros(e), lane_lasts=zeros(e), lane_from=zeros(e),
+        turn=zeros(e), line=zeros(e, 3), to=numbers(e), foot=zeros(e),
+        lateral_action=numbers(e), lateral_lasts=zeros(e), lateral_passed=zeros(e),
+        lateral_origin=zeros(e), lateral_target=zeros(e), wanted=numbers(2),
         speed_action=numbers(e), speed_began=zeros(e), speed_lasts=zeros(e),
         command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
         attention=zeros(e, 3),

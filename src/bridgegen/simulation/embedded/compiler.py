@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bridgegen.ego import DRIVERS, TRAJECTORY, Driver, is_spec, split
+from bridgegen.ego import DRIVERS, STORYBOARD, Driver, is_spec, split
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -68,6 +68,7 @@ class _Compiler:
         self.tables = Tables(scenario, place)
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
+        self.waypoints: list[tuple[LanePoint, ...]] = []
         self.actions = Actions(self.tables, self.paths)
 
     def compile(
@@ -86,7 +87,10 @@ class _Compiler:
         self.triggers = Triggers(self.tables, step, found)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
-        init = self._init()
+        has_driver = (driver or self._declared_driver()) is not STORYBOARD
+        init = self._init(has_driver)
+        chosen = driver or self._declared_driver()
+        self.actions.has_driver = has_driver = chosen is not STORYBOARD
         if driver and self.actions.is_timed(0):
             self.tables.problems.append(
                 f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
@@ -98,7 +102,9 @@ class _Compiler:
             self.tables.slot(path.start.s) if isinstance(path, AlongLanes) else -1
             for path in self.paths
         ]
-        aside_slots = [-1, *(self._aside_slot(path) for path in self.paths[1:])]
+        aside_slots = [self._aside_slot(path) for path in self.paths]
+        if has_driver:  # its path runs there
+            aside_slots[0] = -1
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
         rows = elements(found, self.tables, self.triggers, self.actions)
@@ -110,7 +116,6 @@ class _Compiler:
             )
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
-        chosen = driver or self._declared_driver()
         return Program(
             place=self.place,
             names=self.tables.names,
@@ -120,6 +125,9 @@ class _Compiler:
             slots=self.tables.slots,
             init=np.array(init, dtype=np.int64),
             paths=tuple(self.paths),
+            routes=np.array(self._routes(), dtype=np.int64),
+            waypoints=tuple(self.waypoints),
+            lane_checks=tuple(self.actions.lane_checks),
             start_slots=np.array(start_slots, dtype=np.int64),
             aside_slots=np.array(aside_slots, dtype=np.int64),
             triggers=table(self.triggers.triggers, 2),
@@ -129,6 +137,7 @@ class _Compiler:
             points=tuple(self.triggers.points),
             elements=table(rows, 10),
             actions=table(self.actions.rows, 8),
+            laterals=table(self.actions.laterals, 3),
             weathers=self.actions.environments.rows,
             lights=tuple(self.actions.lights),
             first_states=np.array(self.actions.first_states, dtype=np.int8),
@@ -138,6 +147,16 @@ class _Compiler:
             fixed=self.tables.fixed,
             event_names=tuple(one.path[-1] for one in found if one.kind == EVENT),
         )
+
+    def _routes(self) -> list[int]:
+        """Return the number of the route that each entity starts with, 0 for none."""
+        found = []
+        for path in self.paths:
+            via = path.via if isinstance(path, AlongLanes) else ()
+            if via:
+                self.waypoints.append(via)
+            found.append(len(self.waypoints) if via else 0)
+        return found
 
     def _aside_slot(self, path: PathSpec) -> int:
         """Return the slot of how far who is on a path is beside it; -1 if on it."""
@@ -163,7 +182,7 @@ class _Compiler:
 
     def _declared_driver(self) -> Driver:
         if self.actions.is_timed(0):
-            return TRAJECTORY
+            return STORYBOARD
         for controller in self.tables.objects[0].object_controllers:
             properties = controller.controller.properties
             name = properties.get(DRIVER) if properties else None
@@ -185,9 +204,9 @@ class _Compiler:
                     raise InputError(
                         f"{self.place}, line {controller.line}: property {IDEAL}: {error}"
                     ) from None
-        return DRIVERS["route-follower"]
+        return STORYBOARD
 
-    def _init(self) -> list[int]:
+    def _init(self, has_driver: bool) -> list[int]:
         """Compile the start; return the slots of the entities' speeds."""
         actions = self.scenario.storyboard.init.actions
         for command in actions.user_defined_actions:
@@ -215,7 +234,9 @@ class _Compiler:
                 action = wrapped.action
                 if isinstance(action, osc.TeleportAction):
                     point, aside = self.tables.point(action.position)
-                    if name == self.tables.names[0]:  # the ego's driver keeps to its path
+                    if (
+                        has_driver and name == self.tables.names[0]
+                    ):  # the ego's driver keeps to its path
                         aside = self.tables.literal(action.position.position, "offset", aside)
                     if point is not None:
                         starts[name] = point, aside

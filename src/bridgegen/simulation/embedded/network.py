@@ -1,94 +1,140 @@
-"""The roads of a compiled storyboard: every path on P road networks."""
+"""The roads of a compiled storyboard: P road networks, and the paths on them that are known."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Iterable, Sequence
+from threading import Lock
 
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.openx.opendrive.lane_graph import Ground
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.simulation.embedded.program import BesideLanes, Program
-from bridgegen.simulation.embedded.ways import Ways, padded, position
+from bridgegen.simulation.embedded._memory_kernels import Roads
+from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.embedded.ways import UNKNOWN, Ways, padded, position
+
+NO_GROUND = Ground(np.empty((0, 4)), np.empty(0, np.int64))
 
 
-@dataclass(frozen=True)
 class Network:
-    """P road networks as the rollout reads them.
+    """P road networks as the rollout reads them; it grows as rows ask for ways.
+
+    What is planned depends on the road network and on what is asked for, not on when or by which
+    row; so rows may share it between threads.
 
     Attributes:
-        paths: ``(P, K, L, 6)`` float64: x, y [m], heading [rad], its cosine and sine, curvature
-            [1/m]; rows from ``counts`` on are padding.
-        counts: ``(P, K)`` int64, samples of each path.
-        steps: ``(P, K)`` float64 [m], between two samples.
-        zones: ``(P, K, 5)`` float64: where the route of the ego meets each other path; see
-            ``bridgegen.ego._reference_kernels``.
+        tables: all arrays, as they are now; a newer one holds all that an older one does.
         station: ``(P, E, 2)`` float64: an entity that starts at s on its road starts a + b·s along
             its path.
         sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
             against it; what is to its left, then, of what is to the road's.
-        points: ``(P, Q, 2)`` float64 [m], the positions that conditions name.
-        tracks: ``(P, M, T, 6)`` float64, the states of the M entities with a timetable at every
-            instant: x, y [m], heading [rad], speed [m/s], acceleration [m/s²], metres travelled.
     """
 
-    paths: Float
-    counts: Int
-    steps: Float
-    zones: Float
-    station: Float
-    sides: Float
-    points: Float
-    tracks: Float
+    def __init__(self, program: Program, models: Sequence[OpenDrive]) -> None:
+        self._program = program
+        self._ways = [Ways(program, model) for model in models]
+        self._lock = Lock()
+        self._points = np.zeros((len(models), len(program.points), 2))
+        for p, model in enumerate(models):
+            for i, point in enumerate(program.points):
+                self._points[p, i] = position(program, model, point)
+        self.station: Float = np.array([each.station for each in self._ways])
+        self.sides: Float = np.array([each.sides for each in self._ways], dtype=np.float64)
+        self._zones: list[list[Float]] = [[] for _ in models]
+        self.tables = self._tables()
 
     @property
     def n_networks(self) -> int:
         """P."""
-        return len(self.paths)
+        return len(self._ways)
+
+    def plan(self, wanted: Iterable[tuple[int, int, int]]) -> None:
+        """Plan what rows have asked for.
+
+        Args:
+            wanted: road network, route and node of each way; see `Ways.plan`.
+        """
+        with self._lock:
+            for p, route, node in sorted(set(wanted)):
+                self._ways[p].plan(route, node)
+            self.tables = self._tables()
+
+    def _tables(self) -> Roads:
+        program, ways = self._program, self._ways
+        paths = padded([[path.table for path in each.paths] for each in ways], 6)
+        spans = padded([[path.spans for path in each.paths] for each in ways], 11)
+        counts = _numbers([[len(path.table) for path in each.paths] for each in ways])
+        steps = padded([[np.full((1, 1), path.step) for path in each.paths] for each in ways], 1)
+        lanes = [each.lanes for each in ways]
+        grounds = [
+            each.lanes.graph.ground if each.lanes and each.has_ground else NO_GROUND
+            for each in ways
+        ]
+        tracks = np.array([each.tracks for each in ways])
+        if not tracks.size:
+            tracks = np.zeros((len(ways), 0, program.n_steps, 6))
+        nodes = max(each.numbers.shape[1] for each in ways)
+        return Roads(
+            paths=paths,
+            counts=counts,
+            steps=np.ascontiguousarray(steps[:, :, 0, 0]),
+            follows=_numbers([[path.follows for path in each.paths] for each in ways]),
+            spans=spans,
+            span_counts=_numbers([[len(path.spans) for path in each.paths] for each in ways]),
+            zones=self._find_zones(paths, counts, steps[:, :, 0, 0]),
+            points=self._points,
+            tracks=tracks,
+            nodes=_stacked([each.nodes if each else np.empty((0, 7), np.int64) for each in lanes]),
+            ends=_stacked([each.graph.ends if each else np.empty((0, 2)) for each in lanes]),
+            ways=np.stack(
+                [
+                    np.pad(
+                        each.numbers,
+                        ((0, 0), (0, nodes - each.numbers.shape[1])),
+                        constant_values=UNKNOWN,
+                    )
+                    for each in ways
+                ]
+            ),
+            ground=_stacked([ground.points for ground in grounds]),
+            ground_nodes=_stacked([ground.nodes for ground in grounds]),
+        )
+
+    def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
+        """Return where the ego's first path meets each other one, ``(P, K, 5)``."""
+        from bridgegen.ego._reference_kernels import find_zone  # numba is slow to import
+
+        bodies = self._program.bodies
+        widest = bodies[int(np.argmax(bodies[:, 1]))]
+        for p, found in enumerate(self._zones):
+            for k in range(len(found), len(self._ways[p].paths)):
+                zone = np.full(5, np.inf)
+                if k > 0:
+                    find_zone(
+                        paths[p, 0], counts[p, 0], steps[p, 0], bodies[0],
+                        paths[p, k], counts[p, k], steps[p, k],
+                        bodies[k] if k < len(bodies) else widest, zone,
+                    )  # fmt: skip
+                found.append(zone)
+        whole = np.full((*counts.shape, 5), np.inf)
+        for p, found in enumerate(self._zones):
+            whole[p, : len(found)] = found
+        return whole
 
 
-def compile_network(program: Program, models: Sequence[OpenDrive]) -> Network:
-    """Plan and sample every path on every road network.
-
-    Args:
-        program: the storyboard.
-        models: P road networks.
-
-    Raises:
-        InputError: a position that is not on a road, or a route that no lane leads along.
-    """
-    from bridgegen.ego._reference_kernels import find_zone  # numba is slow to import
-
-    shape = (len(models), len(program.paths))
-    n_entities = len(program.names)
-    ways = [Ways(program, model) for model in models]
-    points = np.zeros((len(models), len(program.points), 2))
-    for p, model in enumerate(models):
-        for i, point in enumerate(program.points):
-            points[p, i] = position(program, model, point)
-    tables = [table for each in ways for table in each.tables]
-    counts = np.array([len(table) for table in tables], dtype=np.int64).reshape(shape)
-    steps = np.array([each.steps for each in ways]).reshape(shape)
-    station = np.array([each.station[:n_entities] for each in ways])
-    sides = np.array([each.sides[:n_entities] for each in ways], dtype=np.float64)
-    paths = padded(tables, shape)
-    bodies = _bodies(program)
-    zones = np.full((*shape, 5), np.inf)
-    for p, k in product(range(shape[0]), range(1, shape[1])):
-        find_zone(
-            paths[p, 0], counts[p, 0], steps[p, 0], program.bodies[0],
-            paths[p, k], counts[p, k], steps[p, k], bodies[k], zones[p, k],
-        )  # fmt: skip
-    tracks = np.array([each.tracks for each in ways])
-    if not tracks.size:
-        tracks = np.zeros((len(models), 0, program.n_steps, 6))
-    return Network(paths, counts, steps, zones, station, sides, points, tracks)
+def _numbers(rows: Sequence[Sequence[int]]) -> Int:
+    """Return rows of numbers as one array, shorter ones filled up with 0."""
+    whole = np.zeros((len(rows), max(map(len, rows))), dtype=np.int64)
+    for row, each in zip(whole, rows, strict=True):
+        row[: len(each)] = each
+    return whole
 
 
-def _bodies(program: Program) -> list[Float]:
-    """Return the body that each path is for."""
-    owners = list(range(len(program.names)))
-    for spec in program.paths[len(owners) :]:
-        assert isinstance(spec, BesideLanes)  # entities' own paths come first
-        owners.append(owners[spec.of])
-    return [program.bodies[owner] for owner in owners]
+def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:
+    """Return tables as one array; shorter ones are filled up with rows of -1: nobody's."""
+    longest = max(map(len, tables))
+    return np.stack(
+        [
+            np.concatenate([one, np.full((longest - len(one), *one.shape[1:]), -1, one.dtype)])
+            for one in tables
+        ]
+    )

@@ -74,23 +74,23 @@ class AlongTrajectory:
 
 
 @dataclass(frozen=True)
-class BesideLanes:
-    """A path along the lanes beside those of another path.
+class LaneCheck:
+    """A lane change that must be possible somewhere on the way of an entity.
 
     Attributes:
-        of: the number of that path.
+        entity: its number.
         lanes: how many lanes to the left of the direction of travel; or None.
         lane: the lane's id, where that is given instead.
-        line: of the action that leads there.
+        line: of the action.
     """
 
-    of: int
+    entity: int
     lanes: int | None
     lane: int | None
     line: int
 
 
-PathSpec = AlongLanes | AlongTrajectory | BesideLanes
+PathSpec = AlongLanes | AlongTrajectory
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,11 @@ class Program:
         parameters: the numeric parameters with their declared values.
         slots: S distinct values.
         init: ``(E,)`` slot of each entity's initial speed.
-        paths: K ≥ E ways: entity e starts on path e; the others are where lane changes lead.
+        paths: E ways: entity e starts on path e. Others are planned as they are needed.
+        routes: ``(E,)`` the route that each starts with, 0 for none; route r has the places of
+            ``waypoints[r - 1]``.
+        waypoints: the places that each route passes.
+        lane_checks: lane changes that are known to be asked for.
         start_slots: ``(E,)`` slot of each start's s; -1 where the path starts with the entity.
         aside_slots: ``(E,)`` slot of how far each is aside of its lane's centre; -1 of the ego,
             whose path runs there, and of who is on the centre.
@@ -118,8 +122,9 @@ class Program:
         elements: ``(X, 10)`` of the storyboard: kind, parent, first element after it, start and
             stop trigger, priority, executions at most, first and past-the-last action, event.
         actions: ``(·, 8)`` entity, kind, shape, dimension, slot of the target, slot of its
-            dynamics, path or row of ``weathers``, whether the entity is selected by the trigger;
-            see ``_action_kernels`` and ``_motion_kernels``. ``_codes`` names the columns.
+            dynamics, row of ``laterals`` or of ``weathers``, whether the entity is selected by the
+            trigger; see ``_action_kernels`` and ``_motion_kernels``. ``_codes`` names the columns.
+        laterals: ``(·, 3)``, see ``_across_kernels``.
         lights: the traffic lights that are set.
         first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
@@ -139,6 +144,9 @@ class Program:
     slots: tuple[Value, ...]
     init: Int
     paths: tuple[PathSpec, ...]
+    routes: Int
+    waypoints: tuple[tuple[LanePoint, ...], ...]
+    lane_checks: tuple[LaneCheck, ...]
     start_slots: Int
     aside_slots: Int
     triggers: Int
@@ -148,6 +156,7 @@ class Program:
     points: tuple[LanePoint, ...]
     elements: Int
     actions: Int
+    laterals: Int
     weathers: Int
     lights: tuple[str, ...]
     first_states: npt.NDArray[np.int8]
@@ -163,13 +172,6 @@ class Program:
         paths = self.paths[: len(self.names)]
         is_timed = np.array([isinstance(one, AlongTrajectory) and bool(one.times) for one in paths])
         return np.where(is_timed, np.cumsum(is_timed) - 1, -1).astype(np.int64)
-
-    def owner(self, path: int) -> str:
-        """Return the name of the entity that a path is for."""
-        spec = self.paths[path]
-        while path >= len(self.names) and isinstance(spec, BesideLanes):
-            path, spec = spec.of, self.paths[spec.of]
-        return self.names[path]
 
     @cached_property
     def box(self) -> Float:

@@ -13,7 +13,7 @@ from bridgegen.ego.driver_process import DriverProcess
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard
-from bridgegen.simulation.embedded.network import Network, compile_network
+from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class EmbeddedSimulator:
 
     def roads(self, models: Sequence[OpenDrive]) -> Network:
         """See `Simulator`: each entity's route, planned and sampled."""
-        return compile_network(self.program, models)
+        return Network(self.program, models)
 
     def run(self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]) -> Rollout:
         """See `Simulator`; runs without the GIL.

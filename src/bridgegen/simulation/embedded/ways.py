@@ -1,39 +1,55 @@
-"""From the paths of a compiled storyboard to the roads: which lanes, and where they run."""
+"""The ways of a compiled storyboard on one road network: planned beforehand, or on demand."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Float, Int
 from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
 from bridgegen.openx.opendrive.lanes import lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.routes import Route, Stretch, next_stretches, plan_route
+from bridgegen.openx.opendrive.routes import (
+    Place,
+    Route,
+    Step,
+    Stretch,
+    next_stretches,
+    plan_route,
+)
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
+from bridgegen.simulation.embedded.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
-    BesideLanes,
+    LaneCheck,
     LanePoint,
     Point,
     Program,
 )
-from bridgegen.simulation.embedded.trajectories import STEP, Corner, polyline, timetable
+from bridgegen.simulation.embedded.trajectories import Corner, polyline, timetable
+
+UNKNOWN, NONE = -1, -2  # in Ways.numbers: not asked for yet; there is no such way
+ENDS, ASKS, LANDS = -1, -2, -3  # in Path.follows, see ``_travel_kernels``
+LANES, GROUND = -1, -2  # asked for instead of a node, see ``_place_kernels``
 
 _MOST_STRETCHES = 1000
+_NO_SPANS = np.empty((0, 11))
 
 
 class Ways:
     """The paths of a storyboard on one road network.
 
     Attributes:
-        tables: per path its samples: x, y [m], heading [rad], its cosine and sine, curvature
-            [1/m].
-        steps: per path the distance between two samples [m].
-        station: per path a, b: who starts at s on the first road starts a + b·s along it.
+        paths: first those that the entities start on, then those that were asked for.
+        station: per entity a, b: who starts at s on the first road starts a + b·s along its path.
+        sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
+            trajectory.
         tracks: per entity with a timetable its ``(T, 6)`` states (``trajectories.timetable``).
-        sides: per path 1 where it leads along its first road, -1 against it; 0 on a trajectory.
+        lanes: the lanes of the road network, None while nobody has asked for them.
+        has_ground: whether somebody has asked where all of them are.
+        numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
 
     Raises:
         InputError: a position that is not on a road, or a way that no lane leads along.
@@ -42,45 +58,97 @@ class Ways:
     def __init__(self, program: Program, model: OpenDrive) -> None:
         self._program, self._model = program, model
         self._routes: list[Route | None] = []
-        self.tables: list[Float] = []
-        self.steps: list[float] = []
+        self.paths: list[Path] = []
         self.station: list[tuple[float, float]] = []
         self.sides: list[int] = []
         self.tracks: list[Float] = []
+        self.lanes: Lanes | None = None
+        self.has_ground = False
+        self.numbers: Int = np.empty((len(program.waypoints) + 1, 0), dtype=np.int64)
         for number, spec in enumerate(program.paths):
-            who = f"route of '{program.owner(number)}'"
-            if isinstance(spec, BesideLanes):
-                who = f"lane change of '{program.owner(number)}'"
             try:
                 if isinstance(spec, AlongTrajectory):
                     self._add_trajectory(spec)
-                elif isinstance(spec, AlongLanes):
-                    route = self._along(spec)
-                    start = _known(program, spec.start)
-                    self.sides.append(model.road(spec.start.road).direction(spec.start.lane))
-                    # the ego's driver keeps to a path beside the lane's; the others' offsets are
-                    # added as they are run, whether rows vary them or not
-                    own = spec.aside if number == 0 and isinstance(spec.aside, float) else 0.0
-                    self._add(route, route.station(*start), own * self.sides[-1])
                 else:
-                    self.sides.append(0)
-                    self._add(self._beside(spec), (0.0, 0.0), 0.0)
+                    self._add_lanes(number, spec)
             except InputError as error:
+                who = f"route of '{program.names[number]}'"
                 raise InputError(f"{program.place}: {who}: {error}") from None
+        if len(program.laterals):
+            self.plan(0, LANES)
+            self._check_lane_changes()
 
-    def _add(self, route: Route, station: tuple[float, float], aside: float) -> None:
-        table, step = _sampled(route)
-        if aside != 0.0:
-            table = _shifted(table, aside)
+    def plan(self, route: int, node: int) -> None:
+        """Plan what a row has asked for; see ``ask`` in ``_place_kernels``."""
+        if node < 0:
+            self._learn_lanes()
+            self.has_ground = self.has_ground or node == GROUND
+            return
+        assert self.lanes is not None
+        if self.numbers[route, node] == UNKNOWN:
+            path = self.lanes.plan(route, node)
+            self.numbers[route, node] = NONE if path is None else len(self.paths)
+            if path is not None:
+                self.paths.append(path)
+
+    def _learn_lanes(self) -> None:
+        """Make the tables of all lanes, and tell which ones the known paths lead along."""
+        if self.lanes is not None:
+            return
+        program = self._program
+        places = [[Place(*_place(program, one)) for one in via] for via in program.waypoints]
+        self.lanes = lanes = Lanes(self._model, places)
+        self.numbers = np.full((len(places) + 1, len(lanes.nodes)), UNKNOWN)
+        for i, route in enumerate(self._routes):
+            if route is not None:
+                chain = [lanes.graph.numbers[_node(self._model, step)] for step in route.steps]
+                follows = int(lanes.graph.straight[chain[-1]])
+                spans = lanes.spans(route, chain)
+                self.paths[i] = self.paths[i]._replace(spans=spans, follows=follows)
+
+    def _check_lane_changes(self) -> None:
+        """Refuse what can be seen not to work: a lane that is nowhere beside an entity's way."""
+        assert self.lanes is not None
+        graph = self.lanes.graph
+        reached: dict[int, list[int]] = {}
+        for check in self._program.lane_checks:
+            spans = self.paths[check.entity].spans
+            known = spans[:, 4].astype(int).tolist()
+            there = reached.setdefault(check.entity, list(dict.fromkeys(known)))
+            targets = [
+                target for one in there if (target := _target(graph, one, check)) is not None
+            ]
+            if there and not targets:
+                which = str(check.lane)
+                if check.lanes is not None:
+                    which = f"{abs(check.lanes)} to the {'left' if check.lanes > 0 else 'right'}"
+                line = f" (line {check.line})" if check.line else ""
+                who = f"lane change of '{self._program.names[check.entity]}'"
+                raise InputError(
+                    f"{self._program.place}: {who}: there is no lane {which} to change to{line}"
+                )
+            onward = (node for target in targets for node in graph.onward(target))
+            reached[check.entity] = list(dict.fromkeys([*there, *onward]))
+
+    def _add_lanes(self, number: int, spec: AlongLanes) -> None:
+        route = self._along(spec)
+        side = self._model.road(spec.start.road).direction(spec.start.lane)
+        table, step = sampled(route)
+        # the ego's driver keeps to a path beside the lane's; the others' offsets are added as
+        # they are run, whether rows vary them or not
+        if number == 0 and self._program.aside_slots[0] < 0 and isinstance(spec.aside, float):
+            table = _shifted(table, spec.aside * side)
         self._routes.append(route)
-        self.tables.append(table)
-        self.steps.append(step)
-        self.station.append(station)
+        last = _stretch(self._model, route.steps[-1])
+        goes_on = next(next_stretches(self._model, last), None) is not None
+        self.paths.append(Path(table, step, _NO_SPANS, ASKS if goes_on else ENDS))
+        self.station.append(route.station(*_known(self._program, spec.start)))
+        self.sides.append(side)
 
     def _along(self, spec: AlongLanes) -> Route:
         """Plan from where the start's road is entered to where the last waypoint's road is left.
 
-        Without a route, an entity goes on along its lane as long as there is one way only.
+        Without a route, an entity goes straight on.
         """
         start, waypoints = spec.start, list(spec.via)
         if not waypoints:
@@ -115,35 +183,11 @@ class Ways:
             high = math.nextafter(end.sections[last.section + 1].s, low)
         return plan_route(model, first, [], (last.road_id, last.lane_id, high if forward else low))
 
-    def _beside(self, spec: BesideLanes) -> Route:
-        """Return the way along the lane beside another path's, from where there is one."""
-        base = self._routes[spec.of]
-        if base is None:
-            raise InputError("a lane change starts from a lane, not from a trajectory")
-        for step in base.steps:
-            road = self._model.road(step.road_id)
-            section = road.sections[section_index(road, 0.5 * (step.s + step.s_end))]
-            forward = road.direction(step.lane_id) > 0
-            wanted = spec.lane
-            if spec.lanes is not None:
-                wanted = step.lane_id + (spec.lanes if forward else -spec.lanes)
-            lane = section.lane(wanted) if wanted else None
-            if lane is None or not lane.drivable or lane.id == step.lane_id:
-                continue
-            if (road.direction(lane.id) > 0) == forward:
-                return self._onward(step.road_id, lane.id, step.s)
-        which = str(spec.lane)
-        if spec.lanes is not None:
-            which = f"{abs(spec.lanes)} to the {'left' if spec.lanes > 0 else 'right'}"
-        line = f" (line {spec.line})" if spec.line else ""
-        raise InputError(f"there is no lane {which} to change to{line}")
-
     def _add_trajectory(self, spec: AlongTrajectory) -> None:
         corners = [_corner(self._program, self._model, point) for point in spec.points]
         table, step = polyline(corners, may_stand=bool(spec.times))
         self._routes.append(None)
-        self.tables.append(table)
-        self.steps.append(step)
+        self.paths.append(Path(table, step, _NO_SPANS, LANDS))
         self.station.append((0.0, 0.0))
         self.sides.append(0)
         if spec.times:
@@ -162,6 +206,18 @@ def position(program: Program, model: OpenDrive, point: LanePoint) -> tuple[floa
     return pose.x, pose.y
 
 
+def _target(graph: LaneGraph, node: int, check: LaneCheck) -> int | None:
+    """Return the lane beside a node that a lane change leads to, if it is there."""
+    own = graph.nodes[node]
+    lane = check.lane
+    if lane is None:
+        assert check.lanes is not None
+        lane = own.lane_id + check.lanes * own.way
+        if lane == 0 or (lane > 0) != (own.lane_id > 0):  # there is no lane 0
+            lane += int(math.copysign(1, check.lanes * own.way))
+    return graph.in_section(node, lane)
+
+
 def _corner(program: Program, model: OpenDrive, point: Point) -> Corner:
     if not isinstance(point, LanePoint):
         return point.x, point.y, point.h
@@ -170,6 +226,16 @@ def _corner(program: Program, model: OpenDrive, point: Point) -> Corner:
     pose = lane_pose(road, point.lane, s)
     aside = point.aside * road.direction(point.lane)  # its sign is the road's, the pose the lane's
     return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h), None
+
+
+def _stretch(model: OpenDrive, step: Step) -> Stretch:
+    road = model.road(step.road_id)
+    return Stretch(step.road_id, section_index(road, 0.5 * (step.s + step.s_end)), step.lane_id)
+
+
+def _node(model: OpenDrive, step: Step) -> Node:
+    way = model.road(step.road_id).direction(step.lane_id)
+    return Node(*_stretch(model, step), way)
 
 
 def _end(model: OpenDrive, road_id: str, lane: int, *, entry: bool) -> tuple[str, int, float]:
@@ -194,13 +260,6 @@ def _declared(program: Program, value: Value) -> float:
     return float(value)
 
 
-def _sampled(route: Route) -> tuple[Float, float]:
-    step = route.length / math.ceil(route.length / STEP)
-    path = route.sample(step)
-    columns = (path.x, path.y, path.h, np.cos(path.h), np.sin(path.h), path.curvature)
-    return np.stack(columns, axis=1), step
-
-
 def _shifted(table: Float, aside: float) -> Float:
     """Return a path that runs beside another one; its samples are where the other's are."""
     moved = table.copy()
@@ -209,9 +268,12 @@ def _shifted(table: Float, aside: float) -> Float:
     return moved
 
 
-def padded(tables: Sequence[Float], shape: tuple[int, int]) -> Float:
-    """Return paths of several road networks as one array, ``(P, K, L, 6)``."""
-    paths = np.zeros((*shape, max(len(table) for table in tables), 6))
-    for index, table in enumerate(tables):
-        paths[index // shape[1], index % shape[1], : len(table)] = table
-    return paths
+def padded(tables: Sequence[Sequence[Float]], width: int) -> Float:
+    """Return K tables of each of P networks as one array, ``(P, K, L, width)``."""
+    k = max(len(each) for each in tables)
+    longest = max((len(table) for each in tables for table in each), default=0)
+    whole = np.zeros((len(tables), k, longest, width))
+    for p, each in enumerate(tables):
+        for i, table in enumerate(each):
+            whole[p, i, : len(table)] = table
+    return whole

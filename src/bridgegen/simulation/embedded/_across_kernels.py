@@ -1,0 +1,119 @@
+"""How actions across the road begin: to which lane, or how far aside of it.
+
+``plan.laterals`` has a row per such action with the columns below.
+"""
+
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.ego._path_kernels import project
+from bridgegen.simulation.embedded._lane_kernels import LANE, WAY, beside, find_lane, station_of
+from bridgegen.simulation.embedded._lateral_kernels import lane_change_lasts, offset_lasts
+from bridgegen.simulation.embedded._memory_kernels import NO_LANE
+from bridgegen.simulation.embedded._place_kernels import (
+    LANES,
+    ask,
+    fail,
+    node_under,
+    put_in_world,
+    way_from,
+)
+
+OF, COUNT, CONTINUOUS = 0, 1, 2
+"""The entity whose lane or offset counts, -1: none; the lane's id, or how many lanes it lies to
+the left; whether the offset is kept until another action moves the entity across."""
+
+
+@inlined_kernel
+def end_lateral(e, state):
+    """End the action that moves an entity across, if any."""
+    if state.lateral_action[e] >= 0:
+        state.action_ended[state.lateral_action[e]] = True
+    state.lateral_action[e] = state.to[e] = -1
+
+
+@inlined_kernel
+def stop_lateral(j, plan, state):
+    """Stop action j, which moves an entity across: it goes on as far aside as it is."""
+    e = plan.actions[j, 0]
+    if state.lateral_action[e] == j:
+        state.lateral_action[e] = state.to[e] = -1
+
+
+@inlined_kernel
+def _lane_of(e, k, roads, state, record):
+    """Return (node, s, t) of the lane that an entity is on; node -1: none, or not known yet."""
+    if roads.nodes.shape[0] == 0:
+        ask(0, LANES, state)
+        return -1, 0.0, 0.0
+    if state.on[e] < 0 or roads.span_counts[state.on[e]] == 0:
+        put_in_world(e, record.x[e, k], record.y[e, k], record.h[e, k], roads, state)
+    node, s, t = node_under(e, roads, state)
+    if node < 0:
+        fail(NO_LANE, state)
+    return node, s, t
+
+
+@kernel
+def begin_lane_change(j, k, plan, roads, state, record):
+    """Begin action j, a LaneChangeAction: onto the other lane's way, still aside of it."""
+    e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
+    node, s, _ = _lane_of(e, k, roads, state, record)
+    if node < 0:
+        return
+    lane = row[COUNT]
+    if row[OF] >= 0:
+        other = node
+        if row[OF] != e:
+            other, _, _ = _lane_of(row[OF], k, roads, state, record)
+            if other < 0:
+                return
+        lane = beside(roads.nodes[other, LANE], row[COUNT] * roads.nodes[other, WAY])
+    way = roads.nodes[node, WAY]
+    target = find_lane(roads.nodes, node, lane, way)
+    if target < 0:
+        fail(NO_LANE, state)
+        return
+    p = way_from(state.route[e], target, roads, state)
+    if p < 0:
+        return
+    left, left_at = state.on[e], state.station[e]
+    end_lateral(e, state)
+    station = station_of(roads.spans[p], roads.span_counts[p], target, s)
+    state.on[e], state.turn[e] = p, 0.0
+    state.station[e], state.aside[e] = project(
+        roads.paths[p], roads.counts[p], roads.steps[p], station, record.x[e, k], record.y[e, k]
+    )
+    if target != node:
+        state.to[e], state.foot[e] = left, left_at
+    offset = way * state.slots[plan.actions[j, 4]]
+    value = state.slots[plan.actions[j, 5]]
+    metres = offset - state.aside[e]
+    state.lateral_action[e] = j
+    state.lateral_lasts[e] = lane_change_lasts(
+        plan.actions[j, 2], plan.actions[j, 3], value, metres
+    )
+    state.lateral_passed[e] = 0.0
+    state.lateral_origin[e], state.lateral_target[e] = state.aside[e], offset
+
+
+@kernel
+def begin_lane_offset(j, k, plan, roads, state, record):
+    """Begin action j, a LaneOffsetAction; an offset counts to the left of the reference line."""
+    e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
+    node, _, t = _lane_of(e, k, roads, state, record)
+    if node < 0:
+        return
+    way, value = roads.nodes[node, WAY], state.slots[plan.actions[j, 4]]
+    target = way * value
+    if row[OF] >= 0:  # as far to the left of another entity as it says
+        other, _, its_t = _lane_of(row[OF], k, roads, state, record)
+        if other < 0:
+            return
+        centre = t - way * state.aside[e]
+        target = way * (its_t + roads.nodes[other, WAY] * value - centre)
+    end_lateral(e, state)
+    state.turn[e] = 0.0
+    state.lateral_action[e] = j
+    most = state.slots[plan.actions[j, 5]]
+    state.lateral_lasts[e] = offset_lasts(plan.actions[j, 2], most, target - state.aside[e])
+    state.lateral_passed[e] = 0.0
+    state.lateral_origin[e], state.lateral_target[e] = state.aside[e], target

@@ -1,0 +1,138 @@
+"""How bodies move across their path while they move along it.
+
+A body's speed is along the line that it draws: what it moves sideways, it does not move ahead, and
+who stands does not slide.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.simulation.embedded._motion_kernels import (
+    CUBIC,
+    DISTANCE,
+    LINEAR,
+    RATE,
+    SINUSOIDAL,
+    STEP,
+    progress,
+)
+
+SLOWEST = 1e-6  # m, a step shorter than this is none
+
+
+@kernel
+def lane_change_lasts(shape, dimension, value, metres):
+    """Return over which time [s] or distance [m] a change of lane goes; 0: at once.
+
+    A rate [m/s] is that of the steepest place of the shape.
+    """
+    if shape == STEP:
+        return 0.0
+    if dimension != RATE:
+        return value
+    steepest = 1.0
+    if shape == CUBIC:
+        steepest = 1.5
+    elif shape == SINUSOIDAL:
+        steepest = 0.5 * math.pi
+    return steepest * abs(metres) / value if value > 0.0 else math.inf
+
+
+@kernel
+def offset_lasts(shape, most, metres):
+    """Return how long [s] a move aside takes that must not exceed a lateral acceleration [m/s²].
+
+    The shapes' second derivatives at their ends: 6/T² and pi²/(2·T²) of the way. A linear one
+    would need an infinite acceleration; it takes as long as a cubic one.
+    """
+    if shape == STEP or most == math.inf:
+        return 0.0
+    if shape == SINUSOIDAL:
+        return math.pi * math.sqrt(abs(metres) / (2.0 * most))
+    return math.sqrt(6.0 * abs(metres) / most)
+
+
+@kernel
+def glide(shape, dimension, lasts, passed, origin, target, step, dt):
+    """Return (aside, ahead, passed, tilt) of a body one step on, on its way across.
+
+    Args:
+        shape: of the change.
+        dimension: what it goes by, time or distance along the path.
+        lasts: the time [s] or distance [m] of the whole change.
+        passed: what of it has passed.
+        origin: how far left of the path it began [m].
+        target: how far left of the path it ends [m].
+        step: how far the body moves [m], ≥ 0.
+        dt: [s].
+
+    Returns:
+        how far left of the path it is then, how far along the path it has come [m], what has
+        passed, and by how much its nose is turned from the path's direction [rad].
+    """
+    if lasts <= 0.0:
+        return target, step, passed, 0.0
+    span = target - origin
+    before = origin + span * progress(shape, passed / lasts)[0]
+    if step <= SLOWEST:
+        return before, 0.0, passed, 0.0
+    if dimension == DISTANCE:
+        ahead = step
+        share, slope = progress(shape, (passed + ahead) / lasts)
+        for _ in range(3):  # towards ahead² + across² = step²
+            across = origin + span * share - before
+            ahead = step / math.sqrt(1.0 + (across / ahead) ** 2)
+            share, slope = progress(shape, (passed + ahead) / lasts)
+        passed = min(passed + ahead, lasts)
+        return origin + span * share, ahead, passed, math.atan(span * slope / lasts)
+    share, slope = progress(shape, (passed + dt) / lasts)
+    across = origin + span * share - before
+    if abs(across) >= step:  # faster than it moves: straight across, as fast as it can
+        moved = math.copysign(step, across)
+        if (target - before - moved) * span <= 0.0:
+            return target, 0.0, lasts, 0.0
+        share = (before + moved - origin) / span
+        return (
+            before + moved,
+            0.0,
+            lasts * inverse(shape, share),
+            math.copysign(0.5 * math.pi, across),
+        )
+    passed = min(passed + dt, lasts)
+    sideways = span * slope / lasts * dt
+    ahead = math.sqrt(step * step - across * across)
+    tilt = math.asin(min(max(sideways / step, -1.0), 1.0))
+    return origin + span * share, ahead, passed, tilt
+
+
+@kernel
+def inverse(shape, share):
+    """Return at which share of its time a change has come so far (bisection)."""
+    if shape == LINEAR:
+        return share
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if progress(shape, middle)[0] < share:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def approach(error, speed, most_speed, most_acceleration, most_deceleration, step, dt):
+    """Return (way across [m], speed across) of a body that closes a distance across its path.
+
+    As fast as its limits let it, and so that it can stop there; ``error`` is what is left [m].
+    Without limits it is there at once; it never moves farther across than it moves.
+    """
+    if most_acceleration == math.inf and most_speed == math.inf:
+        moved = error
+    else:
+        wanted = min(math.sqrt(2.0 * most_deceleration * abs(error)), most_speed, abs(error) / dt)
+        wanted = math.copysign(wanted, error)
+        change = (most_acceleration if abs(wanted) > abs(speed) else most_deceleration) * dt
+        speed += min(max(wanted - speed, -change), change)
+        moved = speed * dt
+    return moved, moved / dt
