@@ -82,3 +82,14 @@ def test_the_documentation_of_drivers_names_what_there_is():
     text = (DOCS / "drivers.md").read_text("utf-8")
     names = ("v", "target_speed", "offset", "stop_distance", "light", "route_3_x", "track_1_vx")
     assert all(f"`{name}`" in text and _is_known(name) for name in names)
+
+
+def test_every_metric_and_column_is_described():
+    from bridgegen.metrics import METRICS
+    from bridgegen.simulation.trace import COLUMNS, MORE
+
+    text = (DOCS / "metrics.md").read_text("utf-8")
+    rows = [line.split(" | ")[:3] for line in text.splitlines() if line.startswith("| `")]
+    told = {row[0].strip("| `"): tuple(row[1:]) for row in rows if len(row) == 3}
+    assert {m.name: (m.unit, m.sense) for m in METRICS.values()}.items() <= told.items()
+    assert [name for name in (*COLUMNS, *MORE) if f"`{name}`" not in text] == []

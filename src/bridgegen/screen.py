@@ -2,8 +2,9 @@
 
 import json
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from bridgegen.campaign.driver_contract import Check
     from bridgegen.campaign.loop import Progress as LoopProgress
     from bridgegen.campaign.settings import Settings
+    from bridgegen.metrics.measure import Measured
     from bridgegen.odd.coverage import Coverage, ParameterBins
     from bridgegen.odd.scenario import ParameterLine
     from bridgegen.pipeline import FileResult
@@ -123,14 +125,42 @@ def print_summary(run: "Run", seconds: float) -> None:
 
 def print_file_result(file: Path, result: "FileResult") -> None:
     """Print what one scenario file came to."""
-    from bridgegen.metrics import METRICS
-
     print(f"{file}: ego {result.driver}, {result.seconds:g} s simulated")
     if result.status != "ok":
         print(f"failed: {result.status}")
-    width = max(len(name) for name in result.metrics)
-    for name, value in result.metrics.items():
-        print(f"{name:<{width}}  {value!r} {METRICS[name].unit}")
+    _print_metrics(result.metrics)
+
+
+def print_measured(file: Path, measured: "Measured", *, as_json: bool) -> None:
+    """Print what a recording came to."""
+    rollout, n = measured.rollout, measured.rollout.shape[2]
+    if as_json:
+        facts = {
+            "file": str(file), "ego": rollout.names[0], "entities": rollout.names, "instants": n,
+            "time_step": rollout.time_step, "metrics": _finite(measured.metrics),
+            "notes": measured.notes,
+        }  # fmt: skip
+        print(json.dumps(facts, indent=2))
+        return
+    print(
+        f"{file}: ego {rollout.names[0]}, {len(rollout.names) - 1} others, {measured.seconds:g} s "
+        f"in {n} instants"
+    )
+    _print_metrics(measured.metrics)
+
+
+def _print_metrics(values: Mapping[str, float]) -> None:
+    from bridgegen.metrics import METRICS
+
+    width = max(len(name) for name in values)
+    for name, value in values.items():
+        unit = METRICS[name].unit
+        print(f"{name:<{width}}  {value!r}{'' if unit == '1' else ' ' + unit}")
+
+
+def _finite(values: Mapping[str, float]) -> dict[str, float | None]:
+    """Return values as JSON has them: null for what is infinite or NaN."""
+    return {name: value if isfinite(value) else None for name, value in values.items()}
 
 
 def print_checks(checks: "Iterable[Check]", *, as_json: bool) -> bool:

@@ -51,6 +51,15 @@ def test_one_that_stands_where_the_ego_was(rollout_of):
     assert crawls == pytest.approx([2.0], abs=0.051)  # its front needs 2 s to where our rear was
 
 
+@pytest.mark.parametrize(("later", "expected"), [(9.8, True), (10.3, False)])
+def test_what_is_longer_than_ten_seconds_is_none(rollout_of, later, expected):
+    ego, other = (-27.0, 0.0, 0.0, 10.0), (0.0, -3.0 - 2.0 * (3.0 + later), pi / 2, 2.0)
+    found = pet(drive(rollout_of, ego, other, t=400))
+    assert np.isfinite(found) == [expected]
+    if expected:
+        assert found == pytest.approx([later], abs=0.051)
+
+
 def plain(rollout, i):
     n = rollout.n_steps[i]
     corners = []

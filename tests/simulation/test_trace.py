@@ -10,7 +10,7 @@ from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline, simulate_file
-from bridgegen.simulation.trace import COLUMNS, write_trace
+from bridgegen.simulation.trace import COLUMNS, MORE, write_trace
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,8 @@ def test_it_is_the_rollout_to_the_last_bit(xosc, tmp_path, monkeypatch, capsys):
     assert "d_min" in capsys.readouterr().out
     rollout = simulate_file(xosc).rollout
     rows = table(path)
-    assert tuple(rows[0]) == COLUMNS
+    assert tuple(rows[0]) == (*COLUMNS, *MORE)
+    assert COLUMNS == ("time", "entity", "x", "y", "h", "speed")
     n = int(rollout.n_steps[0])
     assert len(rows) == n * len(rollout.names)
     for e, name in enumerate(rollout.names):

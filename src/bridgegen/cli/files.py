@@ -141,6 +141,39 @@ def ask(
     print_table(answer.columns, answer.rows, as_json=as_json)
 
 
+@app.command()
+def metrics(
+    file: Annotated[
+        Path,
+        typer.Argument(help="A recording: a trace (.csv), or what esmini's --csv_logger writes."),
+    ],
+    ego: Annotated[
+        str | None, typer.Option(help="The entity under test; that of the first line by default.")
+    ] = None,
+    boxes: Annotated[
+        Path | None,
+        typer.Option(help="Take the entities' boxes from this OpenSCENARIO file (.xosc)."),
+    ] = None,
+    dt: Annotated[
+        float | None, typer.Option(help="Resample the recording at this time step [s].")
+    ] = None,
+    only: Annotated[
+        str | None,
+        typer.Option("--metrics", help="Only these, e.g. pet,drac.", show_default="all there are"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Print the metrics of a recording that another simulator, or the road, made."""
+    from bridgegen.metrics.measure import measure_recording
+    from bridgegen.screen import print_measured
+
+    names = [name.strip() for name in only.split(",")] if only else None
+    measured = measure_recording(file, ego=ego, boxes=boxes, metrics=names, time_step=dt)
+    for note in measured.notes:
+        print(f"bridgegen: note: {file}: {note}", file=sys.stderr)
+    print_measured(file, measured, as_json=as_json)
+
+
 @ontology.command("docs")
 def ontology_docs(
     out: Annotated[Path, typer.Option(help="The page (.html).")] = Path("bridgegen-ontology.html"),

@@ -83,14 +83,17 @@ def nearest_in_time(
 @kernel
 def encroachment(
     half: Float, x: Float, y: Float, cosine: Float, sine: Float, distance: Float, n_steps: Int,
-    out: Float,
+    longest: int, out: Float,
 ) -> None:  # fmt: skip
-    """Write each scenario's least number of steps between being at one point; +inf if none."""
-    n_rows, n_entities, n_instants = x.shape
+    """Write each scenario's least number of steps between being at one point; +inf if none.
+
+    More than ``longest`` steps are none.
+    """
+    n_rows, n_entities, _ = x.shape
     for i in range(n_rows):
-        best = n_instants
+        best = longest + 1
         for e in range(1, n_entities):
             best = nearest_in_time(
                 half, x[i], y[i], cosine[i], sine[i], distance[i, e], e, n_steps[i], best
             )
-        out[i] = best if best < n_instants else np.inf
+        out[i] = best if best <= longest else np.inf

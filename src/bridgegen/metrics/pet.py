@@ -3,9 +3,12 @@
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.metrics.metric import Metric, without_failed
+from bridgegen.metrics.metric import Metric, in_steps, without_failed
 from bridgegen.metrics.motion import motion
 from bridgegen.simulation.rollout import Rollout
+
+LONGEST = 10.0
+"""[s] Conflicts have 1 to 5 s."""
 
 
 def pet(rollout: Rollout) -> Float:
@@ -14,11 +17,11 @@ def pet(rollout: Rollout) -> Float:
     It is the least time between an instant at which the one covers a point and one at which the
     other does, whoever came first: between leaving and entering the conflict area for those that
     cross or merge, and the time gap for one that follows. The bodies are the oriented boxes; the
-    resolution is the time step.
+    resolution is the time step. What is longer than `LONGEST` is no encroachment.
 
     Returns:
         ``(N,)`` float64 [s], 0 where they were in contact, +inf where they have no point in
-        common, NaN where the scenario failed.
+        common within `LONGEST`, NaN where the scenario failed.
 
     Source: Allen, Shin, Cooper, Analysis of traffic conflicts and collisions, Transp. Res. Rec.
     667 (1978) 67; Westhofen et al., Criticality metrics for automated driving, Arch. Comput.
@@ -28,7 +31,10 @@ def pet(rollout: Rollout) -> Float:
 
     m = motion(rollout)
     out = np.empty(len(m.n_steps))
-    _pet_kernels.encroachment(m.half, m.x, m.y, m.cosine, m.sine, m.distance, m.n_steps, out)
+    longest = in_steps("LONGEST", LONGEST, rollout.time_step)
+    _pet_kernels.encroachment(
+        m.half, m.x, m.y, m.cosine, m.sine, m.distance, m.n_steps, longest, out
+    )
     return without_failed(rollout, out * rollout.time_step)
 
 
@@ -37,6 +43,6 @@ METRIC = Metric(
     unit="s",
     description="smallest post-encroachment time: between one and the other at the same point",
     sense="smaller",
-    cap=10.0,  # conflicts have 1 to 5 s
+    cap=LONGEST,
     compute=pet,
 )

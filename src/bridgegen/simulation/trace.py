@@ -10,9 +10,15 @@ from bridgegen.simulation.rollout import Rollout
 COLUMNS = ("time", "entity", "x", "y", "h", "speed")
 """[s], name, [m], [m], [rad], [m/s]; positions are OpenSCENARIO's reference points."""
 
+MORE = ("acceleration", "offset", "length", "width", "centre")
+"""What else the metrics need: [m/s²] along the heading, [m] from the lane's centre, and the box [m]
+with its centre's distance ahead of the reference point."""
+
 
 def write_trace(path: Path, rollout: Rollout, row: int = 0) -> None:
     """Write one scenario of a rollout as CSV, whole or not at all; every number in full.
+
+    Its columns are `COLUMNS` and `MORE`; who is not present at an instant has no line then.
 
     Args:
         path: a new file, its name ends in .csv.
@@ -31,13 +37,17 @@ def write_trace(path: Path, rollout: Rollout, row: int = 0) -> None:
 
 
 def _lines(rollout: Rollout, row: int) -> Iterator[str]:
-    yield ",".join(COLUMNS) + "\r\n"
+    yield ",".join((*COLUMNS, *MORE)) + "\r\n"
     names = [_quoted(name) for name in rollout.names]
-    states = [getattr(rollout, name)[row].tolist() for name in ("x", "y", "h", "v")]
+    boxes = [",".join(repr(size) for size in box) for box in rollout.box.tolist()]
+    states = [getattr(rollout, name)[row].tolist() for name in ("x", "y", "h", "v", "a", "offset")]
+    present = rollout.present[row] if rollout.present.size else None
     for k in range(int(rollout.n_steps[row])):
         time = repr(k * rollout.time_step)
         for e, name in enumerate(names):
-            yield ",".join((time, name, *(repr(array[e][k]) for array in states))) + "\r\n"
+            if present is None or present[e, k]:
+                values = ",".join(repr(array[e][k]) for array in states)
+                yield f"{time},{name},{values},{boxes[e]}\r\n"
 
 
 def _quoted(name: str) -> str:
