@@ -1,14 +1,15 @@
-"""The job in one file: rows of X → scenarios → rollouts → metrics → objectives.
+"""The job in one file: rows of X → scenarios → rollouts → metrics → objectives → causes.
 
-Read this first. `Pipeline.evaluate` is the whole path of a batch, one line per stage; everything
-else here prepares it.
+Read this first. `Pipeline._evaluate_chunk` is the whole path of a batch, one line per stage;
+everything else here prepares it.
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.cause import Cause, Counterfactual, causes, require
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.objective import CLASSIFYING, Objective, Thresholds, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
@@ -30,6 +32,8 @@ from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 from bridgegen.simulation.simulator import Simulator
 
+T = TypeVar("T")
+
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
 
@@ -41,9 +45,11 @@ class Evaluation:
     Attributes:
         metrics: ``(N, M)`` float64, NaN in a failed row.
         F: ``(N, n_obj)`` float64, minimised; a filler in a failed row.
-        critical: ``(N,)`` bool.
+        critical: ``(N,)`` bool, of those of the cause that is asked for, if one is.
         status: ``(N,)`` int8, 0 is success.
         messages: by row, what else there is to say of its failure.
+        cause: ``(N,)`` int8, the `Cause` of what the thresholds call critical; None where causes
+            are not sought.
     """
 
     metrics: Float
@@ -51,6 +57,26 @@ class Evaluation:
     critical: Bool
     status: npt.NDArray[np.int8]
     messages: Mapping[int, str] = field(default_factory=dict)
+    cause: npt.NDArray[np.int8] | None = None
+
+    @classmethod
+    def join(cls, parts: Sequence["Evaluation"]) -> "Evaluation":
+        """Return the evaluations of several parts, at least one, in their order."""
+        starts = np.cumsum([0, *(len(one.status) for one in parts)]).tolist()
+        messages = {
+            start + row: text
+            for start, one in zip(starts, parts, strict=False)
+            for row, text in one.messages.items()
+        }
+        sought = [one.cause for one in parts if one.cause is not None]
+        return cls(
+            np.concatenate([one.metrics for one in parts]),
+            np.concatenate([one.F for one in parts]),
+            np.concatenate([one.critical for one in parts]),
+            np.concatenate([one.status for one in parts]),
+            messages,
+            np.concatenate(sought) if sought else None,
+        )
 
 
 class Pipeline:
@@ -65,6 +91,8 @@ class Pipeline:
         metrics: the names of all metrics that are recorded: what was asked for and what the
             objective and the thresholds need.
         simulator: holds the scenario's storyboard.
+        cause: the only one that makes a scenario count as critical, if one was asked for.
+        seeks_causes: whether ``evaluate`` finds causes.
     """
 
     objective: Objective
@@ -80,6 +108,8 @@ class Pipeline:
         road_map: RoadMap | None = None,
         metrics: Sequence[str] | None = None,
         also: Sequence[str] = (),
+        seek_causes: bool = False,
+        cause: Cause | None = None,
     ) -> None:
         """Prepare a scenario.
 
@@ -93,10 +123,12 @@ class Pipeline:
             metrics: the names of all to record, CLASSIFYING and the objective's among them;
                 what ``metrics_of`` says by default.
             also: the names of metrics to record besides, by default.
+            seek_causes: whether to find the cause of each critical scenario.
+            cause: of harm; a critical scenario of another one does not count.
 
         Raises:
             UnknownNameError: no such driver or metric.
-            InputError: a metric does not exist with this driver.
+            InputError: a metric, or harm by the cause, does not exist with this driver.
         """
         self.scenario = scenario
         self.space = space
@@ -105,12 +137,15 @@ class Pipeline:
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
         driver = egos.get(name, ideal, time_limit) if name else None
         self.source = _source(scenario, driver, road_map)
+        self.cause, self.seeks_causes = cause, seek_causes or cause is not None
         nominal = self.concrete(space.row({}))
         simulator = EmbeddedSimulator(nominal.storyboard, scenario.name, driver=driver)
         self.simulator: Simulator[Network] = simulator
         self.driver = simulator.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
             self.source = _source(scenario, self.driver, road_map)
+        if cause is not None:
+            require(cause, self.driver)
         recorded = metrics_of(scenario, self.driver, also) if metrics is None else metrics
         self.metrics = tuple(recorded)
         _refuse_fixed(scenario, space, self.simulator.fixed)
@@ -135,7 +170,8 @@ class Pipeline:
             if needs_sample(spec.weights, spec.scale):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
-                sample = (self._measure(self.space.decode(U))[0], self.metrics)
+                parts = self._in_chunks(self._measure, self.space.decode(U))
+                sample = (np.concatenate(parts), self.metrics)
             limits = spec.critical
             objective = Objective.build(
                 [(term.metric, term.weight) for term in spec.terms],
@@ -154,7 +190,7 @@ class Pipeline:
 
         In this thread: Ctrl-C ends a compilation at once.
         """
-        self._measure_chunk(self.space.row({})[np.newaxis])
+        self._measure(self.space.row({})[np.newaxis])
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
@@ -162,10 +198,23 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
         """
-        metrics, status, messages = self._measure(X)
+        return Evaluation.join(self._in_chunks(self._evaluate_chunk, X))
+
+    def _evaluate_chunk(self, X: Float) -> Evaluation:
+        roads, rows = self._roads_of(X)
+        rollout = self._run(roads, rows, X)
+        metrics = measures.evaluate(rollout, self.metrics)
         F, ok = self.objective.F(metrics, self.metrics)
-        critical = self.objective.critical(metrics, self.metrics)
-        return Evaluation(metrics, F, critical & ok, status, messages)
+        critical = self.objective.critical(metrics, self.metrics) & ok
+        if not self.seeks_causes:
+            return Evaluation(metrics, F, critical, rollout.status, rollout.messages)
+
+        def harmless(at: Int, replay: Counterfactual) -> Bool:
+            return self._harmless(self._run(roads, rows[at], X[at], replay))
+
+        cause = causes(self.driver, critical, harmless)
+        counts = critical if self.cause is None else cause == self.cause
+        return Evaluation(metrics, F, counts, rollout.status, rollout.messages, cause)
 
     def facts(self, x: Float) -> dict[str, float]:
         """Return the parameters of one row that its scenario depends on, by name."""
@@ -183,25 +232,30 @@ class Pipeline:
 
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
+        return self._run(*self._roads_of(X), X)
+
+    def _run(
+        self, roads: Network, rows: Int, X: Float, replay: Counterfactual | None = None
+    ) -> Rollout:
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
-        roads, rows = self._roads_of(X)
-        return self.simulator.run(roads, rows, columns)
+        if replay is None:
+            return self.simulator.run(roads, rows, columns)
+        return self.simulator.run(roads, rows, columns, driver=replay.driver, dry=replay.dry)
 
-    def _measure(self, X: Float) -> tuple[Float, npt.NDArray[np.int8], dict[int, str]]:
-        """Roll out and measure in chunks on all cores; the kernels run without the GIL."""
+    def _harmless(self, rollout: Rollout) -> Bool:
+        """Return which rows succeed and are not critical."""
+        metrics = measures.evaluate(rollout, CLASSIFYING)
+        harmless: Bool = (rollout.status == 0) & ~self.objective.critical(metrics, CLASSIFYING)
+        return harmless
+
+    def _in_chunks(self, work: Callable[[Float], T], X: Float) -> list[T]:
+        """Do chunk by chunk of the rows, on all cores; the kernels run without the GIL."""
         size = max(1, min(self.simulator.rows_at_once, -(-len(X) // self._n_threads)))
-        chunks = [X[i : i + size] for i in range(0, len(X), size)]
-        metrics, status = [np.empty((0, len(self.metrics)))], [np.empty(0, np.int8)]
-        messages: dict[int, str] = {}
-        for i, (values, ended, said) in enumerate(self._threads.map(self._measure_chunk, chunks)):
-            metrics.append(values)
-            status.append(ended)
-            messages |= {i * size + row: text for row, text in said.items()}
-        return np.concatenate(metrics), np.concatenate(status), messages
+        chunks = [X[i : i + size] for i in range(0, len(X), size)] or [X]
+        return list(self._threads.map(work, chunks))
 
-    def _measure_chunk(self, X: Float) -> tuple[Float, npt.NDArray[np.int8], Mapping[int, str]]:
-        rollout = self.rollout(X)
-        return measures.evaluate(rollout, self.metrics), rollout.status, rollout.messages
+    def _measure(self, X: Float) -> Float:
+        return measures.evaluate(self.rollout(X), self.metrics)
 
     def _roads_of(self, X: Float) -> tuple[Network, Int]:
         """Return the compiled road networks of some rows, and which row has which."""

@@ -108,7 +108,8 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
         ("search", f"{settings.algorithm}, seed {settings.seed}"),
         ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
-        ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical)"),
+        ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical{_by(settings.cause)})"),
+        *([("causes", ", ".join(f"{k} {n}" for k, n in s.causes.items()))] if s.causes else []),
         ("first critical after", _count(s.first)),
         ("50th critical after", _count(s.fiftieth)),
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
@@ -253,6 +254,10 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(one) for one in value]
     return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _by(cause: str | None) -> str:
+    return f" by {cause}" if cause else ""
 
 
 def _count(value: int | None) -> str:

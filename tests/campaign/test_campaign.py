@@ -30,7 +30,7 @@ def rows_of(folder: Path):
 def same(a, b) -> bool:
     return all(
         np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
-        for name in ("id", "U", "X", "metrics", "F", "status", "critical")
+        for name in ("id", "U", "X", "metrics", "F", "status", "critical", "cause")
     )
 
 
@@ -76,16 +76,20 @@ FIRST_SEVEN = ("n_collision", "ttc", "d_min", "v_d", "l_offset", "a_change", "n_
 def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monkeypatch):
     """It holds seven metrics, in another order, and says nothing of more."""
     with monkeypatch.context() as patch:
-        patch.setattr("bridgegen.campaign.campaign.metrics_of", lambda *_: FIRST_SEVEN)
+        patch.setattr("bridgegen.pipeline.metrics_of", lambda *_: FIRST_SEVEN)
         patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
         bg.run_search("crossroads-s4", budget=80, out=tmp_path / "run")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
         ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
         settings = json.loads(text)
         del settings["chosen"]["metrics"]
+        for later in ("distribution", "ideal", "causes", "cause"):
+            del settings[later]
         connection.execute(
             "UPDATE run SET value = ? WHERE key = 'settings'", (json.dumps(settings),)
         )
+        connection.execute("ALTER TABLE evaluations DROP COLUMN cause")
+        connection.execute("UPDATE run SET value = '1' WHERE key = 'schema'")
         connection.execute("DELETE FROM evaluations WHERE id >= 40")
     run = bg.resume(tmp_path / "run")
     assert len(run.frame()) == 80
@@ -98,6 +102,37 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
 def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):
     run = bg.run_search("crossroads-s4", budget=40, out=tmp_path / "run", metrics=["d_min"])
     assert "--metrics d_min" in run.settings.command(run.folder)
+
+
+def test_a_search_for_a_cause_counts_and_keeps_no_other(tmp_path):
+    run = bg.run_search(
+        "crossroads-s3", budget=120, keep=4, cause="planning", algorithm="random",
+        out=tmp_path / "run",
+    )  # fmt: skip
+    frame = run.frame()
+    assert (frame["critical"] == (frame["cause"] == "planning")).all()
+    assert 0 < run.summary.critical < sum(run.summary.causes.values())
+    assert "--cause planning" in run.settings.command(run.folder)
+    for path in run.scenarios:
+        assert json.loads(path.with_suffix(".json").read_text("utf-8"))["cause"] == "planning"
+    with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
+        connection.execute("DELETE FROM evaluations WHERE id >= 40")
+    again = bg.resume(tmp_path / "run")
+    assert again.frame()["cause"].tolist() == frame["cause"].tolist()
+    assert again.summary.critical == run.summary.critical
+
+
+def test_causes_can_be_left_out(tmp_path):
+    run = bg.run_search("crossroads-s3", budget=40, causes=False, out=tmp_path / "run")
+    assert run.summary.critical > 0
+    assert run.summary.causes == {}
+    assert run.frame()["cause"].isna().all()
+    assert "--no-causes" in run.settings.command(run.folder)
+    with pytest.raises(InputError, match="must be sought"):
+        bg.run_search("crossroads-s3", causes=False, cause="control", out=tmp_path / "other")
+    with pytest.raises(InputError, match="only planning, control, unavoidable"):
+        bg.run_search("crossroads-s3", cause="perception", out=tmp_path / "other")
+    assert not (tmp_path / "other").exists()
 
 
 @pytest.mark.checkers

@@ -139,7 +139,7 @@ def change(folder, sql, *values):
 @pytest.mark.parametrize(
     ("sql", "values", "message"),
     [
-        ("UPDATE run SET value = ? WHERE key = 'schema'", ["2"], "schema must be 1, got 2"),
+        ("UPDATE run SET value = ? WHERE key = 'schema'", ["3"], "schema must be at most 2, got 3"),
         ("DELETE FROM run WHERE key = 'schema'", [], "damaged: bad or missing 'schema'"),
         ("DELETE FROM run WHERE key = 'settings'", [], "damaged: no settings"),
         ("UPDATE run SET value = '{' WHERE key = 'settings'", [], "damaged: bad or missing"),

@@ -95,7 +95,7 @@ def test_people_can_query_it(tmp_path):
     names = [row[1] for row in db.execute("PRAGMA table_info(evaluations)")]
     assert names == [
         "id", "batch", "seconds", "u", "ego_speed", "fog_density", "d_min", "v_d", "ttc",
-        "f0", "f1", "status", "critical",
+        "f0", "f1", "status", "critical", "cause",
     ]  # fmt: skip
     (n,) = db.execute("SELECT count(*) FROM evaluations WHERE critical AND d_min < 0").fetchone()
     assert n == np.count_nonzero(result.critical & (result.metrics[:, 0] < 0))
@@ -119,6 +119,45 @@ def test_rows_stream_in_chunks(tmp_path):
         assert len(store.read(118, 500)) == 3
 
 
+def test_causes_are_recorded_by_name_and_read_back(tmp_path):
+    U, X, result = batch(30)
+    result.cause = np.arange(30) % 5
+    with create(tmp_path / "run") as store:
+        store.append(U, X, result, 1.0)
+        del result.cause
+        store.append(*batch(3, seed=1), seconds=2.0)  # nobody sought any
+    with Store.open(tmp_path / "run") as store:
+        rows, frame = store.read(), store.frame()
+    assert rows.cause.tolist() == [*(k % 5 for k in range(30)), 0, 0, 0]
+    names = ["", "perception", "planning", "control", "unavoidable"]
+    found = frame["cause"].where(frame["cause"].notna(), "").tolist()
+    assert found == [*(names[k % 5] for k in range(30)), "", "", ""]
+    db = sqlite3.connect(tmp_path / "run" / "run.sqlite")
+    query = "SELECT cause, count(*) FROM evaluations WHERE cause NOT NULL GROUP BY cause"
+    assert dict(db.execute(query)) == {name: 6 for name in names if name}
+    db.close()
+
+
+def test_a_run_of_the_first_schema_has_no_causes_and_goes_on(tmp_path):
+    with create(tmp_path / "run", parameters=["cause", "b"]) as store:
+        store.append(*batch(4), seconds=1.0)
+    db = sqlite3.connect(tmp_path / "run" / "run.sqlite")
+    db.execute("ALTER TABLE evaluations DROP COLUMN cause")
+    db.execute("ALTER TABLE evaluations RENAME COLUMN cause_parameter TO cause")
+    db.execute("UPDATE run SET value = '1' WHERE key = 'schema'")
+    db.commit()
+    db.close()
+    with Store.open(tmp_path / "run", write=True) as store:
+        U, X, result = batch(2, seed=1)
+        result.cause = np.array([1, 2])
+        store.append(U, X, result, 2.0)
+        rows = store.read()
+        assert rows.cause.tolist() == [0] * 6
+        assert (rows.X[4:] == X).all()
+        assert "cause" in store.frame()  # the parameter
+        assert store.frame()["cause"].dtype == float
+
+
 def test_an_empty_run_can_be_read(tmp_path):
     with create(tmp_path / "run") as store:
         assert (len(store), store.n_batches, store.seconds) == (0, 0, 0.0)
@@ -134,7 +173,7 @@ def test_frame(tmp_path):
         frame, rows = store.frame(), store.read()
     assert frame.index.name == "id"
     assert list(frame) == [
-        "batch", "seconds", *PARAMETERS, *METRICS, "f0", "f1", "status", "critical",
+        "batch", "seconds", *PARAMETERS, *METRICS, "f0", "f1", "status", "critical", "cause",
     ]  # fmt: skip
     assert frame["v_d"].to_numpy().tobytes() == rows.metrics[:, 1].tobytes()
     assert frame["f1"].to_numpy().tobytes() == rows.F[:, 1].tobytes()

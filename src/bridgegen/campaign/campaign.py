@@ -11,6 +11,7 @@ from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.run import REPORT, Run
 from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
+from bridgegen.cause import Cause
 from bridgegen.ego import STORYBOARD, is_spec
 from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.objective import Objective
@@ -64,6 +65,8 @@ def run_search(
     weights: str | None = None,
     scale: str | None = None,
     metrics: Sequence[str] = (),
+    causes: bool = True,
+    cause: str | None = None,
     watch: Watch | None = None,
 ) -> Run:
     """Search a logical scenario for its critical concrete ones, and hand them over.
@@ -92,6 +95,9 @@ def run_search(
         weights: "fixed", or "entropy" of a random sample, instead of the scenario's way.
         scale: "raw", or "standardised" by a random sample, instead of the scenario's.
         metrics: names of those to record besides the objective's and the paper's.
+        causes: whether to find the cause of each critical scenario, by replaying it.
+        cause: "perception", "planning", "control" or "unavoidable": a critical scenario of another
+            cause does not count.
         watch: told how it is getting on.
 
     Returns:
@@ -116,6 +122,8 @@ def run_search(
     values = resolve(method, space.n_var, 1, seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
+    if cause is not None and not causes:
+        raise InputError(f"to search for the cause '{cause}', causes must be sought")
     pipeline = Pipeline(
         logical,
         space,
@@ -124,6 +132,8 @@ def run_search(
         time_limit=time_limit,
         road_map=roads,
         also=metrics,
+        seek_causes=causes,
+        cause=None if cause is None else Cause.named(cause),
     )
     watch.stage("compile")
     pipeline.warm_up()
@@ -145,6 +155,8 @@ def run_search(
         map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
         junction=roads.site.junction_id if roads else None,
         keep=keep,
+        causes=causes,
+        cause=cause,
         objective=chosen.to_dict(),
         chosen={
             "objective": objective,
@@ -189,6 +201,8 @@ def resume(folder: Path | str, *, ego: str | None = None, watch: Watch | None = 
             time_limit=settings.time_limit,
             road_map=roads,
             metrics=store.metrics,
+            seek_causes=settings.causes,
+            cause=Cause.named(settings.cause) if settings.cause else None,
         )
         watch.stage("compile")
         pipeline.warm_up()
@@ -275,7 +289,8 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
     metric = store.metrics.index
     summary = summarise(
         rows.critical, rows.status == 0,
-        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], store.seconds,
+        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
+        store.seconds,
     )  # fmt: skip
     data = build_report(
         pipeline, rows, summary,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.cause import Cause
 from bridgegen.errors import OntologyError, StorageError
 from bridgegen.metrics import METRICS
 from bridgegen.ontology.check import check
@@ -146,6 +147,7 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:
         "scenario": pipeline.scenario.name,
         "ego": pipeline.driver.label,
         "critical": bool(rows.critical[i]),
+        "cause": Cause(rows.cause[i]).label or None,
         "parameters": _named(pipeline.facts(rows.X[i]), units),
         "metrics": _named(
             dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),

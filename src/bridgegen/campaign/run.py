@@ -46,6 +46,7 @@ class Run:
                 rows.status == 0,
                 rows.metrics[:, store.metrics.index("d_min")],
                 rows.metrics[:, store.metrics.index("v_d")],
+                rows.cause,
                 store.seconds,
             )
 

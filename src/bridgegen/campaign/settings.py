@@ -10,6 +10,9 @@ from typing import Any, Self
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import StorageError
 
+SINCE: Mapping[str, Any] = {"distribution": None, "ideal": [], "causes": False, "cause": None}
+"""What a run of an earlier version, which could not say it, was made with."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -32,6 +35,8 @@ class Settings:
         map_digest: SHA-256 of that file.
         junction: the junction of the map that was chosen.
         keep: how many scenarios are handed over.
+        causes: whether the causes of critical scenarios are sought.
+        cause: the only one that counts, or None.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
         chosen: what the user chose of the objective instead of the scenario's: metrics with
             weights, way of weighting, scale; None each where nothing; and the metrics to be
@@ -54,6 +59,8 @@ class Settings:
     map_digest: str | None
     junction: str | None
     keep: int
+    causes: bool
+    cause: str | None
     objective: Mapping[str, Any]
     chosen: Mapping[str, Any]
 
@@ -68,6 +75,7 @@ class Settings:
         Raises:
             StorageError: a key is unknown or missing: the run is another version's.
         """
+        data = {**SINCE, **data}
         if odd := set(data) ^ {one.name for one in fields(cls)}:
             raise StorageError(
                 f"{place}: a run's settings must be those of this version; unknown or missing: "
@@ -86,6 +94,10 @@ class Settings:
         if self.time_limit is not None:
             words += ["--time-limit", repr(self.time_limit)]
         words += ["--axes", ",".join(self.axes), "--keep", str(self.keep)]
+        if not self.causes:
+            words.append("--no-causes")
+        if self.cause:
+            words += ["--cause", self.cause]
         if self.distribution:
             words += ["--distribution", self.distribution]
         for name, value in self.algorithm_settings.items():

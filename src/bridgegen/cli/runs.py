@@ -87,6 +87,16 @@ def search(
         str | None,
         typer.Option(help="Record these as well, e.g. pet,drac; see 'bridgegen list metrics'."),
     ] = None,
+    causes: Annotated[
+        bool, typer.Option(help="Find the cause of each critical scenario, by replaying it.")
+    ] = True,
+    cause: Annotated[
+        str | None,
+        typer.Option(
+            help="Count only this cause's: perception, planning, control or unavoidable.",
+            show_default="any",
+        ),
+    ] = None,
     road_map: Annotated[
         Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
     ] = None,
@@ -121,6 +131,8 @@ def search(
             weights=weights,
             scale=scale,
             metrics=_names(metrics),
+            causes=causes,
+            cause=cause,
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)

@@ -96,7 +96,7 @@ def drive_fsm(
     after instant k is read; ``bodies`` ``(E, ·)``; and ``attention`` ``(E, 3)``, zeros before the
     first instant, changed in place.
     """
-    v = speed[0, k]
+    v, own = speed[0, k], on[0]
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
     reach = v * REACTION + v * v / (2.0 * COMFORT_BRAKING) + STANDSTILL + SAFE_MARGIN
     horizon = min(reach / max(v, 1.0), HORIZON)
@@ -106,7 +106,7 @@ def drive_fsm(
         if k > 0:
             turn = (h[e, k] - h[e, k - 1]) / dt
         what, _, gap, along, lateral = foresee(
-            k, dt, paths[0], path_n[0], path_ds[0], station[0], v, bodies[0], to[e] < 0,
+            k, dt, paths[own], path_n[own], path_ds[own], station[0], v, bodies[0], to[e] < 0,
             paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
             bodies[e], horizon, reach + 15.0, attention[e],
         )  # fmt: skip

@@ -64,7 +64,7 @@ def drive_un_r157(
     after instant k is read; ``bodies`` ``(E, ·)``; and ``attention`` ``(E, 3)``, zeros before the
     first instant, changed in place.
     """
-    v = speed[0, k]
+    v, own = speed[0, k], on[0]
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
     reach = 15.0 + (EVALUATION + REACTION) * v + v * v / (2.0 * COMFORT_DECELERATION)
     risk, brakes = False, attention[0, BRAKES] > 0.0
@@ -74,7 +74,7 @@ def drive_un_r157(
         if k > 0:
             turn, slowing = (h[e, k] - h[e, k - 1]) / dt, (speed[e, k - 1] - w) / dt
         what, ttc, gap, along, lateral = foresee(
-            k, dt, paths[0], path_n[0], path_ds[0], station[0], v, bodies[0], to[e] < 0,
+            k, dt, paths[own], path_n[own], path_ds[own], station[0], v, bodies[0], to[e] < 0,
             paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
             bodies[e], CLEAR, reach, attention[e],
         )  # fmt: skip

@@ -6,6 +6,7 @@ from typing import Protocol, TypeVar
 import numpy.typing as npt
 
 from bridgegen.arrays import Int
+from bridgegen.ego import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.rollout import Rollout
 
@@ -46,7 +47,15 @@ class Simulator(Protocol[Roads]):
             InputError: a position that is not on a road, or a route that no lane leads along.
         """
 
-    def run(self, roads: Roads, rows: Int, values: Mapping[str, npt.ArrayLike]) -> Rollout:
+    def run(
+        self,
+        roads: Roads,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        *,
+        driver: Driver | None = None,
+        dry: bool = False,
+    ) -> Rollout:
         """Roll N scenarios out; the result of a row depends on that row alone.
 
         Args:
@@ -54,6 +63,8 @@ class Simulator(Protocol[Roads]):
             rows: ``(N,)`` int64 in 0..P-1, the road network of each row.
             values: ``(N,)`` float64 per parameter, in the parameter's unit; missing ones keep
                 the value that the file declares, others than the file's are not looked at.
+            driver: who drives an ego that has a driver, instead of its own.
+            dry: whether the road has the friction of a dry one, whatever the file says.
 
         Raises:
             InputError: a road network that is not there, or a value that is not finite.

@@ -8,14 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.cause import Cause
 from bridgegen.errors import InputError
 
 FIRST = ("id", "batch", "seconds", "u")
-LAST = ("status", "critical")
+LAST = ("status", "critical", "cause")
 
 
 class Evaluated(Protocol):
-    """What an evaluation of n rows hands over; any object with these arrays will do."""
+    """What an evaluation of n rows hands over; any object with these arrays will do.
+
+    It may have another one, ``cause``: ``(n,)`` integers, a `Cause` each; where it has none, or
+    None, no cause is recorded.
+    """
 
     @property
     def metrics(self) -> Float:
@@ -52,6 +57,7 @@ class Rows:
         F: ``(n, n_obj)`` float64.
         status: ``(n,)`` int64, 0 is success.
         critical: ``(n,)`` bool.
+        cause: ``(n,)`` int8, a `Cause` each; NONE, too, of a run that did not seek causes.
     """
 
     id: Int
@@ -63,6 +69,7 @@ class Rows:
     F: Float
     status: Int
     critical: Bool
+    cause: npt.NDArray[np.int8]
 
     def __len__(self) -> int:
         return len(self.id)
@@ -94,16 +101,24 @@ class Columns:
         X: the column of each parameter.
         metrics: the column of each metric.
         F: the column of each objective: f0, f1 …
+        last: those that come last; a run of the first schema has no cause.
     """
 
     n_var: int
     X: tuple[str, ...]
     metrics: tuple[str, ...]
     F: tuple[str, ...]
+    last: tuple[str, ...] = LAST
 
     @classmethod
     def named(
-        cls, n_var: int, parameters: Sequence[str], metrics: Sequence[str], n_obj: int
+        cls,
+        n_var: int,
+        parameters: Sequence[str],
+        metrics: Sequence[str],
+        n_obj: int,
+        *,
+        has_cause: bool = True,
     ) -> "Columns":
         """Choose the columns' names.
 
@@ -121,18 +136,21 @@ class Columns:
         if problems:
             raise InputError(*problems)
         F = tuple(f"f{i}" for i in range(n_obj))
-        taken = {name.lower() for name in (*FIRST, *F, *LAST)}
-        return cls(n_var, _free(parameters, "parameter", taken), _free(metrics, "metric", taken), F)
+        last = LAST if has_cause else LAST[:-1]
+        taken = {name.lower() for name in (*FIRST, *F, *last)}
+        X = _free(parameters, "parameter", taken)
+        return cls(n_var, X, _free(metrics, "metric", taken), F, last)
 
     @property
     def all(self) -> tuple[str, ...]:
         """Every column, in the table's order."""
-        return (*FIRST, *self.X, *self.metrics, *self.F, *LAST)
+        return (*FIRST, *self.X, *self.metrics, *self.F, *self.last)
 
     def create_sql(self) -> str:
         """Return the statement that makes the table."""
         kinds = {"id": "INTEGER PRIMARY KEY", "batch": "INTEGER NOT NULL", "u": "BLOB NOT NULL"}
         kinds |= {"status": "INTEGER NOT NULL", "critical": "INTEGER NOT NULL"}
+        kinds |= {"cause": "TEXT"}
         columns = ", ".join(f"{quoted(name)} {kinds.get(name, 'REAL')}" for name in self.all)
         return f"CREATE TABLE evaluations ({columns})"
 
@@ -160,7 +178,9 @@ class Columns:
             ]
         )
         status, critical = np.asarray(result.status), np.asarray(result.critical)
-        for name, array in (("status", status), ("critical", critical)):
+        found = getattr(result, "cause", None)
+        cause = np.zeros(n, np.int8) if found is None else np.asarray(found)
+        for name, array in (("status", status), ("critical", critical), ("cause", cause)):
             if array.shape != (n,):
                 raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
         parts = zip(
@@ -168,18 +188,20 @@ class Columns:
             numbers.tolist(),
             status.astype(np.int64).tolist(),
             critical.astype(np.int64).tolist(),
+            [Cause(one).label or None for one in cause.tolist()],
             strict=True,
         )
+        width = len(self.last)
         return [
-            (start + k, batch, seconds, blob, *row, state, hit)
-            for k, (blob, row, state, hit) in enumerate(parts)
+            (start + k, batch, seconds, blob, *row, *last[:width])
+            for k, (blob, row, *last) in enumerate(parts)
         ]
 
     def unpack(self, rows: Sequence[tuple[Any, ...]]) -> Rows:
         """Return what SQL read as arrays.
 
         Raises:
-            ValueError, TypeError: values that this table cannot hold.
+            ValueError, TypeError, InputError: values that this table cannot hold.
         """
         n, first = len(rows), len(FIRST)
         n_float = len(self.X) + len(self.metrics) + len(self.F)
@@ -191,6 +213,8 @@ class Columns:
         )
         blob = b"".join(row[3] for row in rows)
         U = np.frombuffer(blob, dtype="<f8").reshape(n, self.n_var)
+        last = first + n_float
+        causes = [row[last + 2] if len(self.last) > 2 else None for row in rows]
         return Rows(
             id=_column(rows, 0, np.int64),
             batch=_column(rows, 1, np.int64),
@@ -199,8 +223,9 @@ class Columns:
             X=np.ascontiguousarray(X),
             metrics=np.ascontiguousarray(metrics),
             F=np.ascontiguousarray(F),
-            status=_column(rows, -2, np.int64),
-            critical=_column(rows, -1, np.bool_),
+            status=_column(rows, last, np.int64),
+            critical=_column(rows, last + 1, np.bool_),
+            cause=np.array([Cause.named(one) if one else Cause.NONE for one in causes], np.int8),
         )
 
 

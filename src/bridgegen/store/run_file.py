@@ -12,7 +12,10 @@ from bridgegen.errors import StorageError
 from bridgegen.store.rows import Columns
 from bridgegen.store.sqlite import storage_errors, transaction
 
-SCHEMA = 1
+SCHEMA = 2
+READABLE = (1, 2)
+"""The schemas that can be read and gone on with; the first has no column for the cause."""
+
 FILE = "run.sqlite"
 LOCK = "run.lock"
 DRAFT = "run.sqlite.new"
@@ -56,6 +59,17 @@ def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
         raise
 
 
+def columns_of(run: Mapping[str, Any]) -> Columns:
+    """Return the columns of a run's table.
+
+    Raises:
+        InputError: a name that cannot be a column.
+        KeyError: a key is missing.
+    """
+    names = (run["n_var"], run["parameters"], run["metrics"], run["n_obj"])
+    return Columns.named(*names, has_cause=run["schema"] > 1)
+
+
 def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
     """Return what :func:`write_run` was given, ``finished`` besides where the run has ended.
 
@@ -71,12 +85,12 @@ def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
     try:
         run = {key: json.loads(value) for key, value in stored}
         schema = run["schema"]
-        if schema != SCHEMA:
+        if schema not in READABLE:
             raise StorageError(
-                f"{path}: the store's schema must be {SCHEMA}, got {schema!r}: "
+                f"{path}: the store's schema must be at most {SCHEMA}, got {schema!r}: "
                 f"it was made by BridgeGen {run.get('version', '(unknown)')}"
             )
-        columns = Columns.named(run["n_var"], run["parameters"], run["metrics"], run["n_obj"])
+        columns = columns_of(run)
         missing = [key for key in KEYS if key not in run]
     except (KeyError, TypeError, ValueError) as error:
         raise StorageError(f"{path}: the file is damaged: bad or missing {error}") from error

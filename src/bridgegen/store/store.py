@@ -10,9 +10,18 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from bridgegen.arrays import Float
-from bridgegen.errors import StorageError
-from bridgegen.store.rows import Columns, Evaluated, Rows, quoted
-from bridgegen.store.run_file import FILE, LOCK, SCHEMA, read_run, refuse_used, write_run
+from bridgegen.cause import Cause
+from bridgegen.errors import InputError, StorageError
+from bridgegen.store.rows import Evaluated, Rows, quoted
+from bridgegen.store.run_file import (
+    FILE,
+    LOCK,
+    SCHEMA,
+    columns_of,
+    read_run,
+    refuse_used,
+    write_run,
+)
 from bridgegen.store.sqlite import Lock, connect, storage_errors, transaction
 
 if TYPE_CHECKING:
@@ -30,8 +39,9 @@ class Store:
     """A run's settings and its evaluations, in the order of recording; nothing is ever changed.
 
     Table ``evaluations``: id, batch, seconds, u (the unit-cube row, float64 little endian), one
-    column per parameter, metric and objective (f0, f1 …), status, critical. NaN is NULL. SQLite
-    keeps no sign of zero: −0.0 comes back as 0.0; every other float64 comes back bit for bit.
+    column per parameter, metric and objective (f0, f1 …), status, critical, cause. NaN is NULL,
+    and so is the cause of what is not critical. SQLite keeps no sign of zero: −0.0 comes back as
+    0.0; every other float64 comes back bit for bit.
     Table ``run``: key and value (JSON). Table ``failures``, where there is something to say: id,
     message.
 
@@ -53,7 +63,7 @@ class Store:
         self.parameters: tuple[str, ...] = tuple(run["parameters"])
         self.metrics: tuple[str, ...] = tuple(run["metrics"])
         self.version: str = run["version"]
-        self.columns = Columns.named(run["n_var"], self.parameters, self.metrics, run["n_obj"])
+        self.columns = columns_of(run)
         self._connection = connection
         self._lock = lock
         self._finished: str | None = run.get("finished")
@@ -84,7 +94,6 @@ class Store:
             InputError: a name that cannot be a column.
         """
         folder = Path(folder)
-        columns = Columns.named(n_var, parameters, metrics, n_obj)
         run = {
             "schema": SCHEMA,
             "version": version("bridgegen"),
@@ -94,6 +103,7 @@ class Store:
             "n_var": n_var,
             "n_obj": n_obj,
         }
+        columns = columns_of(run)
         refuse_used(folder)
         with storage_errors(folder, "made"):
             folder.mkdir(parents=True, exist_ok=True)
@@ -180,7 +190,7 @@ class Store:
         Args:
             U: ``(n, n_var)`` float64, unit-cube rows.
             X: ``(n, len(parameters))`` float64, what they decode to.
-            result: metrics, F, critical and status of the n rows.
+            result: metrics, F, critical, status and perhaps cause of the n rows.
             seconds: [s] since the start of the run.
 
         Raises:
@@ -276,7 +286,7 @@ class Store:
             found = self._connection.execute(sql, (start, stop)).fetchall()
         try:
             rows = self.columns.unpack(found)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, InputError) as error:
             raise self._damaged(str(error)) from error
         if rows.id.tolist() != list(range(start, stop)):
             raise self._damaged(f"evaluations between {start} and {stop - 1} are missing")
@@ -297,14 +307,18 @@ class Store:
         import pandas as pd
 
         n, columns = len(self), self.columns
-        names = ["batch", "seconds", *columns.X, *columns.metrics, *columns.F, "status", "critical"]
+        names = ["batch", "seconds", *columns.X, *columns.metrics, *columns.F, *columns.last]
         data = {name: np.empty(n) for name in names}
         data |= {"batch": np.empty(n, np.int64), "status": np.empty(n, np.int64)}
         data |= {"critical": np.empty(n, np.bool_)}
+        if "cause" in columns.last:
+            data["cause"] = np.empty(n, dtype=object)
         for rows in self.rows(0, n):
             at = slice(int(rows.id[0]), int(rows.id[-1]) + 1)
             for name in ("batch", "seconds", "status", "critical"):
                 data[name][at] = getattr(rows, name)
+            if "cause" in columns.last:
+                data["cause"][at] = [Cause(one).label or None for one in rows.cause.tolist()]
             for part, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
                                  (columns.F, rows.F)):  # fmt: skip
                 for name, column in zip(part, values.T, strict=True):

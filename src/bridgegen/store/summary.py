@@ -1,10 +1,13 @@
 """A run in figures."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float
+from bridgegen.cause import CAUSES
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,8 @@ class Summary:
         v_d_best: largest v_d [m/s].
         v_d_median: [m/s].
         seconds: of search, all sessions together.
+        causes: how many scenarios each cause has, in the order in which causes are sought, those
+            that do not count as critical included; empty where none was sought or found.
     """
 
     evaluations: int
@@ -36,10 +41,19 @@ class Summary:
     v_d_best: float
     v_d_median: float
     seconds: float
+    causes: Mapping[str, int]
 
 
-def summarise(critical: Bool, ok: Bool, d_min: Float, v_d: Float, seconds: float) -> Summary:
+def summarise(
+    critical: Bool,
+    ok: Bool,
+    d_min: Float,
+    v_d: Float,
+    cause: npt.NDArray[np.int8],
+    seconds: float,
+) -> Summary:
     """Return a run's figures from ``(N,)`` columns in the order of evaluation."""
+    counts = {one.label: int(np.count_nonzero(cause == one)) for one in CAUSES}
     n, hits = len(critical), np.flatnonzero(critical)
     d, v = (d_min[ok], v_d[ok]) if ok.any() else (np.array([np.nan]), np.array([np.nan]))
     return Summary(
@@ -54,4 +68,5 @@ def summarise(critical: Bool, ok: Bool, d_min: Float, v_d: Float, seconds: float
         v_d_best=float(v.max()),
         v_d_median=float(np.median(v)),
         seconds=seconds,
+        causes=counts if any(counts.values()) else {},
     )

@@ -20,6 +20,7 @@ from bridgegen.ego._weather_columns import (
 )
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.simulation.embedded.program import UNSAID
 from bridgegen.simulation.embedded.tables import Tables, table
 
 _CLOUDINESS = (
@@ -29,7 +30,6 @@ _CLOUDS = {
     osc.CloudState.FREE: 0.0, osc.CloudState.CLOUDY: 0.5,
     osc.CloudState.OVERCAST: 1.0, osc.CloudState.RAINY: 1.0,
 }  # fmt: skip
-_UNSAID = -1
 _TIME = re.compile(r"T(\d\d):(\d\d):(\d\d)")
 
 
@@ -42,7 +42,7 @@ class Environments:
 
     def __init__(self, tables: Tables) -> None:
         self._tables = tables
-        self._rows = [[_UNSAID] * STATED]
+        self._rows = [[UNSAID] * STATED]
 
     @property
     def rows(self) -> Int:
@@ -55,7 +55,7 @@ class Environments:
 
     def add(self, environment: osc.Environment) -> int:
         """Add the weather that an event brings; return its row."""
-        self._rows.append([_UNSAID] * STATED)
+        self._rows.append([UNSAID] * STATED)
         self._fill(self._rows[-1], environment)
         return len(self._rows) - 1
 

@@ -6,17 +6,20 @@ compiled storyboard runs over it unchanged. Roads enter only in ``network.py``.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
-from bridgegen.ego import Driver
+from bridgegen.ego import STORYBOARD, Driver
+from bridgegen.ego._weather_columns import FRICTION_SCALE
 from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
+
+UNSAID = -1  # the slot of what an environment leaves as it was
 
 
 @dataclass(frozen=True)
@@ -165,6 +168,17 @@ class Program:
     n_steps: int
     fixed: Mapping[str, str]
     event_names: tuple[str, ...] = ()
+
+    def changed(self, *, driver: Driver | None = None, dry: bool = False) -> "Program":
+        """Return the program with another driver, or with a road that is dry all the time."""
+        changed = self
+        if driver is not None and self.driver != STORYBOARD:
+            changed = replace(changed, driver=driver)
+        if dry:
+            weathers = self.weathers.copy()
+            weathers[:, FRICTION_SCALE] = UNSAID
+            changed = replace(changed, weathers=weathers)
+        return changed
 
     @cached_property
     def timed(self) -> Int:

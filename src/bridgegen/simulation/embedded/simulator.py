@@ -94,18 +94,26 @@ class EmbeddedSimulator:
         """See `Simulator`: each entity's route, planned and sampled."""
         return Network(self.program, models)
 
-    def run(self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]) -> Rollout:
+    def run(
+        self,
+        roads: Network,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        *,
+        driver: Driver | None = None,
+        dry: bool = False,
+    ) -> Rollout:
         """See `Simulator`; runs without the GIL.
 
         Raises:
             InputError: see `Simulator`; or a user's driver that cannot be made.
         """
-        if self.program.driver.is_own:
-            return self._in_lock_step(roads, rows, values)
-        return self.batch(roads, rows, values).run()
+        if self.program.changed(driver=driver).driver.is_own:
+            return self._in_lock_step(roads, rows, values, dry=dry)
+        return self.batch(roads, rows, values, driver=driver, dry=dry).run()
 
     def _in_lock_step(
-        self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]
+        self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike], *, dry: bool
     ) -> Rollout:
         """Roll out with the user's driver, of which there is one."""
         from bridgegen.simulation.embedded.lock_step import drive
@@ -115,15 +123,23 @@ class EmbeddedSimulator:
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
-            return self.batch(roads, rows[at], taken)
+            return self.batch(roads, rows[at], taken, dry=dry)
 
         with self._turn:
             if self._process is None:
                 self._process = DriverProcess(driver.name, driver.time_limit)
-            return drive(self.program, some, len(rows), self._process)
+            return drive(self.program.changed(dry=dry), some, len(rows), self._process)
 
-    def batch(self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]) -> "Batch":
+    def batch(
+        self,
+        roads: Network,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        *,
+        driver: Driver | None = None,
+        dry: bool = False,
+    ) -> "Batch":
         """Set N rows up, for a driver that is asked at every instant; arguments as of ``run``."""
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
-        return Batch(self.program, roads, rows, values)
+        return Batch(self.program.changed(driver=driver, dry=dry), roads, rows, values)

@@ -1,0 +1,148 @@
+"""Why a critical scenario comes to harm: it is replayed with one thing put right at a time.
+
+The first of these after which the scenario is no longer critical is the cause:
+
+1. *perception*: the driver perceives ideally;
+2. *planning*: a careful and competent driver drives, who perceives ideally, too: that of UN R157,
+   or the fuzzy safety model;
+3. *control*: the driver's control is ideal, or the road is dry;
+4. *unavoidable*: none of them.
+
+Everything else is the same, the random numbers included, which depend on the parameters' values
+alone. A driver without one of these stages, or with one that is ideal already, skips its replay:
+the route follower sees nobody whatever its sensors could tell it, so where a careful driver would
+have seen, its cause is planning. Prediction is a part of planning: the careful drivers have their
+own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen import ego as egos
+from bridgegen.arrays import Bool, Int
+from bridgegen.ego import Driver
+from bridgegen.errors import InputError, UnknownNameError
+
+CAREFUL = ("un-r157", "fsm")
+"""The careful and competent drivers; either is enough."""
+
+
+class Cause(IntEnum):
+    """What a critical scenario's harm is put down to; NONE of one that is not critical."""
+
+    NONE = 0
+    PERCEPTION = 1
+    PLANNING = 2
+    CONTROL = 3
+    UNAVOIDABLE = 4
+
+    @property
+    def label(self) -> str:
+        """What people and files call it; empty for NONE."""
+        return self.name.lower() if self else ""
+
+    @classmethod
+    def named(cls, label: str) -> "Cause":
+        """Return the cause of that label, not NONE.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        for one in CAUSES:
+            if one.label == label:
+                return one
+        raise UnknownNameError("cause", label, [one.label for one in CAUSES])
+
+
+CAUSES = tuple(one for one in Cause if one)
+
+
+@dataclass(frozen=True)
+class Counterfactual:
+    """A replay with one thing put right.
+
+    Attributes:
+        cause: what the harm is put down to if it is gone.
+        driver: who drives.
+        dry: whether the road is dry.
+    """
+
+    cause: Cause
+    driver: Driver
+    dry: bool = False
+
+
+def counterfactuals(driver: Driver) -> tuple[Counterfactual, ...]:
+    """Return the replays that tell the cause of a driver's harm, in their order.
+
+    None where the file's own actions move the ego: nobody drives it.
+    """
+    if driver == egos.STORYBOARD:
+        return ()
+
+    def ideal(stage: str) -> list[Driver]:
+        if stage not in driver.stages - driver.ideal:
+            return []
+        return [driver.idealised(driver.ideal | {stage})]
+
+    others = [egos.get(name) for name in CAREFUL if name != driver.name]
+    return (
+        *(Counterfactual(Cause.PERCEPTION, one) for one in ideal("perception")),
+        *(Counterfactual(Cause.PLANNING, one) for one in others),
+        *(Counterfactual(Cause.CONTROL, one) for one in ideal("control")),
+        Counterfactual(Cause.CONTROL, driver, dry=True),
+    )
+
+
+def require(cause: Cause, driver: Driver) -> None:
+    """Refuse to seek a cause that a driver's harm cannot have.
+
+    Raises:
+        InputError: its perception is ideal, say, or it has none; or nobody drives.
+    """
+    replays = counterfactuals(driver)
+    known = [one for one in CAUSES if one in {replay.cause for replay in replays}]
+    if not replays:
+        raise InputError(
+            f"cause '{cause.label}': nobody drives the ego, the file's own actions move it"
+        )
+    if cause not in (*known, Cause.UNAVOIDABLE):
+        others = ", ".join(one.label for one in (*known, Cause.UNAVOIDABLE))
+        raise InputError(
+            f"cause '{cause.label}': no harm of the driver '{driver.label}' can have it, only "
+            f"{others}"
+        )
+
+
+def causes(
+    driver: Driver, critical: Bool, harmless: Callable[[Int, Counterfactual], Bool]
+) -> npt.NDArray[np.int8]:
+    """Return the cause of each row's harm; NONE of what is not critical, or has nobody to drive.
+
+    Only what is still unexplained is replayed; a row's cause depends on that row alone.
+
+    Args:
+        driver: who drove.
+        critical: ``(N,)`` bool.
+        harmless: replays the rows at some positions, and says which succeed and are not critical
+            then.
+
+    Returns:
+        ``(N,)`` int8, a `Cause` each.
+    """
+    found = np.full(len(critical), Cause.NONE, dtype=np.int8)
+    replays = counterfactuals(driver)
+    left = np.flatnonzero(critical)
+    for one in replays:
+        if not len(left):
+            return found
+        gone = harmless(left, one)
+        found[left[gone]] = one.cause
+        left = left[~gone]
+    if replays:
+        found[left] = Cause.UNAVOIDABLE
+    return found

@@ -1,0 +1,127 @@
+"""The order of the replays, and what comes of each."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridgegen.cause import CAUSES, Cause, causes, counterfactuals, require
+from bridgegen.ego import DRIVERS, STORYBOARD
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.reader import load
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.embedded import simulator
+
+WHOLE = replace(DRIVERS["reference"], stages=frozenset({"perception", "prediction", "control"}))
+
+
+def replays(driver):
+    return [
+        (one.cause.label, one.driver.name, *sorted(one.driver.ideal), "dry" if one.dry else "")
+        for one in counterfactuals(driver)
+    ]
+
+
+def test_the_replays_of_a_driver_with_all_stages():
+    assert replays(WHOLE) == [
+        ("perception", "reference", "perception", ""),
+        ("planning", "un-r157", ""),
+        ("planning", "fsm", ""),
+        ("control", "reference", "control", ""),
+        ("control", "reference", "dry"),
+    ]
+
+
+def test_what_is_ideal_already_is_not_put_right_but_stays_ideal():
+    assert replays(WHOLE.idealised(["perception"])) == [
+        ("planning", "un-r157", ""),
+        ("planning", "fsm", ""),
+        ("control", "reference", "control", "perception", ""),
+        ("control", "reference", "perception", "dry"),
+    ]
+
+
+def test_a_driver_without_stages_skips_them_and_is_no_judge_of_itself():
+    assert [one[:2] for one in replays(DRIVERS["fsm"])] == [
+        ("planning", "un-r157"),
+        ("control", "fsm"),
+    ]
+    assert replays(STORYBOARD) == []
+
+
+@given(st.lists(st.lists(st.booleans(), min_size=5, max_size=5), min_size=0, max_size=20))
+def test_the_first_replay_that_helps_tells_and_only_the_unexplained_are_replayed(helps):
+    table = np.array(helps, dtype=bool).reshape(-1, 5)
+    critical = np.arange(len(table)) % 3 > 0
+    order, asked = counterfactuals(WHOLE), []
+
+    def harmless(at, replay):
+        asked.append(at.tolist())
+        return table[at, order.index(replay)]
+
+    found = causes(WHOLE, critical, harmless)
+    for row, (hit, one) in enumerate(zip(critical, table, strict=True)):
+        expected = Cause.NONE
+        if hit:
+            expected = order[int(np.argmax(one))].cause if one.any() else Cause.UNAVOIDABLE
+        assert found[row] == expected
+    for before, after in pairwise(asked):
+        assert set(after) <= set(before)
+    assert all(asked)  # never for nothing
+
+
+def test_nobody_is_to_blame_where_nobody_drives():
+    found = causes(STORYBOARD, np.array([True]), lambda at, replay: np.array([True]))
+    assert found.tolist() == [Cause.NONE]
+
+
+def test_labels_are_the_only_names():
+    assert [Cause.named(one.label) for one in CAUSES] == list(CAUSES)
+    for wrong in ("", "none", "Perception", "luck"):
+        with pytest.raises(UnknownNameError, match="cause"):
+            Cause.named(wrong)
+
+
+def test_a_cause_that_cannot_be_is_refused():
+    with pytest.raises(InputError, match="'route-follower' can have it, only planning, control"):
+        require(Cause.PERCEPTION, DRIVERS["route-follower"])
+    with pytest.raises(InputError, match="nobody drives"):
+        require(Cause.UNAVOIDABLE, STORYBOARD)
+    for one in CAUSES:
+        require(one, WHOLE)
+
+
+@pytest.mark.parametrize("ego", ["route-follower", "reference"])
+def test_a_row_s_cause_is_the_same_in_any_batch_and_order(ego, monkeypatch):
+    scenario = load("crossroads-s3")
+    pipeline = Pipeline(scenario, scenario.space(), ego=ego, seek_causes=True)
+    pipeline.choose_objective()
+    n = 60
+    X = pipeline.space.decode(np.random.default_rng(5).random((n, pipeline.space.n_var)))
+    whole = pipeline.evaluate(X)
+    assert len(set(whole.cause.tolist())) > 2
+    assert ((whole.cause != Cause.NONE) == whole.critical).all()
+    monkeypatch.setattr(simulator, "CHUNK", 7)
+    order = np.random.default_rng(1).permutation(n)
+    assert (pipeline.evaluate(X[order]).cause == whole.cause[order]).all()
+    hit = int(np.flatnonzero(whole.critical)[0])
+    assert pipeline.evaluate(X[hit : hit + 1]).cause == whole.cause[hit]
+
+
+def test_only_the_cause_that_is_asked_for_counts_and_F_is_as_ever():
+    scenario = load("crossroads-s3")
+    X = scenario.space().decode(np.random.default_rng(5).random((40, scenario.space().n_var)))
+    every, only = (
+        Pipeline(scenario, scenario.space(), seek_causes=True, cause=cause)
+        for cause in (None, Cause.PLANNING)
+    )
+    for pipeline in (every, only):
+        pipeline.choose_objective()
+    all_of_them, some = every.evaluate(X), only.evaluate(X)
+    assert (some.cause == all_of_them.cause).all()
+    assert (some.F == all_of_them.F).all()
+    assert (some.critical == (all_of_them.cause == Cause.PLANNING)).all()
+    assert 0 < some.critical.sum() < all_of_them.critical.sum()
