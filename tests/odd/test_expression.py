@@ -32,6 +32,9 @@ WORKED = {
     "sqrt(a*10)": 5.0,
     "log(exp(a))": 2.5,
     "6*asin(0.5)/pi": 1.0,
+    "3*acos(0.5)/pi": 1.0,
+    "4*atan(1)/pi": 1.0,
+    "tan(pi/4)": 1.0,
     "sin(pi/2) + cos(0)": 2.0,
     "1 if a > 2 and b < 0 else 0": 1.0,
     "1 if not (a > 2) or b >= 0 else 0": 0.0,
@@ -184,7 +187,9 @@ def test_agrees_with_python_row_by_row(text, rows):
         assert value == expected
 
 
-@pytest.mark.parametrize("name", ["asin", "cos", "exp", "log", "sin", "sqrt"])
+@pytest.mark.parametrize(
+    "name", ["acos", "asin", "atan", "cos", "exp", "log", "sin", "sqrt", "tan"]
+)
 def test_functions_agree_with_the_math_library(name):
     points = np.linspace(0.01, 1.0, 100)
     expected = [getattr(math, name)(x) for x in points.tolist()]

@@ -39,9 +39,10 @@ MAX_DEPTH = 32
 _Program = Callable[[Mapping[str, Any]], Any]
 
 # NumPy may take different code for whole SIMD registers and for the rest, for strided arrays, and
-# for arrays of length 1 (where pow(x, 2) becomes x·x), and the last bit of exp, log, sin, cos, asin
-# and pow may differ between them. Always giving these whole registers of contiguous memory makes
-# a row's result independent of the batch around it. All other operations are exact by IEEE 754.
+# for arrays of length 1 (where pow(x, 2) becomes x·x), and the last bit of exp, log, pow and the
+# angles' functions may differ between them. Always giving these whole registers of contiguous
+# memory makes a row's result independent of the batch around it. All other operations are exact by
+# IEEE 754.
 _LANES = 16
 
 
@@ -73,7 +74,9 @@ def _greatest(*values: Any) -> Any:
 # name: (fewest arguments, most arguments, function)
 FUNCTIONS: dict[str, tuple[int, int, Callable[..., Any]]] = {
     "abs": (1, 1, np.abs),
+    "acos": (1, 1, _steady(np.arccos)),
     "asin": (1, 1, _steady(np.arcsin)),
+    "atan": (1, 1, _steady(np.arctan)),
     "ceil": (1, 1, np.ceil),
     "cos": (1, 1, _steady(np.cos)),
     "exp": (1, 1, _steady(np.exp)),
@@ -85,6 +88,7 @@ FUNCTIONS: dict[str, tuple[int, int, Callable[..., Any]]] = {
     "sign": (1, 1, np.sign),
     "sin": (1, 1, _steady(np.sin)),
     "sqrt": (1, 1, np.sqrt),
+    "tan": (1, 1, _steady(np.tan)),
 }
 RESERVED = frozenset(FUNCTIONS) | {"pi", "pow"}
 

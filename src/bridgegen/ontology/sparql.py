@@ -134,7 +134,8 @@ class _Compiler:
             return f"IF({x} > 0.0e0, 1.0e0, IF({x} < 0.0e0, -1.0e0, 0.0e0))"
         function = {
             "sqrt": self.sqrt, "exp": self.exp, "log": self.log,
-            "sin": self.sin, "cos": self.cos, "asin": self.asin,
+            "sin": self.sin, "cos": self.cos, "tan": self.tan,
+            "asin": self.asin, "acos": self.acos, "atan": self.atan,
         }[name]  # fmt: skip
         return function(x)
 
@@ -242,6 +243,23 @@ class _Compiler:
         small = self.bind(f"{z} * {self.polynomial(square, terms)}")
         angle = self.bind(f"IF({large}, {literal(0.5 * math.pi)} - 2.0e0 * {small}, {small})")
         return f"IF({size} > 1.0e0, {UNDEFINED}, IF({x} < 0.0e0, -{angle}, {angle}))"
+
+    def tan(self, x: str) -> str:
+        return f"({self.sin(x)} / {self.cos(x)})"
+
+    def acos(self, x: str) -> str:
+        return f"({literal(0.5 * math.pi)} - {self.asin(x)})"
+
+    def atan(self, x: str) -> str:
+        # with the tangent of half the angle, at most 1, asin is far from its steep end
+        near = self.bind(f"IF(ABS({x}) > 1.0e8, 0.0e0, {x})")
+        root = self.sqrt(self.bind(f"1.0e0 + {near} * {near}"))
+        half = self.bind(f"{near} / (1.0e0 + {root})")
+        root = self.sqrt(self.bind(f"1.0e0 + {half} * {half}"))
+        angle = self.bind(f"2.0e0 * {self.asin(self.bind(f'{half} / {root}'))}")
+        far = f"{literal(0.5 * math.pi)} - 1.0e0 / ABS({x})"
+        far = f"IF({x} < 0.0e0, -({far}), {far})"
+        return f"IF(ABS({x}) > 1.0e8, {far}, {angle})"
 
     def power(self, base: str, exponent: ast.expr) -> str:
         a = self.bind(base)

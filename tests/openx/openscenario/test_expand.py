@@ -140,6 +140,57 @@ def test_what_does_not_fit_is_said_with_its_line(value, text):
     assert "(line 3)" in said
 
 
+FLAGS = declared(
+    parameter("dry", "boolean", "true"), parameter("dark", "boolean", "0"),
+    parameter("n", "int", "3"),
+)  # fmt: skip
+
+
+def clock(animation: str) -> str:
+    """A scenario whose clock stands or goes."""
+    return scenario(
+        declared=FLAGS,
+        init='<GlobalAction><EnvironmentAction><Environment name="e"><TimeOfDay '
+        f'animation="{animation}" dateTime="2025-01-01T00:00:00"/></Environment>'
+        "</EnvironmentAction></GlobalAction>",
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("${not $dry}", False),
+        ("${$dry and not $dark}", True),
+        ("${$dark or false}", False),
+        ("${not ($dark or $dry)}", False),
+        ("${true}", True),
+    ],
+)
+def test_booleans_are_worked_out(text, value):
+    found = read(clock(text).encode())
+    (time,) = [one for one in walk(found) if isinstance(one, osc.TimeOfDay)]
+    assert time.animation is value
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("${$n}", "animation of TimeOfDay must be a boolean, ${$n} is a number"),
+        ("${not $n}", "takes a number of $n for not, and, or"),
+        ("${$dry + 1}", "takes a boolean of $dry for arithmetic"),
+        ("${-true}", "is true or false, a number is needed"),
+        ("${$dry and 1}", "takes a number for not, and, or"),
+    ],
+)
+def test_numbers_and_booleans_are_not_mixed(text, said):
+    assert said in problems(clock(text))
+
+
+def test_a_number_is_no_boolean():
+    text = scenario(declared=FLAGS, stories=story(maneuver(speed("${not $dry}"))))
+    assert "must be of type double, ${not $dry} is a boolean" in problems(text)
+
+
 def test_expressions_that_double_each_time_are_refused():
     """Thirty parameters, each twice the one before: a gigabyte, if it were written out."""
     many = [parameter("p0", "double", "1")]

@@ -82,6 +82,10 @@ def test_literals_by_their_xsd_type(kind, text, value):
         (Kind.DOUBLE, "${a+1}"),
         (Kind.DOUBLE, "${__import__(1)}"),
         (Kind.DOUBLE, "${$max+1}"),
+        (Kind.DOUBLE, "${$true}"),
+        (Kind.DOUBLE, "${1 if true else 2}"),
+        (Kind.BOOLEAN, "${1 < 2}"),
+        (Kind.BOOLEAN, "${True}"),
         (Kind.DOUBLE, "${pow(2)}"),
         (Kind.DOUBLE, "${" + "(" * 500 + "1" + ")" * 500 + "}"),
         (Kind.DOUBLE, "${" + "1+" * 5000 + "1}"),
@@ -101,6 +105,12 @@ def test_malformed_values_are_refused(kind, text):
         ("${sqrt($d*5)+floor(1.9)+ceil(1.1)+round(2.6)}", 16.0),
         ("${$d % 7}", 6.0),
         ("${2.1E-7*0+$d}", 20.0),
+        ("${sin($d/20)+cos(0)+tan(0)}", math.sin(1.0) + 1.0),
+        ("${asin(1)+acos(1)+4*atan(1)}", 1.5 * math.pi),
+        ("${sign(-$d)+abs(-3)+max(1,2)+min(1,$d)}", 5.0),
+        ("${not true or $d and true}", 1.0),
+        ("${not (true or false)}", 0.0),
+        ("${8/4/2-1+2*3%4}", 2.0),
     ],
 )
 def test_expressions_by_hand(text, value):

@@ -30,7 +30,7 @@ from bridgegen.openx.openscenario.reader import shorten
 from bridgegen.openx.openscenario.scopes import Binding, Scope, is_made, reads_as_number
 from bridgegen.openx.openscenario.selections import without_selections
 from bridgegen.openx.openscenario.storyboard import OpenScenario
-from bridgegen.openx.openscenario.values import Value
+from bridgegen.openx.openscenario.values import Expr, Kind, Value
 from bridgegen.openx.xml import MAX_DEPTH
 
 MAX_ELEMENTS = 200_000
@@ -68,7 +68,10 @@ def _refers(element: Element) -> bool:
         return is_made(element) or reads_as_number(element)
     if getattr(element, _DECLARED, None) is not None:
         return not isinstance(element, OpenScenario)
-    return isinstance(element, CatalogReference)
+    return isinstance(element, CatalogReference) or any(
+        isinstance(value, Expr) and attribute.kind is Kind.BOOLEAN
+        for attribute, value in values_of(element)
+    )
 
 
 class _Expander:

@@ -13,6 +13,7 @@ from typing import Any
 
 from bridgegen.errors import FileFormatError
 from bridgegen.odd.parameters import slack
+from bridgegen.openx.openscenario import expression_types
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
 from bridgegen.openx.openscenario.element import (
     Attribute,
@@ -143,13 +144,17 @@ def misfits(
     """
     if not isinstance(value, ParameterRef | Expr):
         return
+    is_known = True
     for name in sorted(value.names):
         if name not in declared:
+            is_known = False
             yield f"refers to ${name}, which is not declared"
             continue
         kind, current = declared[name]
         if isinstance(value, Expr):
-            if not kind.is_number and not (texts and _reads_as(Kind.DOUBLE, kind, current)):
+            as_text = texts and _reads_as(Kind.DOUBLE, kind, current)
+            if not kind.is_number and kind is not Kind.BOOLEAN and not as_text:
+                is_known = False
                 yield f"computes with ${name}, which is a {kind.value}"
         elif attribute.enum is not None:
             if kind is not Kind.STRING:
@@ -161,6 +166,10 @@ def misfits(
             texts and _reads_as(attribute.kind, kind, current)
         ):
             yield f"must be of type {attribute.kind.value}, ${name} is a {kind.value}"
+    if is_known and isinstance(value, Expr):
+        booleans = {name: declared[name][0] is Kind.BOOLEAN for name in value.names}
+        if text := expression_types.problem(value, booleans, attribute.kind):
+            yield text
 
 
 def _fits(want: Kind, have: Kind, value: Literal) -> bool:

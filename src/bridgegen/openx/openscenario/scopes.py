@@ -163,8 +163,10 @@ class Scope:
             raise FileFormatError(text)
         as_text = attribute.kind in _TEXTS and isinstance(value, ParameterRef)
         if not as_text:  # a text that reads as a number is that number
-            bound |= {n: replace(b, value=b.now) for n, b in bound.items() if b.kind in _TEXTS}
-        if all(self.own.get(name) is one for name, one in bound.items()):
+            fixed = (*_TEXTS, Kind.BOOLEAN) if isinstance(value, Expr) else _TEXTS
+            bound |= {n: replace(b, value=b.now) for n, b in bound.items() if b.kind in fixed}
+        depends = all(self.own.get(name) is one for name, one in bound.items())
+        if depends and not (isinstance(value, Expr) and attribute.kind is Kind.BOOLEAN):
             return value
         if isinstance(value, ParameterRef):
             one = bound[value.name]

@@ -26,8 +26,9 @@ V = TypeVar("V")
 _REFERENCE = re.compile(r"\$[A-Za-z_][A-Za-z0-9_]*")
 _EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}")
 _WORD = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-# The words of an expression besides parameters: what can be evaluated, and the standard's others.
-_FUNCTIONS = RESERVED | {"tan", "acos", "atan", "not", "and", "or"}
+_TRUTHS = {"true": "(0<1)", "false": "(1<0)"}  # as `bridgegen.odd.expression` has no such words
+_TRUTH = re.compile(r"(?<![$A-Za-z0-9_])(true|false)(?![A-Za-z0-9_])")
+_WORDS = RESERVED | {"not", "and", "or", *_TRUTHS}  # of an expression besides parameters
 
 
 class Kind(Enum):
@@ -108,7 +109,7 @@ class ParameterRef:
 
 @dataclass(frozen=True)
 class Expr:
-    """An arithmetic expression over declared parameters.
+    """An expression over declared parameters: a number, or a boolean.
 
     Attributes:
         text: as in the file, ``${…}`` with ``$name`` for each parameter.
@@ -175,16 +176,16 @@ def resolve(value: Value, parameters: Mapping[str, float | Float]) -> Value | Fl
 def _compile(text: str) -> Expression:
     body = text[2:-1]
     words = _WORD.findall(body)
-    bare = sorted({w for w in words if w[0].isalpha() or w[0] == "_"} - _FUNCTIONS)
+    bare = sorted({w for w in words if w[0].isalpha() or w[0] == "_"} - _WORDS)
     if bare:
         raise FileFormatError(
             f"'{text}': unknown name {bare[0]}; a parameter is written ${bare[0]}"
         )
-    taken = sorted({w[1:] for w in words if w[0] == "$"} & _FUNCTIONS)
+    taken = sorted({w[1:] for w in words if w[0] == "$"} & _WORDS)
     if taken:
-        raise FileFormatError(f"'{text}': the parameter ${taken[0]} has the name of a function")
+        raise FileFormatError(f"'{text}': the parameter ${taken[0]} is a word of expressions")
     try:
-        return parse(body.replace("$", ""))
+        return parse(_TRUTH.sub(lambda word: _TRUTHS[word[1]], body).replace("$", ""))
     except InputError as error:
         raise FileFormatError(f"'{text}' cannot be evaluated: {error}") from None
 
