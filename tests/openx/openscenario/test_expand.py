@@ -261,3 +261,13 @@ def test_the_members_of_a_selection_stand_for_it():
 def test_a_file_that_stands_by_itself_stays_as_it_is(s4):
     """Also with a folder, and parameters that are texts."""
     assert to_xml(read(s4)) == s4
+
+
+def test_a_trailer_whose_name_is_left_empty_is_none():
+    """So catalogues for several tools have it: a parameter that may name a trailer."""
+    pulls = "<Trailer><TrailerRef entityRef='$pulls'/></Trailer></Vehicle>"
+    for name, expected in (("", None), ("other", "other")):
+        body = car(declared=declared(parameter("pulls", "string", name)))
+        text = scenario(entities=entity(body.replace("</Vehicle>", pulls)))
+        trailer = read(text.encode()).entities.scenario_objects[0].entity_object.trailer
+        assert (trailer and trailer.trailer.entity_ref) == expected

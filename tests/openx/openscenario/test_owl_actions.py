@@ -68,10 +68,9 @@ def test_all_classes_are_in_these_stories():
         assert known <= seen | elsewhere
 
 
-@pytest.mark.parametrize("name", ["LaneOffsetAction", "SynchronizeAction", "EntityAction"])
+@pytest.mark.parametrize("name", ["SynchronizeAction", "EntityAction"])
 def test_what_the_simulator_cannot_do_it_names(individuals, name):
     actions = {
-        "LaneOffsetAction": stories.ACTIONS[4],
         "SynchronizeAction": stories.ACTIONS[-1],
         "EntityAction": stories.PRESENCE[0],
     }

@@ -26,6 +26,7 @@ from bridgegen.openx.openscenario.element import (
     values_of,
     walk,
 )
+from bridgegen.openx.openscenario.entities import EntityRef, Trailer
 from bridgegen.openx.openscenario.reader import shorten
 from bridgegen.openx.openscenario.scopes import Binding, Scope, is_made, reads_as_number
 from bridgegen.openx.openscenario.selections import without_selections
@@ -157,7 +158,7 @@ class _Expander:
                 if any(a is not b for a, b in zip(new, held, strict=True)):
                     changes[child.field] = new
             elif (one := self._child(held, child, scope, depth + 1)) is not held:
-                changes[child.field] = one
+                changes[child.field] = None if _is_no_trailer(one) else one
         return replace(element, **changes) if changes else element
 
     def _child(self, element: Element, child: Child, scope: Scope, depth: int) -> Element:
@@ -244,6 +245,13 @@ class _Expander:
                 free = f"{name}_{number}"
             self._named[id(bound)] = bound, replace(bound.declaration, name=free)
         return self._named[id(bound)][1].name
+
+
+def _is_no_trailer(element: Element) -> bool:
+    """Say whether a parameter, meant for the trailer's name, is left empty."""
+    if not isinstance(element, Trailer) or not isinstance(element.trailer, EntityRef):
+        return False
+    return element.trailer.entity_ref == ""
 
 
 def _height(element: Element) -> int:

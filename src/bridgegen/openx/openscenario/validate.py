@@ -9,9 +9,10 @@ from bridgegen.openx.opendrive.lanes import lane_at
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import plan_route
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario import parameters, references
 from bridgegen.openx.openscenario.element import (
     Attribute,
+    Element,
     children_of,
     values_of,
     walk,
@@ -24,9 +25,10 @@ Problem = tuple[int, str]
 def problems(scenario: osc.OpenScenario, road_network: OpenDrive | None = None) -> list[str]:
     """Return all that is wrong, one sentence each, with the line where the scenario was read.
 
-    Checked: parameters; names that must differ; entities that are referred to; the standard's
-    ranges; that whoever acts is there to act; and, on a road network, that every lane position
-    lies on a lane and every route can be driven without a lane change.
+    Checked: parameters; names that must differ; entities, parts of the storyboard and controllers
+    of lights that are referred to; the standard's ranges; that whoever acts is there to act; and,
+    on a road network, that every road and light is there, every lane position lies on a lane and
+    every route can be driven without a lane change.
 
     Args:
         scenario: parameters are taken at their declared values.
@@ -40,7 +42,10 @@ def problems(scenario: osc.OpenScenario, road_network: OpenDrive | None = None) 
         *check.names(),
         *check.attributes(),
         *check.actors(),
+        *references.of_storyboard(scenario, check.value),
+        *references.of_controllers(scenario, road_network, check.value),
         *(check.places() if road_network is not None else ()),
+        *(references.of_map(scenario, road_network, check.value) if road_network else ()),
     ]
     texts = sorted(dict.fromkeys(texts), key=lambda problem: problem[0])
     return [f"{text} (line {line})" if line else text for line, text in texts]
@@ -54,8 +59,11 @@ class _Check:
         self.road_network = road_network
         self.values = parameters.values(scenario)
         self.numbers = parameters.numbers(scenario)
-        objects = scenario.entities.scenario_objects
-        self.entities = [str(self.value(one.name)) for one in objects]
+        self.entities = [
+            str(self.value(one.name))
+            for one in walk(scenario.entities)
+            if isinstance(one, osc.ScenarioObject)
+        ]
 
     def value(self, value: Value) -> Any:
         """Return a value at the declared values of the parameters."""
@@ -64,7 +72,11 @@ class _Check:
         return self.values[value.name] if isinstance(value, osc.ParameterRef) else value
 
     def names(self) -> Iterator[Problem]:
-        """Yield names that two elements of one kind beside each other share."""
+        """Yield names that two elements of one kind beside each other share.
+
+        Of the storyboard's parts only those that are referred to must have a name of their own.
+        """
+        referred = references.to_storyboard(self.scenario, self.value)
         for element in walk(self.scenario):
             seen: set[tuple[str, Any]] = set()
             for tag, child in children_of(element):
@@ -72,6 +84,8 @@ class _Check:
                 if name is None or tag == "Property":
                     continue
                 name = self.value(name)
+                if tag in references.PARTS and name not in referred:
+                    continue
                 if (tag, name) in seen:
                     yield child.line, f"the name of a {tag} must be its own, got '{name}' twice"
                 seen.add((tag, name))
@@ -85,13 +99,21 @@ class _Check:
                 if attribute.is_entity and value not in self.entities:
                     known = ", ".join(self.entities) or "none"
                     yield element.line, f"{what} must be one of {known}, got '{value}'"
-                elif attribute.kind.is_number and not _in_range(attribute, value):
+                elif attribute.kind.is_number and not (
+                    _in_range(attribute, value) or self.is_rate(element)
+                ):
                     given = (
                         f"{raw} = {value:g}"
                         if isinstance(raw, osc.ParameterRef | osc.Expr)
                         else f"{value:g}"
                     )
                     yield element.line, f"{what} must {_range_text(attribute)}, got {given}"
+
+    def is_rate(self, element: Element) -> bool:
+        """Say whether an element's number is a rate, whose sign says no more than the target."""
+        return isinstance(element, osc.TransitionDynamics) and (
+            self.value(element.dynamics_dimension) == osc.DynamicsDimension.RATE
+        )
 
     def actors(self) -> Iterator[Problem]:
         """Yield maneuver groups whose private actions are nobody's."""
