@@ -2,14 +2,17 @@
 
 import numpy as np
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._weather_kernels import change
 from bridgegen.simulation.embedded._across_kernels import (
     begin_lane_change,
     begin_lane_offset,
     stop_lateral,
 )
-from bridgegen.simulation.embedded._speed_kernels import begin_speed_change, stop_speed_change
+from bridgegen.simulation.embedded._codes import RELATIVE_SPEED
+from bridgegen.simulation.embedded._motion_kernels import STEP
+from bridgegen.simulation.embedded._pursuit_kernels import start_at_speed
+from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, stop_longitudinal
 
 SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = 0, 1, 2, 3, 4
 
@@ -18,8 +21,8 @@ SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = 0, 1, 2, 3, 4
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k: a branch per kind; what is over at once says so."""
     kind = plan.actions[j, 1]
-    if kind == SPEED_CHANGE:
-        begin_speed_change(j, k, plan, state)
+    if kind == SPEED_CHANGE or kind >= RELATIVE_SPEED:
+        begin_longitudinal(j, k, plan, roads, state, record)
     elif kind == LANE_CHANGE:
         begin_lane_change(j, k, plan, roads, state, record)
     elif kind == LANE_OFFSET:
@@ -32,11 +35,21 @@ def begin(j, k, plan, roads, state, record):
         state.action_ended[j] = True
 
 
+@kernel
+def begin_initially(plan, roads, state, record):
+    """Begin the actions that begin at the start; a speed that is set at once is the first one."""
+    for i in range(plan.initial.shape[0]):
+        j = plan.initial[i]
+        begin(j, 0, plan, roads, state, record)
+        if plan.actions[j, 1] == RELATIVE_SPEED and plan.actions[j, 2] == STEP:
+            start_at_speed(j, plan, state, record)
+
+
 @inlined_kernel
 def stop(j, k, plan, roads, state, record):
     """Stop action j, which has not ended: whoever it moved goes on as it is."""
     kind = plan.actions[j, 1]
-    if kind == SPEED_CHANGE:
-        stop_speed_change(j, plan, state)
+    if kind == SPEED_CHANGE or kind >= RELATIVE_SPEED:
+        stop_longitudinal(j, plan, state)
     elif kind in (LANE_CHANGE, LANE_OFFSET):
         stop_lateral(j, plan, state)

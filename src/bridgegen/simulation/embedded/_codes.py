@@ -29,3 +29,25 @@ FIRST_BY_ENTITY = 10
 SPEED, TRAVELED_DISTANCE, STAND_STILL, REACH_POSITION = range(10, 14)
 RELATIVE_DISTANCE, TIME_TO_COLLISION, TIME_HEADWAY = range(14, 17)
 GREATER, LESS, EQUAL, GREATER_EQUAL, LESS_EQUAL, NOT_EQUAL = range(6)
+
+# Program.actions: the kinds that move along the road by Program.courses; the others are numbered
+# in _action_kernels.
+RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE = range(40, 44)
+
+# Program.courses: the entity that it goes by, -1 if none; then by kind, slots where not said else.
+REF = 0
+IS_FACTOR, CONTINUOUS = 1, 2  # of a relative speed; also of a distance, CONTINUOUS
+FOLLOWS, FIRST_ENTRY, PAST_ENTRY = 1, 2, 3  # of a profile
+IS_TIME_GAP, FREESPACE, SIDE, BY_BODY, UNLIMITED = 1, 3, 4, 10, 11  # of a distance
+MOST = 5  # of both: 5 to 9, the most acceleration, deceleration, speed, rates of both; -1: not said
+OWN_PLACE, MASTER_PLACE, TOLERANCE, MASTER_TOLERANCE = 1, 2, 3, 4  # of a synchronisation
+FINAL, FINAL_VALUE, STEADY, STEADY_VALUE = 5, 6, 7, 8
+NO_FINAL, FINAL_SPEED, FINAL_DELTA, FINAL_FACTOR = range(4)
+NOT_STEADY, STEADY_DISTANCE, STEADY_TIME = range(3)
+COURSE_WIDTH = 12
+EITHER_SIDE, BEHIND, AHEAD = 0, 1, -1
+
+# State.course: what a course keeps.
+SIDE_TAKEN, ACCELERATION, FOOT, FOOT_PATH = range(4)  # of a distance
+OWN_X, OWN_Y, MASTER_X, MASTER_Y, LEFT, MASTER_LEFT = range(6)  # of a synchronisation
+COURSE_MEMORY = 6

@@ -6,7 +6,7 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.ego.drivers import NOBODY
 from bridgegen.simulation.embedded._ego_kernels import move_ego
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
-from bridgegen.simulation.embedded._speed_kernels import command_speeds
+from bridgegen.simulation.embedded._speed_kernels import command_speed
 from bridgegen.simulation.embedded._storyboard_kernels import decide, finish
 from bridgegen.simulation.embedded._travel_kernels import move_along_path, move_along_timetable
 from bridgegen.simulation.embedded._trigger_kernels import observe
@@ -18,7 +18,7 @@ def before_driver(k, plan, roads, state, record):
     finish(k, plan, state)
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)
-    command_speeds(k, plan, state)
+    command_speed(0, k, plan, roads, state, record)
     for i in range(state.lights.shape[0]):
         record.lights[i, k] = state.lights[i]
 
@@ -31,11 +31,16 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     if plan.driver != NOBODY:
         x, y, h = move_ego(k, demanded, curvature, plan, roads, state, record)
         first = 1
-    for e in range(first, record.x.shape[0]):
+    for i in range(record.x.shape[0]):
+        e = plan.order[0, i]
+        if e < first:
+            continue
         if plan.timed[e] >= 0:
             move_along_timetable(e, k, plan, roads, state, record)
-        else:
-            move_along_path(e, k, plan, roads, state, record)
+            continue
+        if e > 0:
+            command_speed(e, k, plan, roads, state, record)
+        move_along_path(e, k, plan, roads, state, record)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):
         state.ending[STATUS], state.ending[STOPS] = NOT_FINITE, 1
     if state.ending[STOPS]:

@@ -32,6 +32,10 @@ class Plan(NamedTuple):
     conditions: Int
     probes: Int
     elements: Int
+    courses: Int
+    entries: Int
+    order: Int
+    initial: Int
     actions: Int
     laterals: Int
     first_states: npt.NDArray[np.int8]
@@ -98,7 +102,10 @@ class State(NamedTuple):
         command: ``(E,)`` [m/s], the speed that the storyboard asks for now,
         origin: ``(E,)`` [m/s], the one that it comes from,
         target: ``(E,)`` [m/s], the one that it is on its way to,
-        rate: ``(E,)`` [m/s²], how fast at most.
+        rate: ``(E,)`` [m/s²], how fast at most,
+        course: ``(E, 6)`` what a course by another entity keeps; see ``_codes``,
+        profile: ``(E, R, 4)`` the course of a speed profile; see ``_course_kernels``,
+        profile_rows: ``(E,)`` int64, how many rows of it count.
         attention: ``(E, 3)``, what a careful driver keeps of each body; see its kernel.
     """
 
@@ -137,6 +144,9 @@ class State(NamedTuple):
     origin: Float
     target: Float
     rate: Float
+    course: Float
+    profile: Float
+    profile_rows: Int
     attention: Float
 
 

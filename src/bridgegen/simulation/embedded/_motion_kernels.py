@@ -56,25 +56,6 @@ def progress(shape, u):
 
 
 @kernel
-def duration(shape, dimension, value, before, after):
-    """Return how long [s] a change of speed takes.
-
-    By a rate [m/s²], the steepest of the shape; a time [s]; or a distance [m], over which the
-    mean speed of every shape is the mean of both ends.
-    """
-    if dimension == TIME:
-        return value
-    if dimension == DISTANCE:
-        return 2.0 * value / max(before + after, 1e-9)
-    steepest = 1.0
-    if shape == CUBIC:
-        steepest = 1.5
-    elif shape == SINUSOIDAL:
-        steepest = 0.5 * math.pi
-    return steepest * abs(after - before) / abs(value)
-
-
-@kernel
 def shifted(x, y, h, aside):
     """Return the point so far to the left of another one [m]."""
     return x - aside * math.sin(h), y + aside * math.cos(h)

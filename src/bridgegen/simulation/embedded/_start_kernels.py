@@ -5,6 +5,7 @@ import math
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
+from bridgegen.simulation.embedded._action_kernels import begin_initially
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS
 from bridgegen.simulation.embedded._motion_kernels import shifted
 
@@ -46,3 +47,4 @@ def start(plan, roads, state, record):
         record.v[e, 0] = min(state.slots[plan.init[e]], plan.bodies[e, 3])
         record.offset[e, 0] = 0.0
         state.command[e] = state.target[e] = record.v[e, 0]
+    begin_initially(plan, roads, state, record)

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.simulation.embedded.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.environments import Environments
-from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, PathSpec
+from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, LanePoint, PathSpec
 from bridgegen.simulation.embedded.tables import Tables
 
 _SPEED_CHANGE, _LANE_CHANGE, _WEATHER, _LIGHT, _LANE_OFFSET = 0, 1, 2, 3, 4
@@ -15,15 +16,6 @@ LIGHT_STATES = {
     "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
 }  # fmt: skip
 """The states of a traffic light's three lamps as `Rollout.lights` has them."""
-
-_SHAPES = {
-    osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
-    osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
-}  # fmt: skip
-_DIMENSIONS = {
-    osc.DynamicsDimension.RATE: 0, osc.DynamicsDimension.TIME: 1,
-    osc.DynamicsDimension.DISTANCE: 2,
-}  # fmt: skip
 
 
 _BY_TIME = 1
@@ -34,6 +26,8 @@ class Actions:
 
     Attributes:
         rows: as ``Program.actions`` has them.
+        initial: the numbers of those that begin at the start.
+        courses: what moves entities along their paths.
         environments: the weathers, of the start and of events.
         lights: the traffic lights that are set.
         first_states: their states at the start.
@@ -44,24 +38,32 @@ class Actions:
     Args:
         tables: the compiler's; takes down what cannot be run.
         paths: of the entities.
+        points: takes the positions that actions name.
     """
 
-    def __init__(self, tables: Tables, paths: list[PathSpec]) -> None:
+    def __init__(
+        self, tables: Tables, paths: list[PathSpec], points: list[LanePoint] | None = None
+    ) -> None:
         self._tables, self._paths = tables, paths
         self.has_driver = False
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
+        self.courses = Courses(tables, [] if points is None else points)
         self.rows: list[tuple[int, ...]] = []
+        self.initial: list[int] = []
         self.environments = Environments(tables)
         self.lights: list[str] = []
         self.first_states: list[int] = []
 
-    def speed(self, target: osc.SpeedActionTarget) -> int:
-        """Return the slot of a speed that is aimed at."""
-        if isinstance(target.target, osc.RelativeTargetSpeed):
-            self._tables.unsupported(target.target, "RelativeTargetSpeed")
-            return self._tables.slot(0.0)
-        return self._tables.slot(target.target.value)
+    def begin(self, action: osc.PrivateAction, entity: int) -> None:
+        """Add what one entity does from the start on."""
+        first, known = len(self.rows), len(self._tables.problems)
+        self._private(action, entity)
+        if len(self._tables.problems) > known:
+            del self.rows[first:]
+        for i in range(first, len(self.rows)):
+            self.rows[i] = (*self.rows[i], 0)
+            self.initial.append(i)
 
     def add(self, part: osc.Action, named: Sequence[int], selected: Sequence[int]) -> None:
         """Add an action of an event; one that cannot be run is taken down and left out.
@@ -128,13 +130,8 @@ class Actions:
         if self.is_timed(entity):
             what = f"{type(action).__name__} of one that follows a trajectory with times"
             self._tables.unsupported(action, what)
-        elif isinstance(action, osc.LongitudinalAction):
-            if not isinstance(action.action, osc.SpeedAction):
-                self._tables.unsupported(action.action, type(action.action).__name__)
-                return
-            shape, dimension, value = self._dynamics(action.action.dynamics)
-            target = self.speed(action.action.speed_action_target)
-            self.rows.append((entity, _SPEED_CHANGE, shape, dimension, target, value, 0))
+        elif (row := self.courses.add(getattr(action, "action", action), entity)) is not None:
+            self.rows.append(row)
         elif isinstance(action, osc.LateralAction):
             if isinstance(action.action, osc.LaneChangeAction):
                 self._lane_change(action.action, entity)
@@ -146,7 +143,7 @@ class Actions:
             self._tables.unsupported(action, f"{type(action).__name__} in an Event")
 
     def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
-        shape, dimension, value = self._dynamics(action.dynamics)
+        shape, dimension, value = self.courses.dynamics(action.dynamics)
         self._refuse_driven(action, entity)
         target = action.lane_change_target.target
         other, lanes, lane = -1, None, None
@@ -194,15 +191,7 @@ class Actions:
         if isinstance(shape, osc.ParameterRef):
             self._tables.unsupported(element, f'dynamicsShape="{shape}"')
             return 0
-        return _SHAPES[shape]
-
-    def _dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int, int]:
-        slot = self._tables.slot(dynamics.value)
-        shape, dimension = dynamics.dynamics_shape, dynamics.dynamics_dimension
-        if isinstance(shape, osc.ParameterRef) or isinstance(dimension, osc.ParameterRef):
-            self._tables.unsupported(dynamics, f'"{shape}" over "{dimension}"')
-            return 0, 0, slot
-        return _SHAPES[shape], _DIMENSIONS[dimension], slot
+        return SHAPES[shape]
 
     def is_timed(self, entity: int) -> bool:
         """Say whether an entity follows a trajectory with times, which rules out all else."""

@@ -11,7 +11,7 @@ from bridgegen.ego._weather_columns import WEATHER
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
-from bridgegen.simulation.embedded._codes import DELAY
+from bridgegen.simulation.embedded._codes import COURSE_MEMORY, DELAY
 from bridgegen.simulation.embedded._observation_kernels import observe_rows
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
@@ -166,6 +166,10 @@ def _plan(program: Program) -> memory.Plan:
         conditions=program.conditions,
         probes=program.probes,
         elements=program.elements,
+        courses=program.courses,
+        entries=program.entries,
+        order=program.order,
+        initial=program.initial,
         actions=program.actions,
         laterals=program.laterals,
         first_states=program.first_states,
@@ -213,6 +217,7 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
     at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
     longest_delay = int(program.conditions[:, DELAY].max(initial=0))
+    profile_size = 3 * len(program.entries) + 5 if len(program.entries) else 0
     return memory.State(
         slots=slots,
         weather=zeros(WEATHER),
@@ -232,6 +237,7 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
         lateral_origin=zeros(e), lateral_target=zeros(e), wanted=numbers(2),
         speed_action=numbers(e), speed_began=zeros(e), speed_lasts=zeros(e),
         command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
+        course=zeros(e, COURSE_MEMORY), profile=zeros(e, profile_size, 4), profile_rows=numbers(e),
         attention=zeros(e, 3),
     )  # fmt: skip
 

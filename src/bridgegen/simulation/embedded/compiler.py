@@ -15,9 +15,10 @@ from bridgegen.openx.openscenario.declarations import (
 )
 from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.openx.openscenario.values import Value
-from bridgegen.simulation.embedded._codes import EVENT
+from bridgegen.simulation.embedded._codes import COURSE_WIDTH, EVENT
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
+from bridgegen.simulation.embedded.courses import LONGITUDINAL, first_speed
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -68,8 +69,9 @@ class _Compiler:
         self.tables = Tables(scenario, place)
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
+        self.points: list[LanePoint] = []
         self.waypoints: list[tuple[LanePoint, ...]] = []
-        self.actions = Actions(self.tables, self.paths)
+        self.actions = Actions(self.tables, self.paths, self.points)
 
     def compile(
         self, driver: Driver | None, ideal: Iterable[str] | None, time_step: float | None
@@ -84,7 +86,7 @@ class _Compiler:
             )
         storyboard = self.scenario.storyboard
         found = nodes(storyboard)
-        self.triggers = Triggers(self.tables, step, found)
+        self.triggers = Triggers(self.tables, step, found, self.points)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
@@ -134,8 +136,12 @@ class _Compiler:
             groups=table(self.triggers.groups, 2),
             conditions=table(self.triggers.conditions, 5),
             probes=table(self.triggers.probes, 6),
-            points=tuple(self.triggers.points),
+            points=tuple(self.points),
             elements=table(rows, 10),
+            courses=table(self.actions.courses.rows, COURSE_WIDTH),
+            entries=table(self.actions.courses.entries, 2),
+            order=np.array(self.actions.courses.order(), dtype=np.int64),
+            initial=np.array(self.actions.initial, dtype=np.int64),
             actions=table(self.actions.rows, 8),
             laterals=table(self.actions.laterals, 3),
             weathers=self.actions.environments.rows,
@@ -228,6 +234,7 @@ class _Compiler:
         starts: dict[str, tuple[Point, Value]] = {}
         routes: dict[str, tuple[osc.Waypoint, ...]] = dict.fromkeys(self.tables.names, ())
         tracks: dict[str, AlongTrajectory] = {}
+        first: list[tuple[osc.PrivateAction, int]] = []
         for private in actions.privates:
             name = str(private.entity_ref)
             for wrapped in private.private_actions:
@@ -242,11 +249,12 @@ class _Compiler:
                         starts[name] = point, aside
                     continue
                 inner = getattr(action, "action", action)
-                if isinstance(inner, osc.SpeedAction):
-                    dynamics = inner.dynamics
-                    if dynamics.dynamics_shape is not osc.DynamicsShape.STEP:
-                        self.tables.unsupported(dynamics, "an initial SpeedAction other than step")
-                    init[name] = self.actions.speed(inner.speed_action_target)
+                if isinstance(inner, LONGITUDINAL):
+                    speed = first_speed(inner)
+                    if speed is None:
+                        first.append((wrapped, self.tables.entity(name)))
+                    else:
+                        init[name] = self.tables.slot(speed)
                 elif isinstance(inner, osc.FollowTrajectoryAction):
                     tracks[name] = compile_trajectory(self.tables, inner)
                 elif isinstance(inner, osc.AssignRouteAction):
@@ -276,4 +284,6 @@ class _Compiler:
                     f"{self.place}, line {point.line}: a WorldPosition is supported for an entity "
                     "that follows a trajectory, and for no other"
                 )
+        for one_more, entity in first:
+            self.actions.begin(one_more, entity)
         return [init[name] for name in self.tables.names]

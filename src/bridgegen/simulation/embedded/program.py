@@ -124,9 +124,15 @@ class Program:
         points: positions that probes name.
         elements: ``(X, 10)`` of the storyboard: kind, parent, first element after it, start and
             stop trigger, priority, executions at most, first and past-the-last action, event.
+        courses: ``(·, 12)`` what a kind of motion along the path needs besides, by kind; ``_codes``
+            names the columns.
+        entries: ``(·, 2)`` of speed profiles: slots of a speed and of the time to it, -1 if none.
+        order: ``(2, E)``: the entities in the order in which they are moved, and the place of each.
+        initial: ``(·,)`` actions that begin at the start.
         actions: ``(·, 8)`` entity, kind, shape, dimension, slot of the target, slot of its
-            dynamics, row of ``laterals`` or of ``weathers``, whether the entity is selected by the
-            trigger; see ``_action_kernels`` and ``_motion_kernels``. ``_codes`` names the columns.
+            dynamics, row of ``laterals``, ``weathers`` or ``courses``, whether the entity is
+            selected by the trigger; see ``_action_kernels`` and ``_motion_kernels``. ``_codes``
+            names the columns.
         laterals: ``(·, 3)``, see ``_across_kernels``.
         lights: the traffic lights that are set.
         first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
@@ -158,6 +164,10 @@ class Program:
     probes: Int
     points: tuple[LanePoint, ...]
     elements: Int
+    courses: Int
+    entries: Int
+    order: Int
+    initial: Int
     actions: Int
     laterals: Int
     weathers: Int

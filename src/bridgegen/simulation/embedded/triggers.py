@@ -30,12 +30,18 @@ class Triggers:
         stop_time: latest simulation time [s] that the first trigger, the scenario's end, names.
     """
 
-    def __init__(self, tables: Tables, time_step: float, nodes: "Sequence[Node]" = ()) -> None:
+    def __init__(
+        self,
+        tables: Tables,
+        time_step: float,
+        nodes: "Sequence[Node]" = (),
+        points: list[LanePoint] | None = None,
+    ) -> None:
         self.triggers: list[tuple[int, int]] = []
         self.groups: list[tuple[int, int]] = []
         self.conditions: list[tuple[int, ...]] = []
         self.probes: list[tuple[int, ...]] = []
-        self.points: list[LanePoint] = []
+        self.points = [] if points is None else points
         self.stop_time = 0.0
         self._tables = tables
         self._time_step = time_step

@@ -1,0 +1,226 @@
+"""The actions that move an entity along its path, as rows of integers."""
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.simulation.embedded import _codes as codes
+from bridgegen.simulation.embedded.program import LanePoint
+from bridgegen.simulation.embedded.tables import Tables
+
+SPEED_CHANGE = 0
+
+SHAPES = {
+    osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
+    osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
+}  # fmt: skip
+_DIMENSIONS = {
+    osc.DynamicsDimension.RATE: 0, osc.DynamicsDimension.TIME: 1,
+    osc.DynamicsDimension.DISTANCE: 2,
+}  # fmt: skip
+_SIDES = {
+    osc.LongitudinalDisplacement.ANY: codes.EITHER_SIDE,
+    osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY: codes.BEHIND,
+    osc.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY: codes.AHEAD,
+}  # fmt: skip
+_ALONG = (
+    osc.CoordinateSystem.LANE, osc.CoordinateSystem.ROAD, osc.CoordinateSystem.TRAJECTORY,
+)  # fmt: skip
+
+LONGITUDINAL = (
+    osc.SpeedAction, osc.SpeedProfileAction, osc.LongitudinalDistanceAction, osc.SynchronizeAction,
+)  # fmt: skip
+"""What moves an entity along its path."""
+
+Row = tuple[int, ...]
+
+
+def first_speed(action: object) -> Value | None:
+    """Return the speed that an initial action sets at once; None if it does anything else."""
+    if not isinstance(action, osc.SpeedAction):
+        return None
+    target = action.speed_action_target.target
+    at_once = action.dynamics.dynamics_shape is osc.DynamicsShape.STEP
+    return target.value if at_once and isinstance(target, osc.AbsoluteTargetSpeed) else None
+
+
+class Courses:
+    """Compiles longitudinal actions; what cannot be run is taken down in ``tables``.
+
+    Attributes:
+        rows: as ``Program.courses`` has them.
+        entries: of speed profiles, as ``Program.entries`` has them.
+        pairs: which entity goes by which.
+
+    Args:
+        tables: the compiler's.
+        points: takes the positions of synchronisations.
+    """
+
+    def __init__(self, tables: Tables, points: list[LanePoint]) -> None:
+        self._tables, self._points = tables, points
+        self.rows: list[Row] = []
+        self.entries: list[tuple[int, int]] = []
+        self.pairs: list[tuple[int, int]] = []
+
+    def add(self, action: object, entity: int) -> Row | None:
+        """Return an action's row of ``Program.actions``; None if it moves nobody along a path."""
+        match action:
+            case osc.SpeedAction():
+                return self._speed(action, entity)
+            case osc.SpeedProfileAction():
+                return self._profile(action, entity)
+            case osc.LongitudinalDistanceAction():
+                return self._distance(action, entity)
+            case osc.SynchronizeAction():
+                return self._synchronise(action, entity)
+        return None
+
+    def dynamics(self, dynamics: osc.TransitionDynamics) -> tuple[int, int, int]:
+        """Return shape, dimension and the slot of the value."""
+        shape = self._tables.choice(osc.DynamicsShape, dynamics.dynamics_shape)
+        dimension = self._tables.choice(osc.DynamicsDimension, dynamics.dynamics_dimension)
+        return SHAPES[shape], _DIMENSIONS[dimension], self._tables.slot(dynamics.value)
+
+    def order(self) -> tuple[list[int], list[int]]:
+        """Return the entities, each after those that it goes by, and the place of each therein.
+
+        Where they go by each other in a circle, the first of the file comes first.
+        """
+        order: list[int] = []
+        leaders: dict[int, list[int]] = {}
+        for follower, leader in self.pairs:
+            leaders.setdefault(follower, []).append(leader)
+
+        def visit(entity: int, above: tuple[int, ...]) -> None:
+            if entity in order or entity in above:
+                return
+            for leader in leaders.get(entity, ()):
+                visit(leader, (*above, entity))
+            order.append(entity)
+
+        for entity in range(len(self._tables.names)):
+            visit(entity, ())
+        return order, [order.index(entity) for entity in range(len(order))]
+
+    def _speed(self, action: osc.SpeedAction, entity: int) -> Row:
+        shape, dimension, value = self.dynamics(action.dynamics)
+        target = action.speed_action_target.target
+        slot = self._tables.slot(target.value)
+        if isinstance(target, osc.AbsoluteTargetSpeed):
+            self._forward(target, "value", target.value)
+            return entity, SPEED_CHANGE, shape, dimension, slot, value, 0
+        continuous = self._flag(target, "continuous", target.continuous)
+        if continuous and dimension != 0 and shape != 0:
+            dimension_ = action.dynamics.dynamics_dimension
+            self._tables.unsupported(target, f'continuous="true" over a {dimension_}')
+        kind = self._tables.choice(osc.SpeedTargetValueType, target.speed_target_value_type)
+        row = self._row(entity, target.entity_ref)
+        row[codes.IS_FACTOR] = int(kind is osc.SpeedTargetValueType.FACTOR)
+        row[codes.CONTINUOUS] = int(continuous)
+        return entity, codes.RELATIVE_SPEED, shape, dimension, slot, value, self._keep(row)
+
+    def _profile(self, action: osc.SpeedProfileAction, entity: int) -> Row:
+        row = self._row(entity, action.entity_ref)
+        mode = self._tables.choice(osc.FollowingMode, action.following_mode)
+        row[codes.FOLLOWS] = int(mode is osc.FollowingMode.FOLLOW)
+        row[codes.FIRST_ENTRY] = len(self.entries)
+        for one in action.entries:
+            time = -1 if one.time is None else self._tables.slot(one.time)
+            self.entries.append((self._tables.slot(one.speed), time))
+        row[codes.PAST_ENTRY] = len(self.entries)
+        self._limit(row, action.dynamic_constraints)
+        return entity, codes.SPEED_PROFILE, 0, 0, 0, 0, self._keep(row)
+
+    def _distance(self, action: osc.LongitudinalDistanceAction, entity: int) -> Row:
+        row = self._row(entity, action.entity_ref)
+        given = [one for one in (action.distance, action.time_gap) if one is not None]
+        if len(given) != 1:
+            self._tables.unsupported(
+                action, "a LongitudinalDistanceAction without distance or timeGap, or with both,"
+            )
+        row[codes.IS_TIME_GAP] = int(action.time_gap is not None)
+        row[codes.CONTINUOUS] = int(self._flag(action, "continuous", action.continuous))
+        row[codes.FREESPACE] = int(self._flag(action, "freespace", action.freespace))
+        side = osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY
+        if action.displacement is not None:
+            side = self._tables.choice(osc.LongitudinalDisplacement, action.displacement)
+        row[codes.SIDE] = _SIDES[side]
+        system = osc.CoordinateSystem.ENTITY
+        if action.coordinate_system is not None:
+            system = self._tables.choice(osc.CoordinateSystem, action.coordinate_system)
+        if system is osc.CoordinateSystem.WORLD:
+            self._tables.unsupported(action, 'coordinateSystem="world"')
+        row[codes.BY_BODY] = int(system not in _ALONG)
+        limits = action.dynamic_constraints
+        row[codes.UNLIMITED] = int(
+            limits is None or (limits.max_acceleration is None and limits.max_deceleration is None)
+        )
+        self._limit(row, limits)
+        slot = self._tables.slot(given[0] if given else 0.0)
+        return entity, codes.KEEP_DISTANCE, 0, 0, slot, slot, self._keep(row)
+
+    def _synchronise(self, action: osc.SynchronizeAction, entity: int) -> Row:
+        row = self._row(entity, action.master_entity_ref)
+        row[codes.OWN_PLACE] = self._place(action.target_position)
+        row[codes.MASTER_PLACE] = self._place(action.target_position_master)
+        row[codes.TOLERANCE] = self._optional(action.target_tolerance)
+        row[codes.MASTER_TOLERANCE] = self._optional(action.target_tolerance_master)
+        if action.final_speed is not None:
+            speed = action.final_speed.speed
+            row[codes.FINAL] = codes.FINAL_SPEED
+            if isinstance(speed, osc.RelativeSpeedToMaster):
+                kind = self._tables.choice(osc.SpeedTargetValueType, speed.speed_target_value_type)
+                is_factor = kind is osc.SpeedTargetValueType.FACTOR
+                row[codes.FINAL] = codes.FINAL_FACTOR if is_factor else codes.FINAL_DELTA
+            else:
+                self._forward(speed, "value", speed.value)
+            row[codes.FINAL_VALUE] = self._tables.slot(speed.value)
+            steady = speed.steady_state
+            if isinstance(steady, osc.TargetDistanceSteadyState):
+                row[codes.STEADY] = codes.STEADY_DISTANCE
+                row[codes.STEADY_VALUE] = self._tables.slot(steady.distance)
+            elif isinstance(steady, osc.TargetTimeSteadyState):
+                row[codes.STEADY] = codes.STEADY_TIME
+                row[codes.STEADY_VALUE] = self._tables.slot(steady.time)
+        return entity, codes.SYNCHRONIZE, 0, 0, 0, 0, self._keep(row)
+
+    def _row(self, entity: int, ref: str | osc.ParameterRef | None) -> list[int]:
+        row = [0] * codes.COURSE_WIDTH
+        row[codes.REF] = -1
+        if ref is not None:
+            row[codes.REF] = self._tables.entity(ref)
+            self.pairs.append((entity, row[codes.REF]))
+        return row
+
+    def _keep(self, row: list[int]) -> int:
+        self.rows.append(tuple(row))
+        return len(self.rows) - 1
+
+    def _limit(self, row: list[int], limits: osc.DynamicConstraints | None) -> None:
+        most = limits or osc.DynamicConstraints()
+        values = (
+            most.max_acceleration, most.max_deceleration, most.max_speed,
+            most.max_acceleration_rate, most.max_deceleration_rate,
+        )  # fmt: skip
+        row[codes.MOST : codes.MOST + 5] = [self._optional(one) for one in values]
+
+    def _optional(self, value: Value | None) -> int:
+        return -1 if value is None else self._tables.slot(value)
+
+    def _place(self, position: osc.Position) -> int:
+        point = self._tables.lane_point(position)
+        if point is None:
+            return 0
+        if isinstance(point.s, osc.ParameterRef | Expr):
+            self._tables.unsupported(position.position, f's="{point.s}" of a SynchronizeAction')
+        self._points.append(point)
+        return len(self._points) - 1
+
+    def _flag(self, element: Element, name: str, value: Value) -> bool:
+        if not isinstance(value, bool):
+            self._tables.unsupported(element, f'{name}="{value}"')
+        return value is True
+
+    def _forward(self, element: Element, name: str, value: Value) -> None:
+        if isinstance(value, float) and value < 0.0:
+            self._tables.unsupported(element, f'{name}="{value:g}" (driving backwards)')

@@ -1,0 +1,282 @@
+"""Actions along the road, from file to motion: hand-worked cases for each of them."""
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import UnsupportedError
+
+from .storyboards import after, crossroads, events, lane, run, scenario, speed_action, start
+
+DT = 0.05
+ROADS = crossroads(arm_length=300.0)
+
+
+def longitudinal(inner: str) -> str:
+    return f"<LongitudinalAction>{inner}</LongitudinalAction>"
+
+
+def relative(ref: str, value: float, kind: str = "delta", *, continuous: bool = False,
+             dynamics: str = "linear rate 2") -> str:  # fmt: skip
+    shape, dimension, number = dynamics.split()
+    return longitudinal(
+        f'<SpeedAction><SpeedActionDynamics dynamicsShape="{shape}" '
+        f'dynamicsDimension="{dimension}" value="{number}"/><SpeedActionTarget>'
+        f'<RelativeTargetSpeed entityRef="{ref}" value="{value}" speedTargetValueType="{kind}" '
+        f'continuous="{str(continuous).lower()}"/></SpeedActionTarget></SpeedAction>'
+    )
+
+
+def constraints(**limits: float) -> str:
+    words = " ".join(f'{name}="{value}"' for name, value in limits.items())
+    return f"<DynamicConstraints {words}/>" if limits else ""
+
+
+def profile(*entries: tuple[float, float | None], mode: str = "position", ref: str = "",
+            **limits: float) -> str:  # fmt: skip
+    rows = "".join(
+        f'<SpeedProfileEntry speed="{speed}"/>'
+        if time is None
+        else f'<SpeedProfileEntry speed="{speed}" time="{time}"/>'
+        for speed, time in entries
+    )
+    of = f' entityRef="{ref}"' if ref else ""
+    return longitudinal(
+        f'<SpeedProfileAction followingMode="{mode}"{of}>{constraints(**limits)}{rows}'
+        "</SpeedProfileAction>"
+    )
+
+
+def distance(ref: str, *, metres: float | None = None, seconds: float | None = None,
+             freespace: bool = False, continuous: bool = True, side: str = "",
+             system: str = "lane", **limits: float) -> str:  # fmt: skip
+    what = f'distance="{metres}"' if metres is not None else f'timeGap="{seconds}"'
+    beside = f' displacement="{side}"' if side else ""
+    return longitudinal(
+        f'<LongitudinalDistanceAction entityRef="{ref}" {what} freespace="{str(freespace).lower()}"'
+        f' continuous="{str(continuous).lower()}" coordinateSystem="{system}"{beside}>'
+        f"{constraints(**limits)}</LongitudinalDistanceAction>"
+    )
+
+
+# Two cars one behind the other on one lane, the ego on another leg.
+def story(*rows: tuple[str, str, str, str], speeds=(0.0, 10.0, 10.0), gap: float = 20.0,
+          first: str = ""):  # fmt: skip
+    names = ("ego", "bv", "lead")
+    places = (lane(3, -1, 5.0), lane(1, -1, 5.0), lane(1, -1, 5.0 + gap))
+    private = [
+        start(name, place, speed) for name, place, speed in zip(names, places, speeds, strict=True)
+    ]
+    if first:  # what bv begins with, besides
+        more = f"<PrivateAction>{first}</PrivateAction></Private>"
+        private[1] = private[1].replace("</Private>", more)
+    privates = "".join(private)
+    return run(scenario(names, privates, events(*rows)), roads=ROADS)
+
+
+def at(rollout, name: str, seconds: float) -> float:
+    return float(rollout.v[0, rollout.names.index(name), round(seconds / DT)])
+
+
+def travelled(rollout, name: str) -> np.ndarray:
+    e = rollout.names.index(name)
+    return np.hypot(rollout.x[0, e] - rollout.x[0, e, 0], rollout.y[0, e] - rollout.y[0, e, 0])
+
+
+def apart(rollout) -> np.ndarray:
+    bv, lead = (rollout.names.index(name) for name in ("bv", "lead"))
+    return np.hypot(
+        rollout.x[0, lead] - rollout.x[0, bv], rollout.y[0, lead] - rollout.y[0, bv]
+    )  # fmt: skip
+
+
+def speeding(speed: float, dynamics: str) -> str:
+    return longitudinal(speed_action(speed, dynamics))
+
+
+# Speeds one, two and four seconds after an action begins at 1 s and 4 m/s.
+ABSOLUTE = {
+    "step time 0": (8.0, 8.0, 8.0),
+    "linear time 4": (5.0, 6.0, 8.0),
+    "linear rate 2": (6.0, 8.0, 8.0),
+    "linear distance 24": (5.0, 6.0, 8.0),  # 6 m/s on average for 4 s
+    "cubic time 4": (4.625, 6.0, 8.0),
+    "cubic rate 1.5": (4.625, 6.0, 8.0),  # the steepest is 1.5·4/4 m/s²
+    "sinusoidal time 4": (4.0 + 2.0 * (1.0 - np.sqrt(0.5)), 6.0, 8.0),
+    "sinusoidal distance 24": (4.0 + 2.0 * (1.0 - np.sqrt(0.5)), 6.0, 8.0),
+    # The car's own most is 5 m/s².
+    "linear rate 50": (8.0, 8.0, 8.0),
+    "linear time 0.1": (8.0, 8.0, 8.0),
+}
+
+
+@pytest.mark.parametrize("dynamics", ABSOLUTE)
+def test_speeds_by_shape_and_dimension(dynamics):
+    rollout = story(("e", "bv", speeding(8.0, dynamics), after(1.0)), speeds=(0.0, 4.0, 4.0))
+    found = [at(rollout, "bv", t) for t in (2.0, 3.0, 5.0)]
+    assert found == pytest.approx(list(ABSOLUTE[dynamics]), abs=1e-9)
+
+
+@pytest.mark.parametrize("dynamics", ["linear rate 50", "linear time 0.1", "cubic time 0.1"])
+def test_no_car_is_faster_off_than_it_can(dynamics):
+    rollout = story(("e", "bv", speeding(8.0, dynamics), after(1.0)), speeds=(0.0, 4.0, 4.0))
+    assert rollout.a[0, 1].max() <= 5.0 + 1e-9
+    rollout = story(("e", "bv", speeding(0.0, dynamics), after(1.0)), speeds=(0.0, 9.0, 4.0))
+    assert rollout.a[0, 1].min() >= -9.0 - 1e-9
+
+
+@pytest.mark.parametrize("shape", ["linear", "cubic", "sinusoidal"])
+def test_braking_over_a_distance_stops_there(shape):
+    rollout = story(("e", "bv", speeding(0.0, f"{shape} distance 20"), after(1.0)))
+    assert travelled(rollout, "bv")[-1] == pytest.approx(10.0 + 20.0, abs=0.01)
+    assert rollout.v[0, 1, -1] == 0.0
+
+
+def test_an_initial_change_begins_at_once():
+    rollout = story(first=speeding(6.0, "linear rate 1"), speeds=(0.0, 10.0, 10.0))
+    # Both are given by the file: 10 m/s at the start, and on from there.
+    assert [at(rollout, "bv", t) for t in (0.0, 1.0, 3.0, 9.0)] == pytest.approx([10, 9, 7, 6])
+
+
+def test_a_new_change_ends_the_former():
+    rollout = story(
+        ("up", "bv", speeding(20.0, "linear rate 1"), after(1.0)),
+        ("down", "bv", speeding(8.0, "linear rate 2"), after(3.0)),
+        ("then", "bv", speeding(9.0, "step time 0"),
+         '<Condition name="c" delay="0" conditionEdge="none"><ByValueCondition>'
+         '<StoryboardElementStateCondition storyboardElementType="action" '
+         'storyboardElementRef="up::a" state="completeState"/></ByValueCondition></Condition>'),
+    )  # fmt: skip
+    assert at(rollout, "bv", 3.0) == pytest.approx(12.0)
+    assert at(rollout, "bv", 3.0 + 2 * DT) == 9.0  # the first is complete as the second begins
+
+
+@pytest.mark.parametrize(("kind", "value", "speed"), [("delta", -3.0, 7.0), ("factor", 1.5, 15.0)])
+def test_a_speed_relative_to_another_s(kind, value, speed):
+    rollout = story(("e", "bv", relative("lead", value, kind), after(1.0)), gap=40.0)
+    assert at(rollout, "bv", 2.0) == pytest.approx(8.0 if value < 0.0 else 12.0)
+    assert at(rollout, "bv", 4.5) == pytest.approx(speed)
+
+
+def test_a_continuous_relative_speed_goes_on_with_the_other_s():
+    rows = (
+        ("e", "bv", relative("lead", -2.0, continuous=True), after(1.0)),
+        ("brake", "lead", speeding(4.0, "linear rate 1"), after(4.0)),
+    )
+    rollout = story(*rows)
+    assert at(rollout, "bv", 3.0) == pytest.approx(8.0)
+    assert at(rollout, "bv", 7.0) == pytest.approx(5.0)  # at the same instant as the other's 7
+    assert at(rollout, "bv", 10.0) == pytest.approx(2.0)
+    once = story(("e", "bv", relative("lead", -2.0), after(1.0)), rows[1])
+    assert at(once, "bv", 10.0) == pytest.approx(8.0)  # it has been reached
+
+
+def test_a_relative_speed_over_a_time():
+    dynamics = "sinusoidal time 4"
+    rollout = story(("e", "bv", relative("lead", -4.0, dynamics=dynamics), after(1.0)))
+    assert at(rollout, "bv", 3.0) == pytest.approx(8.0)
+    assert at(rollout, "bv", 5.0) == pytest.approx(6.0)
+
+
+def test_an_initial_speed_may_be_relative():
+    rollout = story(first=relative("ego", 3.0, dynamics="step time 0"), speeds=(6.0, 1.0, 1.0))
+    assert at(rollout, "bv", 0.0) == 9.0
+
+
+def test_a_speed_profile():
+    rollout = story(("e", "bv", profile((14.0, 2.0), (14.0, 1.0), (8.0, None)), after(1.0)))
+    times = (1.0, 2.0, 3.0, 4.0, 4.5)
+    expected = [10.0, 12.0, 14.0, 14.0, 9.5]  # at last as hard as the car can: 9 m/s²
+    assert [at(rollout, "bv", t) for t in times] == pytest.approx(expected)
+    assert at(rollout, "bv", 6.0) == pytest.approx(8.0)
+
+
+def test_a_speed_profile_within_limits():
+    rollout = story(
+        ("e", "bv", profile((14.0, 1.0), maxAcceleration=2.0, maxDeceleration=3.0), after(1.0))
+    )
+    assert [at(rollout, "bv", t) for t in (2.0, 3.0, 5.0)] == pytest.approx([12.0, 14.0, 14.0])
+
+
+def test_a_smooth_speed_profile_is_in_time():
+    limits = {"maxAcceleration": 2.0, "maxDeceleration": 2.0, "maxAccelerationRate": 1.0,
+              "maxDecelerationRate": 1.0}  # fmt: skip
+    rollout = story(("e", "bv", profile((14.0, 6.0), mode="follow", **limits), after(1.0)))
+    assert at(rollout, "bv", 4.0) == pytest.approx(12.0, abs=1e-6)  # symmetric
+    assert at(rollout, "bv", 7.0) == pytest.approx(14.0, abs=1e-6)
+    jerk = np.diff(rollout.a[0, 1]) / DT
+    assert np.abs(jerk).max() <= 1.0 + 1e-6
+
+
+def test_a_profile_relative_to_another_s_speed():
+    rollout = story(
+        ("e", "bv", profile((2.0, 2.0), ref="lead"), after(1.0)), speeds=(0.0, 10.0, 6.0)
+    )
+    assert at(rollout, "bv", 3.0) == pytest.approx(8.0)
+
+
+def test_a_distance_without_limits_is_kept_at_once():
+    rows = (
+        ("keep", "bv", distance("lead", metres=12.0), after(1.0)),
+        ("brake", "lead", speeding(2.0, "linear rate 2"), after(3.0)),
+    )
+    rollout = story(*rows, gap=20.0)
+    assert apart(rollout)[round(1.0 / DT)] == pytest.approx(20.0)
+    assert apart(rollout)[round(1.0 / DT) + 1 :] == pytest.approx(12.0, abs=1e-6)
+    assert at(rollout, "bv", 5.0) == pytest.approx(at(rollout, "lead", 5.0))
+
+
+@pytest.mark.parametrize("system", ["entity", "lane", "road"])
+def test_a_distance_between_bodies(system):
+    rows = [("keep", "bv", distance("lead", metres=9.0, freespace=True, system=system), after(1.0))]
+    rollout = story(*rows, gap=20.0)
+    assert apart(rollout)[-1] == pytest.approx(9.0 + 4.0, abs=1e-6)  # and a car's length
+
+
+def test_a_time_gap():
+    rollout = story(("keep", "bv", distance("lead", seconds=1.5), after(1.0)), gap=30.0)
+    assert apart(rollout)[-1] == pytest.approx(15.0, abs=1e-6)
+
+
+def test_a_distance_within_limits_is_reached_by_a_spring():
+    limits = {"maxAcceleration": 2.0, "maxDeceleration": 2.0, "maxSpeed": 13.0}
+    rows = [("keep", "bv", distance("lead", metres=10.0, **limits), after(1.0))]
+    rollout = story(*rows, gap=20.0, speeds=(0.0, 5.0, 5.0))
+    assert apart(rollout)[-1] == pytest.approx(10.0, abs=0.05)
+    assert np.abs(rollout.a[0, 1]).max() <= 2.0 + 1e-9
+    assert at(rollout, "bv", 10.0) == pytest.approx(5.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("side", "expected"), [("any", 12.0), ("leadingReferencedEntity", -12.0)])
+def test_the_side_of_a_distance(side, expected):
+    rollout = story(("keep", "bv", distance("lead", metres=12.0, side=side), after(1.0)), gap=20.0)
+    ahead = rollout.x[0, 2] - rollout.x[0, 1], rollout.y[0, 2] - rollout.y[0, 1]
+    h = rollout.h[0, 1]
+    signed = ahead[0] * np.cos(h) + ahead[1] * np.sin(h)
+    assert signed[-40:] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_distance_that_is_reached_once_is_over():
+    rollout = story(
+        ("keep", "bv", distance("lead", metres=12.0, continuous=False), after(1.0)),
+        ("brake", "lead", speeding(2.0, "linear rate 2"), after(3.0)),
+    )
+    # It does not brake with the other: in 7 s it goes 70 m, the other 24 + 6, and is overtaken.
+    assert apart(rollout)[-1] == pytest.approx(70.0 - 30.0 - 12.0, abs=0.05)
+
+
+UNSUPPORTED = {
+    'value="-3" (driving backwards)': speeding(-3.0, "linear rate 1"),
+    'continuous="true" over a time': relative(
+        "lead", 1.0, continuous=True, dynamics="linear time 2"
+    ),
+    "LongitudinalDistanceAction without distance or timeGap": longitudinal(
+        '<LongitudinalDistanceAction entityRef="lead" freespace="false" continuous="true"/>'
+    ),
+}
+
+
+@pytest.mark.parametrize("message", UNSUPPORTED)
+def test_what_is_not_supported_is_said(message):
+    with pytest.raises(UnsupportedError) as caught:
+        story(("e", "bv", UNSUPPORTED[message], after(1.0)))
+    assert message in str(caught.value)
