@@ -1,5 +1,7 @@
 """What a rollout brings about goes into the ontology that is handed over, and nowhere else."""
 
+import json
+
 import numpy as np
 import pyoxigraph as ox
 import pytest
@@ -11,15 +13,18 @@ from bridgegen.odd.roads import usual
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import from_bytes, to_bytes
 from bridgegen.ontology.files import load as load_owl
+from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build_static
 from bridgegen.ontology.questions import ask
 from bridgegen.ontology.reasoner import reason, require
+from bridgegen.ontology.vocabulary import bg as tbox_property
 from bridgegen.ontology.vocabulary import local_name, tbox
-from bridgegen.openx.convert import convert_file
+from bridgegen.openx.convert import convert_file, import_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
@@ -166,3 +171,35 @@ def test_the_speed_limit_of_a_map_bounds_speeds(tmp_path):
     assert speeds.max() > 7.0
     run = bg.run_search("crossroads-s4", road_map=path, budget=150, keep=2, out=tmp_path / "run")
     assert run.scenarios
+
+
+def test_the_cause_is_in_every_file_and_comes_back(tmp_path):
+    run = bg.run_search(
+        "crossroads-s3", budget=60, keep=2, algorithm="random", out=tmp_path / "run"
+    )
+    frame = run.frame()
+    assert len(run.scenarios) == 2
+    for path in run.scenarios:
+        facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
+        cause = frame.loc[facts["evaluation"], "cause"]
+        individuals = load_owl(path.with_suffix(".owl"))
+        assert facts["cause"] == cause
+        assert individuals.text(individuals.one("Scenario"), "has_cause") == cause
+        assert read(path).file_header.properties.get("cause") == cause
+        (_, xosc), _ = convert_file(path.with_suffix(".owl"), tmp_path / "made")
+        assert xosc.read_bytes() == path.read_bytes()
+        again, _ = import_file(path, tmp_path / f"{path.stem}.owl")
+        scenario = load_owl(again).one("Scenario")
+        assert load_owl(again).text(scenario, "has_cause") == cause
+
+
+def test_a_cause_that_is_none_breaks_a_rule():
+    scenario = load("crossroads-s4")
+    individuals = (
+        Pipeline(scenario, scenario.space()).concrete(scenario.space().row({})).individuals
+    )
+    node = individuals.one("Scenario")
+    quad = ox.Quad(node, tbox_property("has_cause"), ox.Literal("luck"))
+    broken = check(Individuals([*individuals.quads, quad]), scenario)
+    assert ["luck" in str(one) for one in broken] == [True]
+    assert "perception" in str(broken[0])

@@ -3,10 +3,11 @@
 import json
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pyoxigraph as ox
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause
@@ -14,6 +15,10 @@ from bridgegen.errors import OntologyError, StorageError
 from bridgegen.metrics import METRICS
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import save
+from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import bg
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.outcomes import with_outcomes
@@ -97,7 +102,7 @@ def hand_over(
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir()
         for i, name in enumerate(names):
-            files = write_scenario(pipeline, rows.X[i], fresh, name)
+            files = write_scenario(pipeline, rows.X[i], fresh, name, Cause(rows.cause[i]))
             files.append(fresh / f"{name}.json")
             files[-1].write_text(_facts(pipeline, rows, i, name), encoding="utf-8")
             paths = tuple(f"{FOLDER}/{file.name}" for file in files)
@@ -114,10 +119,13 @@ def hand_over(
     return tuple(kept)
 
 
-def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> list[Path]:
+def write_scenario(
+    pipeline: Pipeline, x: Float, folder: Path, name: str, cause: Cause = Cause.NONE
+) -> list[Path]:
     """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
 
-    The ontology also holds what the scenario's rollout brought about (``has_outcome``).
+    The ontology also holds what the scenario's rollout brought about (``has_outcome``) and the
+    cause of it, if it is known (``has_cause``); so does the header of the storyboard.
 
     Raises:
         OntologyError: its individuals break a constraint (SHACL).
@@ -127,15 +135,34 @@ def write_scenario(pipeline: Pipeline, x: Float, folder: Path, name: str) -> lis
     concrete = pipeline.concrete(x, xodr.name)
     rollout = pipeline.rollout(x[np.newaxis])
     xodr.write_bytes(concrete.road_data)
-    xosc.write_bytes(scenario_xml(concrete.storyboard))
+    xosc.write_bytes(scenario_xml(_caused(concrete.storyboard, cause)))
     if concrete.individuals is None:
         return [xodr, xosc]
     individuals = with_outcomes(concrete.individuals, rollout, concrete.roads)
+    if cause:
+        individuals = _with_cause(individuals, cause)
     violations = check(individuals, pipeline.source.constraints)
     if violations:
         raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
     save(individuals, owl)
     return [owl, xodr, xosc]
+
+
+def _caused(storyboard: osc.OpenScenario, cause: Cause) -> osc.OpenScenario:
+    """Return a scenario whose header says its cause, from version 1.2 on: earlier ones cannot."""
+    header = storyboard.file_header
+    if not cause or header.rev_minor in (0, 1):
+        return storyboard
+    said = header.properties or osc.Properties()
+    others = tuple(one for one in said.properties if one.name != CAUSE)
+    properties = replace(said, properties=(*others, osc.Property(CAUSE, cause.label)))
+    return replace(storyboard, file_header=replace(header, properties=properties))
+
+
+def _with_cause(individuals: Individuals, cause: Cause) -> Individuals:
+    scenario = individuals.one("Scenario")
+    quad = ox.Quad(scenario, bg("has_cause"), ox.Literal(cause.label))
+    return Individuals([*individuals.quads, quad])
 
 
 def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:

@@ -20,6 +20,9 @@ TIME_STEP = "time_step"
 DEFAULT_TIME_STEP = 0.05
 """[s], where a header does not say it."""
 
+CAUSE = "cause"
+"""The header's property for what a critical scenario's harm is put down to."""
+
 DRIVER = "driver"
 """Property of a controller: the driver's name."""
 

@@ -19,6 +19,7 @@ about, which one, and what is said of it; what may be said several times is numb
 ``event.NAME.on_road.1``              a road that it is on
 ``event.NAME.time``                   when it happens [s]
 ``signals.NAME.offset``               of a controller: time of its first phase that has passed [s]
+``cause``                             of its harm: perception, planning, control or unavoidable
 ====================================  ============================================================
 """
 
@@ -30,7 +31,7 @@ from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import TIME_STEP
+from bridgegen.openx.openscenario.declarations import CAUSE, TIME_STEP
 from bridgegen.openx.openscenario.from_owl.entities import plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
@@ -72,6 +73,9 @@ class Notes:
         yield from self._changes()
         for name, passed in signals.offsets.items():
             yield osc.Property(f"{SIGNALS}.{name}.offset", format_double(passed))
+        if self._individuals.optional_text(self._scenario, "has_cause") is not None:
+            said = plain_text(self._individuals, self._scenario, "has_cause")
+            yield osc.Property(CAUSE, said)
 
     def _parameters(self) -> Iterator[osc.Property]:
         ind = self._individuals

@@ -13,7 +13,7 @@ import pyoxigraph as ox
 from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.vocabulary import bg, tbox
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import TIME_STEP
+from bridgegen.openx.openscenario.declarations import CAUSE, TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, PARAMETER, SIGNALS
 from bridgegen.openx.openscenario.from_owl.weather import PROPERTIES
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
@@ -30,11 +30,13 @@ class Notes:
 
     Attributes:
         time_step: the property of it, if there is one.
+        cause: likewise.
         of: per kind (``parameter``, ``event``, ``signals``) and name, what is said, by its name.
     """
 
     def __init__(self, builder: StoryBuilder, header: osc.FileHeader) -> None:
         self.time_step: osc.Property | None = None
+        self.cause: osc.Property | None = None
         self.of: dict[str, Facts] = {PARAMETER: {}, EVENT: {}, SIGNALS: {}}
         for one in () if header.properties is None else header.properties.properties:
             name = builder.text(one.name)
@@ -44,6 +46,8 @@ class Notes:
                 which, _, what = which.rpartition(".")
             if name == TIME_STEP:
                 self.time_step = self.time_step or one
+            elif name == CAUSE:
+                self.cause = self.cause or one
             elif kind in self.of and which:
                 about = self.of[kind].setdefault(which, defaultdict(list))
                 about[what].append(one)

@@ -171,6 +171,9 @@ class _Importer:
             with builder.attempt():
                 step = as_number(builder, notes.time_step.value, notes.time_step)
         builder.put(node, "has_time_step", step)
+        if notes.cause is not None:
+            with builder.attempt():
+                builder.put(node, "has_cause", builder.text(notes.cause.value))
         stop = self.scenario.storyboard.stop_trigger
         for group in () if stop is None else stop.condition_groups:
             if (time := _time_alone(group)) is not None:
