@@ -197,7 +197,10 @@ def test_the_best_of_two_detections_takes_the_box(rollout_of):
         ({"kinds": np.array([0])}, r"kinds must be 2 of bridgegen\.ego\.kinds, got \[0\]"),
         ({"kinds": np.array([0, 9])}, "kinds must be 2 of"),
         ({"detections": np.zeros((1, 1, 1, 8))}, r"detections must have shape \(1, 2, 1, 8\)"),
-        ({"detections": np.full((1, 2, 1, 8), np.nan)}, "detections must be finite"),
+        (
+            {"detections": np.full((1, 2, 1, 8), np.nan)},
+            "detections must be finite where there is a frame",
+        ),
     ],
 )
 @pytest.mark.parametrize("metric", [iou, e_position, mean_average_precision])

@@ -60,30 +60,35 @@ def overlap(
 
 @kernel
 def truth(
-    box: Float, x: Float, y: Float, h: Float, detections: Float, n_steps: Int, reach: Float,
-    centre_x: Float, centre_y: Float, counts: Bool,
-) -> None:  # fmt: skip
+    box: Float, x: Float, y: Float, cosine: Float, sine: Float, detections: Float, n_steps: Int,
+    reach: Float, centre_x: Float, centre_y: Float, counts: Bool,
+) -> bool:  # fmt: skip
     """Write where the boxes' centres are at the instants with a frame, and which of them count.
 
-    ``reach`` ``(E,)`` [m] is how near to the ego's reference point an entity must be.
+    ``reach`` ``(E,)`` [m] is how near to the ego's reference point an entity must be. Return
+    whether all detections at these instants are finite.
     """
     n_rows, n_entities, _ = x.shape
+    nothing = 0.0
     for i in range(n_rows):
         counts[i] = False
         for e in range(1, n_entities):
             for k in range(n_steps[i]):
                 if detections[i, e, k, SEEN_BY] < NOBODY:
                     continue
-                centre_x[i, e, k] = x[i, e, k] + box[e, 2] * math.cos(h[i, e, k])
-                centre_y[i, e, k] = y[i, e, k] + box[e, 2] * math.sin(h[i, e, k])
+                for c in range(detections.shape[3]):
+                    nothing += 0.0 * detections[i, e, k, c]  # NaN if it is not finite
+                centre_x[i, e, k] = x[i, e, k] + box[e, 2] * cosine[i, e, k]
+                centre_y[i, e, k] = y[i, e, k] + box[e, 2] * sine[i, e, k]
                 dx, dy = centre_x[i, e, k] - x[i, 0, k], centre_y[i, e, k] - y[i, 0, k]
                 counts[i, e, k] = dx * dx + dy * dy < reach[e] * reach[e]
+    return bool(nothing == 0.0)
 
 
 @kernel
 def mean_iou(
-    half: Float, h: Float, centre_x: Float, centre_y: Float, counts: Bool, detections: Float,
-    n_steps: Int, out: Float,
+    half: Float, h: Float, cosine: Float, sine: Float, centre_x: Float, centre_y: Float,
+    counts: Bool, detections: Float, n_steps: Int, out: Float,
 ) -> None:  # fmt: skip
     """Write each scenario's mean intersection over union; +inf where no truth counts."""
     n_rows, n_entities, _ = h.shape
@@ -99,7 +104,7 @@ def mean_iou(
                 seen = detections[i, e, k]
                 if seen[SEEN_BY] == NOBODY:
                     continue
-                c, s = math.cos(h[i, e, k]), math.sin(h[i, e, k])
+                c, s = cosine[i, e, k], sine[i, e, k]
                 dx, dy = seen[X] - centre_x[i, e, k], seen[Y] - centre_y[i, e, k]
                 lb, wb = 0.5 * seen[LENGTH], 0.5 * seen[WIDTH]
                 common = overlap(

@@ -12,8 +12,8 @@ RED, RED_AND_YELLOW = 1, 2  # of Rollout.lights
 
 @kernel
 def red_lights(
-    front: float, x: Float, y: Float, h: Float, lines: Float, stop_lights: Int, lights: Int,
-    n_steps: Int, aside: float, out: Float,
+    front: float, x: Float, y: Float, cosine: Float, sine: Float, lines: Float, stop_lights: Int,
+    lights: Int, n_steps: Int, aside: float, out: Float,
 ) -> None:  # fmt: skip
     """Count the lights whose stop line the ego crosses while they are red.
 
@@ -28,8 +28,8 @@ def red_lights(
             light = stop_lights[j]
             before = math.inf
             for k in range(n_steps[i]):
-                px = (x[i, 0, k] - lines[i, j, 0]) + front * math.cos(h[i, 0, k])
-                py = (y[i, 0, k] - lines[i, j, 1]) + front * math.sin(h[i, 0, k])
+                px = (x[i, 0, k] - lines[i, j, 0]) + front * cosine[i, 0, k]
+                py = (y[i, 0, k] - lines[i, j, 1]) + front * sine[i, 0, k]
                 past = px * c + py * s
                 if before <= 0.0 and past > 0.0 and abs(py * c - px * s) <= aside:
                     state = lights[i, light, k - 1]

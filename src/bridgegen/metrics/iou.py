@@ -26,8 +26,9 @@ def iou(rollout: Rollout) -> Float:
     p = perceived(rollout)
     out = np.empty(len(p.n_steps))
     _detection_kernels.mean_iou(
-        p.half, p.h, p.centre_x, p.centre_y, p.counts, p.detections, p.n_steps, out
-    )
+        p.half, p.h, p.cosine, p.sine, p.centre_x, p.centre_y, p.counts, p.detections, p.n_steps,
+        out,
+    )  # fmt: skip
     return without_failed(rollout, out)
 
 

@@ -41,8 +41,8 @@ def _motion(rollout: Rollout) -> Motion:
     from bridgegen.metrics import _motion_kernels
 
     box = as_float("rollout.box [m]", rollout.box, (rollout.shape[1], 3))
-    x, y, h, v = (recorded(rollout, field) for field in ("x", "y", "h", "v"))
-    n_steps = steps(rollout)
-    cosine, sine, centre_x, centre_y = (np.empty(rollout.shape) for _ in range(4))
-    _motion_kernels.place(box, x, y, h, n_steps, cosine, sine, centre_x, centre_y)
+    x, y, v = (recorded(rollout, field) for field in ("x", "y", "v"))
+    n_steps, (cosine, sine) = steps(rollout), rollout.direction
+    centre_x, centre_y = np.empty(rollout.shape), np.empty(rollout.shape)
+    _motion_kernels.place(box, x, y, cosine, sine, n_steps, centre_x, centre_y)
     return Motion(0.5 * box[:, :2], centre_x, centre_y, cosine, sine, v, distance(rollout), n_steps)

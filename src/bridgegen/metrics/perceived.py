@@ -38,6 +38,7 @@ class Perceived:
     Attributes:
         half: ``(E, 2)`` float64 [m], half lengths and half widths.
         x, y, h: ``(N, E, T)`` as the rollout has them.
+        cosine, sine: ``(N, E, T)`` float64, of the headings.
         centre_x, centre_y: ``(N, E, T)`` float64 [m], of the boxes; unset without a frame.
         counts: ``(N, E, T)`` bool: there is a frame, and the entity is there, within its class's
             range.
@@ -50,6 +51,8 @@ class Perceived:
     x: Float
     y: Float
     h: Float
+    cosine: Float
+    sine: Float
     centre_x: Float
     centre_y: Float
     counts: Bool
@@ -71,7 +74,7 @@ def _perceived(rollout: Rollout) -> Perceived:
     from bridgegen.metrics import _detection_kernels
 
     n, e, t = rollout.shape
-    detections = as_float("rollout.detections", rollout.detections, (n, e, t, 8))
+    detections = as_float("rollout.detections", rollout.detections, (n, e, t, 8), finite=False)
     entities = np.ascontiguousarray(rollout.kinds, dtype=np.int64)
     if entities.shape != (e,) or not np.isin(entities, range(len(kinds.NAMES))).all():
         raise ValueError(f"rollout.kinds must be {e} of bridgegen.ego.kinds, got {entities}")
@@ -79,11 +82,14 @@ def _perceived(rollout: Rollout) -> Perceived:
     x, y, h = (recorded(rollout, field) for field in ("x", "y", "h"))
     classes, n_steps = CLASS_OF_KIND[entities], steps(rollout)
     centre_x, centre_y, counts = np.empty(x.shape), np.empty(x.shape), np.empty(x.shape, np.bool_)
-    _detection_kernels.truth(
-        box, x, y, h, detections, n_steps, RANGES[classes], centre_x, centre_y, counts
-    )
+    cosine, sine = rollout.direction
+    if not _detection_kernels.truth(
+        box, x, y, cosine, sine, detections, n_steps, RANGES[classes], centre_x, centre_y, counts
+    ):
+        raise ValueError("rollout.detections must be finite where there is a frame")
     if rollout.present.size:
         counts &= rollout.present
     return Perceived(
-        0.5 * box[:, :2], x, y, h, centre_x, centre_y, counts, classes, detections, n_steps
-    )
+        0.5 * box[:, :2], x, y, h, cosine, sine, centre_x, centre_y, counts, classes, detections,
+        n_steps,
+    )  # fmt: skip

@@ -41,8 +41,8 @@ def r_red(rollout: Rollout) -> Float:
         raise ValueError(f"rollout.stop_lights must be in 0..{n_lights - 1}, got {stop_lights}")
     box = rollout.box[0]
     _light_kernels.red_lights(
-        float(box[2] + 0.5 * box[0]), *(recorded(rollout, field) for field in ("x", "y", "h")),
-        lines, stop_lights, lights, steps(rollout), ASIDE, out,
+        float(box[2] + 0.5 * box[0]), recorded(rollout, "x"), recorded(rollout, "y"),
+        *rollout.direction, lines, stop_lights, lights, steps(rollout), ASIDE, out,
     )  # fmt: skip
     return without_failed(rollout, out)
 

@@ -87,20 +87,27 @@ def gaps(
 
 
 @kernel
-def box_distance(box: Float, x: Float, y: Float, h: Float, n_steps: Int, out: Float) -> None:
+def directions_of(h: Float, n_steps: Int, cosine: Float, sine: Float) -> None:
+    """Fill ``cosine`` and ``sine`` (N, E, T) up to each scenario's last real instant."""
+    for i in range(h.shape[0]):
+        for e in range(h.shape[1]):
+            directions(h[i, e], n_steps[i], cosine[i, e], sine[i, e])
+
+
+@kernel
+def box_distance(
+    box: Float, x: Float, y: Float, cosine: Float, sine: Float, n_steps: Int, out: Float
+) -> None:
     """Fill ``out`` (N, E, T) with the distances from entity 0's box to each other's."""
     n_rows, n_entities, n_instants = x.shape
-    cos_a, sin_a = np.empty(n_instants), np.empty(n_instants)
-    cos_b, sin_b = np.empty(n_instants), np.empty(n_instants)
     dx, dy = np.empty(n_instants), np.empty(n_instants)
     ahead_a = box[0, 2]
     for i in range(n_rows):
         n = n_steps[i]
         out[i, 0, :] = np.inf
-        if n_entities > 1:
-            directions(h[i, 0], n, cos_a, sin_a)
+        cos_a, sin_a = cosine[i, 0], sine[i, 0]
         for e in range(1, n_entities):
-            directions(h[i, e], n, cos_b, sin_b)
+            cos_b, sin_b = cosine[i, e], sine[i, e]
             ahead_b = box[e, 2]
             for k in range(n):
                 # Differences first: far from the origin they lose no digits.

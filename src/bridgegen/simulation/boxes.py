@@ -12,6 +12,7 @@ def box_distance(
     y: npt.ArrayLike,
     h: npt.ArrayLike,
     n_steps: npt.ArrayLike,
+    direction: tuple[Float, Float] | None = None,
 ) -> Float:
     """Return the distance from entity 0's oriented box to each other's at every instant.
 
@@ -22,6 +23,7 @@ def box_distance(
         y: ``(N, E, T)`` [m], reference point.
         h: ``(N, E, T)`` [rad], heading.
         n_steps: ``(N,)`` in 1..T, the instants that are real.
+        direction: what `directions` gives for h, if it is known.
 
     Returns:
         ``(N, E, T)`` float64 [m]: 0 where the boxes touch or overlap, +inf for entity 0 itself;
@@ -40,8 +42,23 @@ def box_distance(
     if e < 1 or not (box[:, :2] > 0.0).all():
         raise ValueError(f"box [m] must hold lengths and widths > 0 of ≥ 1 entity, got {box}")
     out = np.empty((n, e, t))
-    _box_kernels.box_distance(box, x, y, h, as_steps(n_steps, n, t), out)
+    cosine, sine = directions(h, n_steps) if direction is None else direction
+    _box_kernels.box_distance(box, x, y, cosine, sine, as_steps(n_steps, n, t), out)
     return out
+
+
+def directions(h: npt.ArrayLike, n_steps: npt.ArrayLike) -> tuple[Float, Float]:
+    """Return the cosine and the sine of headings ``(N, E, T)``; padded instants are unset.
+
+    Raises:
+        ValueError: a shape differs, a heading is not finite.
+    """
+    from bridgegen.simulation import _box_kernels
+
+    h = as_float("h [rad]", h, (None, None, None))
+    cosine, sine = np.empty(h.shape), np.empty(h.shape)
+    _box_kernels.directions_of(h, as_steps(n_steps, h.shape[0], h.shape[2]), cosine, sine)
+    return cosine, sine
 
 
 def as_steps(n_steps: npt.ArrayLike, n: int, t: int) -> Int:

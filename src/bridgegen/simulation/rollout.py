@@ -97,6 +97,13 @@ class Rollout:
         return n, e, t
 
     @cached_property
+    def direction(self) -> tuple[Float, Float]:
+        """Cosine and sine of the headings, each ``(N, E, T)`` float64; padding is unset."""
+        from bridgegen.simulation.boxes import directions
+
+        return directions(self.h, self.n_steps)
+
+    @cached_property
     def distance(self) -> Float:
         """``(N, E, T)`` float64 [m]: from the ego's oriented box to each other's, 0 at contact.
 
@@ -105,7 +112,7 @@ class Rollout:
         """
         from bridgegen.simulation.boxes import box_distance
 
-        distance = box_distance(self.box, self.x, self.y, self.h, self.n_steps)
+        distance = box_distance(self.box, self.x, self.y, self.h, self.n_steps, self.direction)
         if self.present.size:
             distance[~(self.present & self.present[:, :1])] = np.inf
         return distance
@@ -113,7 +120,7 @@ class Rollout:
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
-    "stop_lines",
+    "stop_lines", "present",
 )  # fmt: skip
 
 
