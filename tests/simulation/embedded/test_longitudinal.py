@@ -280,3 +280,72 @@ def test_what_is_not_supported_is_said(message):
     with pytest.raises(UnsupportedError) as caught:
         story(("e", "bv", UNSUPPORTED[message], after(1.0)))
     assert message in str(caught.value)
+
+
+def synchronise(own: float, master: float, final: str = "", tolerance: str = "") -> str:
+    speed = f"<FinalSpeed>{final}</FinalSpeed>" if final else ""
+    places = lane(3, -1, master), lane(1, -1, own)
+    tags = "TargetPositionMaster", "TargetPosition"
+    inner = "".join(
+        place.replace("<Position>", f"<{tag}>").replace("</Position>", f"</{tag}>")
+        for place, tag in zip(places, tags, strict=True)
+    )
+    return f'<SynchronizeAction masterEntityRef="ego"{tolerance}>{inner}{speed}</SynchronizeAction>'
+
+
+def final_speed(value: float, steady: str = "") -> str:
+    return f'<AbsoluteSpeed value="{value}">{steady}</AbsoluteSpeed>'
+
+
+# The ego is at 85 m on its leg after 8 s; by then, the other one is to be at 105 m, and starts at
+# 5 m and 10 m/s. Speeds after 4 and after 8 s, by hand.
+MEETINGS = {
+    "by constant acceleration": ("", (12.5, 15.0)),  # 2·(100 − 80)/64 = 0.625 m/s²
+    "rush": (final_speed(10.0), (15.0, 10.0)),  # 1.25 m/s² up, and down again
+    "at the final speed": (final_speed(15.0), (12.5, 15.0)),
+    "relative": (
+        '<RelativeSpeedToMaster speedTargetValueType="factor" value="1.5"/>', (12.5, 15.0),
+    ),
+    # 10 m/s over the last 20 m: 80 m in 6 s, so apex 40/3 + 10/3.
+    "steady": (
+        final_speed(10.0, '<TargetDistanceSteadyState distance="20"/>'),
+        (10.0 + 20.0 / 3 * 2 / 3, 10.0),
+    ),
+    "steady for a time": (
+        final_speed(10.0, '<TargetTimeSteadyState time="2"/>'),
+        (10.0 + 20.0 / 3 * 2 / 3, 10.0),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MEETINGS)
+def test_being_there_when_the_master_is_there(name):
+    final, speeds = MEETINGS[name]
+    rollout = story(
+        ("e", "bv", synchronise(105.0, 85.0, final), after(0.0)), speeds=(10.0, 10.0, 20.0)
+    )
+    assert [at(rollout, "bv", t) for t in (4.0, 7.95)] == pytest.approx(list(speeds), abs=0.1)
+    way = travelled(rollout, "bv")[round(8.0 / DT)]
+    assert way == pytest.approx(100.0, abs=0.02)
+
+
+def test_the_speed_is_asked_anew_when_the_master_s_changes():
+    rollout = story(
+        ("e", "bv", synchronise(55.0, 65.0), after(0.0)),
+        ("slow", "ego", speeding(5.0, "linear rate 5"), after(2.0)),
+        speeds=(10.0, 10.0, 20.0),
+    )
+    arrives = int(np.argmax(travelled(rollout, "ego") >= 60.0))
+    assert arrives * DT > 8.0  # not after 6 s, as it seemed at first
+    assert travelled(rollout, "bv")[arrives] == pytest.approx(50.0, abs=0.5)
+
+
+def test_tolerances_make_the_places_larger():
+    tolerance = ' targetTolerance="4" targetToleranceMaster="0"'
+    rollout = story(
+        ("e", "bv", synchronise(105.0, 85.0, final_speed(3.0), tolerance), after(0.0)),
+        speeds=(10.0, 10.0, 20.0),
+    )
+    way = travelled(rollout, "bv")[round(8.0 / DT)]
+    assert way == pytest.approx(96.0, abs=0.1)
+    assert at(rollout, "bv", 9.0) == pytest.approx(3.0)

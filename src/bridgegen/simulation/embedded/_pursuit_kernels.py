@@ -62,6 +62,7 @@ from bridgegen.simulation.embedded._course_kernels import (
 from bridgegen.simulation.embedded._motion_kernels import STEP, nearest, ramped
 
 NEAR = 0.1  # m, a distance that is missed by less is reached
+ASIDE = 10.0  # m, a place that is farther from a path does not lie on it
 SLOW = 1e-6  # m/s, a master that is slower is not on its way
 
 
@@ -233,17 +234,19 @@ def _keep_distance(j, e, k, plan, roads, state, record):
 
 @kernel
 def _way_left(e, k, x, y, plan, roads, state, record):
-    """Return how far it is to a place [m]: along an entity's path, else as the crow flies.
+    """Return how far it is to a place [m] at instant k: along an entity's path, if it lies there.
 
-    Negative: behind it.
+    Else as the crow flies. Negative: the entity is past it.
     """
     p = state.on[e]
     if p >= 0:
         path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
         foot = nearest(path, n, ds, x, y)
         px, py, _ = pose(path, n, ds, foot)
-        if math.hypot(px - x, py - y) < 0.5 * abs(foot - state.station[e]) + 5.0:
-            return foot - state.station[e]
+        if math.hypot(px - x, py - y) < ASIDE:
+            # Its station may be the next instant's already.
+            own, _ = project(path, n, ds, state.station[e], record.x[e, k], record.y[e, k])
+            return foot - own
     return math.hypot(x - record.x[e, k], y - record.y[e, k])
 
 
