@@ -6,6 +6,7 @@ from math import comb
 import numpy as np
 
 from bridgegen import metrics as measures
+from bridgegen.cause import Cause
 from bridgegen.errors import ScenarioError
 from bridgegen.objective import Thresholds
 from bridgegen.odd.coverage import CoverageMap, coverage_map
@@ -76,7 +77,7 @@ def build_report(
         n_evaluations=summary.evaluations,
         n_critical=summary.critical,
         r_critic=summary.r_critic,
-        critical_rule=_rule(limits),
+        critical_rule=_rule(limits, pipeline.cause),
         critical_distance=limits.d_min_below,
         first_critical=summary.first,
         fiftieth_critical=summary.fiftieth,
@@ -102,14 +103,15 @@ def build_report(
     )
 
 
-def _rule(limits: Thresholds) -> str:
+def _rule(limits: Thresholds, cause: Cause | None) -> str:
     """Return what counts as critical, in words."""
     many = limits.n_collision_above
     contact = "a collision" if many == 0 else f"more than {many:g} collisions"
     close = (
         f"d_min below {limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
     )
-    return f"{contact}, or {close}"
+    rule = f"{contact}, or {close}"
+    return rule if cause is None else f"{rule}, put down to {cause.label}"
 
 
 def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
@@ -138,7 +140,10 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
         Column("F" if n_obj == 1 else f"F{j + 1}", "1", np.ascontiguousarray(rows.F[:, j]))
         for j in range(n_obj)
     )
-    return Evaluations(rows.batch, parameters, metrics, objectives, rows.critical, rows.status)
+    cause = rows.cause if rows.cause.any() else None
+    return Evaluations(
+        rows.batch, parameters, metrics, objectives, rows.critical, rows.status, cause
+    )
 
 
 def _coverage(pipeline: Pipeline, rows: Rows) -> CoverageMap:
@@ -188,6 +193,7 @@ def _playbacks(
                 files=files,
                 picture=picture,
                 lamps=lamps(rollout, k, lights),
+                cause=Cause(rows.cause[evaluation]).label,
             )
         )  # fmt: skip
     return tuple(playbacks)

@@ -115,6 +115,7 @@ class Evaluations:
         objectives: columns of F, minimised.
         critical: ``(N,)`` bool.
         status: ``(N,)`` int64, 0 is success; every other row is counted but not drawn.
+        cause: ``(N,)``, a `bridgegen.cause.Cause` each; None where causes were not sought.
     """
 
     iteration: Int
@@ -123,6 +124,7 @@ class Evaluations:
     objectives: tuple[Column, ...]
     critical: Bool
     status: Int
+    cause: npt.NDArray[np.int8] | None = None
 
     def __post_init__(self) -> None:
         n = self.iteration.size
@@ -132,8 +134,9 @@ class Evaluations:
             raise ValueError(f"column names must be unique, got {', '.join(twice)} twice")
         for column in self.columns:
             as_float(f"{column.name} [{column.unit}]", column.values, (n,), finite=False)
-        for name, array in (("critical", self.critical), ("status", self.status)):
-            if array.shape != (n,):
+        arrays = {"critical": self.critical, "status": self.status, "cause": self.cause}
+        for name, array in arrays.items():
+            if array is not None and array.shape != (n,):
                 raise ValueError(f"{name} must have shape {(n,)}, got {array.shape}")
         if n and (self.iteration[1:] < self.iteration[:-1]).any():
             raise ValueError("iteration must ascend")
@@ -222,6 +225,7 @@ class Playback:
         parameters: all parameters' values, in the units of the columns of the same name.
         metrics: all metrics' values, likewise.
         critical: whether it counts as critical.
+        cause: what its harm is put down to; may be empty.
         time_step: seconds between two instants.
         entities: E bodies, the ego first.
         x: ``(E, T)`` float64 [m], rear axle.
@@ -256,6 +260,7 @@ class Playback:
     files: tuple[str, ...] = ()
     picture: Picture | None = None
     lamps: tuple[Lamp, ...] = ()
+    cause: str = ""
 
     def __post_init__(self) -> None:
         place = f"playback '{self.name}'"

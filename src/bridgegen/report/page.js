@@ -104,7 +104,8 @@ function fillList(choose) {
   const head = element("tr");
   const body = $("list-body");
   const sorting = { by: "rank", down: false };
-  const key = (kept) => (sorting.by === "rank" ? kept.rank : kept.metrics[sorting.by]);
+  const causes = data.causes?.labels;
+  const key = (kept) => ({ rank: kept.rank, cause: causes?.indexOf(kept.cause) }[sorting.by] ?? kept.metrics[sorting.by]);
   const order = () => {
     const sign = sorting.down ? -1 : 1;
     const ranked = data.kept.map((kept, i) => ({ i, value: key(kept) }));
@@ -115,8 +116,8 @@ function fillList(choose) {
       th.setAttribute("aria-sort", th.dataset.by === sorting.by ? (sorting.down ? "descending" : "ascending") : "none");
     }
   };
-  for (const name of ["rank", ...names]) {
-    const unit = name === "rank" ? "" : unitText(columns.get(name)?.unit ?? "");
+  for (const name of ["rank", ...names, ...(causes ? ["cause"] : [])]) {
+    const unit = name === "rank" || name === "cause" ? "" : unitText(columns.get(name)?.unit ?? "");
     const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? name, element("small", {}, unit || "\u00a0"));
     button.addEventListener("click", () => {
       sorting.down = sorting.by === name && !sorting.down;
@@ -134,6 +135,7 @@ function fillList(choose) {
       if (name === "n_collision" && value > 0) cell.className = "hit";
       row.append(cell);
     }
+    if (causes) row.append(element("td", {}, kept.cause || "–"));
     row.addEventListener("click", () => choose(i));
     return row;
   });
@@ -163,7 +165,8 @@ function fillDetails(kept) {
   };
   const lines = (values) => Object.entries(values).map(([name, value]) => line(name, value, columns.get(name)));
   const name = element("h3", {}, `Scenario ${kept.name}, evaluation ${number(kept.evaluation + 1)}`);
-  $("measures").replaceChildren(name, ...lines(kept.metrics));
+  const cause = kept.cause ? [element("div", { title: CAUSE_HELP[data.causes.labels.indexOf(kept.cause)] }, element("span", { class: "name" }, "cause"), element("b", {}, kept.cause))] : [];
+  $("measures").replaceChildren(name, ...cause, ...lines(kept.metrics));
   const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
   if (kept.files.length) {
     // Always relative: a path with a scheme or a leading slash cannot lead elsewhere.
@@ -192,8 +195,10 @@ function start() {
   if (!$("coverage").hidden) new Coverage(data.coverage);
   const hook = { data, state: () => null, charts: 0, chartsDrawn: 0, drawCharts };
   window.bridgegen = hook; // for tests, and for whoever wants to drive the page
+  const causes = data.causes ? new Causes(data.causes, hook) : null;
   if (data.kept.length) {
     const player = new Player(hook);
+    if (causes) causes.listRows = player.rows;
     darkScheme.addEventListener("change", () => { readPalette(); player.redraw(); });
   } else {
     $("kept").hidden = $("made-of").hidden = true;

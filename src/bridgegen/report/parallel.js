@@ -8,6 +8,7 @@ class Parallel {
     this.changed = changed;
     const chosen = rows.columns.filter((c) => rows.telling.includes(c.name) || c.name in data.batches.trends);
     this.axes = chosen.map((c) => this.axis(c.name, c.unit, c.values, c.low, c.high));
+    if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, 4), words: data.causes.labels });
     this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
     this.byName = new Map(this.axes.map((axis) => [axis.name, axis]));
     this.filters = new Map(); // axis name → [low, high]
@@ -37,6 +38,7 @@ class Parallel {
     if (low === null && high === null) this.filters.delete(name);
     else this.filters.set(name, [low ?? -Infinity, high ?? Infinity]);
     $("filter-axis").value = axis.name;
+    document.dispatchEvent(new CustomEvent("filters", { detail: this.filters }));
     this.showNumbers();
     this.note();
     this.drawing ??= requestAnimationFrame(() => { this.drawing = null; this.draw(); });
@@ -152,7 +154,7 @@ class Parallel {
 
   connect() {
     const select = $("filter-axis");
-    const text = (axis) => (axis.words ? "critical (0 or 1)" : titled(axis.name));
+    const text = (axis) => (axis.words ? `${axis.name} (${axis.low} to ${axis.high})` : titled(axis.name));
     select.append(...this.axes.map((axis) => element("option", { value: axis.name }, text(axis))));
     select.addEventListener("change", () => this.showNumbers());
     for (const id of ["filter-low", "filter-high"]) {

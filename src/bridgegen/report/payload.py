@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.cause import CAUSES, Cause
 from bridgegen.report import convergence, sentences
 from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, Lamp, Playback, ReportData
@@ -73,6 +74,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         },
         "rows": _rows(data.evaluations, [playback.evaluation for playback in data.kept]),
         "batches": _batches(data.evaluations),
+        "causes": _causes(data.evaluations),
         "roads": roads,
         "kept": kept,
         "coverage": coverage_payload(data.coverage) if data.coverage else None,
@@ -95,8 +97,19 @@ def _rows(e: Evaluations, kept: list[int]) -> dict[str, Any]:
         "evaluation": np.flatnonzero(ok).tolist(),
         "iteration": (e.iteration[ok] + 1).tolist(),
         "critical": e.critical[ok].astype(np.int64).tolist(),
+        "cause": None if e.cause is None else e.cause[ok].tolist(),
         "columns": [_column(c, group, ok) for group, columns in groups for c in columns],
         "telling": convergence.telling_parameters(e.parameters, e.critical, ok),
+    }
+
+
+def _causes(e: Evaluations) -> dict[str, Any] | None:
+    """Return how many evaluations have each cause; number 0 is none."""
+    if e.cause is None:
+        return None
+    return {
+        "labels": ["none", *(one.label for one in CAUSES)],
+        "counts": [int(np.count_nonzero(e.cause == one)) for one in Cause],
     }
 
 
@@ -155,6 +168,7 @@ def _playback(p: Playback, road: int, picture: int | None) -> dict[str, Any]:
         "rank": int(p.rank),
         "evaluation": int(p.evaluation),
         "critical": bool(p.critical),
+        "cause": p.cause,
         "parameters": {name: _number(value) for name, value in p.parameters.items()},
         "metrics": {name: _number(value) for name, value in p.metrics.items()},
         "files": list(p.files),

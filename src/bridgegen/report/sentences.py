@@ -4,9 +4,17 @@ import math
 
 import numpy as np
 
+from bridgegen.cause import CAUSES, Cause
 from bridgegen.report.data import ReportData, RunSummary
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
+
+AVOIDED = {
+    Cause.PERCEPTION: "would not happen with ideal perception",
+    Cause.PLANNING: "would not happen to a careful and competent driver",
+    Cause.CONTROL: "would not happen with ideal control or on a dry road",
+    Cause.UNAVOIDABLE: "would happen all the same",
+}
 
 
 def sentences(data: ReportData) -> list[str]:
@@ -31,8 +39,7 @@ def sentences(data: ReportData) -> list[str]:
         if s.fiftieth_critical is not None:
             found += f", the 50th at {s.fiftieth_critical:,}"
     words.append(found + ".")
-    worst = _worst(data)
-    return [*words, worst] if worst else words
+    return [*words, *filter(None, (_causes(data), _worst(data)))]
 
 
 def summary_table(s: RunSummary) -> list[tuple[str, str]]:
@@ -97,6 +104,19 @@ def duration(seconds: float) -> str:
         return f"{minutes}{NARROW}min {rest}{NARROW}s"
     hours, minutes = divmod(minutes, 60)
     return f"{hours:,}{NARROW}h {minutes}{NARROW}min"
+
+
+def _causes(data: ReportData) -> str:
+    """Return what a replay of each critical scenario told."""
+    causes = data.evaluations.cause
+    if causes is None:
+        return ""
+    told = [
+        f"{n:,} {AVOIDED[cause]} ({cause.label})"
+        for cause in CAUSES
+        if (n := int(np.count_nonzero(causes == cause)))
+    ]
+    return f"Replayed with one thing put right at a time, {', '.join(told)}."
 
 
 def _worst(data: ReportData) -> str:

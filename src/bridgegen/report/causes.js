@@ -1,0 +1,56 @@
+// The causes of the critical scenarios: a bar, and a button for each that filters the page.
+
+const CAUSE_HELP = [
+  "", "gone with ideal perception", "gone with a careful and competent driver", "gone with ideal control or on a dry road",
+  "gone with none of these",
+];
+
+class Causes {
+  constructor({ labels, counts }, hook) {
+    this.labels = labels;
+    this.chosen = null;
+    this.listRows = [];
+    const total = counts.slice(1).reduce((a, b) => a + b, 0);
+    const causes = labels.map((label, i) => i).slice(1);
+    this.parts = causes.filter((i) => counts[i]).map((i) => {
+      const part = element("span", { class: `cause-${i}`, title: `${labels[i]} ${number(counts[i])}` });
+      part.style.flexGrow = counts[i];
+      return [i, part];
+    });
+    this.buttons = causes.map((i) => {
+      const share = `${((100 * counts[i]) / total).toFixed(1)}${NARROW}%`;
+      const text = element("span", {}, labels[i], " ", element("b", {}, number(counts[i])), ` (${share})`, element("small", {}, CAUSE_HELP[i]));
+      const button = element("button", { type: "button", class: `cause-${i}`, "aria-pressed": "false" }, element("i", { "aria-hidden": "true" }), text);
+      button.disabled = !counts[i];
+      button.addEventListener("click", () => this.choose(this.chosen === i ? null : i));
+      return [i, button];
+    });
+    $("causes-bar").replaceChildren(...this.parts.map(([, part]) => part));
+    $("causes-list").replaceChildren(...this.buttons.map(([, button]) => element("li", {}, button)));
+    $("causes").hidden = false;
+    hook.cause = (label) => this.choose(label === null ? null : labels.indexOf(label));
+    // The parallel coordinates have an axis for it, which can be filtered there as well.
+    document.addEventListener("filters", ({ detail }) => {
+      const range = detail.get("cause");
+      const i = range ? Math.round((range[0] + range[1]) / 2) : null;
+      this.show(range && range[1] - range[0] < 1 ? i : null);
+    });
+  }
+
+  choose(i) {
+    const filter = window.bridgegen.filter;
+    if (!filter) this.show(i);
+    else if (i === null) filter("cause");
+    else filter("cause", i - 0.3, i + 0.3);
+  }
+
+  show(i) {
+    this.chosen = i;
+    for (const [k, part] of this.parts) part.classList.toggle("off", i !== null && k !== i);
+    for (const [k, button] of this.buttons) button.setAttribute("aria-pressed", `${k === i}`);
+    this.listRows.forEach((row, k) => { row.hidden = i !== null && data.kept[k].cause !== this.labels[i]; });
+    const left = this.listRows.filter((row) => !row.hidden).length;
+    $("list-note").hidden = i === null || left > 0;
+    $("list-note").textContent = i === null ? "" : `None of the kept scenarios is put down to ${this.labels[i]}.`;
+  }
+}
