@@ -169,11 +169,20 @@ def _logical(seed: Seed, folder: Path) -> None:
     Pipeline(scenario, scenario.space())
 
 
+def _recording(seed: Seed, folder: Path) -> None:
+    from bridgegen.metrics.measure import measure_recording
+
+    path = folder / "mutated.csv"
+    path.write_bytes(seed.data)
+    measure_recording(path)
+
+
 READERS: dict[str, Callable[[Seed, Path], None]] = {
     ".xosc": _scenario,
     ".xodr": _roads,
     ".owl": _individuals,
     ".yaml": _logical,
+    ".csv": _recording,
 }
 
 
@@ -181,7 +190,7 @@ READERS: dict[str, Callable[[Seed, Path], None]] = {
 
 
 def write_ours(folder: Path) -> None:
-    """Write the catalogue's scenarios at their defaults into a folder, in all four formats."""
+    """Write the catalogue's scenarios at their defaults into a folder, in all formats."""
     from importlib import resources
 
     from bridgegen.odd.reader import load, names
@@ -189,6 +198,7 @@ def write_ours(folder: Path) -> None:
     from bridgegen.openx.opendrive.write import to_xml as road_xml
     from bridgegen.openx.openscenario.write import to_xml as scenario_xml
     from bridgegen.pipeline import Pipeline
+    from bridgegen.simulation.trace import write_trace
 
     for name in names():
         scenario = load(name)
@@ -201,6 +211,9 @@ def write_ours(folder: Path) -> None:
         (folder / f"{name}.xosc").write_bytes(scenario_xml(concrete.storyboard))
         text = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_bytes()
         (folder / f"{name}.yaml").write_bytes(text)
+        write_trace(folder / f"{name}.csv", pipeline.rollout(space.row({})[None]))
+    log = Path(__file__).parent / "simulation" / "data" / "esmini_log.csv"
+    (folder / log.name).write_bytes(log.read_bytes())
 
 
 def read_seeds(folders: list[Path], kinds: set[str]) -> list[Seed]:

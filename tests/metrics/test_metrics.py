@@ -193,6 +193,17 @@ def test_padding_is_not_read(driven):
     np.testing.assert_array_equal(metrics.evaluate(spoiled, ALL), before)
 
 
+def test_more_padding_changes_nothing(driven):
+    rollout = driven()
+    names = ("x", "y", "h", "v", "a", "offset", "lights", "detections")
+    longer = {}
+    for name in names:
+        array = getattr(rollout, name)
+        longer[name] = np.concatenate([array, np.repeat(array[:, :, -1:], 30, axis=2)], axis=2)
+    here, there = (metrics.evaluate(r, ALL) for r in (rollout, replace(rollout, **longer)))
+    assert there.tobytes() == here.tobytes()
+
+
 def test_every_metric_finds_something_in_the_rollouts_of_these_tests(driven):
     values = metrics.evaluate(driven(200), ALL)
     finite = np.where(np.isfinite(values), values, -1.0)

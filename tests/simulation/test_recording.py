@@ -223,11 +223,12 @@ def test_others_beyond_the_ego_s_time_are_named(write):
         (table(head="time,entity,x,y,h,speed,x"), "line 1: columns twice: x"),
         (table("0,e,0,0,0,1,4"), "line 2: has 7 fields, the header has 8"),
         (table("0,,0,0,0,1,4,2"), "line 2: entity must be a name"),
-        (table("0,e,0,zero,0,1,4,2"), "line 2: y must be a finite number, got 'zero'"),
-        (table("0,e,nan,0,0,1,4,2"), "line 2: x must be a finite number, got 'nan'"),
-        (table("0,e,0,0,0,inf,4,2"), "line 2: speed must be a finite number, got 'inf'"),
-        (table("0,e,0,0,0,1_0,4,2"), "line 2: speed must be a finite number, got '1_0'"),
-        (table("0,e,0,0,0,,4,2"), "line 2: speed must be a finite number, got ''"),
+        (table("0,e,0,zero,0,1,4,2"), "line 2: y must be a number within ±1e\\+09, got 'zero'"),
+        (table("0,e,nan,0,0,1,4,2"), "line 2: x must be a number within ±1e\\+09, got 'nan'"),
+        (table("0,e,0,0,0,inf,4,2"), "line 2: speed must be a number within ±1e\\+09, got 'inf'"),
+        (table("0,e,0,0,0,1_0,4,2"), "line 2: speed must be a number within ±1e\\+09, got '1_0'"),
+        (table("1e10,e,0,0,0,1,4,2"), "line 2: time must be a number within ±1e\\+09, got '1e10'"),
+        (table("0,e,0,0,0,,4,2"), "line 2: speed must be a number within ±1e\\+09, got ''"),
         (table("0,e,0,0,0,-1,4,2"), "line 2: speed .* must be ≥ 0, got -1"),
         (table("0,e,0,0,0,1,0,2"), "line 2: length .* must be > 0, got 0"),
         (table("0,e,0,0,0,1,4,2"), "'e' needs two instants at least"),
@@ -254,7 +255,9 @@ def test_a_broken_log_of_esmini(write):
     with pytest.raises(FileFormatError, match="line 10: must have 2 fields and 31 an entity, got"):
         read_recording(write("".join(short)))
     odd = [*lines[:9], lines[9].replace("7.969166", "nan", 1), *lines[10:12]]
-    with pytest.raises(FileFormatError, match="line 10: speed must be a finite number, got 'nan'"):
+    with pytest.raises(
+        FileFormatError, match="line 10: speed must be a number within ±1e\\+09, got 'nan'"
+    ):
         read_recording(write("".join(odd)))
 
 

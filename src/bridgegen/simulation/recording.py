@@ -18,6 +18,7 @@ MAX_INSTANTS = 100_000
 MAX_STATES = 2_000_000
 """Entities times instants."""
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
+SAME = 1e-5  # s, two instants that are nearer than this are one
 ROUNDING = 1e-6  # s, of times that are written with six decimals …
 TOLERANCE = 1e-3  # … and what else an instant may be off, as a share of the step
 
@@ -154,7 +155,7 @@ def _in_time(found: Tracks, name: str) -> Track:
     track = found.tracks[name]
     times = np.array(track.states["time"])
     order = np.argsort(times, kind="stable")
-    twice = np.flatnonzero(np.diff(times[order]) <= 0.0)
+    twice = np.flatnonzero(np.diff(times[order]) < SAME)
     if len(twice):
         first, second = (track.lines[order[i]] for i in (twice[0], twice[0] + 1))
         raise FileFormatError(

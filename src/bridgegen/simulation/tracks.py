@@ -17,6 +17,8 @@ from bridgegen.simulation.trace import COLUMNS, MORE
 
 STATES = ("time", "x", "y", "h", "speed")
 MAX_PROBLEMS = 20
+MOST = 1e9
+"""Larger than any place on Earth, and than what may be squared without thinking."""
 
 
 @dataclass
@@ -63,9 +65,9 @@ class Tracks:
             value = float(text)
         except ValueError:
             value = float("nan")
-        if not isfinite(value) or "_" in text:
+        if not isfinite(value) or "_" in text or abs(value) > MOST:
             shown = text if len(text) <= 40 else f"{text[:40]}…"
-            self.say(line, f"{column} must be a finite number, got '{shown}'")
+            self.say(line, f"{column} must be a number within ±{MOST:g}, got '{shown}'")
             return 0.0
         if column == "speed" and value < 0.0:
             self.say(line, f"speed [m/s] must be ≥ 0, got {text} (going backwards is not known)")
