@@ -7,10 +7,13 @@ from functools import partial
 from pathlib import Path
 
 from bridgegen.campaign.handover import FOLDER
+from bridgegen.ego.noise import noise_key
 from bridgegen.errors import FileFormatError, InputError, StorageError, UnknownNameError
 from bridgegen.openx.convert import roads_of
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
+from bridgegen.openx.openscenario.declarations import DRIVER, NOISE_KEY
+from bridgegen.openx.openscenario.parameters import numbers
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.recorded import Recording, recorded
 from bridgegen.openx.openscenario.resolve import resolved
@@ -112,7 +115,28 @@ def _moved(scenario: osc.OpenScenario, path: Path, road_map: str, folder: Path) 
 
 
 def _resolved(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
-    return to_version(resolved(scenario, str(path)), "1.2", str(path))
+    return to_version(resolved(_keyed(scenario), str(path)), "1.2", str(path))
+
+
+def _keyed(scenario: osc.OpenScenario) -> osc.OpenScenario:
+    """Return a scenario that says the key of its driver's random numbers.
+
+    Without parameters it would follow from nothing, and the driver would see other things.
+    """
+    key = osc.Property(NOISE_KEY, str(noise_key(numbers(scenario), 1)[0]))
+
+    def keyed(one: osc.ObjectController) -> osc.ObjectController:
+        said = one.controller.properties
+        if said is None or said.get(DRIVER) is None or said.get(NOISE_KEY) is not None:
+            return one
+        properties = replace(said, properties=(*said.properties, key))
+        return replace(one, controller=replace(one.controller, properties=properties))
+
+    objects = tuple(
+        replace(one, object_controllers=tuple(keyed(each) for each in one.object_controllers))
+        for one in scenario.entities.scenario_objects
+    )
+    return replace(scenario, entities=replace(scenario.entities, scenario_objects=objects))
 
 
 def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:

@@ -25,7 +25,7 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._conflict_kernels import LEADER, NOBODY, foresee
-from bridgegen.ego._reference_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
+from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
 from bridgegen.ego._route_follower_kernels import hold_speed
 
 REACTION = 0.75  # s

@@ -1,171 +1,154 @@
-"""The reference ego: slows for bends, follows, yields and brakes by predicted conflict.
+"""The reference ego: sensors → tracks → prediction → planning → control.
 
-Perception is perfect, and so is knowledge of where the others are going (as if their indicators
-told): each is predicted along its route at its present speed. Where two routes come closer than
-two cars abreast lies their conflict zone; the ego enters it only if it will be clear of the other.
-The driver is a function of the present state alone.
-
-A conflict zone is a row of five: where the ego's route enters and leaves it [m], where the other's
-does [m], and 1 if the routes go on together from there (a merge), else 0. No zone: infinity.
+Each is a kernel file of its own; here they are joined. The planner sees tracks only, and thinks ten
+times a second; control acts at every instant. What the driver keeps in mind between two instants is
+``mind`` ``(MIND,)``, zeros before the first.
 """
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import COS, CURVATURE, SIN, X, Y
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.ego import _control_kernels as control
+from bridgegen.ego._caution_kernels import careful_speed
+from bridgegen.ego._emergency_kernels import must_brake
+from bridgegen.ego._following_kernels import (
+    COMFORT_ACCELERATION,
+    COMFORT_DECELERATION,
+    keep_distance,
+)
+from bridgegen.ego._lights_kernels import stop_at_lights
+from bridgegen.ego._perception_kernels import perceive
+from bridgegen.ego._prediction_kernels import predict, predict_truly
 from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, sight
+from bridgegen.ego._speed_kernels import (
+    FAST_ROAD,
+    LIMIT,
+    bend_speed,
+    limit_speed,
+    scan_length,
+    sight_speed,
+)
+from bridgegen.ego._surroundings_kernels import surround
+from bridgegen.ego._yielding_kernels import yield_to_all
 
-# Intelligent driver model; source: Treiber, Hennecke, Helbing, Phys. Rev. E 62 (2000) 1805, with
-# their city values rounded.
-COMFORT_ACCELERATION = 1.5  # m/s²
-COMFORT_DECELERATION = 2.0  # m/s²
-HEADWAY = 1.2  # s
-STANDSTILL_GAP = 2.0  # m
+PLANNED, NEXT_PLAN, STOPS_FOR = control.SIZE, control.SIZE + 1, control.SIZE + 2
+"""What it plans to do [m/s²], when it thinks again [s], and 1 + the light that it stops for."""
 
-LATERAL_COMFORT = 3.0  # m/s², in bends; drivers keep below 4 (UN R79 annex 3 allows 3)
-FRICTION_SHARE = 0.6  # of the friction limit that it plans to use in a bend
-SIDE_MARGIN = 0.6  # m, kept to another body's side
-TIME_MARGIN = 1.0  # s, kept between two bodies' turns at one point
-STOP_MARGIN = 1.5  # m, between the front bumper and the point of conflict
-HORIZON = 6.0  # s, how far it predicts
-BRAKE_FROM = 1.5  # m/s², it acts on a conflict once stopping for it needs this much
-SCAN_STEP = 1.0  # m, between the points of its route that it looks at
-SAME_WAY = 0.9  # cosine of the heading difference above which two routes go on together
+MIND = control.SIZE + 3
 
-
-@kernel
-def scan_length(v):
-    """Return how far ahead [m] the driver looks: to stop comfortably, and a reaction more."""
-    return 12.0 + 1.5 * v + v * v / (2.0 * COMFORT_DECELERATION)
+CYCLE = 0.1  # s, between two plans
+PLANNING_REACH = 30.0  # m, how far it looks at least …
+PLANNING_TIME = 6.0  # s, … and how far in time, at the present speed
 
 
 @kernel
-def plan_speed(path, n, ds, s, v, target, friction_limit):
-    """Return the speed [m/s] that the bends ahead allow, at most ``target``."""
-    lateral = min(LATERAL_COMFORT, FRICTION_SHARE * friction_limit)
-    stride = max(int(SCAN_STEP / ds), 1)
-    first = int(s / ds)
-    last = min(n - 1, first + int(scan_length(v) / ds))
-    best = target * target
-    for i in range(first, last, stride):
-        bend = abs(path[i, CURVATURE])
-        if bend > 1e-4:
-            allowed = lateral / bend + 2.0 * COMFORT_DECELERATION * max(i * ds - s, 0.0)
-            best = min(best, allowed)
-    return math.sqrt(best)
+def reach_of(v):
+    """Return how far ahead on its route [m] the planner minds others."""
+    return max(PLANNING_REACH + PLANNING_TIME * v, scan_length(v))
 
 
 @kernel
-def follow(gap, v, leader_speed):
-    """Return the interaction part of the IDM's acceleration [m/s²] for a leader at a gap [m]."""
-    desired = STANDSTILL_GAP + max(
-        0.0,
-        v * HEADWAY
-        + v * (v - leader_speed) / (2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)),
+def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, light_seen,
+         in_town, around, tracks, passages, n_passages, crosswalks, stop_stations, lights,
+         mind):  # fmt: skip
+    """Return the acceleration [m/s²] that the planner wants.
+
+    Args:
+        path: the ego's route, ``(n, 6)``.
+        road: what is along it, ``(n, ROAD)``.
+        n: its samples.
+        road_n: those of ``road``; 0 where the map says nothing along this route.
+        ds: between two of them [m].
+        s: the ego's station on it [m].
+        v: its speed [m/s].
+        body: its row of bodies.
+        target: the speed that the storyboard asks for [m/s].
+        friction_limit: [m/s²].
+        seen: how far it sees somebody [m].
+        light_seen: how far it sees a light [m].
+        in_town: whether people may walk here.
+        around: the others, from the route.
+        tracks: the others, in the world.
+        passages: what is predicted of them.
+        n_passages: how many passages there are.
+        crosswalks: that the route leads over.
+        stop_stations: of the stop lines of lights, +inf where not on the route [m].
+        lights: their states.
+        mind: see above.
+    """
+    front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
+    speed = bend_speed(path, n, ds, s, v, target, friction_limit)
+    speed = min(speed, sight_speed(seen, friction_limit))
+    if road_n == 0:
+        crosswalks, stop_stations = crosswalks[:0], stop_stations[:0]
+    else:
+        speed = min(speed, limit_speed(road, road_n, ds, s, v))
+    careful = careful_speed(
+        around, tracks, crosswalks, s, front, half_width, 0.0, in_town, friction_limit
     )
-    ratio = desired / max(gap, 0.1)
-    return COMFORT_ACCELERATION * (1.0 - ratio * ratio)
+    speed = min(speed, careful)
+    wanted = min(max(hold_speed(v, speed), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
+    asked, stops_for = stop_at_lights(
+        stop_stations, lights, s, front, v, light_seen, int(mind[STOPS_FOR]) - 1
+    )
+    mind[STOPS_FOR] = stops_for + 1.0
+    wanted = min(wanted, asked)
+    wanted = min(wanted, keep_distance(around, tracks, s, front, rear, half_width, 0.0, v))
+    wanted = min(wanted, yield_to_all(s, v, speed, front, rear, passages, n_passages))
+    if must_brake(path, n, ds, s, v, body, 0.0, around, tracks, friction_limit):
+        wanted = -friction_limit
+    return max(wanted, -friction_limit)
 
 
-@kernel
-def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone):
-    """Fill ``zone`` with the first conflict zone of two routes."""
-    side = 0.5 * (body[1] + other_body[1]) + SIDE_MARGIN
-    zone[:] = (math.inf, math.inf, math.inf, math.inf, 0.0)
-    stride = max(int(0.5 * SCAN_STEP / ds), 1)
-    other_stride = max(int(0.5 * SCAN_STEP / other_ds), 1)
-    last_i, last_j = -1, -1
-    for i in range(0, n, stride):
-        nearest, at = math.inf, -1
-        for j in range(0, other_n, other_stride):
-            dx, dy = path[i, X] - other_path[j, X], path[i, Y] - other_path[j, Y]
-            gap = dx * dx + dy * dy
-            if gap < nearest:
-                nearest, at = gap, j
-        if nearest < side * side:
-            q = at * other_ds
-            if last_i < 0:
-                zone[0], zone[2], zone[3] = i * ds, q, q
-            zone[1], zone[2], zone[3] = i * ds, min(zone[2], q), max(zone[3], q)
-            last_i, last_j = i, at
-        elif last_i >= 0:
-            break
-    if last_i >= 0:
-        along = (
-            path[last_i, COS] * other_path[last_j, COS]
-            + path[last_i, SIN] * other_path[last_j, SIN]
-        )
-        zone[4] = 1.0 if along > SAME_WAY else 0.0
+@inlined_kernel
+def drive(k, curvature, friction_limit, plan_, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m].
 
-
-@kernel
-def react(s, v, own, q, w, other, zone):
-    """Return the acceleration [m/s²] that one other body asks for; +inf where it asks nothing.
-
-    The ego is at station s of its route at speed v, the other at q of its own at w; ``own`` and
-    ``other`` are rows (length, width, centre ahead of the reference point) [m].
+    Args:
+        k: the instant.
+        curvature: that of the path to its preview point [1/m].
+        friction_limit: [m/s²].
+        plan_: the compiled storyboard, see ``simulation.embedded._memory_kernels``.
+        roads: the row's, of the same.
+        state: the row's.
+        record: the row's.
     """
-    front, rear = own[2] + 0.5 * own[0], 0.5 * own[0] - own[2]
-    other_front, other_rear = other[2] + 0.5 * other[0], 0.5 * other[0] - other[2]
-    merges = zone[4] > 0.0
-    if s - rear > zone[1] or (q - other_rear > zone[3] and not merges):
-        return math.inf
-    to_enter = zone[0] - front - s  # what is left until our bumper is in
-    inside = q + other_front > zone[2]
-    if merges and inside:
-        # It drives before us, or will: its place on our route, counted from the common end.
-        ahead = zone[1] - (zone[3] - q)
-        if ahead >= s:
-            return follow(ahead - other_rear - front - s, v, w)
-        return math.inf
-    if to_enter <= 0.0:
-        return math.inf  # we are in: the way out is forward
-    if inside:
-        if w < 0.1:
-            return stop_for(to_enter, v)
-        leaves = (zone[3] + other_rear - q) / w
-        if to_enter / max(v, 1.0) < leaves + TIME_MARGIN:
-            return stop_for(to_enter, v)
-        return math.inf
-    if w < 0.1:
-        return math.inf
-    pace = max(v, 1.0)
-    enters = (zone[2] - other_front - q) / w
-    width = 0.0 if merges else zone[3] - zone[2]
-    leaves = enters + (width + other[0]) / w
-    arrives = to_enter / pace
-    clears = arrives + (own[0] + (0.0 if merges else zone[1] - zone[0])) / pace
-    if enters < HORIZON and arrives < leaves + TIME_MARGIN and clears > enters - TIME_MARGIN:
-        return stop_for(to_enter, v)
-    return math.inf
-
-
-@kernel
-def stop_for(distance, v):
-    """Return the acceleration [m/s²] that stops before a point; +inf while that is not urgent."""
-    needed = v * v / (2.0 * max(distance - STOP_MARGIN, 0.1))
-    if needed >= BRAKE_FROM or distance < STOP_MARGIN + 0.5:
-        return -max(needed, BRAKE_FROM)
-    return math.inf
-
-
-@kernel
-def drive(path, n, ds, v, target, friction_limit, bodies, station, speed, k, zones, on, to, foot):
-    """Return the acceleration [m/s²] demanded at instant k.
-
-    ``station`` ``(E,)`` [m] and ``speed`` ``(E, T)`` [m/s] are those of all, the ego's first;
-    ``zones`` has a row per path. Who is between two paths (``to`` ≥ 0, at the station ``foot`` of
-    the other one) counts on both.
-    """
-    s = station[0]
-    planned = plan_speed(path, n, ds, s, v, target, friction_limit)
-    demanded = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
-    for e in range(1, len(station)):
-        p, q = on[e], to[e]
-        if zones[p, 0] < math.inf:
-            asked = react(s, v, bodies[0], station[e], speed[e, k], bodies[e], zones[p])
-            demanded = min(demanded, asked)
-        if q >= 0 and zones[q, 0] < math.inf:
-            asked = react(s, v, bodies[0], foot[e], speed[e, k], bodies[e], zones[q])
-            demanded = min(demanded, asked)
-    return demanded
+    s, v, mind = state.station[0], record.v[0, k], state.mind
+    perceive(
+        k, plan_.dt, state.key[0], plan_.ideal_perception, record.x, record.y, record.h, record.v,
+        plan_.bodies, plan_.kinds, state.weather, state.sensors, state.tracks, record.detections,
+    )  # fmt: skip
+    if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
+        mind[NEXT_PLAN] += max(CYCLE, plan_.dt)
+        p = state.on[0]
+        # What the map says is known along the first route; on another one it goes by sight.
+        known = p == 0
+        path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
+        road_n = n if known else 0
+        body, ahead = plan_.bodies[0], reach_of(v)
+        surround(path, n, ds, s, ahead, max(CYCLE, plan_.dt), state.tracks, state.around)
+        if plan_.ideal_prediction and known:
+            count = predict_truly(
+                path, n, ds, s, ahead, body[1], state.tracks, roads.paths, roads.counts,
+                roads.steps, roads.zones, state.station, state.on, state.to, state.foot,
+                state.passages,
+            )  # fmt: skip
+        else:
+            count = predict(
+                path, n, ds, s, ahead, body[1], state.tracks, known, roads.hypotheses,
+                roads.hypothesis_counts, roads.hypothesis_steps, roads.hypothesis_zones,
+                roads.hypothesis_first, state.feet, state.passages,
+            )  # fmt: skip
+        in_town = road_n > 0 and roads.road[min(int(s / ds), n - 1), LIMIT] <= FAST_ROAD
+        seen = light_seen = math.inf
+        if not plan_.ideal_perception:
+            cosine, sine = math.cos(record.h[0, k]), math.sin(record.h[0, k])
+            seen = sight(state.weather, WALKER if in_town else REAR, cosine, sine)
+            light_seen = sight(state.weather, LIGHT, cosine, sine)
+        mind[PLANNED] = plan(
+            path, roads.road, n, road_n, ds, s, v, body, state.command[0], friction_limit, seen,
+            light_seen, in_town, state.around, state.tracks, state.passages, count,
+            roads.crosswalks, roads.stops, state.lights, mind,
+        )  # fmt: skip
+    return control.actuate(mind, mind[PLANNED], curvature, plan_.dt, plan_.ideal_control)

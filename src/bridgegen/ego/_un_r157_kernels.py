@@ -34,7 +34,7 @@ from bridgegen.ego._conflict_kernels import (
     WANDERING,
     foresee,
 )
-from bridgegen.ego._reference_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, follow
+from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
 from bridgegen.ego._route_follower_kernels import hold_speed
 
 EVALUATION = 0.4  # s, until the risk is perceived
@@ -93,7 +93,7 @@ def drive_un_r157(
             left = max(gap - (0.0 if brakes else closing * REACTION), 0.1)
             risk = risk or closing * closing / (2.0 * left) > hard
         if what == LEADER and known_for >= EVALUATION + REACTION:
-            wanted = min(wanted, max(follow(gap, v, along), -COMFORT_DECELERATION))
+            wanted = min(wanted, max(idm(gap, v, along), -COMFORT_DECELERATION))
     if not risk:
         attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
         return wanted

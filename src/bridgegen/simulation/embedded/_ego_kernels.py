@@ -3,8 +3,9 @@
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._fsm_kernels import drive_fsm
 from bridgegen.ego._path_kernels import project
-from bridgegen.ego._reference_kernels import drive, plan_speed
+from bridgegen.ego._reference_kernels import drive
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
+from bridgegen.ego._speed_kernels import bend_speed
 from bridgegen.ego._un_r157_kernels import drive_un_r157
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego.drivers import NOBODY
@@ -26,12 +27,8 @@ def demand(k, plan, roads, state, record):
     if plan.driver == 0:
         return hold_speed(v, state.command[0]), curvature
     if plan.driver == 1:
-        demanded = drive(
-            path, n, ds, v, state.command[0], state.weather[FRICTION], plan.bodies, state.station,
-            record.v, k, roads.zones, state.on, state.to, state.foot,
-        )  # fmt: skip
-        return demanded, curvature
-    planned = plan_speed(path, n, ds, s, v, state.command[0], state.weather[FRICTION])
+        return drive(k, curvature, state.weather[FRICTION], plan, roads, state, record)
+    planned = bend_speed(path, n, ds, s, v, state.command[0], state.weather[FRICTION])
     if plan.driver == 2:
         demanded = drive_un_r157(
             k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,

@@ -24,6 +24,7 @@ class Plan(NamedTuple):
     """The compiled storyboard; `Program` tells the tables' columns."""
 
     bodies: Float
+    kinds: Int
     init: Int
     routes: Int
     timed: Int
@@ -41,11 +42,17 @@ class Plan(NamedTuple):
     first_states: npt.NDArray[np.int8]
     weathers: Int
     driver: int
+    ideal_perception: int
+    ideal_prediction: int
+    ideal_control: int
     dt: float
 
 
 class Roads(NamedTuple):
-    """The paths on a road network; `Network` tells the shapes."""
+    """The paths on a road network, and what the driver knows of it.
+
+    `Network` and `bridgegen.ego.scene.Scene` tell the shapes.
+    """
 
     paths: Float
     counts: Int
@@ -61,6 +68,14 @@ class Roads(NamedTuple):
     ways: Int
     ground: Float
     ground_nodes: Int
+    road: Float
+    stops: Float
+    crosswalks: Float
+    hypotheses: Float
+    hypothesis_counts: Int
+    hypothesis_steps: Float
+    hypothesis_zones: Float
+    hypothesis_first: Int
 
 
 class State(NamedTuple):
@@ -107,6 +122,13 @@ class State(NamedTuple):
         profile: ``(E, R, 4)`` the course of a speed profile; see ``_course_kernels``,
         profile_rows: ``(E,)`` int64, how many rows of it count.
         attention: ``(E, 3)``, what a careful driver keeps of each body; see its kernel.
+        key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
+        sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
+        tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
+        around: ``(E, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
+        passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
+        feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
+        mind: ``(MIND,)`` what else it keeps in mind; see ``ego._reference_kernels``.
     """
 
     slots: Float
@@ -148,10 +170,20 @@ class State(NamedTuple):
     profile: Float
     profile_rows: Int
     attention: Float
+    key: npt.NDArray[np.uint64]
+    sensors: Float
+    tracks: Float
+    around: Float
+    passages: Float
+    feet: Float
+    mind: Float
 
 
 class Record(NamedTuple):
-    """What is written: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`."""
+    """What is written: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`.
+
+    ``detections`` are ``(E, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing.
+    """
 
     x: Float
     y: Float
@@ -159,6 +191,7 @@ class Record(NamedTuple):
     v: Float
     a: Float
     offset: Float
+    detections: Float
     lights: npt.NDArray[np.int8]
     began: Int
 

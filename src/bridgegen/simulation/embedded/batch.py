@@ -7,7 +7,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.ego._perception_kernels import MEMORY
+from bridgegen.ego._prediction_kernels import LOST, PASSAGE
+from bridgegen.ego._reference_kernels import MIND
+from bridgegen.ego._surroundings_kernels import AROUND
+from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego._weather_columns import WEATHER
+from bridgegen.ego.detections import DETECTION
+from bridgegen.ego.noise import noise_key
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
@@ -45,10 +52,12 @@ class Batch:
         n = len(rows)
         if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
             raise InputError(f"rows must name one of {roads.n_networks} road networks")
-        self._program, self._rows = program, rows
+        self._program, self._roads, self._rows = program, roads, rows
         self._plan = _plan(program)
-        self._roads = roads
-        self.state = _state(program, roads, rows, program.fill(values, n))
+        key = np.full(n, program.noise_key or 0, dtype=np.uint64)
+        if program.noise_key is None:
+            key = noise_key({**program.parameters, **_known(program, values)}, n)
+        self.state = _state(program, roads, rows, program.fill(values, n), key)
         self.record = _record(program, n)
         self._messages: dict[int, str] = {}
 
@@ -139,6 +148,7 @@ class Batch:
     def rollout(self) -> Rollout:
         """Return what is recorded; all rows must have ended."""
         program, record = self._program, self.record
+        stop_lights, stop_lines = self._roads.stop_lines()
         return Rollout(
             time_step=program.time_step,
             names=program.names,
@@ -149,15 +159,27 @@ class Batch:
             lights=record.lights,
             event_names=program.event_names,
             began=record.began,
+            detections=record.detections if record.detections.size else NO_DETECTIONS,
+            stop_lines=stop_lines[self._rows],
+            stop_lights=stop_lights,
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,
         )  # fmt: skip
 
 
+NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
+
+
+def _known(program: Program, values: Mapping[str, npt.ArrayLike]) -> dict[str, npt.ArrayLike]:
+    """Return the values of the parameters that the file has."""
+    return {name: value for name, value in values.items() if name in program.parameters}
+
+
 def _plan(program: Program) -> memory.Plan:
     return memory.Plan(
         bodies=program.bodies,
+        kinds=program.kinds,
         init=program.init,
         routes=program.routes,
         timed=program.timed,
@@ -175,6 +197,9 @@ def _plan(program: Program) -> memory.Plan:
         first_states=program.first_states,
         weathers=program.weathers,
         driver=program.driver.code,
+        ideal_perception=int("perception" in program.driver.ideal),
+        ideal_prediction=int("prediction" in program.driver.ideal),
+        ideal_control=int("control" in program.driver.ideal),
         dt=program.time_step,
     )
 
@@ -199,7 +224,9 @@ def _put_back(rows: Rows, part: Rows, some: Int) -> None:
         whole[some] = array
 
 
-def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.State:
+def _state(
+    program: Program, roads: Network, rows: Int, slots: Float, key: npt.NDArray[np.uint64]
+) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what is not 0."""
     n, n_entities = len(rows), len(program.names)
 
@@ -212,7 +239,7 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
     def flags(*shape: int) -> Bool:
         return np.zeros((n, *shape), dtype=np.bool_)
 
-    e = n_entities
+    e, n_ways = n_entities, roads.scene.hypotheses.shape[1]
     a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
     at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
@@ -239,14 +266,19 @@ def _state(program: Program, roads: Network, rows: Int, slots: Float) -> memory.
         command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
         course=zeros(e, COURSE_MEMORY), profile=zeros(e, profile_size, 4), profile_rows=numbers(e),
         attention=zeros(e, 3),
+        key=key[:, None], sensors=zeros(e, MEMORY), tracks=zeros(e, TRACK), around=zeros(e, AROUND),
+        passages=zeros(2 * e + n_ways, PASSAGE), feet=np.full((n, n_ways), LOST), mind=zeros(MIND),
     )  # fmt: skip
 
 
 def _record(program: Program, n: int) -> memory.Record:
     shape = (n, len(program.names), program.n_steps)
     x, y, h, v, a, offset = (np.empty(shape) for _ in range(6))
+    perceives = "perception" in program.driver.stages
+    seen = (*shape, DETECTION) if perceives else (n, 0, 0, DETECTION)
     return memory.Record(
         x=x, y=y, h=h, v=v, a=a, offset=offset,
+        detections=np.zeros(seen),
         lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
         began=np.full((n, len(program.event_names)), -1, dtype=np.int64),
     )  # fmt: skip

@@ -11,6 +11,7 @@ from bridgegen.openx.openscenario.declarations import (
     DEFAULT_TIME_STEP,
     DRIVER,
     IDEAL,
+    NOISE_KEY,
     TIME_STEP,
 )
 from bridgegen.openx.openscenario.resolve import texts_resolved
@@ -152,6 +153,7 @@ class _Compiler:
             n_steps=n_steps,
             fixed=self.tables.fixed,
             event_names=tuple(one.path[-1] for one in found if one.kind == EVENT),
+            noise_key=self._declared_noise_key(),
         )
 
     def _routes(self) -> list[int]:
@@ -211,6 +213,19 @@ class _Compiler:
                         f"{self.place}, line {controller.line}: property {IDEAL}: {error}"
                     ) from None
         return STORYBOARD
+
+    def _declared_noise_key(self) -> int | None:
+        for controller in self.tables.objects[0].object_controllers:
+            properties = controller.controller.properties
+            text = properties.get(NOISE_KEY) if properties else None
+            if text is not None:
+                if not (str(text).isdecimal() and int(str(text)) < 2**64):
+                    raise InputError(
+                        f"{self.place}, line {controller.line}: property {NOISE_KEY} must be a "
+                        f"whole number from 0 to 2^64 - 1, got '{text}'"
+                    )
+                return int(str(text))
+        return None
 
     def _init(self, has_driver: bool) -> list[int]:
         """Compile the start; return the slots of the entities' speeds."""

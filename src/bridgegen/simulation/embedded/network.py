@@ -1,13 +1,17 @@
 """The roads of a compiled storyboard: P road networks, and the paths on them that are known."""
 
 from collections.abc import Iterable, Sequence
+from itertools import product
 from threading import Lock
 
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.ego.scene import Scene, beside, stacked, survey
 from bridgegen.openx.opendrive.lane_graph import Ground
+from bridgegen.openx.opendrive.lanes import section_index
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.routes import Stretch
 from bridgegen.simulation.embedded._memory_kernels import Roads
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.ways import UNKNOWN, Ways, padded, position
@@ -27,6 +31,7 @@ class Network:
             its path.
         sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
             against it; what is to its left, then, of what is to the road's.
+        scene: what a driver with stages knows of them.
     """
 
     def __init__(self, program: Program, models: Sequence[OpenDrive]) -> None:
@@ -40,6 +45,8 @@ class Network:
         self.station: Float = np.array([each.station for each in self._ways])
         self.sides: Float = np.array([each.sides for each in self._ways], dtype=np.float64)
         self._zones: list[list[Float]] = [[] for _ in models]
+        pairs = zip(models, self._ways, strict=True)
+        self.scene = stacked([_scene(program, model, ways) for model, ways in pairs])
         self.tables = self._tables()
 
     @property
@@ -97,11 +104,12 @@ class Network:
             ),
             ground=_stacked([ground.points for ground in grounds]),
             ground_nodes=_stacked([ground.nodes for ground in grounds]),
+            **self.scene._asdict(),
         )
 
     def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
         """Return where the ego's first path meets each other one, ``(P, K, 5)``."""
-        from bridgegen.ego._reference_kernels import find_zone  # numba is slow to import
+        from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
 
         bodies = self._program.bodies
         widest = bodies[int(np.argmax(bodies[:, 1]))]
@@ -119,6 +127,45 @@ class Network:
         for p, found in enumerate(self._zones):
             whole[p, : len(found)] = found
         return whole
+
+    def stop_lines(self) -> tuple[Int, Float]:
+        """Return the stop lines of lights that the ego's route crosses.
+
+        Returns:
+            ``(L,)`` int64, each line's light; ``(P, L, 3)`` float64, where the route crosses it: x,
+            y [m] and heading [rad], NaN in a road network where it does not.
+        """
+        tables = self.tables
+        lights = np.flatnonzero(np.isfinite(self.scene.stops).any(axis=0))
+        found = np.full((self.n_networks, len(lights), 3), np.nan)
+        for p, (light, line) in product(range(self.n_networks), enumerate(lights)):
+            station = self.scene.stops[p, line]
+            if np.isfinite(station):
+                n = tables.counts[p, 0]
+                stations = np.arange(n) * tables.steps[p, 0]
+                found[p, light] = [
+                    np.interp(station, stations, tables.paths[p, 0, :n, column])
+                    for column in range(3)
+                ]
+        return lights, found
+
+
+def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
+    """Return what the driver knows of a road network; without stages, nothing of the others."""
+    starts: list[list[tuple[Stretch, float]]] = [[] for _ in program.names]
+    for entity, route in enumerate(ways.routes if program.driver.stages else ()):
+        if route is not None and entity > 0:
+            step = route.steps[0]
+            road = model.road(step.road_id)
+            section = section_index(road, 0.5 * (step.s + step.s_end))
+            starts[entity] = [
+                (Stretch(step.road_id, section, lane), step.s)
+                for lane in beside(road, section, step.lane_id)
+            ]
+    path = ways.paths[0]
+    return survey(
+        model, ways.routes[0], path.table, path.step, program.lights, starts, program.bodies
+    )
 
 
 def _numbers(rows: Sequence[Sequence[int]]) -> Int:

@@ -143,6 +143,7 @@ class Program:
         n_steps: recorded instants at most.
         fixed: parameters that rows may not vary, and what they are used for.
         event_names: of the V events, in the order of the file.
+        noise_key: of the driver's random numbers, if the file says it.
     """
 
     place: str
@@ -178,6 +179,7 @@ class Program:
     n_steps: int
     fixed: Mapping[str, str]
     event_names: tuple[str, ...] = ()
+    noise_key: int | None = None
 
     def changed(self, *, driver: Driver | None = None, dry: bool = False) -> "Program":
         """Return the program with another driver, or with a road that is dry all the time."""

@@ -43,6 +43,7 @@ class Ways:
 
     Attributes:
         paths: first those that the entities start on, then those that were asked for.
+        routes: per entity the lanes that its first path leads along; None off the lanes.
         station: per entity a, b: who starts at s on the first road starts a + b·s along its path.
         sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
             trajectory.
@@ -57,7 +58,7 @@ class Ways:
 
     def __init__(self, program: Program, model: OpenDrive) -> None:
         self._program, self._model = program, model
-        self._routes: list[Route | None] = []
+        self.routes: list[Route | None] = []
         self.paths: list[Path] = []
         self.station: list[tuple[float, float]] = []
         self.sides: list[int] = []
@@ -99,7 +100,7 @@ class Ways:
         places = [[Place(*_place(program, one)) for one in via] for via in program.waypoints]
         self.lanes = lanes = Lanes(self._model, places)
         self.numbers = np.full((len(places) + 1, len(lanes.nodes)), UNKNOWN)
-        for i, route in enumerate(self._routes):
+        for i, route in enumerate(self.routes):
             if route is not None:
                 chain = [lanes.graph.numbers[_node(self._model, step)] for step in route.steps]
                 follows = int(lanes.graph.straight[chain[-1]])
@@ -138,7 +139,7 @@ class Ways:
         # they are run, whether rows vary them or not
         if number == 0 and self._program.aside_slots[0] < 0 and isinstance(spec.aside, float):
             table = _shifted(table, spec.aside * side)
-        self._routes.append(route)
+        self.routes.append(route)
         last = _stretch(self._model, route.steps[-1])
         goes_on = next(next_stretches(self._model, last), None) is not None
         self.paths.append(Path(table, step, _NO_SPANS, ASKS if goes_on else ENDS))
@@ -186,7 +187,7 @@ class Ways:
     def _add_trajectory(self, spec: AlongTrajectory) -> None:
         corners = [_corner(self._program, self._model, point) for point in spec.points]
         table, step = polyline(corners, may_stand=bool(spec.times))
-        self._routes.append(None)
+        self.routes.append(None)
         self.paths.append(Path(table, step, _NO_SPANS, LANDS))
         self.station.append((0.0, 0.0))
         self.sides.append(0)

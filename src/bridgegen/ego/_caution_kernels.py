@@ -1,0 +1,99 @@
+"""Slowing for those who might step out, and for places where somebody may be hidden.
+
+Somebody at the side, ``room`` [m] from the strip that the ego sweeps, is there after room/`WALK`
+seconds. Up to the speed from which the ego stops in that time nothing can happen: who steps out
+late finds it past, who steps out early finds it standing.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._following_kernels import COMFORT_DECELERATION
+from bridgegen.ego._surroundings_kernels import (
+    ACROSS,
+    ALONG,
+    ASIDE,
+    AT,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    NEAR,
+)
+from bridgegen.ego._tracking_kernels import KIND
+from bridgegen.ego.kinds import ANIMAL, BUS, PEDESTRIAN
+
+ENTER, LEAVE, RIGHT_END, LEFT_END = 0, 1, 2, 3
+"""Columns of a crosswalk: where the ego's route enters and leaves it, and how far it reaches to
+the right (negative) and to the left of the route [m]."""
+
+WALK = 1.5  # m/s; source: Euro NCAP AEB VRU, adult walking 5 km/h, rounded up
+REACTION = 0.4  # s, from seeing somebody move to full braking
+BRAKING_SHARE = 0.7  # of the friction limit that it counts on
+CREEP = 2.0  # m/s, always allowed
+AT_SIDE = 3.5  # m from the ego's strip within which somebody standing may step out
+BY_CROSSWALK = 3.0  # m before and behind a crosswalk that still count as at it
+HIDES = 25.0  # m before a crosswalk, within which somebody who stands hides an end of it
+PARKED_SPEED = 8.3  # m/s past parked vehicles; 30 km/h, as in residential streets (StVO § 45)
+PARKED_ROOM = 1.5  # m; parked vehicles farther to the side need no slowing
+STANDS = 0.3  # m/s, who is slower stands, as far as tracking can tell
+
+
+@kernel
+def safe_speed(room, friction_limit):
+    """Return the speed [m/s] at which somebody at ``room`` [m] may step out at any moment."""
+    spare = max(room, 0.0) / WALK - REACTION
+    return max(2.0 * BRAKING_SHARE * friction_limit * spare, CREEP)
+
+
+@kernel
+def slow_to(speed, distance):
+    """Return the speed [m/s] now from which ``speed`` is reached comfortably in time."""
+    return math.sqrt(speed * speed + 2.0 * COMFORT_DECELERATION * max(distance, 0.0))
+
+
+@kernel
+def careful_speed(around, tracks, crosswalks, s, front, half_width, aside, in_town, friction_limit):
+    """Return the speed [m/s] that those beside the route and what they hide allow; +inf if any."""
+    best = math.inf
+    for e in range(1, around.shape[0]):
+        if around[e, NEAR] == 0.0 or around[e, AT] + around[e, HALF_LENGTH] < s:
+            continue
+        kind = tracks[e, KIND]
+        room = abs(around[e, ASIDE] - aside) - around[e, HALF_WIDTH] - half_width
+        if room < 0.0 or math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS:
+            continue
+        distance = around[e, AT] - around[e, HALF_LENGTH] - s - front
+        if kind in (PEDESTRIAN, ANIMAL):
+            if room < AT_SIDE or at_crosswalk(crosswalks, around[e, AT]):
+                best = min(best, slow_to(safe_speed(room, friction_limit), distance))
+        elif in_town and kind <= BUS and room < PARKED_ROOM:
+            best = min(best, slow_to(PARKED_SPEED, distance))
+            hidden = hidden_speed(around, e, crosswalks, s, front, half_width, room, friction_limit)
+            best = min(best, hidden)
+    return best
+
+
+@kernel
+def at_crosswalk(crosswalks, at):
+    """Return whether a station is at a crosswalk."""
+    for i in range(crosswalks.shape[0]):
+        if crosswalks[i, ENTER] - BY_CROSSWALK <= at <= crosswalks[i, LEAVE] + BY_CROSSWALK:
+            return True
+    return False
+
+
+@kernel
+def hidden_speed(around, e, crosswalks, s, front, half_width, room, friction_limit):
+    """Return the speed [m/s] for who may come from behind a standing vehicle onto a crosswalk."""
+    best = math.inf
+    end = around[e, AT] + around[e, HALF_LENGTH]
+    for i in range(crosswalks.shape[0]):
+        enter = crosswalks[i, ENTER]
+        if not end - around[e, HALF_LENGTH] <= enter + BY_CROSSWALK <= end + HIDES:
+            continue
+        if s > crosswalks[i, LEAVE]:
+            continue
+        # Past the vehicle's far corner one sees the more of the crosswalk the nearer one is.
+        opened = (room + half_width) * (enter - s) / max(end - s, 0.5) - half_width
+        speed = safe_speed(max(opened, room), friction_limit)
+        best = min(best, slow_to(speed, enter - s - front))
+    return best

@@ -1,0 +1,107 @@
+"""Keeping a distance: the intelligent driver model, calmed where it would overreact.
+
+Sources: Treiber, Hennecke, Helbing, Phys. Rev. E 62 (2000) 1805 (IDM), with their city values
+rounded; Kesting, Treiber, Helbing, Phil. Trans. R. Soc. A 368 (2010) 4585 (constant-acceleration
+heuristic: a short gap to somebody who is not slower needs no hard braking).
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._surroundings_kernels import (
+    ACROSS,
+    ALONG,
+    ASIDE,
+    AT,
+    COSINE,
+    GAINING,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    NEAR,
+)
+from bridgegen.ego._tracking_kernels import KIND
+from bridgegen.ego.kinds import BICYCLE, PEDESTRIAN
+
+COMFORT_ACCELERATION = 1.5  # m/s²
+COMFORT_DECELERATION = 2.0  # m/s²
+HEADWAY = 1.2  # s
+STANDSTILL_GAP = 2.0  # m
+COOLNESS = 0.99  # share of the heuristic; source: Kesting et al., table 1
+LEAST_GAP = 0.1  # m, below which the model divides by this
+STOP_MARGIN = 1.5  # m, between the front bumper and a point to stop at
+BRAKE_FROM = 1.5  # m/s², it acts on a point to stop at once stopping needs this much
+
+SIDE_GAP = 0.3  # m; who is nearer to the strip that the ego will sweep is in its way …
+SIDE_GAP_ON_FOOT = 0.8  # m; … nearer than this, if on foot or on a bicycle
+COMING_IN = 1.2  # s; who will be in its way so soon, as it moves to the side now, counts as well …
+DRIFT = 0.3  # m/s; … if it moves faster than this, which tracking does not invent
+SAME_WAY = 0.5  # cosine of the heading difference below which somebody goes another way …
+HEAD_ON = -0.9  # … and below which they come towards the ego
+STANDS = 0.5  # m/s, who is slower stands
+
+
+@kernel
+def idm(gap, v, leader_speed):
+    """Return the acceleration [m/s²] that a leader at a gap [m] allows, by the model alone."""
+    desired = STANDSTILL_GAP + max(
+        0.0,
+        v * HEADWAY
+        + v * (v - leader_speed) / (2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)),
+    )
+    ratio = desired / max(gap, LEAST_GAP)
+    return COMFORT_ACCELERATION * (1.0 - ratio * ratio)
+
+
+@kernel
+def follow(gap, v, leader_speed, leader_acceleration):
+    """Return the acceleration [m/s²] for a leader at a gap [m]; at most `COMFORT_ACCELERATION`."""
+    # What avoids contact if nobody changes what they do, with half of the standstill gap to spare.
+    free = max(gap - 0.5 * STANDSTILL_GAP, LEAST_GAP)
+    w, slowing = max(leader_speed, 0.0), min(leader_acceleration, 0.0)
+    closing = max(v - leader_speed, 0.0)
+    if slowing < 0.0 and w * (v - w) <= -2.0 * free * slowing:
+        needed = v * v * slowing / (w * w - 2.0 * free * slowing)
+    else:
+        needed = slowing - 0.5 * closing * closing / free
+    model = idm(gap, v, leader_speed)
+    if model >= needed:
+        return model
+    calmed = needed + COMFORT_DECELERATION * math.tanh((model - needed) / COMFORT_DECELERATION)
+    return (1.0 - COOLNESS) * model + COOLNESS * calmed
+
+
+@kernel
+def stop_for(distance, v):
+    """Return the acceleration [m/s²] that stops before a point; +inf while that is not urgent."""
+    needed = v * v / (2.0 * max(distance - STOP_MARGIN, 0.1))
+    if needed >= BRAKE_FROM or distance < STOP_MARGIN + 0.5:
+        return -max(needed, BRAKE_FROM)
+    return math.inf
+
+
+@kernel
+def keep_distance(around, tracks, s, front, rear, half_width, aside, v):
+    """Return the acceleration [m/s²] that those ahead on the ego's strip ask for; +inf if none.
+
+    The ego's centre line is ``aside`` [m] left of its route.
+    """
+    asked = math.inf
+    for e in range(1, around.shape[0]):
+        if around[e, NEAR] == 0.0 or around[e, AT] + around[e, HALF_LENGTH] < s - rear:
+            continue
+        beside = around[e, ASIDE] - aside
+        space = abs(beside) - around[e, HALF_WIDTH] - half_width
+        kind = tracks[e, KIND]
+        least = SIDE_GAP_ON_FOOT if kind in (BICYCLE, PEDESTRIAN) else SIDE_GAP
+        nearing = -around[e, ACROSS] if beside > 0.0 else around[e, ACROSS]
+        moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
+        if moves and HEAD_ON < around[e, COSINE] < SAME_WAY:
+            continue  # it is not to be followed; whether both meet is a matter of time
+        if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
+            continue
+        gap = around[e, AT] - around[e, HALF_LENGTH] - s - front
+        if gap < 0.0 and around[e, AT] < s + front:
+            continue  # beside us: braking would not part us
+        speed = around[e, ALONG] if moves else 0.0
+        asked = min(asked, follow(gap, v, speed, around[e, GAINING]))
+    return asked

@@ -1,0 +1,43 @@
+"""Traffic lights: to stop before the line, or to go on at yellow because one no longer can."""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._following_kernels import STOP_MARGIN
+
+RED, RED_YELLOW, YELLOW = 1, 2, 3
+"""As `Rollout.lights` has them."""
+
+YELLOW_DECELERATION = 3.0  # m/s²; who would need more at the onset of yellow goes on; source: ITE,
+# Traffic Signal Timing Manual, 3.0 m/s² (10 ft/s²)
+COMMITTED = 8.0  # m/s²; who would need more than this for a red light is past stopping
+BRAKE_FROM = 1.5  # m/s², it brakes for a light once that needs this much
+
+
+@kernel
+def stop_at_lights(stations, states, s, front, v, sight, stopping):
+    """Return (acceleration [m/s²] that the lights ask for or +inf, which one it stops for or -1).
+
+    ``stations`` are those of the stop lines on the ego's route [m], +inf where a light is not on
+    it; ``sight`` is how far a light is seen [m]; ``stopping`` is the light that it stops for since
+    an earlier instant, -1 if none: at yellow that is decided once.
+    """
+    asked, chosen = math.inf, -1
+    for i in range(stations.shape[0]):
+        distance = stations[i] - s - front
+        if not 0.0 <= distance <= sight:
+            continue
+        state = states[i]
+        if state != RED and state != RED_YELLOW and state != YELLOW:
+            continue
+        needed = v * v / (2.0 * max(distance - STOP_MARGIN, 0.1))
+        at_line = v * v / (2.0 * max(distance, 0.1))
+        if state == YELLOW and stopping != i and at_line > YELLOW_DECELERATION:
+            continue
+        if at_line > COMMITTED and v > 1.0:
+            continue
+        chosen = i
+        if needed >= BRAKE_FROM or distance < STOP_MARGIN + 0.5:
+            # Close to the line gently: never harder than stopping at the line itself needs + 1.
+            asked = min(asked, -min(max(needed, BRAKE_FROM), at_line + 1.0))
+    return asked, chosen

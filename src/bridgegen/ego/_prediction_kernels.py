@@ -1,0 +1,168 @@
+"""Where each track will be: its passages over the ego's route, by the ways that the map offers.
+
+A passage is a row of `PASSAGE` numbers: a conflict zone (five, see ``_yielding_kernels``), then the
+track's station on its way [m], its speed along it [m/s], how far its body reaches ahead of and
+behind that station [m], and the track. The planner reads passages, whoever predicted them.
+
+- A vehicle is expected on every way that the map offers from where it came, as long as it is on
+  that way, at the speed that was measured.
+- Who is on no such way (on foot, on a bicycle, off the lanes) is expected straight ahead.
+- The ideal prediction knows everybody's true way, and the one that a lane change leads to.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._path_kernels import COS, SIN, X, Y, project
+from bridgegen.ego._surroundings_kernels import BEHIND
+from bridgegen.ego._tracking_kernels import CONFIRMED, KIND, LENGTH, STATE, VX, VY, WIDTH, H
+from bridgegen.ego._tracking_kernels import X as TRACK_X
+from bridgegen.ego._tracking_kernels import Y as TRACK_Y
+from bridgegen.ego._yielding_kernels import (
+    FRONT,
+    REAR,
+    SIDE_MARGIN,
+    SPEED,
+    STANDING,
+    STATION,
+    WHO,
+)
+from bridgegen.ego.kinds import ANIMAL, BICYCLE, PEDESTRIAN
+
+PASSAGE = 10
+
+OFF_WAY = 2.0  # m beside a way's centre, or …
+TURNED = 0.6  # rad off its heading, a vehicle is not on it
+LOST = -1.0  # a station on a way that is to be looked for; less: that will be, so many plans later
+PATIENCE = 10.0  # plans until a way that somebody is not on is looked at again
+SEARCH_STEP = 4.0  # m, between the points of a way at which a track is first looked for
+STRAIGHT_STEP = 2.0  # m, between the points of the ego's route that a straight line may cross
+GRAZING = 0.25  # sine of the angle below which two lines run beside each other, not across
+ON_FOOT_MARGIN = 0.4  # m, kept besides `SIDE_MARGIN` to who has no body of steel
+
+
+@kernel
+def locate_on_way(way, n, ds, guess, x, y, h):
+    """Return the station of a track on a way, or `LOST` if it is not on it."""
+    if guess < 0.0:
+        stride = max(int(SEARCH_STEP / ds), 1)
+        nearest, at = math.inf, 0
+        for i in range(0, n, stride):
+            gap = (way[i, X] - x) ** 2 + (way[i, Y] - y) ** 2
+            if gap < nearest:
+                nearest, at = gap, i
+        if nearest > (OFF_WAY + SEARCH_STEP) ** 2:
+            return LOST
+        guess = at * ds
+    q, d = project(way, n, ds, guess, x, y)
+    if abs(d) > OFF_WAY or q >= (n - 1) * ds:
+        return LOST
+    i = int(q / ds)
+    if math.cos(h) * way[i, COS] + math.sin(h) * way[i, SIN] < math.cos(TURNED):
+        return LOST
+    return q
+
+
+@kernel
+def add_passage(passages, count, zone, q, w, half, e):
+    """Append a passage; return how many there are."""
+    if count == passages.shape[0]:
+        return count
+    for i in range(5):
+        passages[count, i] = zone[i]
+    passages[count, STATION], passages[count, SPEED] = q, w
+    passages[count, FRONT] = passages[count, REAR] = half
+    passages[count, WHO] = e
+    return count + 1
+
+
+@kernel
+def add_straight(path, n, ds, s, ahead, own_width, track, e, passages, count):
+    """Append the passage of a track that goes straight on, if that crosses the ego's route."""
+    w = math.hypot(track[VX], track[VY])
+    if w < 3.0 * STANDING or count == passages.shape[0]:
+        return count
+    ux, uy = track[VX] / w, track[VY] / w
+    px, py = track[TRACK_X], track[TRACK_Y]
+    stride = max(int(STRAIGHT_STEP / ds), 1)
+    first = max(int((s - BEHIND) / ds), 0)
+    before = ux * (path[first, Y] - py) - uy * (path[first, X] - px)
+    for i in range(first + stride, min(int((s + ahead) / ds), n - 1), stride):
+        dx, dy = path[i, X] - px, path[i, Y] - py
+        side = ux * dy - uy * dx
+        if before * side < 0.0 and ux * dx + uy * dy > -track[LENGTH] - own_width:
+            sine = abs(ux * path[i, SIN] - uy * path[i, COS])
+            if sine > GRAZING:
+                share = before / (before - side)
+                at = (i - stride + share * stride) * ds
+                r = ux * dx + uy * dy
+                r -= (1.0 - share) * stride * ds * (ux * path[i, COS] + uy * path[i, SIN])
+                cosine = math.sqrt(max(1.0 - sine * sine, 0.0))
+                margin = SIDE_MARGIN + ON_FOOT_MARGIN
+                own = 0.5 * (track[WIDTH] + own_width * cosine) / sine + margin
+                other = 0.5 * (own_width + track[WIDTH] * cosine) / sine + margin
+                zone = (at - own, at + own, r - other, r + other, 0.0)
+                return add_passage(passages, count, zone, 0.0, w, 0.5 * track[LENGTH], e)
+        before = side
+    return count
+
+
+@kernel
+def predict(path, n, ds, s, ahead, own_width, tracks, known, ways, counts, steps, zones, first,
+            feet, passages):  # fmt: skip
+    """Fill ``passages`` by the map and the tracks; return how many there are.
+
+    ``ways`` ``(W, L, 6)`` are those that the map offers, entity e's from ``first[e]`` to
+    ``first[e + 1]``; ``zones`` ``(W, 5)`` tells where each meets the ego's route; ``feet`` ``(W,)``
+    remembers the station of the entity on it. On a route that the zones are not for (``known``),
+    everybody is expected straight ahead.
+    """
+    count = 0
+    for e in range(1, tracks.shape[0]):
+        if tracks[e, STATE] < CONFIRMED:
+            continue
+        x, y, h, kind = tracks[e, TRACK_X], tracks[e, TRACK_Y], tracks[e, H], tracks[e, KIND]
+        on_way = False
+        for j in range(first[e], first[e + 1] if known else first[e]):
+            if feet[j] < LOST:
+                feet[j] += 1.0
+                continue
+            q = locate_on_way(ways[j], counts[j], steps[j], feet[j], x, y, h)
+            feet[j] = q if q != LOST else -PATIENCE
+            if q == LOST:
+                continue
+            on_way = True
+            if zones[j, 0] < math.inf:
+                i = int(q / steps[j])
+                w = tracks[e, VX] * ways[j, i, COS] + tracks[e, VY] * ways[j, i, SIN]
+                half = 0.5 * tracks[e, LENGTH]
+                count = add_passage(passages, count, zones[j], q, max(w, 0.0), half, e)
+        if not on_way or kind in (BICYCLE, PEDESTRIAN, ANIMAL):
+            count = add_straight(path, n, ds, s, ahead, own_width, tracks[e], e, passages, count)
+    return count
+
+
+@kernel
+def predict_truly(path, n, ds, s, ahead, own_width, tracks, paths, counts, steps, zones, station,
+                  on, to, foot, passages):  # fmt: skip
+    """Fill ``passages`` by everybody's true way; return how many there are.
+
+    ``station`` and ``foot`` are where the entities are on the paths ``on`` and ``to`` (-1: none).
+    Who is on foot or on a bicycle goes straight on, and is given more room.
+    """
+    count = 0
+    for e in range(1, tracks.shape[0]):
+        if tracks[e, STATE] < CONFIRMED:
+            continue
+        for turn in range(2):
+            j, near = (on[e], station[e]) if turn == 0 else (to[e], foot[e])
+            if j < 0 or zones[j, 0] == math.inf:
+                continue
+            q, _ = project(
+                paths[j], counts[j], steps[j], near, tracks[e, TRACK_X], tracks[e, TRACK_Y]
+            )
+            w = math.hypot(tracks[e, VX], tracks[e, VY])
+            count = add_passage(passages, count, zones[j], q, w, 0.5 * tracks[e, LENGTH], e)
+        if tracks[e, KIND] in (BICYCLE, PEDESTRIAN, ANIMAL):
+            count = add_straight(path, n, ds, s, ahead, own_width, tracks[e], e, passages, count)
+    return count

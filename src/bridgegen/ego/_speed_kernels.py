@@ -1,0 +1,61 @@
+"""How fast the road lets one drive: limits, bends, and what can be seen in time."""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._following_kernels import COMFORT_DECELERATION
+from bridgegen.ego._path_kernels import CURVATURE
+
+LIMIT = 0  # column of the road ahead: the speed limit [m/s], +inf if none is posted
+LEFT, RIGHT = 1, 2  # m, to the centre of the lane beside that goes the same way; 0: there is none
+ROAD = 3
+
+LATERAL_COMFORT = 3.0  # m/s², in bends; drivers keep below 4 (UN R79 annex 3 allows 3)
+FRICTION_SHARE = 0.6  # of the friction limit that it plans to use in a bend
+SCAN_STEP = 1.0  # m, between the points of its route that it looks at
+REACTION = 0.5  # s, from seeing to braking: perception, confirmation, build-up
+SIGHT_SHARE = 0.7  # of the friction limit with which it could stop within what it sees
+SIGHT_MARGIN = 3.0  # m, left then
+FAST_ROAD = 17.0  # m/s; where more is allowed nobody walks (60 km/h; StVO § 18 Abs. 1)
+
+
+@kernel
+def scan_length(v):
+    """Return how far ahead [m] the driver looks: to stop comfortably, and a reaction more."""
+    return 12.0 + 1.5 * v + v * v / (2.0 * COMFORT_DECELERATION)
+
+
+@kernel
+def bend_speed(path, n, ds, s, v, target, friction_limit):
+    """Return the speed [m/s] that the bends ahead allow, at most ``target``."""
+    lateral = min(LATERAL_COMFORT, FRICTION_SHARE * friction_limit)
+    stride = max(int(SCAN_STEP / ds), 1)
+    first = min(int(s / ds), n - 1)
+    last = min(n - 1, first + int(scan_length(v) / ds))
+    best = target * target
+    for i in range(first, last, stride):
+        bend = abs(path[i, CURVATURE])
+        if bend > 1e-4:
+            best = min(best, lateral / bend + 2.0 * COMFORT_DECELERATION * max(i * ds - s, 0.0))
+    return math.sqrt(best)
+
+
+@kernel
+def limit_speed(road, n, ds, s, v):
+    """Return the speed [m/s] that the limits here and ahead allow; +inf if there are none."""
+    stride = max(int(SCAN_STEP / ds), 1)
+    first = min(int(s / ds), n - 1)
+    last = min(n - 1, first + int(scan_length(v) / ds))
+    best = road[first, LIMIT] * road[first, LIMIT]
+    for i in range(first, last, stride):
+        ahead = 2.0 * COMFORT_DECELERATION * max(i * ds - s, 0.0)
+        best = min(best, road[i, LIMIT] * road[i, LIMIT] + ahead)
+    return math.sqrt(best)
+
+
+@kernel
+def sight_speed(sight, friction_limit):
+    """Return the speed [m/s] from which the ego can stop within what it sees [m]."""
+    b = SIGHT_SHARE * friction_limit
+    within = max(sight - SIGHT_MARGIN, 0.0)
+    return math.sqrt(b * b * REACTION * REACTION + 2.0 * b * within) - b * REACTION

@@ -1,0 +1,143 @@
+"""Where two ways conflict, and whether to go first.
+
+A conflict zone is a row of five: where the ego's route enters and leaves it [m], where the other's
+way does [m], and 1 if both go on together from there (a merge), else 0. No zone: infinity. A
+passage begins with its zone, see ``_prediction_kernels``.
+
+Who comes first goes first, with a margin in time; the ego gives way wherever that is in doubt, and
+does not wait where somebody else will pass (StVO § 11).
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, follow, stop_for
+from bridgegen.ego._path_kernels import COS, SIN, X, Y
+
+SIDE_MARGIN = 0.6  # m, kept to another body's side
+TIME_MARGIN = 1.0  # s, kept between two bodies' turns at one point
+TAIL_MARGIN = 1.0  # m, kept to the tail of who has passed
+KEEP_CLEAR_ROUNDS = 3  # zones that overlap in a row, at most
+HORIZON = 10.0  # s, how far ahead arrivals are compared
+STATION, SPEED, FRONT, REAR, WHO = 5, 6, 7, 8, 9
+"""Columns of a passage after its zone."""
+
+SCAN_STEP = 0.5  # m, between the points of a way that are looked at
+SAME_WAY = 0.9  # cosine of the heading difference above which two ways go on together
+STANDING = 0.1  # m/s, who is slower stands
+
+
+@kernel
+def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone):
+    """Fill ``zone`` with the first conflict zone of two ways."""
+    side = 0.5 * (body[1] + other_body[1]) + SIDE_MARGIN
+    zone[:] = (math.inf, math.inf, math.inf, math.inf, 0.0)
+    stride = max(int(SCAN_STEP / ds), 1)
+    other_stride = max(int(SCAN_STEP / other_ds), 1)
+    last_i, last_j = -1, -1
+    for i in range(0, n, stride):
+        nearest, at, j = side, -1, 0
+        while j < other_n:
+            dx, dy = path[i, X] - other_path[j, X], path[i, Y] - other_path[j, Y]
+            gap = math.sqrt(dx * dx + dy * dy)
+            if gap < nearest:
+                nearest, at = gap, j
+            # No point of the other way that is nearer can come sooner than this.
+            j += other_stride * max(int((gap - nearest) / (other_stride * other_ds)), 1)
+        if at >= 0:
+            q = at * other_ds
+            if last_i < 0:
+                zone[0], zone[2], zone[3] = i * ds, q, q
+            zone[1], zone[2], zone[3] = i * ds, min(zone[2], q), max(zone[3], q)
+            last_i, last_j = i, at
+        elif last_i >= 0:
+            break
+    if last_i >= 0:
+        along = (
+            path[last_i, COS] * other_path[last_j, COS]
+            + path[last_i, SIN] * other_path[last_j, SIN]
+        )
+        zone[4] = 1.0 if along > SAME_WAY else 0.0
+        if zone[4] == 0.0:
+            # Across, the ego's width counts, too.
+            zone[2] -= 0.5 * body[1]
+            zone[3] += 0.5 * body[1]
+
+
+@kernel
+def time_to(distance, v, pace):
+    """Return when a distance [m] is covered by who speeds up comfortably from v to a pace [m/s]."""
+    pace = max(pace, v, 1.0)
+    gained = (pace * pace - v * v) / (2.0 * COMFORT_ACCELERATION)
+    if distance <= gained:
+        return (math.sqrt(v * v + 2.0 * COMFORT_ACCELERATION * distance) - v) / COMFORT_ACCELERATION
+    return (pace - v) / COMFORT_ACCELERATION + (distance - gained) / pace
+
+
+@kernel
+def give_way(s, v, pace, front, rear, zone, q, w, other_front, other_rear):
+    """Return what one other body asks for: (an acceleration [m/s²], a station to stop at [m]).
+
+    Either is +inf where it asks nothing of the kind. The ego is at station s of its route at speed
+    v, and would go on at ``pace``; the other is at q of its way, and goes on at w. Bodies reach
+    ``front`` and ``rear`` [m] ahead of and behind these stations.
+    """
+    merges = zone[4] > 0.0
+    if s - rear > zone[1] or (q - other_rear > zone[3] and not merges):
+        return math.inf, math.inf
+    to_enter = zone[0] - front - s  # what is left until our bumper is in
+    inside = q + other_front > zone[2]
+    if merges and inside:
+        # It drives before us, or will: its place on our route, counted from the common end.
+        ahead = zone[1] - (zone[3] - q)
+        if ahead >= s:
+            return follow(ahead - other_rear - front - s, v, w, 0.0), math.inf
+        return math.inf, math.inf
+    if to_enter <= 0.0:
+        return math.inf, math.inf  # we are in: the way out is forward
+    if w < STANDING:
+        return math.inf, zone[0] if inside else math.inf
+    width = 0.0 if merges else zone[3] - zone[2]
+    enters = (zone[2] - other_front - q) / w
+    leaves = enters + (width + other_front + other_rear + TAIL_MARGIN) / w
+    through = front + rear + (0.0 if merges else zone[1] - zone[0])
+    arrives, clears = time_to(to_enter, v, pace), time_to(to_enter + through, v, pace)
+    if enters < HORIZON and arrives < leaves + TIME_MARGIN and clears > enters - TIME_MARGIN:
+        return math.inf, zone[0]
+    return math.inf, math.inf
+
+
+@kernel
+def keep_clear(s, front, rear, length, zone, q, w, other_rear, stop):
+    """Return where to stop [m] so as not to stand in another one's way while stopping at ``stop``.
+
+    ``length`` is the ego's [m]; the rest as of `give_way`.
+    """
+    gone = q - other_rear > zone[3] or w < STANDING
+    if gone or zone[0] - front - s <= 0.0 or zone[0] >= stop or stop - length > zone[1]:
+        return stop
+    return zone[0]
+
+
+@kernel
+def yield_to_all(s, v, pace, front, rear, passages, count):
+    """Return the acceleration [m/s²] that all predicted passages ask for; +inf if none does."""
+    asked, stop = math.inf, math.inf
+    for i in range(count):
+        one = passages[i]
+        follows, stops = give_way(
+            s, v, pace, front, rear, one, one[STATION], one[SPEED], one[FRONT], one[REAR]
+        )
+        asked, stop = min(asked, follows), min(stop, stops)
+    if stop == math.inf:
+        return asked
+    for _ in range(KEEP_CLEAR_ROUNDS):
+        before = stop
+        for i in range(count):
+            one = passages[i]
+            stop = keep_clear(
+                s, front, rear, front + rear, one, one[STATION], one[SPEED], one[REAR], stop
+            )
+        if stop == before:
+            break
+    return min(asked, stop_for(stop - front - s, v))
