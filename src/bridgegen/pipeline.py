@@ -342,8 +342,8 @@ def simulate_file(
         time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.
         time_step: [s]; what the file's header says by default.
-        skipped: takes a sentence for each thing that the file holds and the model does not, which
-            is left out then instead of refused (`bridgegen.openx.openscenario.read`).
+        skipped: takes a sentence for each thing that is not supported, which is left out then
+            instead of refused, with the event, action, entity or condition group around it.
 
     Raises:
         InputError: a time step out of range, or a stage that the driver has not.
@@ -358,7 +358,7 @@ def simulate_file(
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     simulator = EmbeddedSimulator(
-        scenario, str(path), driver=driver, ideal=ideal, time_step=time_step
+        scenario, str(path), driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
     )
     held = measures.held_by(simulator.program.driver)
     names = measures.existing(tuple(measures.METRICS), held)

@@ -17,7 +17,7 @@ from bridgegen.openx.openscenario.element import (
     values_of,
     walk,
 )
-from bridgegen.openx.openscenario.entities import ScenarioObject
+from bridgegen.openx.openscenario.entities import ScenarioObject, Trailer
 from bridgegen.openx.openscenario.storyboard import ManeuverGroup, OpenScenario
 
 _WHOLES = frozenset(
@@ -106,6 +106,8 @@ def _paths(element: Element, above: tuple[Element, ...] = ()) -> Iterator[tuple[
 def _whole(path: tuple[Element, ...]) -> Element:
     """Return what goes with the last element of a path from the root."""
     whole = path[-1]
+    if isinstance(whole, Trailer):  # a car without its trailer is one
+        return whole
     for one in reversed(path[1:]):
         name = type(one).__name__
         if name in _WHOLES:

@@ -14,6 +14,8 @@ from bridgegen.openx.openscenario.declarations import (
     NOISE_KEY,
     TIME_STEP,
 )
+from bridgegen.openx.openscenario.element import walk
+from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded._codes import COURSE_WIDTH, EVENT
@@ -45,6 +47,7 @@ def compile_storyboard(
     driver: Driver | None = None,
     ideal: Iterable[str] | None = None,
     time_step: float | None = None,
+    skipped: list[str] | None = None,
 ) -> Program:
     """Compile a scenario file.
 
@@ -54,12 +57,29 @@ def compile_storyboard(
         driver: who drives the ego, whatever the file says.
         ideal: its stages that are ideal, whatever the driver or the file says.
         time_step: [s], whatever the file says.
+        skipped: takes a sentence for each thing that the rollout cannot do, which is left out then
+            instead of refused, with what it is part of; never the ego.
 
     Raises:
         UnsupportedError: what the rollout cannot do, by name and line, all of it at once.
         InputError: an entity without a start, or no entity at all; stages that the driver has not.
     """
-    return _Compiler(scenario, place).compile(driver, ideal, time_step)
+    while True:
+        compiler = _Compiler(scenario, place)
+        try:
+            return compiler.compile(driver, ideal, time_step)
+        except InputError as error:
+            left = compiler.without_culprits(scenario)
+            if skipped is None or left is scenario or not compiler.has_ego(left):
+                raise
+            skipped += error.problems
+        while astray := strays(left):
+            skipped += [
+                f"{place}, line {one.line}: {type(one).__name__} of an entity that is not there"
+                for one in astray
+            ]
+            left = without(left, astray)
+        scenario = left
 
 
 class _Compiler:
@@ -73,6 +93,16 @@ class _Compiler:
         self.points: list[LanePoint] = []
         self.waypoints: list[tuple[LanePoint, ...]] = []
         self.actions = Actions(self.tables, self.paths, self.points)
+
+    def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
+        """Return the scenario as it was given without what cannot be run."""
+        culprits = {id(one) for one in self.tables.culprits}
+        pairs = zip(walk(scenario), walk(self.scenario), strict=True)  # one is resolved
+        return without(scenario, [one for one, other in pairs if id(other) in culprits])
+
+    def has_ego(self, left: osc.OpenScenario) -> bool:
+        """Say whether a scenario still has the entity that is this one's ego."""
+        return self.tables.names[:1] == Tables(left, self.place).names[:1]
 
     def compile(
         self, driver: Driver | None, ideal: Iterable[str] | None, time_step: float | None
@@ -278,6 +308,7 @@ class _Compiler:
                     self.tables.unsupported(inner, f"an initial {type(inner).__name__}")
         missing = [name for name in self.tables.names if name not in starts]
         if missing and not self.tables.problems:
+            self.tables.culprits += [one for one in self.tables.objects if str(one.name) in missing]
             raise InputError(
                 *(
                     f"{self.place}: entity '{name}' needs an initial TeleportAction"
@@ -299,6 +330,7 @@ class _Compiler:
                     f"{self.place}, line {point.line}: a WorldPosition is supported for an entity "
                     "that follows a trajectory, and for no other"
                 )
+                self.tables.culprits.append(self.tables.objects[self.tables.entity(name)])
         for one_more, entity in first:
             self.actions.begin(one_more, entity)
         return [init[name] for name in self.tables.names]

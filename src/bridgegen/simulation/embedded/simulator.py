@@ -36,6 +36,8 @@ class EmbeddedSimulator:
         driver: who drives the ego; what the file says by default.
         ideal: stages of the driver that are ideal; what the driver says by default.
         time_step: [s]; what the file says by default.
+        skipped: takes a sentence for each thing that it cannot run, which is left out then instead
+            of refused, with the event, action, entity or condition group that it is part of.
 
     Attributes:
         program: the compiled storyboard.
@@ -53,9 +55,10 @@ class EmbeddedSimulator:
         driver: Driver | None = None,
         ideal: Iterable[str] | None = None,
         time_step: float | None = None,
+        skipped: list[str] | None = None,
     ) -> None:
         self.program = compile_storyboard(
-            storyboard, place, driver=driver, ideal=ideal, time_step=time_step
+            storyboard, place, driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
         )
         self._process: DriverProcess | None = None
         self._turn = threading.Lock()

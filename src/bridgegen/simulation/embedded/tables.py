@@ -30,6 +30,7 @@ class Tables:
         names: their names.
         parameters: the numeric parameters with their declared values.
         problems: what the rollout cannot do, a sentence each.
+        culprits: the elements that say so.
         fixed: parameters that rows may not vary, and what they are used for.
     """
 
@@ -42,6 +43,7 @@ class Tables:
         self.parameters = numbers(scenario)
         self._declared = values(scenario)
         self.problems: list[str] = []
+        self.culprits: list[Element] = []
         self.fixed: dict[str, str] = {}
         self._slots: dict[tuple[type, Value], int] = {}
 
@@ -87,6 +89,7 @@ class Tables:
         """Take down what cannot be run, with its line."""
         line = f", line {element.line}" if element.line else ""
         self.problems.append(f"{self.place}{line}: {what} is not supported")
+        self.culprits.append(element)
 
     def literal(self, element: Element, name: str, value: Value) -> float:
         """Return a number that rows may not vary: parameters keep their declared values."""
