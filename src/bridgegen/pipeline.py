@@ -25,6 +25,8 @@ from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.convert import roads_of
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.source import ConcreteScenario, Source, source_of
 from bridgegen.simulation.embedded.network import Network
@@ -312,6 +314,8 @@ class FileResult:
         parameters: the file's numeric parameters.
         metrics: by name, in the metric's unit.
         rollout: the motion, N = 1.
+        cause: what the search that handed the file over found its harm put down to, as its header
+            says; None where it says nothing, or another driver than the file's drives.
     """
 
     driver: str
@@ -320,6 +324,7 @@ class FileResult:
     parameters: Mapping[str, float]
     metrics: Mapping[str, float]
     rollout: Rollout
+    cause: str | None = None
 
 
 def simulate_file(
@@ -373,4 +378,11 @@ def simulate_file(
         parameters=simulator.parameters,
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
+        cause=_stated_cause(scenario) if ego is None and ideal is None else None,
     )
+
+
+def _stated_cause(scenario: OpenScenario) -> str | None:
+    properties = scenario.file_header.properties
+    stated = properties.get(CAUSE) if properties else None
+    return None if stated is None else str(stated)

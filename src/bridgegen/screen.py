@@ -129,6 +129,8 @@ def print_file_result(file: Path, result: "FileResult") -> None:
     print(f"{file}: ego {result.driver}, {result.seconds:g} s simulated")
     if result.status != "ok":
         print(f"failed: {result.status}")
+    if result.cause is not None:
+        print(f"cause of its harm, as it was found: {result.cause}")
     _print_metrics(result.metrics)
 
 

@@ -186,6 +186,8 @@ def test_the_cause_is_in_every_file_and_comes_back(tmp_path):
         assert facts["cause"] == cause
         assert individuals.text(individuals.one("Scenario"), "has_cause") == cause
         assert read(path).file_header.properties.get("cause") == cause
+        assert bg.simulate_file(path).cause == cause
+        assert bg.simulate_file(path, ego="fsm").cause is None  # that was another driver's
         (_, xosc), _ = convert_file(path.with_suffix(".owl"), tmp_path / "made")
         assert xosc.read_bytes() == path.read_bytes()
         again, _ = import_file(path, tmp_path / f"{path.stem}.owl")

@@ -232,9 +232,14 @@ def simulate(
     if trace is not None:
         write_trace(trace, result.rollout)
     if as_json:
-        facts = {"file": str(file), "ego": result.driver, "status": result.status}
+        facts: dict[str, object] = {
+            "file": str(file),
+            "ego": result.driver,
+            "status": result.status,
+        }
         values = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
-        print(json.dumps({**facts, "parameters": result.parameters, "metrics": values}, indent=2))
+        facts |= {"cause": result.cause, "parameters": result.parameters, "metrics": values}
+        print(json.dumps(facts, indent=2))
     else:
         print_file_result(file, result)
 
