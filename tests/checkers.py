@@ -72,8 +72,12 @@ class Checkers:
 
     def schema(self, package: str, name: str) -> etree.XMLSchema:
         """Return a schema that a checker brings, as in ``("qc_opendrive", "1.7.0/x.xsd")``."""
+        return etree.XMLSchema(etree.parse(self.schema_path(package, name)))
+
+    def schema_path(self, package: str, name: str) -> Path:
+        """Return where that schema lies."""
         (found,) = self.venv.glob(f"lib/python*/site-packages/{package}/schema/{name}")
-        return etree.XMLSchema(etree.parse(found))
+        return found
 
     def netconvert(self, path: Path, *, seconds: float = 60.0) -> subprocess.CompletedProcess[str]:
         """Convert an OpenDRIVE file to a SUMO network beside it, in at most 2 GiB of memory."""
