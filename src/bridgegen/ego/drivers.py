@@ -29,7 +29,6 @@ class Driver:
         description: one sentence.
         stages: those of `STAGES` that it has, and that can be made ideal.
         ideal: those that are.
-        perceives: whether it has sensors, whose detections a rollout then holds.
         time_limit: [s] that one call of a user's own may take.
     """
 
@@ -38,13 +37,17 @@ class Driver:
     description: str
     stages: frozenset[str] = frozenset()
     ideal: frozenset[str] = frozenset()
-    perceives: bool = False
     time_limit: float = TIME_LIMIT
 
     @property
     def is_own(self) -> bool:
         """Whether it is the user's, in Python or a co-simulation unit."""
         return self.code == OWN
+
+    @property
+    def perceives(self) -> bool:
+        """Whether it has sensors, ideal or not, whose detections a rollout then holds."""
+        return "perception" in self.stages
 
     @property
     def label(self) -> str:

@@ -274,7 +274,7 @@ def _state(
 def _record(program: Program, n: int) -> memory.Record:
     shape = (n, len(program.names), program.n_steps)
     x, y, h, v, a, offset = (np.empty(shape) for _ in range(6))
-    perceives = "perception" in program.driver.stages
+    perceives = program.driver.perceives
     seen = (*shape, DETECTION) if perceives else (n, 0, 0, DETECTION)
     return memory.Record(
         x=x, y=y, h=h, v=v, a=a, offset=offset,
