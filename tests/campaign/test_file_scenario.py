@@ -60,7 +60,7 @@ def test_what_is_found_is_handed_over_as_the_user_s_own_file(tmp_path, ego, body
     run = search(tmp_path, body, ego=ego)
     # The budget and the seed are the distribution's, unless the user says otherwise.
     assert (run.settings.budget, run.settings.seed) == (60, 7)
-    assert run.settings.ego == (ego or "route-follower")
+    assert run.settings.ego == (ego or "storyboard")
     rows = rows_of(run.folder)
     assert len(rows) == 60
     assert run.report.stat().st_size > 10_000
