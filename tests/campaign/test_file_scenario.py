@@ -217,7 +217,7 @@ REFUSED = {
     "must be of type double, got 'far'": deterministic(
         ("Gap", '<DistributionSet><Element value="far"/></DistributionSet>')
     ),
-    "a reference as upperLimit of Range is not supported, got ${1+1}": stochastic(
+    "upperLimit of Range must be of type double, got '${1+1}'": stochastic(
         ("Gap", '<UniformDistribution><Range lowerLimit="1" upperLimit="${1+1}"/>'
          "</UniformDistribution>")
     ),
