@@ -122,7 +122,9 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         )
     if is_spec(name):
         what = "A driver of the user's own."
-        return Driver(name, OWN, what, time_limit=time_limit or TIME_LIMIT).idealised(ideal)
+        sees = frozenset({"perception"})
+        own = Driver(name, OWN, what, stages=sees, time_limit=time_limit or TIME_LIMIT)
+        return own.idealised(ideal)
     try:
         driver = DRIVERS[name]
     except KeyError:

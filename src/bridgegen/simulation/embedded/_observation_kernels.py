@@ -1,41 +1,51 @@
-"""What a driver in Python is told at an instant: the route ahead, and the others as tracks."""
+"""What a driver in Python is told at an instant: the route ahead, the next light, and tracks."""
 
 import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import CURVATURE, locate, pose
-from bridgegen.simulation.embedded._memory_kernels import N_STEPS, record_of, roads_of, state_of
-
-CONFIRMED = 2.0  # a track's state
+from bridgegen.ego._perception_kernels import perceive
+from bridgegen.simulation.embedded._memory_kernels import (
+    N_STEPS,
+    plan_of,
+    record_of,
+    roads_of,
+    state_of,
+)
 
 
 @kernel
-def observe_rows(k, plan, networks, rows, states, records, kinds, step, route, tracks):
-    """Fill ``route (N, P, 4)`` and ``tracks (N, M, 12)`` of rows that run; see `Observation`."""
+def observe_rows(k, plan, networks, rows, states, records, step, route, tracks, stop, light):
+    """Let the sensors look, and fill what `Observation` has of rows that run.
+
+    ``route (N, P, 4)``, ``tracks (N, M, 12)``, ``stop (N,)`` and ``light (N,)`` int8.
+    """
+    plan = plan_of(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] > 0:
             continue
         roads, state = roads_of(networks, rows[i]), state_of(states, i)
         record = record_of(records, i)
-        path, n, ds = roads.paths[0], roads.counts[0], roads.steps[0]
+        perceive(
+            k, plan.dt, state.key[0], plan.ideal_perception, record.x, record.y, record.h,
+            record.v, plan.bodies, plan.kinds, state.weather, state.sensors, state.tracks,
+            record.detections,
+        )  # fmt: skip
+        tracks[i] = state.tracks[1:]
+        on, station = state.on[0], state.station[0]
+        path, n, ds = roads.paths[on], roads.counts[on], roads.steps[on]
         for p in range(route.shape[1]):
-            s = state.station[0] + p * step
+            s = station + p * step
             route[i, p, 0], route[i, p, 1], route[i, p, 2] = pose(path, n, ds, s)
             at, share = locate(n, ds, s)
             route[i, p, 3] = 0.0
             if share <= 1.0:  # else it is beyond the end, straight on
                 bend = path[at, CURVATURE]
                 route[i, p, 3] = bend + share * (path[at + 1, CURVATURE] - bend)
-        for e in range(1, record.x.shape[0]):
-            x, y, h, v = record.x[e, k], record.y[e, k], record.h[e, k], record.v[e, k]
-            track, centre = tracks[i, e - 1], plan.bodies[e, 2]
-            track[0] = CONFIRMED
-            track[1] = x + centre * math.cos(h)
-            track[2] = y + centre * math.sin(h)
-            track[3] = h
-            track[4], track[5] = v * math.cos(h), v * math.sin(h)
-            track[6], track[7] = plan.bodies[e, 0], plan.bodies[e, 1]
-            track[8] = kinds[e]
-            track[9] = 1.0
-            track[10] = 0.0
-            track[11] = k * plan.dt
+        stop[i], light[i] = math.inf, 0
+        if on == 0:  # where the map's stop lines are along another way, nobody has looked
+            front = station + plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
+            for one in range(roads.stops.shape[0]):
+                ahead = roads.stops[one] - front
+                if 0.0 <= ahead < stop[i]:
+                    stop[i], light[i] = ahead, state.lights[one]

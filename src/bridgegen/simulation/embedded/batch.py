@@ -119,18 +119,23 @@ class Batch:
             _put_back(self.state, state, again)
             _put_back(self.record, record, again)
 
-    def observe(self, k: int, step: float, route: Float, tracks: Float) -> None:
+    def observe(
+        self, k: int, step: float, route: Float, tracks: Float, stop: Float,
+        light: npt.NDArray[np.int8],
+    ) -> None:  # fmt: skip
         """Fill what a driver in Python is told of the rows that run; see `Observation`.
 
         Args:
-            k: the instant.
+            k: the instant; once each, in order, for the sensors look.
             step: between two points of the route [m].
             route: ``(N, P, 4)`` float64.
             tracks: ``(N, E − 1, 12)`` float64.
+            stop: ``(N,)`` float64, the distance to the next stop line [m].
+            light: ``(N,)`` int8, the state of its light.
         """
         observe_rows(
             k, self._plan, self._roads.tables, self._rows, self.state, self.record,
-            self._program.kinds, step, route, tracks,
+            step, route, tracks, stop, light,
         )  # fmt: skip
 
     def fail(self, status: int, message: str) -> None:

@@ -8,14 +8,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Int
+from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego.driver_process import DriverError, DriverProcess
 from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
-
-TRACK_COLUMNS = 12
 
 
 def drive(
@@ -62,15 +61,25 @@ def _together(program: Program, batch: Batch, driver: DriverProcess) -> None:
     if not batch.running.any():
         return
     driver.reset(n, _scene(program))
-    route, tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK_COLUMNS))
+    route, tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
+    stop, light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
     for k in range(program.n_steps):
-        running = batch.running
-        if not running.any():
+        if not batch.running.any():
             return
         batch.before_driver(k)
-        batch.observe(k, ROUTE_STEP, route, tracks)
-        acceleration, curvature = driver.act(_observation(program, batch, k, route, tracks))
-        batch.after_driver(k, acceleration, curvature)
+        batch.observe(k, ROUTE_STEP, route, tracks, stop, light)
+        record, state = batch.record, batch.state
+        x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
+        observation = Observation(
+            time=k * program.time_step,
+            running=batch.running,
+            x=x, y=y, h=h, v=v,
+            a=record.a[:, 0, k - 1] if k else np.zeros(n),
+            target_speed=state.command[:, 0],
+            offset=record.offset[:, 0, k],
+            route=route, tracks=tracks, stop_distance=stop, light=light,
+        )  # fmt: skip
+        batch.after_driver(k, *driver.act(observation))
 
 
 def _scene(program: Program) -> Scene:
@@ -78,23 +87,4 @@ def _scene(program: Program) -> Scene:
     return Scene(
         program.time_step, program.n_steps, program.names[1:], program.kinds[1:],
         length, width, centre, *limits,
-    )  # fmt: skip
-
-
-def _observation(
-    program: Program, batch: Batch, k: int, route: Float, tracks: Float
-) -> Observation:
-    record, state = batch.record, batch.state
-    x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
-    return Observation(
-        time=k * program.time_step,
-        running=batch.running,
-        x=x, y=y, h=h, v=v,
-        a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
-        target_speed=state.command[:, 0],
-        offset=record.offset[:, 0, k],
-        route=route,
-        tracks=tracks,
-        stop_distance=np.full(len(x), np.inf),
-        light=np.zeros(len(x), dtype=np.int8),
     )  # fmt: skip
