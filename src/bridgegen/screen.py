@@ -70,7 +70,7 @@ class Screen:
 
         if stage == "compile" and not is_compiled():
             self._console.print(
-                "First run: compiling the simulator, some ten to thirty seconds; later runs start "
+                "First run: compiling the simulator, which takes a minute or two; later runs start "
                 "at once."
             )
         self._progress.update(self._task, description=_STAGES[stage])
