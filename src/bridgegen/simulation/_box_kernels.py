@@ -87,6 +87,31 @@ def gaps(
 
 
 @kernel
+def box_gap(
+    box_a: Float, box_b: Float, dx: float, dy: float, cos_a: float, sin_a: float, cos_b: float,
+    sin_b: float,
+) -> float:  # fmt: skip
+    """Return the distance of two boxes whose reference points are (dx, dy) apart, as ``gaps``."""
+    la, wa, lb, wb = 0.5 * box_a[0], 0.5 * box_a[1], 0.5 * box_b[0], 0.5 * box_b[1]
+    dx += box_b[2] * cos_b - box_a[2] * cos_a
+    dy += box_b[2] * sin_b - box_a[2] * sin_a
+    ax, ay = dx * cos_a + dy * sin_a, dy * cos_a - dx * sin_a
+    bx, by = -(dx * cos_b + dy * sin_b), -(dy * cos_b - dx * sin_b)
+    c, s = cos_a * cos_b + sin_a * sin_b, cos_a * sin_b - sin_a * cos_b
+    ac, az = abs(c), abs(s)
+    apart_a = max(abs(ax) - (la + (ac * lb + az * wb)), abs(ay) - (wa + (az * lb + ac * wb)))
+    apart_b = max(abs(bx) - (lb + (ac * la + az * wa)), abs(by) - (wb + (az * la + ac * wa)))
+    if max(apart_a, apart_b) <= 0.0:
+        return 0.0
+    return math.sqrt(
+        min(
+            corners_outside(ax, ay, c, s, la, wa, lb, wb),
+            corners_outside(bx, by, c, -s, lb, wb, la, wa),
+        )
+    )
+
+
+@kernel
 def directions_of(h: Float, n_steps: Int, cosine: Float, sine: Float) -> None:
     """Fill ``cosine`` and ``sine`` (N, E, T) up to each scenario's last real instant."""
     for i in range(h.shape[0]):

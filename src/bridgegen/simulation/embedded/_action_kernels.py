@@ -1,38 +1,36 @@
 """How actions begin; what they do from then on: ``_speed_kernels`` and ``_travel_kernels``."""
 
-import numpy as np
-
 from bridgegen.compiled import inlined_kernel, kernel
-from bridgegen.ego._weather_kernels import change
 from bridgegen.simulation.embedded._across_kernels import (
     begin_lane_change,
     begin_lane_offset,
     stop_lateral,
 )
-from bridgegen.simulation.embedded._codes import RELATIVE_SPEED
+from bridgegen.simulation.embedded._codes import (
+    FIRST_GLOBAL,
+    LANE_CHANGE,
+    LANE_OFFSET,
+    RELATIVE_SPEED,
+    SPEED_CHANGE,
+)
+from bridgegen.simulation.embedded._global_kernels import begin_global
 from bridgegen.simulation.embedded._motion_kernels import STEP
 from bridgegen.simulation.embedded._pursuit_kernels import start_at_speed
 from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, stop_longitudinal
-
-SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = 0, 1, 2, 3, 4
 
 
 @inlined_kernel
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k: a branch per kind; what is over at once says so."""
     kind = plan.actions[j, 1]
-    if kind == SPEED_CHANGE or kind >= RELATIVE_SPEED:
+    if kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
         begin_longitudinal(j, k, plan, roads, state, record)
     elif kind == LANE_CHANGE:
         begin_lane_change(j, k, plan, roads, state, record)
     elif kind == LANE_OFFSET:
         begin_lane_offset(j, k, plan, roads, state, record)
-    elif kind == WEATHER_CHANGE:
-        change(state.weather, plan.weathers, plan.actions[j, 6], state.slots)
-        state.action_ended[j] = True
     else:
-        state.lights[plan.actions[j, 0]] = np.int8(state.slots[plan.actions[j, 4]])
-        state.action_ended[j] = True
+        begin_global(j, k, plan, state)
 
 
 @kernel
@@ -49,7 +47,7 @@ def begin_initially(plan, roads, state, record):
 def stop(j, k, plan, roads, state, record):
     """Stop action j, which has not ended: whoever it moved goes on as it is."""
     kind = plan.actions[j, 1]
-    if kind == SPEED_CHANGE or kind >= RELATIVE_SPEED:
+    if kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
         stop_longitudinal(j, plan, state)
     elif kind in (LANE_CHANGE, LANE_OFFSET):
         stop_lateral(j, plan, state)

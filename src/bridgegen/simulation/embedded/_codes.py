@@ -16,19 +16,27 @@ STARTED, ENDED, STOPPED, SKIPPED = range(4)
 
 # Program.actions, columns that the storyboard reads; the others are their kinds' own.
 WHOM, SELECTS = 0, 7
+SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = range(5)
+FIRST_GLOBAL = 100  # whose first column is a light, a controller, a value, not an entity
+TIME_CHANGE, PHASE_CHANGE, VALUE_SET, VALUE_ADD, VALUE_MULTIPLY = range(100, 105)
 
 # Program.conditions: first and past-the-last probe, how they count, edge, delay in steps.
 PROBES, PROBES_END, QUANTITY, EDGE, DELAY = range(5)
 ANY, ALL, NOBODY = range(3)
 NO_EDGE, RISING, FALLING, EITHER = range(4)
 
-# Program.probes: what is looked at; see _probe_kernels.
-PROBE, WHO, OTHER, RULE, LIMIT, PLACE = range(6)
-NEVER_TRUE, SIMULATION_TIME, ELEMENT_STATE = range(3)
+# Program.probes: what is looked at, by whom and at whom (-1: at a place), the rule and the slot of
+# what it is compared with; how a distance is measured; a second slot; whether seldom asked for.
+PROBE, WHO, OTHER, RULE, LIMIT, PLACE, MEASURE, SYSTEM, BOXES, WITHIN, CLOSELY = range(11)
+NEVER_TRUE, SIMULATION_TIME, ELEMENT_STATE, VALUE, TIME_OF_DAY, LIGHT_STATE, LIGHT_PHASE = range(7)
 FIRST_BY_ENTITY = 10
-SPEED, TRAVELED_DISTANCE, STAND_STILL, REACH_POSITION = range(10, 14)
-RELATIVE_DISTANCE, TIME_TO_COLLISION, TIME_HEADWAY = range(14, 17)
+SPEED, SPEED_DIFFERENCE, ACCELERATION, TRAVELED_DISTANCE, STAND_STILL = range(10, 15)
+ANGLE, RELATIVE_ANGLE, COLLISION, COLLISION_WITH_TYPE, END_OF_ROAD = range(15, 20)
+DISTANCE, TIME_TO_COLLISION, TIME_HEADWAY = range(20, 23)
 GREATER, LESS, EQUAL, GREATER_EQUAL, LESS_EQUAL, NOT_EQUAL = range(6)
+EUCLIDIAN, LONGITUDINAL, LATERAL = range(3)
+TOTAL, VERTICAL = 0, 3  # with LONGITUDINAL and LATERAL, the directions of a speed
+ENTITY_SYSTEM, PATH_SYSTEM, WORLD_SYSTEM = range(3)
 
 # Program.actions: the kinds that move along the road by Program.courses; the others are numbered
 # in _action_kernels.

@@ -6,6 +6,7 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.ego.drivers import NOBODY
 from bridgegen.simulation.embedded._ego_kernels import move_ego
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
+from bridgegen.simulation.embedded._signal_kernels import run_controllers
 from bridgegen.simulation.embedded._speed_kernels import command_speed
 from bridgegen.simulation.embedded._storyboard_kernels import decide, finish
 from bridgegen.simulation.embedded._travel_kernels import move_along_path, move_along_timetable
@@ -15,6 +16,10 @@ from bridgegen.simulation.embedded._trigger_kernels import observe
 @inlined_kernel
 def before_driver(k, plan, roads, state, record):
     """Do at instant k what the storyboard says, up to what it asks of the ego."""
+    run_controllers(
+        k * plan.dt, plan.controllers, plan.phases, plan.changes, state.slots, state.phase_now,
+        state.phase_until, state.lights,
+    )  # fmt: skip
     finish(k, plan, state)
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)

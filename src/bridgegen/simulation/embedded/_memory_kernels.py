@@ -25,6 +25,7 @@ class Plan(NamedTuple):
 
     bodies: Float
     kinds: Int
+    objects: Int
     init: Int
     routes: Int
     timed: Int
@@ -32,6 +33,7 @@ class Plan(NamedTuple):
     groups: Int
     conditions: Int
     probes: Int
+    looks_closely: int
     elements: Int
     courses: Int
     entries: Int
@@ -39,7 +41,14 @@ class Plan(NamedTuple):
     initial: Int
     actions: Int
     laterals: Int
+    values: Int
     first_states: npt.NDArray[np.int8]
+    first_phases: Int
+    controllers: Int
+    phases: Int
+    changes: Int
+    first_time: int
+    time_passes: int
     weathers: Int
     driver: int
     ideal_perception: int
@@ -92,9 +101,14 @@ class State(NamedTuple):
         executions: ``(X,)`` int64, how often each has started or been skipped,
         stamps: ``(X, 4)`` int64, the number of its last start, end, stop and skip,
         looked: ``(P, 2)`` int64, the last number when a probe looked: before this instant; at all.
+        held: ``(P,)`` [s], how long a probe has seen what must last.
         action_ended: ``(J,)`` bool.
         selected: ``(E,)`` bool, the entities that made the present event's trigger fire.
+        values: ``(U,)``, the parameters and variables that change.
+        clock: ``(3,)`` [s], a date, how fast it passes, and when it was that date.
         lights: ``(L,)`` int8, the traffic lights' states.
+        phase_now: ``(K,)`` int64, the phase that each controller is in,
+        phase_until: ``(K,)`` [s], and until when.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] since it last moved.
         route: ``(E,)`` int64, the route that a body follows where it can; 0: none.
@@ -140,9 +154,14 @@ class State(NamedTuple):
     executions: Int
     stamps: Int
     looked: Int
+    held: Float
     action_ended: Bool
     selected: Bool
+    values: Float
+    clock: Float
     lights: npt.NDArray[np.int8]
+    phase_now: Int
+    phase_until: Float
     travelled: Float
     stood: Float
     route: Int

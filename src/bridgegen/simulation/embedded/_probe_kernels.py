@@ -1,6 +1,7 @@
-"""What a probe sees: one entity, two of them, the time, or an element of the storyboard.
+"""What a probe sees: an entity, two of them, a value, or an element of the storyboard.
 
-A condition has a probe per triggering entity. Another kind of condition is a branch in ``look``.
+A condition has a probe per triggering entity. Another kind of condition is a branch in ``look_one``
+of ``_relation_kernels``, where all is that is seldom asked for.
 """
 
 import math
@@ -8,77 +9,51 @@ import math
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import (
     COMPLETE,
+    DISTANCE,
     ELEMENT_STATE,
-    EQUAL,
-    GREATER,
-    GREATER_EQUAL,
-    LESS,
-    LESS_EQUAL,
     LIMIT,
     NEVER_TRUE,
     OTHER,
-    PLACE,
     PROBE,
-    REACH_POSITION,
-    RELATIVE_DISTANCE,
     RULE,
     SIMULATION_TIME,
     SPEED,
-    STAND_STILL,
     TIME_HEADWAY,
     TRAVELED_DISTANCE,
     WHO,
 )
+from bridgegen.simulation.embedded._relation_kernels import compare, compare_times
 
 
 @inlined_kernel
-def look(p, k, plan, roads, state, record):
+def look(p, k, plan, state, record):
     """Return whether probe p sees at instant k what its condition asks for."""
     kind, e, other = plan.probes[p, PROBE], plan.probes[p, WHO], plan.probes[p, OTHER]
     rule, limit = plan.probes[p, RULE], state.slots[plan.probes[p, LIMIT]]
     if kind == SIMULATION_TIME:
-        return compare(k * plan.dt, rule, limit)
+        return compare_times(k * plan.dt, rule, limit)
     if kind == ELEMENT_STATE:
         return is_in_state(p, plan.probes, state.phase, state.stamps, state.looked)
     if kind == NEVER_TRUE:
         return False
-    x, y, v = record.x[e, k], record.y[e, k], record.v[e, k]
+    if kind >= DISTANCE:
+        return look_at_pair(
+            kind, rule, limit, record.x[other, k] - record.x[e, k],
+            record.y[other, k] - record.y[e, k], record.v[e, k], record.h[e, k],
+            record.v[other, k], record.h[other, k],
+        )  # fmt: skip
     if kind == SPEED:
-        return compare(v, rule, limit)
+        return compare(record.v[e, k], rule, limit)
     if kind == TRAVELED_DISTANCE:
         return state.travelled[e] >= limit
-    if kind == STAND_STILL:
-        return state.stood[e] >= limit
-    if kind == REACH_POSITION:
-        place = plan.probes[p, PLACE]
-        return math.hypot(x - roads.points[place, 0], y - roads.points[place, 1]) <= limit
-    return look_at_pair(
-        kind, rule, limit, record.x[other, k] - x, record.y[other, k] - y, v, record.h[e, k],
-        record.v[other, k], record.h[other, k],
-    )  # fmt: skip
-
-
-@kernel
-def compare(value, rule, limit):
-    """Apply an OpenSCENARIO Rule."""
-    if rule == GREATER:
-        return value > limit
-    if rule == LESS:
-        return value < limit
-    if rule == GREATER_EQUAL:
-        return value >= limit
-    if rule == LESS_EQUAL:
-        return value <= limit
-    if rule == EQUAL:
-        return value == limit
-    return value != limit
+    return state.stood[e] >= limit  # STAND_STILL
 
 
 @kernel
 def look_at_pair(kind, rule, limit, dx, dy, v, h, other_v, other_h):
     """Return whether a condition on two entities holds; the other one is at (dx, dy) from it."""
     gap = math.hypot(dx, dy)
-    if kind == RELATIVE_DISTANCE:
+    if kind == DISTANCE:
         return compare(gap, rule, limit)
     if kind == TIME_HEADWAY:
         return v > 0.0 and compare(gap / v, rule, limit)

@@ -6,8 +6,14 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._action_kernels import begin_initially
+from bridgegen.simulation.embedded._global_kernels import set_clock
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS
 from bridgegen.simulation.embedded._motion_kernels import shifted
+from bridgegen.simulation.embedded._signal_kernels import (
+    DURATION,
+    enter_phase,
+    start_controllers,
+)
 
 
 @inlined_kernel
@@ -16,8 +22,7 @@ def start(plan, roads, state, record):
     n_entities, n_steps = record.x.shape
     set_clear(state.weather)
     change(state.weather, plan.weathers, 0, state.slots)
-    for i in range(state.lights.shape[0]):
-        state.lights[i] = plan.first_states[i]
+    start_globals(plan, state)
     for e in range(n_entities):
         state.on[e], state.to[e], state.route[e] = e, -1, plan.routes[e]
         state.lateral_action[e] = state.speed_action[e] = -1
@@ -48,3 +53,28 @@ def start(plan, roads, state, record):
         record.offset[e, 0] = 0.0
         state.command[e] = state.target[e] = record.v[e, 0]
     begin_initially(plan, roads, state, record)
+
+
+@inlined_kernel
+def start_globals(plan, state):
+    """Set values, time of day, controllers and lights; what the start says of a light goes last."""
+    for i in range(state.values.shape[0]):
+        state.values[i] = state.slots[plan.values[i]]
+    state.clock[0] = math.nan
+    if plan.first_time >= 0:
+        set_clock(state.slots[plan.first_time], plan.time_passes, 0.0, state.clock)
+    start_controllers(
+        plan.controllers, plan.phases, plan.changes, state.slots, state.phase_now,
+        state.phase_until, state.lights,
+    )  # fmt: skip
+    for c in range(plan.first_phases.shape[0]):
+        i = plan.first_phases[c]
+        if i >= 0:
+            until = max(state.slots[plan.phases[i, DURATION]], 0.0)
+            enter_phase(
+                c, i, until, plan.phases, plan.changes, state.phase_now, state.phase_until,
+                state.lights,
+            )  # fmt: skip
+    for i in range(state.lights.shape[0]):
+        if plan.first_states[i] >= 0:
+            state.lights[i] = plan.first_states[i]

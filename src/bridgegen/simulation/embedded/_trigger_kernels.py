@@ -7,6 +7,7 @@ from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import (
     ALL,
     ANY,
+    CLOSELY,
     DELAY,
     EDGE,
     ELEMENT_STATE,
@@ -20,17 +21,22 @@ from bridgegen.simulation.embedded._codes import (
     RISING,
     WHO,
 )
+from bridgegen.simulation.embedded._distance_kernels import scene_of
 from bridgegen.simulation.embedded._memory_kernels import TICKS, view
 from bridgegen.simulation.embedded._probe_kernels import is_in_state, look
+from bridgegen.simulation.embedded._relation_kernels import look_closely
 
 
 @inlined_kernel
 def observe(k, plan, roads, state, record):
     """Take down what all probes see at instant k, and which conditions that makes true."""
+    if plan.looks_closely:
+        look_closely(k, scene_of(plan, roads, state, record))
     for p in range(plan.probes.shape[0]):
-        state.looked[p, 0] = state.looked[p, 1]
-        state.observed[p] = look(p, k, plan, roads, state, record)
-        state.looked[p, 1] = state.ending[TICKS]
+        if plan.probes[p, CLOSELY] == 0:
+            state.looked[p, 0] = state.looked[p, 1]
+            state.observed[p] = look(p, k, plan, state, record)
+            state.looked[p, 1] = state.ending[TICKS]
     for c in range(plan.conditions.shape[0]):
         conclude(c, k, plan.conditions, state.observed, state.history)
 

@@ -6,16 +6,11 @@ from collections.abc import Sequence
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded.courses import SHAPES, Courses
-from bridgegen.simulation.embedded.environments import Environments
-from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, LanePoint, PathSpec
+from bridgegen.simulation.embedded.global_actions import GlobalActions
+from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, PathSpec, Point
 from bridgegen.simulation.embedded.tables import Tables
 
-_SPEED_CHANGE, _LANE_CHANGE, _WEATHER, _LIGHT, _LANE_OFFSET = 0, 1, 2, 3, 4
-
-LIGHT_STATES = {
-    "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
-}  # fmt: skip
-"""The states of a traffic light's three lamps as `Rollout.lights` has them."""
+_SPEED_CHANGE, _LANE_CHANGE, _LANE_OFFSET = 0, 1, 4
 
 
 _BY_TIME = 1
@@ -28,9 +23,6 @@ class Actions:
         rows: as ``Program.actions`` has them.
         initial: the numbers of those that begin at the start.
         courses: what moves entities along their paths.
-        environments: the weathers, of the start and of events.
-        lights: the traffic lights that are set.
-        first_states: their states at the start.
         laterals: as ``Program.laterals`` has them.
         lane_checks: lane changes that are known to be asked for.
         has_driver: whether a driver drives the ego, and the storyboard does not; set it first.
@@ -39,21 +31,20 @@ class Actions:
         tables: the compiler's; takes down what cannot be run.
         paths: of the entities.
         points: takes the positions that actions name.
+        everywhere: compiles what concerns all.
     """
 
     def __init__(
-        self, tables: Tables, paths: list[PathSpec], points: list[LanePoint] | None = None
-    ) -> None:
-        self._tables, self._paths = tables, paths
+        self, tables: Tables, paths: list[PathSpec], points: list[Point],
+        everywhere: GlobalActions,
+    ) -> None:  # fmt: skip
+        self._tables, self._paths, self._everywhere = tables, paths, everywhere
         self.has_driver = False
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
         self.courses = Courses(tables, [] if points is None else points)
         self.rows: list[tuple[int, ...]] = []
         self.initial: list[int] = []
-        self.environments = Environments(tables)
-        self.lights: list[str] = []
-        self.first_states: list[int] = []
 
     def begin(self, action: osc.PrivateAction, entity: int) -> None:
         """Add what one entity does from the start on."""
@@ -76,7 +67,7 @@ class Actions:
         first, known = len(self.rows), len(self._tables.problems)
         sure = None
         if isinstance(part.action, osc.GlobalAction):
-            self._global(part.action)
+            self.rows += self._everywhere.rows(part.action.action)
         elif not isinstance(part.action, osc.PrivateAction):
             self._tables.unsupported(part.action, type(part.action).__name__)
         else:
@@ -91,39 +82,6 @@ class Actions:
             del self.rows[first:]
         for i in range(first, len(self.rows)):
             self.rows[i] = (*self.rows[i], int(sure is not None and i >= sure))
-
-    def _global(self, wrapped: osc.GlobalAction) -> None:
-        action = wrapped.action
-        if isinstance(action, osc.EntityAction):
-            self._tables.unsupported(action, type(action.action).__name__)
-            return
-        if isinstance(action, osc.InfrastructureAction):
-            light, state = self.light(action)
-            slot = self._tables.slot(float(state))
-            self.rows.append((max(light, 0), _LIGHT, 0, 0, slot, slot, 0))
-            return
-        if not isinstance(action, osc.EnvironmentAction):
-            self._tables.unsupported(action, type(action).__name__)
-            return
-        row, slot = self.environments.add(action.environment), self._tables.slot(0.0)
-        self.rows.append((0, _WEATHER, 0, 0, slot, slot, row))
-
-    def light(self, action: osc.InfrastructureAction) -> tuple[int, int]:
-        """Return the number of the light that an action sets, and its state; -1 if it sets none."""
-        set_ = action.traffic_signal_action.action
-        if not isinstance(set_, osc.TrafficSignalStateAction):
-            self._tables.unsupported(set_, type(set_).__name__)
-            return -1, 0
-        state = LIGHT_STATES.get(str(set_.state))
-        if state is None:
-            known = ", ".join(LIGHT_STATES)
-            self._tables.unsupported(set_, f'state="{set_.state}" (other than {known})')
-            return -1, 0
-        name = str(set_.name)
-        if name not in self.lights:
-            self.lights.append(name)
-            self.first_states.append(0)
-        return self.lights.index(name), state
 
     def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
         action = wrapped.action

@@ -18,7 +18,7 @@ from bridgegen.ego.noise import noise_key
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
-from bridgegen.simulation.embedded._codes import COURSE_MEMORY, DELAY
+from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
 from bridgegen.simulation.embedded._observation_kernels import observe_rows
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
@@ -185,6 +185,7 @@ def _plan(program: Program) -> memory.Plan:
     return memory.Plan(
         bodies=program.bodies,
         kinds=program.kinds,
+        objects=program.objects,
         init=program.init,
         routes=program.routes,
         timed=program.timed,
@@ -192,6 +193,7 @@ def _plan(program: Program) -> memory.Plan:
         groups=program.groups,
         conditions=program.conditions,
         probes=program.probes,
+        looks_closely=int(program.probes[:, CLOSELY].any()),
         elements=program.elements,
         courses=program.courses,
         entries=program.entries,
@@ -199,7 +201,14 @@ def _plan(program: Program) -> memory.Plan:
         initial=program.initial,
         actions=program.actions,
         laterals=program.laterals,
+        values=program.values,
         first_states=program.first_states,
+        first_phases=program.first_phases,
+        controllers=program.controllers,
+        phases=program.phases,
+        changes=program.changes,
+        first_time=program.first_time,
+        time_passes=program.time_passes,
         weathers=program.weathers,
         driver=program.driver.code,
         ideal_perception=int("perception" in program.driver.ideal),
@@ -258,9 +267,14 @@ def _state(
         history=flags(len(program.conditions), longest_delay + 2),
         phase=numbers(len(program.elements)), executions=numbers(len(program.elements)),
         stamps=numbers(len(program.elements), 4), looked=numbers(len(program.probes), 2),
+        held=zeros(len(program.probes)),
         action_ended=flags(len(program.actions)),
         selected=flags(e),
+        values=zeros(len(program.values)),
+        clock=zeros(3),
         lights=np.zeros((n, len(program.lights)), dtype=np.int8),
+        phase_now=numbers(len(program.controllers)),
+        phase_until=zeros(len(program.controllers)),
         travelled=zeros(e), stood=zeros(e),
         route=numbers(e), on=numbers(e), station=np.ascontiguousarray(a + b * at),
         aside=np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),

@@ -22,6 +22,7 @@ from bridgegen.simulation.embedded._codes import COURSE_WIDTH, EVENT
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
 from bridgegen.simulation.embedded.courses import LONGITUDINAL, first_speed
+from bridgegen.simulation.embedded.global_actions import GlobalActions
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -90,9 +91,10 @@ class _Compiler:
         self.tables = Tables(scenario, place)
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
-        self.points: list[LanePoint] = []
+        self.points: list[Point] = []
         self.waypoints: list[tuple[LanePoint, ...]] = []
-        self.actions = Actions(self.tables, self.paths, self.points)
+        self.everywhere = GlobalActions(self.tables, scenario)
+        self.actions = Actions(self.tables, self.paths, self.points, self.everywhere)
 
     def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
         """Return the scenario as it was given without what cannot be run."""
@@ -117,7 +119,7 @@ class _Compiler:
             )
         storyboard = self.scenario.storyboard
         found = nodes(storyboard)
-        self.triggers = Triggers(self.tables, step, found, self.points)
+        self.triggers = Triggers(self.tables, step, found, self.points, self.everywhere)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
@@ -149,10 +151,14 @@ class _Compiler:
             )
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
+        everywhere, signals = self.everywhere, self.everywhere.signals
+        time = everywhere.first_time
+        first_time = -1 if time is None else self.tables.slot(time[0])
         return Program(
             place=self.place,
             names=self.tables.names,
             bodies=bodies,
+            objects=np.array([self.tables.type_of(one) for one in objects], dtype=np.int64),
             kinds=np.array([kind(one) for one in objects], dtype=np.int64),
             parameters=self.tables.parameters,
             slots=self.tables.slots,
@@ -166,7 +172,7 @@ class _Compiler:
             triggers=table(self.triggers.triggers, 2),
             groups=table(self.triggers.groups, 2),
             conditions=table(self.triggers.conditions, 5),
-            probes=table(self.triggers.probes, 6),
+            probes=table(self.triggers.probes, 11),
             points=tuple(self.points),
             elements=table(rows, 10),
             courses=table(self.actions.courses.rows, COURSE_WIDTH),
@@ -175,9 +181,19 @@ class _Compiler:
             initial=np.array(self.actions.initial, dtype=np.int64),
             actions=table(self.actions.rows, 8),
             laterals=table(self.actions.laterals, 3),
-            weathers=self.actions.environments.rows,
-            lights=tuple(self.actions.lights),
-            first_states=np.array(self.actions.first_states, dtype=np.int8),
+            weathers=everywhere.environments.rows,
+            values=np.array(everywhere.values.slots, dtype=np.int64),
+            lights=tuple(signals.lights),
+            first_states=np.array(signals.first_states, dtype=np.int8),
+            controllers=table(signals.controllers, 4),
+            phases=table(signals.phases, 3),
+            changes=table(signals.changes, 2),
+            first_phases=np.array(
+                [everywhere.first_phases.get(c, -1) for c in range(len(signals.controllers))],
+                dtype=np.int64,
+            ),
+            first_time=first_time,
+            time_passes=int(time is not None and time[1]),
             driver=chosen if ideal is None else chosen.idealised(ideal),
             time_step=step,
             n_steps=n_steps,
@@ -263,18 +279,7 @@ class _Compiler:
         for command in actions.user_defined_actions:
             self.tables.unsupported(command, "UserDefinedAction")
         for one in actions.global_actions:
-            if isinstance(one.action, osc.EntityAction):
-                self.tables.unsupported(one.action, type(one.action.action).__name__)
-                continue
-            if not isinstance(one.action, osc.EnvironmentAction | osc.InfrastructureAction):
-                self.tables.unsupported(one.action, type(one.action).__name__)
-                continue
-            if isinstance(one.action, osc.InfrastructureAction):
-                light, state = self.actions.light(one.action)
-                if light >= 0:
-                    self.actions.first_states[light] = state
-                continue
-            self.actions.environments.begin_with(one.action.environment)
+            self.everywhere.begin_with(one.action)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
         starts: dict[str, tuple[Point, Value]] = {}
         routes: dict[str, tuple[osc.Waypoint, ...]] = dict.fromkeys(self.tables.names, ())

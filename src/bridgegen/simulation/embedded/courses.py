@@ -4,7 +4,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.program import LanePoint
+from bridgegen.simulation.embedded.program import Point
 from bridgegen.simulation.embedded.tables import Tables
 
 SPEED_CHANGE = 0
@@ -56,7 +56,7 @@ class Courses:
         points: takes the positions of synchronisations.
     """
 
-    def __init__(self, tables: Tables, points: list[LanePoint]) -> None:
+    def __init__(self, tables: Tables, points: list[Point]) -> None:
         self._tables, self._points = tables, points
         self.rows: list[Row] = []
         self.entries: list[tuple[int, int]] = []

@@ -1,15 +1,17 @@
 """What a condition looks at: one probe for each triggering entity or element of the storyboard."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.program import LanePoint
+from bridgegen.simulation.embedded.global_actions import GlobalActions
+from bridgegen.simulation.embedded.program import LanePoint, Point
 from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.values import EQUALITY, seconds
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.storyboard import Node
@@ -37,9 +39,47 @@ _STATES = {
 }  # fmt: skip
 
 
+Pair = (
+    osc.DistanceCondition
+    | osc.RelativeDistanceCondition
+    | osc.TimeHeadwayCondition
+    | osc.TimeToCollisionCondition
+)
+"""The conditions on a distance, or on a time in which one is covered."""
+
+_PAIRS = {
+    osc.DistanceCondition: codes.DISTANCE, osc.RelativeDistanceCondition: codes.DISTANCE,
+    osc.TimeHeadwayCondition: codes.TIME_HEADWAY,
+    osc.TimeToCollisionCondition: codes.TIME_TO_COLLISION,
+}  # fmt: skip
+_MEASURES = {
+    osc.RelativeDistanceType.EUCLIDIAN_DISTANCE: codes.EUCLIDIAN,
+    osc.RelativeDistanceType.CARTESIAN_DISTANCE: codes.EUCLIDIAN,
+    osc.RelativeDistanceType.LONGITUDINAL: codes.LONGITUDINAL,
+    osc.RelativeDistanceType.LATERAL: codes.LATERAL,
+}  # fmt: skip
+_SYSTEMS = {
+    osc.CoordinateSystem.ENTITY: codes.ENTITY_SYSTEM, osc.CoordinateSystem.LANE: codes.PATH_SYSTEM,
+    osc.CoordinateSystem.ROAD: codes.PATH_SYSTEM,
+    osc.CoordinateSystem.TRAJECTORY: codes.PATH_SYSTEM,
+    osc.CoordinateSystem.WORLD: codes.WORLD_SYSTEM,
+}  # fmt: skip
+_DIRECTIONS = {
+    osc.DirectionalDimension.LONGITUDINAL: codes.LONGITUDINAL,
+    osc.DirectionalDimension.LATERAL: codes.LATERAL,
+    osc.DirectionalDimension.VERTICAL: codes.VERTICAL,
+}  # fmt: skip
+_DISTANCES = (codes.DISTANCE, codes.TIME_TO_COLLISION, codes.TIME_HEADWAY)
+_OFTEN = (
+    codes.NEVER_TRUE, codes.SIMULATION_TIME, codes.ELEMENT_STATE, codes.SPEED,
+    codes.TRAVELED_DISTANCE, codes.STAND_STILL,
+)  # fmt: skip
+_ON_OWN_WAY = (osc.RoutingAlgorithm.UNDEFINED, osc.RoutingAlgorithm.ASSIGNED_ROUTE)
+
+
 @dataclass(frozen=True)
 class Probe:
-    """A row of ``Program.probes``; ``limit`` is a value and not yet its slot."""
+    """A row of ``Program.probes``; ``limit`` and ``within`` are values and not yet their slots."""
 
     kind: int
     who: int = 0
@@ -47,6 +87,17 @@ class Probe:
     rule: int = 0
     limit: Value = 0.0
     place: int = 0
+    measure: int = 0
+    system: int = 0
+    freespace: bool = False
+    within: Value = 0.0
+
+    @property
+    def looks_closely(self) -> bool:
+        """Whether it is seldom asked for, and looked at in a function of its own."""
+        if self.kind in _DISTANCES:
+            return self.other < 0 or self.freespace or self.measure != codes.EUCLIDIAN
+        return self.kind not in _OFTEN or (self.kind == codes.SPEED and self.measure != codes.TOTAL)
 
 
 class Probes:
@@ -56,101 +107,192 @@ class Probes:
         tables: the compiler's.
         nodes: the storyboard's elements.
         points: takes the positions that probes name.
+        everywhere: knows lights, controllers and values.
     """
 
-    def __init__(self, tables: Tables, nodes: "Sequence[Node]", points: list[LanePoint]) -> None:
+    def __init__(
+        self, tables: Tables, nodes: "Sequence[Node]", points: list[Point],
+        everywhere: GlobalActions,
+    ) -> None:  # fmt: skip
         self._tables, self._nodes, self._points = tables, nodes, points
+        self._signals, self._values = everywhere.signals, everywhere.values
 
     def by_value(self, condition: Element) -> list[Probe]:
         """Return the probes of a condition that no entity triggers."""
-        if isinstance(condition, osc.SimulationTimeCondition):
-            rule = self._rule(condition, condition.rule)
-            return [Probe(codes.SIMULATION_TIME, rule=rule, limit=condition.value)]
-        if isinstance(condition, osc.StoryboardElementStateCondition):
-            return self._element_state(condition)
+        match condition:
+            case osc.SimulationTimeCondition():
+                rule = self._rule(condition.rule)
+                return [Probe(codes.SIMULATION_TIME, rule=rule, limit=condition.value)]
+            case osc.StoryboardElementStateCondition():
+                return self._element_state(condition)
+            case osc.ParameterCondition():
+                return [self._value(condition, "parameter", condition.parameter_ref)]
+            case osc.VariableCondition():
+                return [self._value(condition, "variable", condition.variable_ref)]
+            case osc.TimeOfDayCondition():
+                rule, date = self._rule(condition.rule), self._tables.text(condition.date_time)
+                moment = seconds(date)
+                if moment is not None:
+                    return [Probe(codes.TIME_OF_DAY, rule=rule, limit=moment)]
+                self._tables.unsupported(condition, f'dateTime="{date}"')
+                return []
+            case osc.TrafficSignalCondition():
+                light = self._signals.light(self._tables.text(condition.name))
+                state = self._signals.state(condition, self._tables.text(condition.state))
+                return [Probe(codes.LIGHT_STATE, other=light, limit=float(state))]
+            case osc.TrafficSignalControllerCondition():
+                name = self._tables.text(condition.traffic_signal_controller_ref)
+                controller = self._signals.controller(condition, name)
+                wanted = self._tables.text(condition.phase)
+                phase = self._signals.phase(condition, controller, wanted)
+                return [Probe(codes.LIGHT_PHASE, other=controller, limit=float(phase))]
         self._tables.unsupported(condition, type(condition).__name__)
         return []
 
+    def _value(
+        self, one: osc.ParameterCondition | osc.VariableCondition, what: str, name: str
+    ) -> Probe:
+        """Return the probe of a condition on a parameter or variable."""
+        rule, number = self._rule(one.rule), self._values.number(one, what, name)
+        if not self._values.is_ordered(what, name) and rule not in EQUALITY:
+            self._tables.unsupported(one, f"rule=\"{one.rule}\" for the text of {what} '{name}'")
+        value = self._values.value(one, what, name, one.value)
+        return Probe(codes.VALUE, other=number, rule=rule, limit=value)
+
     def by_entity(self, condition: Element, entities: Sequence[int]) -> list[Probe]:
         """Return a condition's probes, one for each triggering entity."""
-        make = self._maker(condition)
-        return [make(e) for e in entities]
+        probe = self._probe(condition)
+        return [replace(probe, who=e) for e in entities]
 
-    def _maker(self, one: Element) -> Callable[[int], Probe]:
-        """Return what makes the probe of an entity."""
+    def _probe(self, one: Element) -> Probe:
+        """Return the probe of a condition on no entity in particular."""
         match one:
-            case osc.SpeedCondition():
-                if one.direction is not None:
-                    self._tables.unsupported(one, f'direction="{one.direction}"')
-                rule = self._rule(one, one.rule)
-                return lambda e: Probe(codes.SPEED, e, rule=rule, limit=one.value)
+            case osc.SpeedCondition() | osc.AccelerationCondition():
+                kind = codes.SPEED if isinstance(one, osc.SpeedCondition) else codes.ACCELERATION
+                direction = self._direction(one.direction)
+                return Probe(kind, rule=self._rule(one.rule), limit=one.value, measure=direction)
+            case osc.RelativeSpeedCondition():
+                return Probe(
+                    codes.SPEED_DIFFERENCE, other=self._tables.entity(one.entity_ref),
+                    rule=self._rule(one.rule), limit=one.value,
+                    measure=self._direction(one.direction),
+                )  # fmt: skip
             case osc.TraveledDistanceCondition():
-                return lambda e: Probe(codes.TRAVELED_DISTANCE, e, limit=one.value)
+                return Probe(codes.TRAVELED_DISTANCE, limit=one.value)
             case osc.StandStillCondition():
-                return lambda e: Probe(codes.STAND_STILL, e, limit=one.duration)
+                return Probe(codes.STAND_STILL, limit=one.duration)
+            case osc.EndOfRoadCondition():
+                return Probe(codes.END_OF_ROAD, limit=one.duration)
             case osc.ReachPositionCondition():
-                place = self._place(one)
-                return lambda e: Probe(codes.REACH_POSITION, e, limit=one.tolerance, place=place)
-            case osc.RelativeDistanceCondition():
-                return self._pair(one, one.entity_ref, codes.RELATIVE_DISTANCE)
-            case osc.TimeHeadwayCondition():
-                return self._pair(one, one.entity_ref, codes.TIME_HEADWAY)
-            case osc.TimeToCollisionCondition():
-                target = one.target.target
-                if isinstance(target, osc.EntityRef):
-                    return self._pair(one, target.entity_ref, codes.TIME_TO_COLLISION)
-                self._tables.unsupported(target, "TimeToCollisionConditionTarget with a Position")
-            case _:
-                self._tables.unsupported(one, type(one).__name__)
-        return lambda e: Probe(codes.NEVER_TRUE, e)
+                rule, place = codes.LESS_EQUAL, self._place(one.position)
+                return Probe(codes.DISTANCE, other=-1, rule=rule, limit=one.tolerance, place=place)
+            case osc.CollisionCondition(target=osc.EntityRef() as target):
+                return Probe(codes.COLLISION, other=self._tables.entity(target.entity_ref))
+            case osc.CollisionCondition(target=osc.ByObjectType() as target):
+                number = self._tables.type_number(target.type)
+                return Probe(codes.COLLISION_WITH_TYPE, other=number)
+            case osc.AngleCondition() | osc.RelativeAngleCondition():
+                return self._angle(one)
+            case (
+                osc.DistanceCondition()
+                | osc.RelativeDistanceCondition()
+                | osc.TimeHeadwayCondition()
+                | osc.TimeToCollisionCondition()
+            ):
+                return self._pair(one)
+        self._tables.unsupported(one, type(one).__name__)
+        return Probe(codes.NEVER_TRUE)
 
-    def _place(self, one: osc.ReachPositionCondition) -> int:
-        point = self._tables.lane_point(one.position)
+    def _place(self, position: osc.Position) -> int:
+        """Return the number of a place that rows may not vary."""
+        point, aside = self._tables.point(position)
+        if isinstance(point, LanePoint):
+            where = position.position
+            s = self._tables.literal(where, "s", point.s)
+            aside = self._tables.literal(where, "offset", aside)
+            point = replace(point, s=s, aside=aside)
         if point is None:
             return 0
-        if isinstance(point.s, osc.ParameterRef | Expr):
-            self._tables.unsupported(one, f's="{point.s}" of a position to be reached')
         self._points.append(point)
         return len(self._points) - 1
 
-    def _pair(
-        self,
-        one: osc.RelativeDistanceCondition
-        | osc.TimeHeadwayCondition
-        | osc.TimeToCollisionCondition,
-        entity_ref: object,
-        kind: int,
-    ) -> Callable[[int], Probe]:
-        """Return what makes a probe on two entities: reference points, as the crow flies."""
-        kinds = osc.RelativeDistanceType
-        if one.relative_distance_type not in (kinds.EUCLIDIAN_DISTANCE, kinds.CARTESIAN_DISTANCE):
-            self._tables.unsupported(one, f'relativeDistanceType="{one.relative_distance_type}"')
-        if one.freespace is not False:
-            self._tables.unsupported(one, f'freespace="{str(one.freespace).lower()}"')
-        other, rule = self._tables.entity(entity_ref), self._rule(one, one.rule)
-        return lambda e: Probe(kind, e, other, rule, one.value)
+    def _pair(self, one: Pair) -> Probe:
+        """Return the probe of a condition on a distance to an entity or a place."""
+        other, place = -1, 0
+        if isinstance(one, osc.DistanceCondition):
+            place = self._place(one.position)
+        elif isinstance(one, osc.TimeToCollisionCondition):
+            target = one.target.target
+            if isinstance(target, osc.EntityRef):
+                other = self._tables.entity(target.entity_ref)
+            else:
+                place = self._place(target)
+        else:
+            other = self._tables.entity(one.entity_ref)
+        measure, system = self._measure(one)
+        freespace = self._tables.truth(one.freespace)
+        return Probe(
+            _PAIRS[type(one)], 0, other, self._rule(one.rule), one.value, place, measure, system,
+            freespace,
+        )  # fmt: skip
+
+    def _measure(self, one: Pair) -> tuple[int, int]:
+        """Return which distance is meant, and in which system; 1.0 says ``alongRoute`` instead."""
+        if not isinstance(one, osc.RelativeDistanceCondition) and one.along_route is not None:
+            along = self._tables.truth(one.along_route)
+            return (codes.LONGITUDINAL, codes.PATH_SYSTEM) if along else (codes.EUCLIDIAN, 0)
+        measure, system = codes.EUCLIDIAN, codes.ENTITY_SYSTEM
+        if one.relative_distance_type is not None:
+            kind = self._tables.choice(osc.RelativeDistanceType, one.relative_distance_type)
+            measure = _MEASURES[kind]
+        if one.coordinate_system is not None:
+            system = _SYSTEMS[self._tables.choice(osc.CoordinateSystem, one.coordinate_system)]
+        if measure == codes.EUCLIDIAN:
+            return measure, system
+        if system == codes.WORLD_SYSTEM:
+            self._tables.unsupported(one, 'coordinateSystem="world" of a distance')
+        if one.routing_algorithm is not None and system == codes.PATH_SYSTEM:
+            way = self._tables.choice(osc.RoutingAlgorithm, one.routing_algorithm)
+            if way not in _ON_OWN_WAY:  # distances are measured on the entity's own way
+                self._tables.unsupported(one, f'routingAlgorithm="{way}"')
+        return measure, system
+
+    def _angle(self, one: osc.AngleCondition | osc.RelativeAngleCondition) -> Probe:
+        """Return the probe of a condition on a heading."""
+        kind = self._tables.choice(osc.AngleType, one.angle_type)
+        if kind is not osc.AngleType.HEADING:
+            self._tables.unsupported(one, f'angleType="{kind}"')
+        system = codes.WORLD_SYSTEM
+        if one.coordinate_system is not None:
+            chosen = self._tables.choice(osc.CoordinateSystem, one.coordinate_system)
+            system = _SYSTEMS[chosen]
+            if isinstance(one, osc.AngleCondition) and chosen is osc.CoordinateSystem.ROAD:
+                self._tables.unsupported(one, 'coordinateSystem="road" of an angle')
+        within = one.angle_tolerance
+        if isinstance(one, osc.AngleCondition):
+            return Probe(codes.ANGLE, limit=one.angle, system=system, within=within)
+        other = self._tables.entity(one.entity_ref)
+        return Probe(codes.RELATIVE_ANGLE, other=other, limit=one.angle, within=within)
 
     def _element_state(self, one: osc.StoryboardElementStateCondition) -> list[Probe]:
         """Return a probe for each element that bears the name, or ends in the path of names."""
-        if isinstance(one.storyboard_element_type, osc.ParameterRef) or isinstance(
-            one.state, osc.ParameterRef
-        ):
-            self._tables.unsupported(one, "a StoryboardElementStateCondition by a parameter")
-            return []
-        kind, state = _ELEMENTS[one.storyboard_element_type], _STATES[one.state]
-        path = tuple(str(one.storyboard_element_ref).split("::"))
+        kind = self._tables.choice(osc.StoryboardElementType, one.storyboard_element_type)
+        state = self._tables.choice(osc.StoryboardElementState, one.state)
+        path = tuple(self._tables.text(one.storyboard_element_ref).split("::"))
         found = [
             number
             for number, node in enumerate(self._nodes)
-            if node.kind == kind and node.path[-len(path) :] == path
+            if node.kind == _ELEMENTS[kind] and node.path[-len(path) :] == path
         ]
         if not found:
             what = f'storyboardElementRef="{one.storyboard_element_ref}"'
-            self._tables.unsupported(one, f"{what} (no such {one.storyboard_element_type})")
-        return [Probe(codes.ELEMENT_STATE, number, state) for number in found]
+            self._tables.unsupported(one, f"{what} (no such {kind})")
+        return [Probe(codes.ELEMENT_STATE, number, _STATES[state]) for number in found]
 
-    def _rule(self, element: Element, rule: osc.Rule | osc.ParameterRef) -> int:
-        if isinstance(rule, osc.ParameterRef):
-            self._tables.unsupported(element, f'rule="{rule}"')
-            return 0
-        return _RULES[rule]
+    def _rule(self, rule: osc.Rule | osc.ParameterRef) -> int:
+        return _RULES[self._tables.choice(osc.Rule, rule)]
+
+    def _direction(self, direction: osc.DirectionalDimension | osc.ParameterRef | None) -> int:
+        if direction is None:
+            return codes.TOTAL
+        return _DIRECTIONS[self._tables.choice(osc.DirectionalDimension, direction)]

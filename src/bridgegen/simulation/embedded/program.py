@@ -106,6 +106,7 @@ class Program:
         bodies: ``(E, 8)``: length, width, centre ahead of the reference point [m], maximum speed
             [m/s], acceleration and deceleration [m/s²], curvature at full lock [1/m], height [m].
         kinds: ``(E,)``: what they are, see `bridgegen.ego.kinds`.
+        objects: ``(E,)``: OpenSCENARIO's ObjectType of each: vehicle, pedestrian, miscellaneous.
         parameters: the numeric parameters with their declared values.
         slots: S distinct values.
         init: ``(E,)`` slot of each entity's initial speed.
@@ -120,7 +121,9 @@ class Program:
         triggers: ``(·, 2)`` first and past-the-last group; trigger 0 stops the scenario.
         groups: ``(·, 2)`` first and past-the-last condition.
         conditions: ``(C, 5)`` first and past-the-last probe, quantity, edge, delay in steps.
-        probes: ``(·, 6)`` kind, entity, other entity, rule, slot, point.
+        probes: ``(·, 11)`` kind, entity, other entity or -1 for a point, rule, slot, point,
+            measure, coordinate system, whether between boxes, a second slot, whether it is one
+            of those that are seldom asked for.
         points: positions that probes name.
         elements: ``(X, 10)`` of the storyboard: kind, parent, first element after it, start and
             stop trigger, priority, executions at most, first and past-the-last action, event.
@@ -134,8 +137,16 @@ class Program:
             selected by the trigger; see ``_action_kernels`` and ``_motion_kernels``. ``_codes``
             names the columns.
         laterals: ``(·, 3)``, see ``_across_kernels``.
-        lights: the traffic lights that are set.
-        first_states: ``(S,)`` int8, their states at the start, see `Rollout.lights`.
+        values: slots of the first values of parameters and variables that change.
+        lights: the traffic lights that are set or looked at.
+        first_states: ``(S,)`` int8, their states that the start sets, see `Rollout.lights`; -1:
+            none.
+        controllers: ``(·, 4)`` first and past-the-last phase, slot of the delay, to whom or -1.
+        phases: ``(·, 3)`` slot of the duration, first and past-the-last change.
+        changes: ``(·, 2)`` light, state.
+        first_phases: by controller the phase that the start sets, -1 if none.
+        first_time: slot of the start's date [s], -1 if it states none.
+        time_passes: whether that date passes.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
@@ -150,6 +161,7 @@ class Program:
     names: tuple[str, ...]
     bodies: Float
     kinds: Int
+    objects: Int
     parameters: Mapping[str, float]
     slots: tuple[Value, ...]
     init: Int
@@ -163,7 +175,7 @@ class Program:
     groups: Int
     conditions: Int
     probes: Int
-    points: tuple[LanePoint, ...]
+    points: tuple[Point, ...]
     elements: Int
     courses: Int
     entries: Int
@@ -172,8 +184,15 @@ class Program:
     actions: Int
     laterals: Int
     weathers: Int
+    values: Int
     lights: tuple[str, ...]
     first_states: npt.NDArray[np.int8]
+    controllers: Int
+    phases: Int
+    changes: Int
+    first_phases: Int
+    first_time: int
+    time_passes: int
     driver: Driver
     time_step: float
     n_steps: int

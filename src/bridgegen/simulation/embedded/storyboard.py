@@ -115,10 +115,7 @@ def _count(tables: Tables, part: osc.ManeuverGroup | osc.Event) -> int:
 
 
 def _priority(tables: Tables, event: osc.Event) -> int:
-    if isinstance(event.priority, osc.ParameterRef):
-        tables.unsupported(event, f'priority="{event.priority}"')
-        return codes.PARALLEL
-    return _PRIORITIES[event.priority]
+    return _PRIORITIES[tables.choice(osc.Priority, event.priority)]
 
 
 def _actors(
@@ -127,7 +124,5 @@ def _actors(
     """Return a group's actors, and those that act only if they make the event's trigger fire."""
     refs = group.actors.entity_refs
     named = list(dict.fromkeys(e for ref in refs for e in tables.members(ref.entity_ref)))
-    selects = group.actors.select_triggering_entities
-    if isinstance(selects, osc.ParameterRef):
-        tables.unsupported(group.actors, f'selectTriggeringEntities="{selects}"')
-    return named, [e for e in triggering if e not in named] if selects is True else []
+    selects = tables.truth(group.actors.select_triggering_entities)
+    return named, [e for e in triggering if e not in named] if selects else []

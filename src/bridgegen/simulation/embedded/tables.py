@@ -16,6 +16,7 @@ from bridgegen.simulation.embedded.program import LanePoint, Point, WorldPoint
 _OBJECTS = {
     osc.ObjectType.VEHICLE: osc.Vehicle, osc.ObjectType.PEDESTRIAN: osc.Pedestrian,
     osc.ObjectType.MISCELLANEOUS: osc.MiscObject,
+    osc.ObjectType.EXTERNAL: osc.ExternalObjectReference,
 }  # fmt: skip
 
 Choice = TypeVar("Choice", bound=StrEnum)
@@ -74,16 +75,21 @@ class Tables:
             if isinstance(member, osc.EntityRef):
                 found[self.entity(member.entity_ref)] = None
             else:
-                found |= dict.fromkeys(self.of_type(member, member.object_type))
+                found |= dict.fromkeys(self.of_type(member.object_type))
         return tuple(found)
 
-    def of_type(self, element: Element, kind: osc.ObjectType | osc.ParameterRef) -> list[int]:
+    def of_type(self, kind: osc.ObjectType | osc.ParameterRef) -> list[int]:
         """Return the numbers of the entities of a kind."""
-        if kind not in _OBJECTS:
-            self.unsupported(element, f'objectType="{kind}"')
-            return []
-        wanted = _OBJECTS[kind]
+        wanted = _OBJECTS[self.choice(osc.ObjectType, kind)]
         return [e for e, one in enumerate(self.objects) if isinstance(one.entity_object, wanted)]
+
+    def type_number(self, kind: osc.ObjectType | osc.ParameterRef) -> int:
+        """Return the number of a kind of entities."""
+        return list(_OBJECTS).index(self.choice(osc.ObjectType, kind))
+
+    def type_of(self, body: object) -> int:
+        """Return the number of an entity's kind."""
+        return next(i for i, kind in enumerate(_OBJECTS.values()) if isinstance(body, kind))
 
     def unsupported(self, element: Element, what: str) -> None:
         """Take down what cannot be run, with its line."""
@@ -108,9 +114,22 @@ class Tables:
         """Return a text; a parameter of text has the same value in every row."""
         return str(self._declared[value.name] if isinstance(value, osc.ParameterRef) else value)
 
+    def truth(self, value: bool | osc.ParameterRef | Expr) -> bool:
+        """Return a Boolean; a parameter of one has the same value in every row."""
+        if isinstance(value, Expr):
+            return bool(self.declared(value))
+        if isinstance(value, osc.ParameterRef):
+            return self.text(value).lower() in ("true", "1", "1.0")
+        return value
+
     def choice(self, enum: type[Choice], value: str | osc.ParameterRef) -> Choice:
-        """Return which of an enumeration's values is meant."""
-        return enum(self.text(value))
+        """Return which of an enumeration's values is meant; a wrong one is taken down."""
+        text = self.text(value)
+        if text not in tuple(enum):
+            known = ", ".join(enum)
+            self.problems.append(f"{self.place}: one of {known} is needed, got '{text}' ({value})")
+            return next(iter(enum))
+        return enum(text)
 
     def point(self, position: osc.Position) -> tuple[Point | None, Value]:
         """Return a position and how far it is aside of its lane's centre [m]."""

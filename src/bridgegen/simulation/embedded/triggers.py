@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded import _codes as codes
+from bridgegen.simulation.embedded.global_actions import GlobalActions
 from bridgegen.simulation.embedded.probes import Probe, Probes
-from bridgegen.simulation.embedded.program import LanePoint
+from bridgegen.simulation.embedded.program import Point
 from bridgegen.simulation.embedded.tables import Tables
 
 if TYPE_CHECKING:
@@ -34,18 +35,19 @@ class Triggers:
         self,
         tables: Tables,
         time_step: float,
-        nodes: "Sequence[Node]" = (),
-        points: list[LanePoint] | None = None,
+        nodes: "Sequence[Node]",
+        points: list[Point],
+        everywhere: GlobalActions,
     ) -> None:
         self.triggers: list[tuple[int, int]] = []
         self.groups: list[tuple[int, int]] = []
         self.conditions: list[tuple[int, ...]] = []
         self.probes: list[tuple[int, ...]] = []
-        self.points = [] if points is None else points
+        self.points = points
         self.stop_time = 0.0
         self._tables = tables
         self._time_step = time_step
-        self._probes = Probes(tables, nodes, self.points)
+        self._probes = Probes(tables, nodes, self.points, everywhere)
 
     def add(self, trigger: osc.Trigger | None) -> int:
         """Append a trigger and return its number; -1 if it is missing."""
@@ -77,9 +79,7 @@ class Triggers:
     def _condition(self, condition: osc.Condition) -> None:
         """Append a condition; one that cannot be run is taken down and never true."""
         known = len(self._tables.problems)
-        edge = _EDGES.get(condition.condition_edge, -1)  # type: ignore[arg-type]
-        if edge < 0:
-            self._tables.unsupported(condition, f'conditionEdge="{condition.condition_edge}"')
+        edge = _EDGES[self._tables.choice(osc.ConditionEdge, condition.condition_edge)]
         delay = round(self._tables.literal(condition, "delay", condition.delay) / self._time_step)
         kind, quantity = condition.condition, codes.ANY
         if isinstance(kind, osc.ByValueCondition):
@@ -88,19 +88,22 @@ class Triggers:
                 self._note_end(kind.condition, delay)
         else:
             who = kind.triggering_entities
-            rule = who.triggering_entities_rule
-            if isinstance(rule, osc.ParameterRef):
-                self._tables.unsupported(who, f'triggeringEntitiesRule="{rule}"')
-            else:
-                quantity = _QUANTITIES[rule]
+            rule = self._tables.choice(osc.TriggeringEntitiesRule, who.triggering_entities_rule)
+            quantity = _QUANTITIES[rule]
             entities = [e for ref in who.entity_refs for e in self._tables.members(ref.entity_ref)]
             probes = self._probes.by_entity(kind.entity_condition.condition, entities)
         if len(self._tables.problems) > known or not probes:
             probes, quantity = [Probe(codes.NEVER_TRUE)], codes.ANY
         first = len(self.probes)
         for probe in probes:
-            limit = self._tables.slot(probe.limit)
-            self.probes.append((probe.kind, probe.who, probe.other, probe.rule, limit, probe.place))
+            limit, within = self._tables.slot(probe.limit), self._tables.slot(probe.within)
+            self.probes.append(
+                (
+                    probe.kind, probe.who, probe.other, probe.rule, limit, probe.place,
+                    probe.measure, probe.system, int(probe.freespace), within,
+                    int(probe.looks_closely),
+                )
+            )  # fmt: skip
         self.conditions.append((first, len(self.probes), quantity, edge, delay))
 
     def _note_end(self, clock: osc.SimulationTimeCondition, delay: int) -> None:

@@ -196,15 +196,13 @@ class Ways:
             self.tracks.append(timetable(corners, spec.times, instants))
 
 
-def position(program: Program, model: OpenDrive, point: LanePoint) -> tuple[float, float]:
+def position(program: Program, model: OpenDrive, point: Point) -> tuple[float, float]:
     """Return where a condition's point is [m].
 
     Raises:
         InputError: it is not on a road.
     """
-    road, s = _known(program, point)
-    pose = lane_pose(model.road(road), point.lane, s)
-    return pose.x, pose.y
+    return _corner(program, model, point)[:2]
 
 
 def _target(graph: LaneGraph, node: int, check: LaneCheck) -> int | None:
