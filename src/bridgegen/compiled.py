@@ -15,6 +15,9 @@ from typing import Any
 
 import numba
 import numba.extending
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
 
 @lru_cache(maxsize=1)
@@ -87,8 +90,74 @@ def _borrowed(_: Any, array: Any) -> Any:
     return array(array), generate
 
 
+class Bundle(numba.types.Type):
+    """In a kernel: where a named tuple of arrays is described; its arrays are read as attributes.
+
+    A tuple itself would be copied whole wherever one of its arrays is read, and passed array by
+    array wherever a kernel calls another: a hundred arrays take the compiler minutes.
+    """
+
+    def __init__(self, held: Any) -> None:
+        self.held = held
+        super().__init__(name=f"Bundle({held})")
+
+
+@numba.extending.register_model(Bundle)
+class _BundleModel(numba.extending.models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, cgutils.voidptr_t)
+
+
+@infer_getattr
+class _BundleAttributes(AttributeTemplate):  # type: ignore[misc]
+    key = Bundle
+
+    def generic_resolve(self, bundle: Bundle, name: str) -> Any:
+        fields = bundle.held.instance_class._fields
+        return bundle.held.types[fields.index(name)] if name in fields else None
+
+
+@lower_getattr_generic(Bundle)
+def _read(context: Any, builder: Any, bundle: Bundle, value: Any, name: str) -> Any:
+    held = bundle.held
+    i = held.instance_class._fields.index(name)
+    place = builder.bitcast(value, context.get_value_type(held).as_pointer())
+    at = cgutils.gep_inbounds(builder, place, 0, i)
+    if not isinstance(held.types[i], numba.types.Array):
+        return builder.load(at)
+    there = context.make_array(held.types[i])(context, builder, ref=at)
+    view = context.make_array(held.types[i])(context, builder)
+    view.meminfo, view.parent = view.meminfo.type(None), view.parent.type(None)
+    for part in ("nitems", "itemsize", "data", "shape", "strides"):
+        setattr(view, part, getattr(there, part))
+    return view._getvalue()
+
+
+def _bundled(_: Any, value: Any) -> Any:
+    """In a kernel: a bundle of a named tuple's arrays, borrowed; their owners must outlive it."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = cgutils.alloca_once(builder, arguments[0].type)
+        for i, member in enumerate(value.types):
+            at = cgutils.gep_inbounds(builder, place, 0, i)
+            part = builder.extract_value(arguments[0], i)
+            if not isinstance(member, numba.types.Array):
+                builder.store(part, at)
+                continue
+            here = context.make_array(member)(context, builder, part)
+            there = context.make_array(member)(context, builder, ref=at)
+            for name in ("nitems", "itemsize", "data", "shape", "strides"):
+                setattr(there, name, getattr(here, name))
+        return builder.bitcast(place, cgutils.voidptr_t)
+
+    return Bundle(value)(value), generate
+
+
 def _itself(array: Any) -> Any:
     return array
 
 
-borrowed = _itself if numba.config.DISABLE_JIT else numba.extending.intrinsic(_borrowed)
+if numba.config.DISABLE_JIT:
+    borrowed = bundled = _itself
+else:
+    borrowed, bundled = map(numba.extending.intrinsic, (_borrowed, _bundled))

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.compiled import borrowed, inlined_kernel
+from bridgegen.compiled import borrowed, bundled, inlined_kernel
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
@@ -216,13 +216,13 @@ class Record(NamedTuple):
 
 
 def view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:
-    """Return the kernel that borrows a tuple's arrays; of N rows' those of row i if at="[i]"."""
+    """Return the kernel that bundles a tuple's arrays; of N rows' those of row i if at="[i]"."""
     items = ", ".join(
         f"rows.{name}" if type_ in (int, float) else f"borrowed(rows.{name}{at})"
         for name, type_ in kind.__annotations__.items()
     )
-    code = f"lambda rows{', i' if at else ''}: kind({items})"
-    return inlined_kernel(eval(code, {"kind": kind, "borrowed": borrowed}))
+    code = f"lambda rows{', i' if at else ''}: bundled(kind({items}))"
+    return inlined_kernel(eval(code, {"kind": kind, "borrowed": borrowed, "bundled": bundled}))
 
 
 plan_of = view(Plan)
