@@ -90,7 +90,7 @@ def _borrowed(_: Any, array: Any) -> Any:
     return array(array), generate
 
 
-class Bundle(numba.types.Type):
+class Bundle(numba.types.Type):  # type: ignore[misc]
     """In a kernel: where a named tuple of arrays is described; its arrays are read as attributes.
 
     A tuple itself would be copied whole wherever one of its arrays is read, and passed array by
@@ -117,7 +117,7 @@ class _BundleAttributes(AttributeTemplate):  # type: ignore[misc]
         return bundle.held.types[fields.index(name)] if name in fields else None
 
 
-@lower_getattr_generic(Bundle)
+@lower_getattr_generic(Bundle)  # type: ignore[untyped-decorator]
 def _read(context: Any, builder: Any, bundle: Bundle, value: Any, name: str) -> Any:
     held = bundle.held
     i = held.instance_class._fields.index(name)

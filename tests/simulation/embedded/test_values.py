@@ -97,7 +97,6 @@ def test_what_texts_cannot_do_is_refused():
     for row in (
         ("e", MOVE, variable("word", "end", "lessThan")),
         ("e", MOVE, variable("n", "many")),
-        ("e", MOVE, variable("other", 1)),
         ("e", set_("word", ADD), after(1.0)),
     ):
         with pytest.raises(UnsupportedError):

@@ -8,7 +8,7 @@ import math
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
-    ACCELERATION,
+    ACCELERATING,
     ANGLE,
     CLOSELY,
     COLLISION,
@@ -123,7 +123,7 @@ def look_one(p, k, scene):
         if measure == LONGITUDINAL:
             return compare(scene.v[e, k] - along, rule, limit)
         return compare(-aside if measure == LATERAL else 0.0, rule, limit)
-    if kind == ACCELERATION:
+    if kind == ACCELERATING:
         along, aside = accelerations(e, k, scene)
         if measure == TOTAL:
             return compare(math.hypot(along, aside), rule, limit)

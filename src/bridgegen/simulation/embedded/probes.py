@@ -168,7 +168,7 @@ class Probes:
         """Return the probe of a condition on no entity in particular."""
         match one:
             case osc.SpeedCondition() | osc.AccelerationCondition():
-                kind = codes.SPEED if isinstance(one, osc.SpeedCondition) else codes.ACCELERATION
+                kind = codes.SPEED if isinstance(one, osc.SpeedCondition) else codes.ACCELERATING
                 direction = self._direction(one.direction)
                 return Probe(kind, rule=self._rule(one.rule), limit=one.value, measure=direction)
             case osc.RelativeSpeedCondition():
