@@ -21,8 +21,9 @@ CARS = (4.5, 1.8, 1.4, 50.0, 3.0, 9.0, 0.2, 1.5)
 
 
 @kernel
-def drive(n_rows, x, y, h, v, bodies, kinds, weather, memory, tracks, detections):
+def drive(n_rows, present, x, y, h, v, bodies, kinds, weather, memory, tracks, detections):
     """Perceive N rows, each with noise of its own."""
+    present = borrowed(present)
     x, y, h, v = borrowed(x), borrowed(y), borrowed(h), borrowed(v)
     bodies, kinds, weather = borrowed(bodies), borrowed(kinds), borrowed(weather)
     memory, tracks, detections = borrowed(memory), borrowed(tracks), borrowed(detections)
@@ -31,8 +32,8 @@ def drive(n_rows, x, y, h, v, bodies, kinds, weather, memory, tracks, detections
         tracks[:] = 0.0
         for k in range(x.shape[1]):
             perceive(
-                k, DT, np.uint64(row), False, x, y, h, v, bodies, kinds, weather, memory, tracks,
-                detections,
+                k, DT, np.uint64(row), False, present, x, y, h, v, bodies, kinds, weather, memory,
+                tracks, detections,
             )  # fmt: skip
 
 
@@ -48,7 +49,8 @@ def perception(n_bodies: int, n_rows: int) -> float:
     x = start[0][:, None] + v * np.cos(h) * t
     y = start[1][:, None] + v * np.sin(h) * t
     arrays = (
-        x, y, h, v, np.tile(CARS, (e, 1)), np.full(e, CAR), Sky().numbers(),
+        np.ones(e, dtype=np.bool_), x, y, h, v, np.tile(CARS, (e, 1)), np.full(e, CAR),
+        Sky().numbers(),
         np.zeros((e, MEMORY)), np.zeros((e, TRACK)), np.zeros((e, STEPS, DETECTION)),
     )  # fmt: skip
     drive(1, *arrays)

@@ -42,6 +42,7 @@ class Scene:
         self.x = start[:, 0:1] + self.v * np.cos(self.h) * t
         self.y = start[:, 1:2] + self.v * np.sin(self.h) * t
         self.n_entities = e
+        self.present = np.ones(e, dtype=np.bool_)
 
     def perceive(self, numbers: np.ndarray, key: int = 1, *, ideal: bool = False):
         """Return the detections ``(E, T, 8)`` and the tracks of all instants ``(T, E, 12)``."""
@@ -51,8 +52,8 @@ class Scene:
         history = np.empty((self.n_steps, self.n_entities, TRACK))
         for k in range(self.n_steps):
             perceive(
-                k, self.dt, np.uint64(key), ideal, self.x, self.y, self.h, self.v, self.bodies,
-                self.kinds, numbers, memory, tracks, detections,
+                k, self.dt, np.uint64(key), ideal, self.present, self.x, self.y, self.h, self.v,
+                self.bodies, self.kinds, numbers, memory, tracks, detections,
             )  # fmt: skip
             history[k] = tracks
         return detections, history

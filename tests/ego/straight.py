@@ -26,6 +26,7 @@ class Road:
         self, drive: Callable[..., float], speed: float, other: np.ndarray, body: np.ndarray = CAR
     ) -> None:
         self.drive, self.speed, self.body = drive, speed, body
+        self.present = np.ones(2, dtype=np.bool_)
         self.paths = np.stack([path(0.0, 0.0, 0.0), other])
 
     def run(self, seconds: float, w: Callable[[float], float], aside=None) -> "Road":
@@ -46,8 +47,8 @@ class Road:
             y[1, k] = self.paths[1, 0, 1] + station[1] * np.sin(heading) + left * np.cos(heading)
             x[0, k] = station[0]
             asked = self.drive(
-                k, DT, self.paths, counts, steps, station, on, to, self.speed, x, y, h, v, bodies,
-                attention,
+                k, DT, self.paths, counts, steps, station, on, to, self.speed, self.present, x, y,
+                h, v, bodies, attention,
             )  # fmt: skip
             end = max(v[0, k] + asked * DT, 0.0)
             self.a[k] = (end - v[0, k]) / DT

@@ -1,6 +1,7 @@
 """The page of a logical scenario, and its picture."""
 
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -57,6 +58,25 @@ def test_bodies_are_drawn_where_they_are():
     scale = float(re.search(r"h(\d+\.\d)", bar.get("d")).group(1)) / metres
     assert len(places) == 2
     np.testing.assert_allclose((places[1] - places[0]) / scale, gap * [1, -1], atol=0.05)
+
+
+def test_nobody_is_drawn_who_is_not_there(monkeypatch):
+    scenario = load("crossroads-s4")
+    pipeline = Pipeline(scenario, scenario.space())
+    rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
+    present = np.ones(rollout.x.shape, dtype=np.bool_)
+    present[0, 1, 20:] = False
+    gone = replace(rollout, present=present)
+    monkeypatch.setattr(pipeline, "rollout", lambda _: gone)
+    root = ElementTree.fromstring(sketch(pipeline))
+    closest = int(gone.distance[0, 1, : gone.n_steps[0]].argmin())
+    assert closest < 20  # it counts only while it is there
+    assert len(list(root.iter(f"{SVG}polyline"))) > 4
+    present[0, 1] = False
+    gone = replace(rollout, present=present)
+    root = ElementTree.fromstring(sketch(pipeline))
+    assert "ego" in {one.text for one in root.iter(f"{SVG}text")}
+    assert "bv" not in {one.text for one in root.iter(f"{SVG}text")}
 
 
 def test_it_tells_the_story():

@@ -211,3 +211,25 @@ def test_a_row_of_a_batch_is_that_row_alone(model):
     )  # fmt: skip
     assert queues(both, 0, one.names, model, LANES) == ()
     assert queues(both, 1, one.names, model, LANES) == queues(one, 0, one.names, model, LANES)
+
+
+# -- who is not there --------------------------------------------------------------------------
+
+
+def test_nobody_runs_into_somebody_that_is_not_there():
+    """As above, with bv1 there up to 2.5 s, which is an instant before it would be touched."""
+    t = np.arange(40) * DT
+    one = rollout([10.0 * t, np.full(40, 30.0)], np.array([[0.0], [1.0]]))
+    present = np.ones(one.x.shape, dtype=np.bool_)
+    present[0, 1, 27:] = False
+    assert len(accidents(replace(one, present=present), 0)) == 1
+    present[0, 1, 26:] = False
+    assert accidents(replace(one, present=present), 0) == ()
+
+
+def test_nobody_queues_that_is_not_there(model):
+    one = waiting([5.0, 15.0, 25.0])
+    present = np.ones(one.x.shape, dtype=np.bool_)
+    assert len(queues(replace(one, present=present), 0, one.names, model, LANES)) == 1
+    present[0, 1] = False
+    assert queues(replace(one, present=present), 0, one.names, model, LANES) == ()

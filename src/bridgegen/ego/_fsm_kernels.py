@@ -86,15 +86,16 @@ def braking(gap, v, w, a):
 
 @kernel
 def drive_fsm(
-    k, dt, paths, path_n, path_ds, station, on, to, planned, x, y, h, speed, bodies, attention
+    k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
+    attention,
 ):  # fmt: skip
     """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
 
     The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
     ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
-    that it changes ``to``, -1 if none; ``x``, ``y``, ``h``, ``speed`` ``(E, T)``, of which nothing
-    after instant k is read; ``bodies`` ``(E, ·)``; and ``attention`` ``(E, 3)``, zeros before the
-    first instant, changed in place.
+    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
+    ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; and ``attention``
+    ``(E, 3)``, zeros before the first instant, changed in place.
     """
     v, own = speed[0, k], on[0]
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
@@ -102,6 +103,8 @@ def drive_fsm(
     horizon = min(reach / max(v, 1.0), HORIZON)
     needed = 0.0
     for e in range(1, len(speed)):
+        if not present[e]:
+            continue
         p, w, turn = on[e], speed[e, k], 0.0
         if k > 0:
             turn = (h[e, k] - h[e, k - 1]) / dt

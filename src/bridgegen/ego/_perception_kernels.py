@@ -67,7 +67,7 @@ def frame_at(k, dt):
 
 
 @kernel
-def place(k, x, y, h, bodies, memory):
+def place(k, present, x, y, h, bodies, memory):
     """Fill the geometry of all bodies as seen from the ego's box centre; return how many count."""
     cosine, sine = math.cos(h[0, k]), math.sin(h[0, k])
     sx, sy = x[0, k] + bodies[0, 2] * cosine, y[0, k] + bodies[0, 2] * sine
@@ -78,7 +78,7 @@ def place(k, x, y, h, bodies, memory):
         d = math.sqrt(dx * dx + dy * dy)
         memory[e, DX], memory[e, DY], memory[e, COS], memory[e, SIN] = dx, dy, c, s
         memory[e, D] = max(d, 1e-3)
-        if d <= CULL:
+        if present[e] and d <= CULL:
             near += 1
         else:
             memory[e, D] = math.inf
@@ -91,10 +91,13 @@ def place(k, x, y, h, bodies, memory):
 
 
 @kernel
-def know(k, dt, x, y, h, v, bodies, kinds, tracks, detections):
+def know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections):
     """Ideal perception: the truth goes to the tracks, and to the detections of a frame."""
     frame = frame_at(k, dt) >= 0
     for e in range(1, x.shape[0]):
+        if not present[e]:
+            blank(detections, e, k, NOBODY if frame else NO_FRAME)
+            continue
         cosine, sine = math.cos(h[e, k]), math.sin(h[e, k])
         tracks[e, tracking.STATE] = tracking.CONFIRMED
         tracks[e, tracking.X] = x[e, k] + bodies[e, 2] * cosine
@@ -115,11 +118,11 @@ def know(k, dt, x, y, h, v, bodies, kinds, tracks, detections):
 
 
 @kernel
-def look(k, dt, frame, key, x, y, h, bodies, kinds, weather, memory, tracks, detections):
+def look(k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tracks, detections):
     """Take a sensor frame: fill its detections, and tell the tracks."""
     elapsed = max(dt, FRAME)
     renew, keep = 1.0 - math.exp(-elapsed / DROPOUT_TIME), math.exp(-elapsed / ERROR_TIME)
-    near = place(k, x, y, h, bodies, memory)
+    near = place(k, present, x, y, h, bodies, memory)
     heading = math.cos(h[0, k]), math.sin(h[0, k])
     height = max(MOUNT * bodies[0, 7], LEAST_HEIGHT)
     sx = x[0, k] + bodies[0, 2] * heading[0]
@@ -152,7 +155,9 @@ def look(k, dt, frame, key, x, y, h, bodies, kinds, weather, memory, tracks, det
 
 
 @kernel
-def perceive(k, dt, key, ideal, x, y, h, v, bodies, kinds, weather, memory, tracks, detections):
+def perceive(
+    k, dt, key, ideal, present, x, y, h, v, bodies, kinds, weather, memory, tracks, detections
+):  # fmt: skip
     """Bring the tracks up to instant k, with a sensor frame if one is due.
 
     To be called at every instant from 0 on, in order.
@@ -162,6 +167,8 @@ def perceive(k, dt, key, ideal, x, y, h, v, bodies, kinds, weather, memory, trac
         dt: between two instants [s].
         key: uint64, of the scenario's random numbers.
         ideal: whether the truth itself goes to the tracks.
+        present: ``(E,)`` bool, who is there; the caller drops the tracks of who ceases to be
+            (``tracking.forget``).
         x: ``(E, T)`` [m], reference points; of all that has T, only instant k is read.
         y: ``(E, T)`` [m].
         h: ``(E, T)`` [rad].
@@ -175,14 +182,16 @@ def perceive(k, dt, key, ideal, x, y, h, v, bodies, kinds, weather, memory, trac
     """
     blank(detections, 0, k, NOBODY)
     if ideal:
-        know(k, dt, x, y, h, v, bodies, kinds, tracks, detections)
+        know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections)
         return
     if k > 0:
         for e in range(1, x.shape[0]):
             tracking.advance(tracks, memory, e, dt)
     frame = frame_at(k, dt)
     if frame >= 0:
-        look(k, dt, frame, key, x, y, h, bodies, kinds, weather, memory, tracks, detections)
+        look(
+            k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tracks, detections
+        )
         return
     for e in range(1, x.shape[0]):
         blank(detections, e, k, NO_FRAME)

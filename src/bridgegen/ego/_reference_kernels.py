@@ -116,8 +116,9 @@ def drive(k, curvature, friction_limit, plan_, roads, state, record):
     """
     s, v, mind = state.station[0], record.v[0, k], state.mind
     perceive(
-        k, plan_.dt, state.key[0], plan_.ideal_perception, record.x, record.y, record.h, record.v,
-        plan_.bodies, plan_.kinds, state.weather, state.sensors, state.tracks, record.detections,
+        k, plan_.dt, state.key[0], plan_.ideal_perception, state.present, record.x, record.y,
+        record.h, record.v, plan_.bodies, plan_.kinds, state.weather, state.sensors, state.tracks,
+        record.detections,
     )  # fmt: skip
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)

@@ -105,6 +105,13 @@ def see(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, var_
 
 
 @kernel
+def forget(tracks, e):
+    """Drop a track."""
+    for i in range(TRACK):
+        tracks[e, i] = 0.0
+
+
+@kernel
 def miss(tracks, memory, e):
     """Tell a track that a frame has not seen it."""
     if tracks[e, STATE] == NONE:
@@ -115,5 +122,4 @@ def miss(tracks, memory, e):
         tracks[e, STATE] = COASTING
         hopeless = tracks[e, UNSEEN] > COAST
     if hopeless:
-        for i in range(TRACK):
-            tracks[e, i] = 0.0
+        forget(tracks, e)

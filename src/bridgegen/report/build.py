@@ -171,6 +171,8 @@ def _playbacks(
     for k, (name, evaluation, files) in enumerate(kept):
         concrete = pipeline.concrete(rows.X[evaluation])
         x, y = rollout.x[k], rollout.y[k]
+        if rollout.present.size:  # the page shows nobody where there is no place
+            x, y = (np.where(rollout.present[k], one, np.nan) for one in (x, y))
         lanes, lights = scenery.road(rows.X[evaluation])
         picture = None
         if concrete.individuals is not None:

@@ -228,8 +228,8 @@ class Playback:
         cause: what its harm is put down to; may be empty.
         time_step: seconds between two instants.
         entities: E bodies, the ego first.
-        x: ``(E, T)`` float64 [m], rear axle.
-        y: ``(E, T)`` float64 [m].
+        x: ``(E, T)`` float64 [m], rear axle; NaN where an entity is not there.
+        y: ``(E, T)`` float64 [m], likewise.
         h: ``(E, T)`` float64 [rad], heading, counter-clockwise from +x, continuous.
         v: ``(E, T)`` float64 [m/s].
         distance: ``(T,)`` float64 [m], from the ego's box to the nearest other, 0 at contact;

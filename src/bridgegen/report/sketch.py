@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import AREA_KINDS, Entity, Lamp, Outline
 from bridgegen.report.scenery import Scenery, bodies, lamps
@@ -74,14 +74,19 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
     last = min(n - 1, closest + round(_AFTER / rollout.time_step))
     entities = bodies(rollout, pipeline.source.bodies)
     where = np.stack([rollout.x[0], rollout.y[0], rollout.h[0]], axis=-1)  # (E, T, 3)
+    there = rollout.present[0] if rollout.present.size else np.ones(where.shape[:2], np.bool_)
     moving = [e == 0 or bool((rollout.v[0, e, :n] > _MOVES).any()) for e in range(len(entities))]
-    view = _view(where[moving], closest, last)
+    seen = there & np.array(moving)[:, np.newaxis]
+    view = _view(where[:, : last + 1][seen[:, : last + 1]], where[0, closest])
     parts = [*_roads(road, view), *_lamps(lamps(rollout, 0, lights), closest, view)]
     labels = []
     for e, body in enumerate(entities):
         colour = "#d9480f" if body.type in ("cone", "sign") else _COLOURS[_number(e, moving)]
         if moving[e]:
-            parts += _way(body, where[e], closest, last, colour, view)
+            for first, end in _stays(there[e, : last + 1]):
+                parts += _way(body, where[e], (first, closest, end), colour, view)
+        if not there[e, closest]:
+            continue
         parts.append(_body(body, where[e, closest], colour, view))
         if body.type not in ("cone", "sign"):
             labels.append((body.name, colour, view.point(*_centre(body, where[e, closest]))))
@@ -99,15 +104,21 @@ def _number(e: int, moving: Sequence[bool]) -> int:
     return 0 if e == 0 else (e - 1) % 3 + 1
 
 
-def _view(where: Float, closest: int, last: int) -> _View:
-    """Return the view that holds the ways; of long ones, the stretch about the closest approach."""
-    points = where[:, : last + 1, :2].reshape(-1, 2)
+def _stays(there: Bool) -> Iterator[tuple[int, int]]:
+    """Yield the first and the last instant of each time in which a body is there."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
+    yield from ((first, end - 1) for first, end in edges.reshape(-1, 2).tolist())
+
+
+def _view(where: Float, ego: Float) -> _View:
+    """Return the view that holds poses (·, 3); of long ways, the stretch about the ego's."""
+    points = where[:, :2]
     low, high = points.min(axis=0), points.max(axis=0)
     half = 0.5 * (high - low) + 8.0
     reach = max(half[0], half[1] * WIDTH / HEIGHT)
     middle = 0.5 * (low + high)
     if reach > _REACH[1]:
-        middle = where[0, closest, :2]
+        middle = ego[:2]
     reach = min(max(reach, _REACH[0]), _REACH[1])
     return _View(float(middle[0]), float(middle[1]), WIDTH / 2.0 / reach)
 
@@ -157,12 +168,17 @@ def _centre(body: Entity, at: Float) -> tuple[float, float]:
 
 
 def _way(
-    body: Entity, where: Float, closest: int, last: int, colour: str, view: _View
+    body: Entity, where: Float, stay: tuple[int, int, int], colour: str, view: _View
 ) -> Iterator[str]:
-    """Yield where a body starts and goes, with an arrow's head at the end."""
-    yield _body(body, where[0], colour, view, start=True)
+    """Yield where a body starts and goes, with an arrow's head at the end.
+
+    ``stay`` is its first instant, that of the closest approach, and its last one.
+    """
+    first, closest, last = stay
+    yield _body(body, where[first], colour, view, start=True)
     centres = np.array([_centre(body, at) for at in where[: last + 1]])
-    keep = np.unique(np.append(np.arange(0, last + 1, 4), [closest, last]))
+    keep = np.unique(np.append(np.arange(first, last + 1, 4), [max(closest, first), last]))
+    keep = keep[keep <= last]
     for part, opacity in ((keep[keep <= closest], 1.0), (keep[keep >= closest], 0.45)):
         if len(part) > 1:
             yield (

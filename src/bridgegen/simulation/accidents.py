@@ -53,7 +53,11 @@ def accidents(rollout: Rollout, row: int, standing: Iterable[str] = ()) -> tuple
         rest = order[k:]
         x, y, h = (one[[row]][:, rest, :steps] for one in (rollout.x, rollout.y, rollout.h))
         gaps = box_distance(rollout.box[rest], x, y, h, np.array([steps]))[0, 1:]
-        for other, first in _beginnings(gaps <= 0.0, within):
+        contact = gaps <= 0.0
+        if rollout.present.size:
+            there = rollout.present[row, rest, :steps]
+            contact &= there[:1] & there[1:]
+        for other, first in _beginnings(contact, within):
             a, b = sorted((rest[0], rest[1 + other]))
             px, py = _middle(_corners(rollout, row, a, first), _corners(rollout, row, b, first))
             who = (rollout.names[a], rollout.names[b])

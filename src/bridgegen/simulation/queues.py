@@ -72,6 +72,8 @@ def queues(
     who = [k for k, name in enumerate(rollout.names) if name in wanted]
     steps = int(rollout.n_steps[row])
     slow = rollout.v[row, who, :steps] < CRAWL
+    if rollout.present.size:
+        slow &= rollout.present[row, who, :steps]
     if (slow.sum(axis=0) >= QUEUE_SIZE).sum() * rollout.time_step < QUEUE_TIME:
         return ()
     length, ahead = rollout.box[who, 0], rollout.box[who, 2, np.newaxis]

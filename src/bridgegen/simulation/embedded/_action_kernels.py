@@ -7,6 +7,7 @@ from bridgegen.simulation.embedded._across_kernels import (
     stop_lateral,
 )
 from bridgegen.simulation.embedded._codes import (
+    DELETE_ENTITY,
     FIRST_GLOBAL,
     LANE_CHANGE,
     LANE_OFFSET,
@@ -15,6 +16,7 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._global_kernels import begin_global
 from bridgegen.simulation.embedded._motion_kernels import STEP
+from bridgegen.simulation.embedded._presence_kernels import begin_delete, is_pointless
 from bridgegen.simulation.embedded._pursuit_kernels import start_at_speed
 from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, stop_longitudinal
 
@@ -23,12 +25,16 @@ from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, sto
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k: a branch per kind; what is over at once says so."""
     kind = plan.actions[j, 1]
-    if kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
+    if plan.comes_and_goes and is_pointless(j, plan, state):
+        state.action_ended[j] = True
+    elif kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
         begin_longitudinal(j, k, plan, roads, state, record)
     elif kind == LANE_CHANGE:
         begin_lane_change(j, k, plan, roads, state, record)
     elif kind == LANE_OFFSET:
         begin_lane_offset(j, k, plan, roads, state, record)
+    elif kind == DELETE_ENTITY:
+        begin_delete(j, k, plan, roads, state, record)
     else:
         begin_global(j, k, plan, state)
 

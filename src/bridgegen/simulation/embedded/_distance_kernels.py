@@ -52,6 +52,7 @@ class Scene(NamedTuple):
     v: Float
     a: Float
     observed: Bool
+    present: Bool
     dt: float
 
 
@@ -65,7 +66,7 @@ def scene_of(plan, roads, state, record):
         plan.probes, state.slots, state.values, state.clock, state.held, state.lights,
         state.phase_now, plan.bodies, plan.objects, state.on, state.station, roads.paths,
         roads.counts, roads.steps, roads.points, record.x, record.y, record.h, record.v, record.a,
-        state.observed, plan.dt,
+        state.observed, state.present, plan.dt,
     )  # fmt: skip
 
 

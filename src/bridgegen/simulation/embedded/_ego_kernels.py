@@ -32,12 +32,14 @@ def demand(k, plan, roads, state, record):
     if plan.driver == 2:
         demanded = drive_un_r157(
             k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
-            planned, record.x, record.y, record.h, record.v, plan.bodies, state.attention,
+            planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
+            state.attention,
         )  # fmt: skip
         return demanded, curvature
     demanded = drive_fsm(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
-        planned, record.x, record.y, record.h, record.v, plan.bodies, state.attention,
+        planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
+        state.attention,
     )  # fmt: skip
     return demanded, curvature
 

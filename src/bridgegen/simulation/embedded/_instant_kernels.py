@@ -6,6 +6,7 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.ego.drivers import NOBODY
 from bridgegen.simulation.embedded._ego_kernels import move_ego
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
+from bridgegen.simulation.embedded._presence_kernels import stay_away
 from bridgegen.simulation.embedded._signal_kernels import run_controllers
 from bridgegen.simulation.embedded._speed_kernels import command_speed
 from bridgegen.simulation.embedded._storyboard_kernels import decide, finish
@@ -40,12 +41,17 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         e = plan.order[0, i]
         if e < first:
             continue
+        if not state.present[e]:
+            stay_away(e, k, record)
+            continue
         if plan.timed[e] >= 0:
             move_along_timetable(e, k, plan, roads, state, record)
             continue
         if e > 0:
             command_speed(e, k, plan, roads, state, record)
         move_along_path(e, k, plan, roads, state, record)
+    for e in range(record.present.shape[0] if k < record.x.shape[1] - 1 else 0):
+        record.present[e, k + 1] = state.present[e]
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):
         state.ending[STATUS], state.ending[STOPS] = NOT_FINITE, 1
     if state.ending[STOPS]:
@@ -60,5 +66,7 @@ def _repeat(k, record):
     for array in (record.x, record.y, record.h, record.v, record.a, record.offset):
         for e in range(array.shape[0]):
             array[e, k + 1 :] = array[e, k]
+    for e in range(record.present.shape[0]):
+        record.present[e, k + 1 :] = record.present[e, k]
     for i in range(record.lights.shape[0]):
         record.lights[i, k + 1 :] = record.lights[i, k]

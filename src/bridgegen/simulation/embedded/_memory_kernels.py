@@ -49,6 +49,8 @@ class Plan(NamedTuple):
     changes: Int
     first_time: int
     time_passes: int
+    absent: Int
+    comes_and_goes: int
     weathers: Int
     driver: int
     ideal_perception: int
@@ -109,6 +111,7 @@ class State(NamedTuple):
         lights: ``(L,)`` int8, the traffic lights' states.
         phase_now: ``(K,)`` int64, the phase that each controller is in,
         phase_until: ``(K,)`` [s], and until when.
+        present: ``(E,)`` bool, who is there.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] since it last moved.
         route: ``(E,)`` int64, the route that a body follows where it can; 0: none.
@@ -162,6 +165,7 @@ class State(NamedTuple):
     lights: npt.NDArray[np.int8]
     phase_now: Int
     phase_until: Float
+    present: Bool
     travelled: Float
     stood: Float
     route: Int
@@ -201,7 +205,8 @@ class State(NamedTuple):
 class Record(NamedTuple):
     """What is written: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`.
 
-    ``detections`` are ``(E, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing.
+    ``detections`` are ``(E, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing;
+    ``present`` is ``(E, T)``, or ``(0, 0)`` where everybody always is.
     """
 
     x: Float
@@ -212,6 +217,7 @@ class Record(NamedTuple):
     offset: Float
     detections: Float
     lights: npt.NDArray[np.int8]
+    present: Bool
     began: Int
 
 

@@ -27,8 +27,8 @@ def observe_rows(k, plan, networks, rows, states, records, step, route, tracks, 
         roads, state = roads_of(networks, rows[i]), state_of(states, i)
         record = record_of(records, i)
         perceive(
-            k, plan.dt, state.key[0], plan.ideal_perception, record.x, record.y, record.h,
-            record.v, plan.bodies, plan.kinds, state.weather, state.sensors, state.tracks,
+            k, plan.dt, state.key[0], plan.ideal_perception, state.present, record.x, record.y,
+            record.h, record.v, plan.bodies, plan.kinds, state.weather, state.sensors, state.tracks,
             record.detections,
         )  # fmt: skip
         tracks[i] = state.tracks[1:]

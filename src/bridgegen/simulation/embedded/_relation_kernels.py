@@ -102,7 +102,8 @@ def look_one(p, k, scene):
         return touch(e, other, k, scene)
     if kind == COLLISION_WITH_TYPE:
         for i in range(scene.x.shape[0]):
-            if i != e and scene.objects[i] == other and touch(e, i, k, scene):
+            there = i != e and scene.present[i]
+            if there and scene.objects[i] == other and touch(e, i, k, scene):
                 return True
         return False
     if kind in (ANGLE, RELATIVE_ANGLE):
@@ -112,7 +113,7 @@ def look_one(p, k, scene):
     if kind == END_OF_ROAD:
         path = scene.on[e]
         length = (scene.counts[path] - 1) * scene.steps[path]
-        at_end = path >= 0 and scene.station[e] >= length - AT_END
+        at_end = scene.present[e] and path >= 0 and scene.station[e] >= length - AT_END
         scene.held[p] = scene.held[p] + scene.dt if at_end else -scene.dt
         return at_end and scene.held[p] >= limit - AT_END
     if kind == SPEED_DIFFERENCE:

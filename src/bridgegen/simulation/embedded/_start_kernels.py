@@ -27,6 +27,9 @@ def start(plan, roads, state, record):
         state.on[e], state.to[e], state.route[e] = e, -1, plan.routes[e]
         state.lateral_action[e] = state.speed_action[e] = -1
         state.rate[e] = math.inf
+        state.present[e] = plan.absent[e] == 0
+        if plan.comes_and_goes:
+            record.present[e, 0] = state.present[e]
         m = plan.timed[e]
         if m >= 0:
             for k in range(n_steps):

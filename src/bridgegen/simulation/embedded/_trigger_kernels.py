@@ -23,6 +23,7 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._distance_kernels import scene_of
 from bridgegen.simulation.embedded._memory_kernels import TICKS, view
+from bridgegen.simulation.embedded._presence_kernels import leave_out_absent
 from bridgegen.simulation.embedded._probe_kernels import is_in_state, look
 from bridgegen.simulation.embedded._relation_kernels import look_closely
 
@@ -37,6 +38,8 @@ def observe(k, plan, roads, state, record):
             state.looked[p, 0] = state.looked[p, 1]
             state.observed[p] = look(p, k, plan, state, record)
             state.looked[p, 1] = state.ending[TICKS]
+    if plan.comes_and_goes:
+        leave_out_absent(plan.conditions, plan.probes, state.present, state.observed)
     for c in range(plan.conditions.shape[0]):
         conclude(c, k, plan.conditions, state.observed, state.history)
 

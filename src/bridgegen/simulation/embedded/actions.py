@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.simulation.embedded._codes import ADD_ENTITY, DELETE_ENTITY
 from bridgegen.simulation.embedded.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.global_actions import GlobalActions
 from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, PathSpec, Point
@@ -67,7 +68,11 @@ class Actions:
         first, known = len(self.rows), len(self._tables.problems)
         sure = None
         if isinstance(part.action, osc.GlobalAction):
-            self.rows += self._everywhere.rows(part.action.action)
+            change = part.action.action
+            if isinstance(change, osc.EntityAction):
+                self._presence(change)
+            else:
+                self.rows += self._everywhere.rows(change)
         elif not isinstance(part.action, osc.PrivateAction):
             self._tables.unsupported(part.action, type(part.action).__name__)
         else:
@@ -99,6 +104,16 @@ class Actions:
                 self._tables.unsupported(action.action, type(action.action).__name__)
         else:
             self._tables.unsupported(action, f"{type(action).__name__} in an Event")
+
+    def _presence(self, action: osc.EntityAction) -> None:
+        """Add an action by which an entity comes or goes."""
+        entity = self._tables.entity(action.entity_ref)
+        self._refuse_driven(action.action, entity)
+        if isinstance(action.action, osc.AddEntityAction):
+            self._tables.unsupported(action, type(action.action).__name__)
+            return
+        slot = self._tables.slot(0.0)
+        self.rows.append((entity, DELETE_ENTITY, 0, 0, slot, slot, 0))
 
     def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
         shape, dimension, value = self.courses.dynamics(action.dynamics)
@@ -150,6 +165,11 @@ class Actions:
             self._tables.unsupported(element, f'dynamicsShape="{shape}"')
             return 0
         return SHAPES[shape]
+
+    @property
+    def has_comings_and_goings(self) -> bool:
+        """Whether entities are added or deleted."""
+        return any(row[1] in (ADD_ENTITY, DELETE_ENTITY) for row in self.rows)
 
     def is_timed(self, entity: int) -> bool:
         """Say whether an entity follows a trajectory with times, which rules out all else."""

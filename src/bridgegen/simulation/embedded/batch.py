@@ -164,6 +164,7 @@ class Batch:
             lights=record.lights,
             event_names=program.event_names,
             began=record.began,
+            present=record.present,
             detections=record.detections if record.detections.size else NO_DETECTIONS,
             stop_lines=stop_lines[self._rows],
             stop_lights=stop_lights,
@@ -209,6 +210,8 @@ def _plan(program: Program) -> memory.Plan:
         changes=program.changes,
         first_time=program.first_time,
         time_passes=program.time_passes,
+        absent=program.absent,
+        comes_and_goes=int(program.comes_and_goes),
         weathers=program.weathers,
         driver=program.driver.code,
         ideal_perception=int("perception" in program.driver.ideal),
@@ -275,6 +278,7 @@ def _state(
         lights=np.zeros((n, len(program.lights)), dtype=np.int8),
         phase_now=numbers(len(program.controllers)),
         phase_until=zeros(len(program.controllers)),
+        present=flags(e),
         travelled=zeros(e), stood=zeros(e),
         route=numbers(e), on=numbers(e), station=np.ascontiguousarray(a + b * at),
         aside=np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
@@ -295,9 +299,11 @@ def _record(program: Program, n: int) -> memory.Record:
     x, y, h, v, a, offset = (np.empty(shape) for _ in range(6))
     perceives = program.driver.perceives
     seen = (*shape, DETECTION) if perceives else (n, 0, 0, DETECTION)
+    there = shape if program.comes_and_goes else (n, 0, 0)
     return memory.Record(
         x=x, y=y, h=h, v=v, a=a, offset=offset,
         detections=np.zeros(seen),
         lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
+        present=np.zeros(there, dtype=np.bool_),
         began=np.full((n, len(program.event_names)), -1, dtype=np.int64),
     )  # fmt: skip

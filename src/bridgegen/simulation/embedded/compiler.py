@@ -194,6 +194,8 @@ class _Compiler:
             ),
             first_time=first_time,
             time_passes=int(time is not None and time[1]),
+            absent=np.zeros(len(objects), dtype=np.int64),
+            comes_and_goes=self.actions.has_comings_and_goings,
             driver=chosen if ideal is None else chosen.idealised(ideal),
             time_step=step,
             n_steps=n_steps,

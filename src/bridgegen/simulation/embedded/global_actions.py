@@ -71,8 +71,6 @@ class GlobalActions:
                 return [self._value(action, "variable", action.variable_ref)]
             case osc.SetMonitorAction():  # monitors are outputs, and nothing looks at them
                 return []
-            case osc.EntityAction():
-                self._tables.unsupported(action, type(action.action).__name__)
             case _:
                 self._tables.unsupported(action, type(action).__name__)
         return []

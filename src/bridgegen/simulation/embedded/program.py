@@ -147,6 +147,8 @@ class Program:
         first_phases: by controller the phase that the start sets, -1 if none.
         first_time: slot of the start's date [s], -1 if it states none.
         time_passes: whether that date passes.
+        absent: ``(E,)`` 1 for who is not there before it is added, else 0.
+        comes_and_goes: whether there are such, or somebody is deleted.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
@@ -193,6 +195,8 @@ class Program:
     first_phases: Int
     first_time: int
     time_passes: int
+    absent: Int
+    comes_and_goes: bool
     driver: Driver
     time_step: float
     n_steps: int

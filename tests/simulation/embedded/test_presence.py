@@ -1,0 +1,166 @@
+"""Entities that are added and deleted: from when on they are there, and what that changes.
+
+On leg C (road 3, straight, south is inward) lane 1 leads south, lane 2 lies 3.5 m to its right;
+the instants are 0.05 s apart. A car is 4 m long, its front 3.4 m ahead of its reference point.
+"""
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import UnsupportedError
+
+from .storyboards import after, condition, lane, near, run, scenario, speed_action, start
+
+EGO = start("ego", lane(1, 1, 90.0), 0.0)
+
+
+def delete(name: str) -> str:
+    return f'<EntityAction entityRef="{name}"><DeleteEntityAction/></EntityAction>'
+
+
+def add(name: str, place: str) -> str:
+    return f"""<EntityAction entityRef="{name}"><AddEntityAction>{place}</AddEntityAction>
+</EntityAction>"""
+
+
+def speed(value: float, dynamics: str = "step time 0") -> str:
+    return f"<LongitudinalAction>{speed_action(value, dynamics)}</LongitudinalAction>"
+
+
+def act(*rows: tuple[str, tuple[str, ...], str], actor: str = "cv") -> str:
+    """Events of (name, actions, condition), each in a group of its own."""
+    groups = []
+    for name, actions, when in rows:
+        parts = "".join(
+            f'<Action name="{name}{i}">'
+            + (
+                f"<GlobalAction>{one}</GlobalAction>"
+                if one.startswith("<EntityAction")
+                else f"<PrivateAction>{one}</PrivateAction>"
+            )
+            + "</Action>"
+            for i, one in enumerate(actions)
+        )
+        groups.append(
+            f"""<ManeuverGroup name="g{name}" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="{actor}"/></Actors>
+<Maneuver name="m"><Event name="{name}" priority="parallel" maximumExecutionCount="1">{parts}
+<StartTrigger><ConditionGroup>{when}</ConditionGroup></StartTrigger></Event></Maneuver>
+</ManeuverGroup>"""
+        )
+    return "".join(groups)
+
+
+def scene(*rows, names=("ego", "bv", "cv"), privates="", actor="cv", ego="route-follower"):
+    bv = start("bv", lane(3, 1, 95.0), 10.0) + start("cv", lane(3, 2, 50.0), 0.0)
+    return run(scenario(names, EGO + (privates or bv), act(*rows, actor=actor)), ego)
+
+
+def there(rollout, name):
+    """Return the first and the past-the-last instant at which somebody is there, gaps refused."""
+    present = rollout.present[0, rollout.names.index(name), : rollout.n_steps[0]]
+    k = np.flatnonzero(present)
+    assert (np.diff(k) == 1).all()
+    return int(k[0]), int(k[-1]) + 1
+
+
+def test_who_is_deleted_is_not_there_from_that_instant_on():
+    rollout = scene(("gone", (delete("bv"),), after(2.0)))
+    assert there(rollout, "bv") == (0, 40)
+    assert there(rollout, "ego") == there(rollout, "cv") == (0, 201)
+    assert np.ptp(rollout.y[0, 1, 40:]) == 0.0  # states of who is gone do not change
+    assert np.isinf(rollout.distance[0, 1, 40:]).all()
+
+
+def test_files_without_comings_and_goings_record_no_presence():
+    assert scene(("set", (speed(3.0),), after(2.0))).present.size == 0
+
+
+@pytest.mark.parametrize("who", ["bv", "cv"])
+def test_nobody_meets_a_condition_that_is_gone(who):
+    """bv, at 10 m/s, would be within 20 m of cv, 45 m ahead, after 2.5 s."""
+    gone = ("gone", (delete(who),), after(2.0))
+    seen = ("seen", (speed(3.0),), near("bv", "cv", 20.4))
+    assert scene(gone, seen, actor="ego").began[0, 1] == -1
+    assert scene(seen, actor="ego").began[0, 0] == 50
+
+
+def both(rule, text):
+    """A condition on bv and cv, by any or all."""
+    return condition("bv", text).replace(
+        '"any"><EntityRef entityRef="bv"/>',
+        f'"{rule}"><EntityRef entityRef="bv"/><EntityRef entityRef="cv"/>',
+    )
+
+
+@pytest.mark.parametrize(("rule", "at"), [("any", 40), ("all", 41)])
+def test_of_all_that_must_meet_a_condition_those_count_that_are_there(rule, at):
+    """cv stands from the start, bv never does; bv goes at 2 s, which is seen an instant later."""
+    stands = '<SpeedCondition value="0" rule="equalTo"/>'
+    gone = ("gone", (delete("bv"),), after(2.0))
+    seen = ("seen", (speed(3.0),), both(rule, stands) + after(2.0))
+    assert scene(gone, seen, actor="ego").began[0, 1] == at
+
+
+def test_where_nobody_of_all_is_there_nobody_meets_a_condition():
+    gone = ("gone", (delete("bv"), delete("cv")), after(2.0))
+    stands = '<SpeedCondition value="99" rule="lessThan"/>'
+    seen = ("seen", (speed(3.0),), both("all", stands) + after(2.1))
+    assert scene(gone, seen, actor="ego").began[0, 1] == -1
+
+
+def test_what_somebody_does_that_is_gone_is_over():
+    """bv speeds up for 5 s; with bv, after 2 s, goes its action, and so its event ends."""
+    ended = """<Condition name="c" delay="0" conditionEdge="none"><ByValueCondition>
+<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="fast"
+state="completeState"/></ByValueCondition></Condition>"""
+    fast = ("fast", (speed(20.0, "linear time 5"),), after(0.0))
+    seen = ("seen", (speed(3.0),), ended)
+    gone = ("gone", (delete("bv"),), after(2.0))
+    assert scene(fast, seen, actor="bv").began[0, 1] == 100
+    # ends with the next instant, and what is asked of who is gone is over as it begins
+    assert scene(fast, gone, seen, actor="bv").began[0, 2] == 41
+
+
+def test_who_goes_by_somebody_that_is_gone_goes_on_as_it_is():
+    """cv, 45 m ahead of bv, keeps bv's speed plus 2 m/s, until bv is gone."""
+    relative = """<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step"
+dynamicsDimension="time" value="0"/><SpeedActionTarget><RelativeTargetSpeed entityRef="bv" value="2"
+speedTargetValueType="delta" continuous="true"/></SpeedActionTarget></SpeedAction>
+</LongitudinalAction>"""
+    follow = ("follow", (relative,), after(0.0))
+    gone = ("gone", (delete("bv"),), after(2.0))
+    rollout = scene(follow, gone)
+    assert rollout.v[0, 2, 1:101] == pytest.approx(12.0)
+
+
+def test_drivers_do_not_mind_who_is_gone():
+    """bv stands 40 m ahead of an ego at 15 m/s, and is gone after 1 s."""
+    privates = start("ego", lane(3, 1, 95.0), 15.0) + start("bv", lane(3, 1, 45.0), 0.0)
+    privates += start("cv", lane(3, 2, 20.0), 0.0)
+    gone = ("gone", (delete("bv"),), after(1.0))
+    for ego in ("un-r157", "fsm", "reference"):
+        with_it = scene(privates=privates, ego=ego)
+        without = scene(gone, privates=privates, ego=ego)
+        assert with_it.v[0, 0, -1] < 1.0, ego
+        assert (without.v[0, 0, :20] == with_it.v[0, 0, :20]).all()
+        assert without.y[0, 0, without.n_steps[0] - 1] < 30.0, ego  # past where bv stood
+
+
+def test_sensors_do_not_see_who_is_gone():
+    privates = start("ego", lane(3, 1, 95.0), 0.0) + start("bv", lane(3, 1, 65.0), 0.0)
+    privates += start("cv", lane(3, 1, 45.0), 0.0)
+    rollout = scene(("gone", (delete("bv"),), after(2.0)), privates=privates, ego="reference")
+    seen = rollout.detections[0, :, :, 0]
+    assert (seen[1, 20:40:2] > 0).all()
+    assert (seen[1, 40:] <= 0).all()
+    assert (seen[2, 42:200:2] > 0).mean() > 0.9  # whom it hid
+    assert (seen[2, 20:40:2] > 0).mean() < 0.5
+
+
+def test_the_ego_that_a_driver_drives_does_not_go():
+    with pytest.raises(UnsupportedError, match="DeleteEntityAction of the ego, which a driver"):
+        scene(("gone", (delete("ego"),), after(2.0)))
+    rollout = scene(("gone", (delete("ego"),), after(2.0)), ego=None)
+    assert there(rollout, "ego") == (0, 40)
+    assert np.isinf(rollout.distance[0, 1, 40:]).all()
