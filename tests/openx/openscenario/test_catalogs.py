@@ -179,6 +179,25 @@ def test_a_parameter_that_the_entry_lacks_may_be_put_up_with(file):
     assert ["has no parameter 'hue'" in one for one in skipped] == [True]
 
 
+def test_what_a_catalogue_lacks_may_be_left_out_with_what_it_is_part_of(tmp_path):
+    """Without its body the second car goes, and what it does; a folder that is not there, likewise.
+
+    The ego, the first one, never does: what is left would be another scenario.
+    """
+    written(tmp_path / "catalogs", cars=catalog("cars", car("small")))
+    cars = entity(reference("cars", "small"), "ego"), entity(reference("cars", "huge"), "other")
+    text = scenario(entities="".join(cars), locations=CARS)
+    skipped: list[str] = []
+    found = read(written(tmp_path, s=text), skipped=skipped)
+    assert [one.name for one in found.entities.scenario_objects] == ["ego"]
+    assert len(skipped) == 1
+    assert "has no Vehicle or Pedestrian or MiscObject 'huge' (line " in skipped[0]
+    for body in (reference("cars", "huge"), reference("../cars", "small")):
+        alone = scenario(entities=entity(body), locations=CARS)
+        with pytest.raises(FileFormatError, match="cannot be left out"):
+            read(written(tmp_path, s=alone), skipped=[])
+
+
 def test_without_a_path_there_is_no_catalogue(file):
     path = file(cars=catalog("cars", car("small")))
     with pytest.raises(UnsupportedError, match=r"document that has no path .* \(line 2\)"):

@@ -111,6 +111,15 @@ def test_at_once():
     assert x[k : k + 2] == pytest.approx([0.0, 3.5], abs=1e-9)
 
 
+def test_from_the_start_on():
+    """As above, from the first instant on."""
+    bv = start("bv", lane(3, 2, 90.0), 5.0)
+    first = f"<PrivateAction>{lateral(1, 'linear time 4')}</PrivateAction></Private>"
+    rollout = run(scenario(("ego", "bv"), EGO + bv.replace("</Private>", first)))
+    x = rollout.x[0, 1] - rollout.x[0, 1, 0]
+    assert x[[0, 20, 40, 80, 160]] == pytest.approx([0.0, 0.875, 1.75, 3.5, 3.5], abs=1e-9)
+
+
 def test_to_a_lane_by_its_id_and_to_the_side_of_its_centre():
     """Left of the road's direction, which leads away from the junction, is west."""
     to = changing('<AbsoluteTargetLane value="2"/>', "cubic time 2", 0.5)

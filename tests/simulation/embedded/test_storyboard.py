@@ -272,6 +272,18 @@ def test_a_delay_on_a_state():
     assert began(told(watched_, seen))["seen"] == 70
 
 
+@pytest.mark.parametrize("delay", ["4.95", "1e5", "99999999999999999999", "INF"])
+def test_a_delay_longer_than_the_scenario_never_ends(delay):
+    """It lasts 10 s: a delay of 4.95 s on 5 s is over just in time."""
+    made = told(act(group(maneuver(event("e", AT_ONCE, trigger(after(5.0, delay=delay)))))))
+    assert began(made) == {"e": 199 if delay == "4.95" else -1}
+
+
+def test_a_stop_that_never_comes_is_none():
+    made = simulator(scenario(("ego",), EGO).replace('"10.0"', '"INF"'))
+    assert made.duration == 60.0  # the default, as of a file without a stop trigger
+
+
 FASTER = '<SpeedCondition value="5.5" rule="greaterThan"/>'
 
 

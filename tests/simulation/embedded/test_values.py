@@ -87,6 +87,16 @@ def test_a_variable_has_its_first_value_until_it_is_set():
     assert at == {"seen": 0}
 
 
+def test_a_variable_is_set_at_the_start():
+    """In the order of the file: (3 + 2) · 3."""
+    first = set_("n", ADD) + set_("n", TIMES)
+    row = ("seen", MOVE, variable("n", 15))
+    assert began(row, declared=VARIABLES, environment=first)[0] == {"seen": 0}
+    first = set_("word", '<SetAction value="end"/>')
+    row = ("seen", MOVE, variable("word", "begin", "notEqualTo"))
+    assert began(row, declared=VARIABLES, environment=first)[0] == {"seen": 0}
+
+
 def test_an_event_may_add_again_and_again():
     """At 20, 21, 22 and 23: each run ends before the next instant's triggers are looked at."""
     add, look = ("add", set_("n", ADD), after(1.0), 4), ("seen", MOVE, variable("n", 11))

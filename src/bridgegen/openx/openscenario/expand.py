@@ -27,6 +27,7 @@ from bridgegen.openx.openscenario.element import (
     walk,
 )
 from bridgegen.openx.openscenario.entities import EntityRef, Trailer
+from bridgegen.openx.openscenario.pruning import without
 from bridgegen.openx.openscenario.reader import shorten
 from bridgegen.openx.openscenario.scopes import Binding, Scope, is_made, reads_as_number
 from bridgegen.openx.openscenario.selections import without_selections
@@ -91,6 +92,7 @@ class _Expander:
         self._scope = Scope.of_scenario(self._declared, self)
         self._named: dict[int, tuple[Binding, ParameterDeclaration]] = {}
         self._open: list[Element] = []
+        self._missing: list[CatalogReference] = []
         self._elements = 0
         self._catalogs = None if folder is None else self._of(folder, skipped)
 
@@ -113,6 +115,7 @@ class _Expander:
     def result(self) -> OpenScenario:
         """Return the scenario, or raise all problems."""
         made = self._element(replace(self._file, parameter_declarations=None), self._scope, 0)
+        made = self._without_missing(made)
         if self._problems or self._elsewhere:
             problems = sorted(dict.fromkeys(self._problems), key=lambda one: int(one[0]))
             texts = [f"{self._place}: {text} (line {line})" for line, text in problems]
@@ -126,6 +129,20 @@ class _Expander:
             parameter_declarations=ParameterDeclarations(declarations) if declarations else None,
             catalog_locations=CatalogLocations(),
         )
+
+    def _without_missing(self, scenario: OpenScenario) -> OpenScenario:
+        """Return a scenario without what catalogues lack, and what that is part of.
+
+        Without its ego, which is the entity of that name or else the first, it would be another.
+        """
+        left = without(scenario, self._missing)
+        names = [str(one.name) for one in scenario.entities.scenario_objects]
+        ego = min(names, key=lambda name: name.lower() != "ego", default="")
+        kept = {str(one.name) for one in left.entities.scenario_objects}
+        for reference in self._missing:
+            if (names and ego not in kept) or any(one is reference for one in walk(left)):
+                self.wrong(reference, f"'{reference.entry_name}' cannot be left out")
+        return left
 
     def _element(
         self, element: E, scope: Scope, depth: int, assigned: dict[str, Value] | None = None
@@ -170,7 +187,9 @@ class _Expander:
             self._unsupported += error.problems
         except NoEntryError as error:
             for problem in error.problems:
-                self.wrong(element, problem)
+                self.doubtful(element, problem)
+            if self._skipped is not None:
+                self._missing.append(element)
         except FileFormatError as error:
             self._elsewhere += error.problems
         return element

@@ -57,6 +57,17 @@ class Actions:
             self.rows[i] = (*self.rows[i], 0)
             self.initial.append(i)
 
+    def begin_with_all(self, action: Element) -> None:
+        """Add what concerns all from the start on."""
+        if isinstance(action, osc.EntityAction):
+            self._tables.unsupported(action, f"an initial {type(action.action).__name__}")
+        elif isinstance(action, osc.ParameterAction | osc.VariableAction):
+            for row in self._everywhere.rows(action):
+                self.initial.append(len(self.rows))
+                self.rows.append((*row, 0))
+        else:
+            self._everywhere.begin_with(action)
+
     def add(self, part: osc.Action, named: Sequence[int], selected: Sequence[int]) -> None:
         """Add an action of an event; one that cannot be run is taken down and left out.
 

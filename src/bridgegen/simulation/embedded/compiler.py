@@ -18,7 +18,7 @@ from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.openx.openscenario.values import Value
-from bridgegen.simulation.embedded._codes import COURSE_WIDTH, EVENT
+from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
 from bridgegen.simulation.embedded.courses import LONGITUDINAL, first_speed
@@ -34,10 +34,9 @@ from bridgegen.simulation.embedded.program import (
 from bridgegen.simulation.embedded.storyboard import elements, nodes
 from bridgegen.simulation.embedded.tables import Tables, table
 from bridgegen.simulation.embedded.trajectories import compile_trajectory
-from bridgegen.simulation.embedded.triggers import Triggers
+from bridgegen.simulation.embedded.triggers import MAX_STEPS, Triggers
 
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
-MAX_STEPS = 100_000
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
 
 
@@ -151,6 +150,8 @@ class _Compiler:
             )
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
+        conditions = table(self.triggers.conditions, 5)
+        conditions[:, DELAY] = np.minimum(conditions[:, DELAY], n_steps)
         everywhere, signals = self.everywhere, self.everywhere.signals
         time = everywhere.first_time
         first_time = -1 if time is None else self.tables.slot(time[0])
@@ -171,7 +172,7 @@ class _Compiler:
             aside_slots=np.array(aside_slots, dtype=np.int64),
             triggers=table(self.triggers.triggers, 2),
             groups=table(self.triggers.groups, 2),
-            conditions=table(self.triggers.conditions, 5),
+            conditions=conditions,
             probes=table(self.triggers.probes, 11),
             points=tuple(self.points),
             elements=table(rows, 10),
@@ -281,7 +282,7 @@ class _Compiler:
         for command in actions.user_defined_actions:
             self.tables.unsupported(command, "UserDefinedAction")
         for one in actions.global_actions:
-            self.everywhere.begin_with(one.action)
+            self.actions.begin_with_all(one.action)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
         starts: dict[str, tuple[Point, Value]] = {}
         routes: dict[str, tuple[osc.Waypoint, ...]] = dict.fromkeys(self.tables.names, ())
@@ -307,6 +308,8 @@ class _Compiler:
                         first.append((wrapped, self.tables.entity(name)))
                     else:
                         init[name] = self.tables.slot(speed)
+                elif isinstance(action, osc.LateralAction):
+                    first.append((wrapped, self.tables.entity(name)))
                 elif isinstance(inner, osc.FollowTrajectoryAction):
                     tracks[name] = compile_trajectory(self.tables, inner)
                 elif isinstance(inner, osc.AssignRouteAction):

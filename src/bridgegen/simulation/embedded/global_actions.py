@@ -48,8 +48,6 @@ class GlobalActions:
                 else:
                     controller, phase = self._phase(set_)
                     self.first_phases[controller] = phase
-            case osc.ParameterAction() | osc.VariableAction():
-                self._tables.unsupported(action, f"an initial {type(action).__name__}")
             case _:
                 self.rows(action)
 

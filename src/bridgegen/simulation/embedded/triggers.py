@@ -1,5 +1,6 @@
 """Triggers as tables: which groups a trigger has, which conditions a group, which probes those."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,9 @@ _EDGES = {
     osc.ConditionEdge.NONE: codes.NO_EDGE, osc.ConditionEdge.RISING: codes.RISING,
     osc.ConditionEdge.FALLING: codes.FALLING, osc.ConditionEdge.RISING_OR_FALLING: codes.EITHER,
 }  # fmt: skip
+MAX_STEPS = 100_000
+"""Instants that a run may have."""
+
 _QUANTITIES = {
     osc.TriggeringEntitiesRule.ANY: codes.ANY, osc.TriggeringEntitiesRule.ALL: codes.ALL,
 }  # fmt: skip
@@ -80,7 +84,10 @@ class Triggers:
         """Append a condition; one that cannot be run is taken down and never true."""
         known = len(self._tables.problems)
         edge = _EDGES[self._tables.choice(osc.ConditionEdge, condition.condition_edge)]
-        delay = round(self._tables.literal(condition, "delay", condition.delay) / self._time_step)
+        seconds = self._tables.literal(condition, "delay", condition.delay)
+        delay = MAX_STEPS  # no run is longer: it never comes
+        if seconds < MAX_STEPS * self._time_step:
+            delay = max(round(seconds / self._time_step), 0)
         kind, quantity = condition.condition, codes.ANY
         if isinstance(kind, osc.ByValueCondition):
             probes = self._probes.by_value(kind.condition)
@@ -110,4 +117,5 @@ class Triggers:
         """Take down when the scenario ends at the latest, by the storyboard's own stop trigger."""
         if not self.triggers:  # it is the first
             end = self._tables.literal(clock, "value", clock.value) + delay * self._time_step
-            self.stop_time = max(self.stop_time, end)
+            if math.isfinite(end) and delay < MAX_STEPS:  # else it never comes
+                self.stop_time = max(self.stop_time, end)
