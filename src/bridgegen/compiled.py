@@ -5,6 +5,7 @@ calls from another file would go unnoticed. Here the cache folder's name is a di
 of every private module, kernels and what they read: change one, and all are compiled again.
 """
 
+import gc
 import hashlib
 import os
 import tempfile
@@ -15,7 +16,7 @@ from typing import Any
 
 import numba
 import numba.extending
-from numba.core import cgutils
+from numba.core import cgutils, event
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
@@ -52,6 +53,26 @@ def is_compiled() -> bool:
     return any(cache_folder().rglob("*.nbi"))
 
 
+class _Unhurried(event.Listener):  # type: ignore[misc]
+    """Collects garbage less often while Numba compiles: its millions of small objects all stay."""
+
+    depth, usual = 0, (0, 0, 0)
+
+    def on_start(self, _: Any) -> None:
+        if self.depth == 0:
+            self.usual = gc.get_threshold()
+            gc.set_threshold(50_000, 20, 50)
+        self.depth += 1
+
+    def on_end(self, _: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0:
+            gc.set_threshold(*self.usual)
+
+
+event.register("numba:compile", _Unhurried())  # always under Numba's own lock
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function of arrays and numbers on its first call; it then runs without the GIL.
 
@@ -71,8 +92,18 @@ def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _compile(function: Callable[..., Any], **options: bool | str) -> Callable[..., Any]:
     numba.config.CACHE_DIR = str(cache_folder())
-    compiled: Callable[..., Any] = numba.njit(nogil=True, error_model="numpy", **options)(function)
-    return compiled
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
+    if not numba.config.DISABLE_JIT:
+        resolve = compiled.get_call_template
+
+        def resolve_alike(given: Any, named: Any) -> Any:
+            """Compile a function once for any number, not once more for every constant given."""
+            plain = numba.types.unliteral
+            return resolve([plain(a) for a in given], {k: plain(a) for k, a in named.items()})
+
+        compiled.get_call_template = resolve_alike
+    function = compiled
+    return function
 
 
 def _borrowed(_: Any, array: Any) -> Any:
