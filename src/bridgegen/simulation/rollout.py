@@ -20,6 +20,7 @@ STATUS_MESSAGES = {
     22: "the driver's process ended",
     23: "the driver answered what is no control",
     4: "a position that is not on the road network",
+    5: "no lane leads from where an entity is to its route",
 }
 
 FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}

@@ -5,12 +5,27 @@
 
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import project
-from bridgegen.simulation.embedded._lane_kernels import LANE, WAY, beside, find_lane, station_of
+from bridgegen.simulation.embedded._lane_kernels import (
+    LANE,
+    T_LEAVE,
+    WAY,
+    T,
+    along,
+    beside,
+    find_lane,
+    nearest_lane,
+    span_at,
+    station_of,
+)
 from bridgegen.simulation.embedded._lateral_kernels import lane_change_lasts, offset_lasts
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE
+from bridgegen.simulation.embedded._motion_kernels import nearest
 from bridgegen.simulation.embedded._place_kernels import (
+    GROUND,
     LANES,
     ask,
+    end_follow,
+    end_lateral,
     fail,
     node_under,
     put_in_world,
@@ -23,14 +38,6 @@ the left; whether the offset is kept until another action moves the entity acros
 
 
 @inlined_kernel
-def end_lateral(e, state):
-    """End the action that moves an entity across, if any."""
-    if state.lateral_action[e] >= 0:
-        state.action_ended[state.lateral_action[e]] = True
-    state.lateral_action[e] = state.to[e] = -1
-
-
-@inlined_kernel
 def stop_lateral(j, plan, state):
     """Stop action j, which moves an entity across: it goes on as far aside as it is."""
     e = plan.actions[j, 0]
@@ -39,11 +46,15 @@ def stop_lateral(j, plan, state):
 
 
 @inlined_kernel
-def _lane_of(e, k, roads, state, record):
-    """Return (node, s, t) of the lane that an entity is on; node -1: none, or not known yet."""
+def _take_lane(e, k, roads, state, record):
+    """Return (node, s, t) of the lane that an entity is on; it follows no trajectory any more.
+
+    Node -1: it is on none, or the lanes are not known yet; the row ends.
+    """
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
         return -1, 0.0, 0.0
+    end_follow(e, state)
     if state.on[e] < 0 or roads.span_counts[state.on[e]] == 0:
         put_in_world(e, record.x[e, k], record.y[e, k], record.h[e, k], roads, state)
     node, s, t = node_under(e, roads, state)
@@ -52,18 +63,41 @@ def _lane_of(e, k, roads, state, record):
     return node, s, t
 
 
+@inlined_kernel
+def _lane_of(e, k, roads, state, record):
+    """Return (node, t) of the lane that another entity is on, as ``_take_lane``."""
+    node, _, t = node_under(e, roads, state)
+    if node >= 0:
+        return node, t
+    x, y = record.x[e, k], record.y[e, k]
+    if roads.ground.shape[0] == 0:
+        ask(0, GROUND, state)
+        return -1, 0.0
+    node = nearest_lane(roads.ground, roads.ground_nodes, x, y, record.h[e, k])
+    if node < 0:
+        fail(NO_LANE, state)
+        return -1, 0.0
+    p = way_from(0, node, roads, state)
+    if p < 0:
+        return -1, 0.0
+    path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
+    station, aside = project(path, n, ds, nearest(path, n, ds, x, y), x, y)
+    i = span_at(roads.spans[p], roads.span_counts[p], station)
+    return node, along(roads.spans[p], i, station, T, T_LEAVE) + roads.nodes[node, WAY] * aside
+
+
 @kernel
 def begin_lane_change(j, k, plan, roads, state, record):
     """Begin action j, a LaneChangeAction: onto the other lane's way, still aside of it."""
     e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
-    node, s, _ = _lane_of(e, k, roads, state, record)
+    node, s, _ = _take_lane(e, k, roads, state, record)
     if node < 0:
         return
     lane = row[COUNT]
     if row[OF] >= 0:
         other = node
         if row[OF] != e:
-            other, _, _ = _lane_of(row[OF], k, roads, state, record)
+            other, _ = _lane_of(row[OF], k, roads, state, record)
             if other < 0:
                 return
         lane = beside(roads.nodes[other, LANE], row[COUNT] * roads.nodes[other, WAY])
@@ -99,13 +133,13 @@ def begin_lane_change(j, k, plan, roads, state, record):
 def begin_lane_offset(j, k, plan, roads, state, record):
     """Begin action j, a LaneOffsetAction; an offset counts to the left of the reference line."""
     e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
-    node, _, t = _lane_of(e, k, roads, state, record)
+    node, _, t = _take_lane(e, k, roads, state, record)
     if node < 0:
         return
     way, value = roads.nodes[node, WAY], state.slots[plan.actions[j, 4]]
     target = way * value
     if row[OF] >= 0:  # as far to the left of another entity as it says
-        other, _, its_t = _lane_of(row[OF], k, roads, state, record)
+        other, its_t = _lane_of(row[OF], k, roads, state, record)
         if other < 0:
             return
         centre = t - way * state.aside[e]

@@ -7,12 +7,21 @@ from bridgegen.simulation.embedded._across_kernels import (
     stop_lateral,
 )
 from bridgegen.simulation.embedded._codes import (
+    ASSIGN_ROUTE,
     DELETE_ENTITY,
     FIRST_GLOBAL,
+    FOLLOW,
     LANE_CHANGE,
     LANE_OFFSET,
     RELATIVE_SPEED,
     SPEED_CHANGE,
+    TELEPORT,
+)
+from bridgegen.simulation.embedded._follow_kernels import (
+    begin_follow,
+    begin_route,
+    begin_teleport,
+    stop_follow,
 )
 from bridgegen.simulation.embedded._global_kernels import begin_global
 from bridgegen.simulation.embedded._motion_kernels import STEP
@@ -35,6 +44,12 @@ def begin(j, k, plan, roads, state, record):
         begin_lane_offset(j, k, plan, roads, state, record)
     elif kind == DELETE_ENTITY:
         begin_delete(j, k, plan, roads, state, record)
+    elif kind == TELEPORT:
+        begin_teleport(j, k, plan, roads, state, record)
+    elif kind == ASSIGN_ROUTE:
+        begin_route(j, plan, roads, state)
+    elif kind == FOLLOW:
+        begin_follow(j, k, plan, roads, state)
     else:
         begin_global(j, k, plan, state)
 
@@ -57,3 +72,5 @@ def stop(j, k, plan, roads, state, record):
         stop_longitudinal(j, plan, state)
     elif kind in (LANE_CHANGE, LANE_OFFSET):
         stop_lateral(j, plan, state)
+    elif kind == FOLLOW:
+        stop_follow(j, k, plan, roads, state, record)

@@ -60,3 +60,11 @@ EITHER_SIDE, BEHIND, AHEAD = 0, 1, -1
 SIDE_TAKEN, ACCELERATION, FOOT, FOOT_PATH = range(4)  # of a distance
 OWN_X, OWN_Y, MASTER_X, MASTER_Y, LEFT, MASTER_LEFT = range(6)  # of a synchronisation
 COURSE_MEMORY = 6
+
+# Program.places: kind, entity, lanes to the left, slots of the two numbers, whether the heading is
+# absolute, its slot, whether ahead and left are those of the lane's traffic, not of the road.
+PLACE_KIND, WHOSE, LANES_LEFT, ALONG, ACROSS, ABSOLUTE, HEADING, BY_LANE = range(8)
+ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_OBJECT, BY_WORLD = range(7)
+
+# Program.actions: kinds of those that say where an entity is, and where it goes.
+TELEPORT, ASSIGN_ROUTE, FOLLOW = 30, 31, 32

@@ -5,12 +5,13 @@ import math
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego.drivers import NOBODY
 from bridgegen.simulation.embedded._ego_kernels import move_ego
+from bridgegen.simulation.embedded._follow_kernels import move_by_timetable
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
 from bridgegen.simulation.embedded._presence_kernels import stay_away
 from bridgegen.simulation.embedded._signal_kernels import run_controllers
 from bridgegen.simulation.embedded._speed_kernels import command_speed
 from bridgegen.simulation.embedded._storyboard_kernels import decide, finish
-from bridgegen.simulation.embedded._travel_kernels import move_along_path, move_along_timetable
+from bridgegen.simulation.embedded._travel_kernels import move_along_path
 from bridgegen.simulation.embedded._trigger_kernels import observe
 
 
@@ -37,15 +38,16 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     if plan.driver != NOBODY:
         x, y, h = move_ego(k, demanded, curvature, plan, roads, state, record)
         first = 1
+    for e in range(first, record.x.shape[0]):  # those who look at nobody come first
+        state.timed[e] = state.present[e] and state.follow[e] >= 0
+        if state.timed[e]:
+            move_by_timetable(e, k, plan, roads, state, record)
     for i in range(record.x.shape[0]):
         e = plan.order[0, i]
-        if e < first:
+        if e < first or state.timed[e]:
             continue
         if not state.present[e]:
             stay_away(e, k, record)
-            continue
-        if plan.timed[e] >= 0:
-            move_along_timetable(e, k, plan, roads, state, record)
             continue
         if e > 0:
             command_speed(e, k, plan, roads, state, record)

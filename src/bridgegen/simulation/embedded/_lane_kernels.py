@@ -33,6 +33,12 @@ def turned(h, other):
 
 
 @kernel
+def continued(h, before):
+    """Return a heading by the whole turns that lead on from an earlier one, else to the bit."""
+    return h - 2.0 * math.pi * round((h - before) / (2.0 * math.pi))
+
+
+@kernel
 def beside(lane, lanes):
     """Return the id of the lane so many to the left in road direction; there is no lane 0."""
     target = lane + lanes

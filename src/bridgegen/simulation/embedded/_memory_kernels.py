@@ -16,7 +16,7 @@ from bridgegen.compiled import borrowed, bundled, inlined_kernel
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
-OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE = 0, 1, 2, 3, 4  # see rollout.STATUS_MESSAGES
+OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY = range(6)  # see rollout.STATUS_MESSAGES
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
 
@@ -28,7 +28,10 @@ class Plan(NamedTuple):
     objects: Int
     init: Int
     routes: Int
-    timed: Int
+    follows: Int
+    starts: Int
+    places: Int
+    trajectories: Int
     triggers: Int
     groups: Int
     conditions: Int
@@ -73,7 +76,9 @@ class Roads(NamedTuple):
     span_counts: Int
     zones: Float
     points: Float
-    tracks: Float
+    spots: Float
+    timetables: Float
+    timetable_counts: Int
     nodes: Int
     ends: Float
     ways: Int
@@ -127,6 +132,11 @@ class State(NamedTuple):
         lateral_passed: ``(E,)`` [s] or [m], what of it has passed,
         lateral_origin: ``(E,)`` [m], how far left of its path it began,
         lateral_target: ``(E,)`` [m], how far left of its path it ends.
+        follow: ``(E,)`` int64, the trajectory whose timetable moves it; -1: none,
+        follow_action: ``(E,)`` int64, the action that leads it along a trajectory; -1: none,
+        follow_began: ``(E,)`` [s], when the times of the timetable begin.
+        timed: ``(E,)`` bool, a timetable moves it at this instant.
+        placed: ``(E,)`` bool, it was put where it is at this instant, and does not move on.
         wanted: ``(2,)`` int64, the route and the node of the way that is not planned yet.
         speed_action: ``(E,)`` int64, the action that changes its speed; -1: none,
         speed_began: ``(E,)`` [s], since when,
@@ -181,6 +191,11 @@ class State(NamedTuple):
     lateral_passed: Float
     lateral_origin: Float
     lateral_target: Float
+    follow: Int
+    follow_action: Int
+    follow_began: Float
+    timed: Bool
+    placed: Bool
     wanted: Int
     speed_action: Int
     speed_began: Float

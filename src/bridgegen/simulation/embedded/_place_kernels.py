@@ -8,6 +8,22 @@ import math
 
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import pose, project
+from bridgegen.simulation.embedded._codes import (
+    ABSOLUTE,
+    ACROSS,
+    ALONG,
+    BY_LANE,
+    BY_LANES,
+    BY_OBJECT,
+    BY_ROAD,
+    BY_WORLD,
+    HEADING,
+    IN_WORLD,
+    LANES_LEFT,
+    ON_LANE,
+    PLACE_KIND,
+    WHOSE,
+)
 from bridgegen.simulation.embedded._lane_kernels import (
     LANE,
     LEAVE,
@@ -32,15 +48,6 @@ from bridgegen.simulation.embedded._lane_kernels import (
 from bridgegen.simulation.embedded._memory_kernels import NO_PLACE, STATUS, STOPS, UNPLANNED
 from bridgegen.simulation.embedded._motion_kernels import nearest, shifted
 
-KIND, WHOSE, COUNT, ALONG, ACROSS, ABSOLUTE, HEADING, BY_LANE = range(8)
-"""Columns of ``plan.places``: kind, entity, lanes to the left (of the road, or of the lane's
-traffic where ``BY_LANE``), slots of the two numbers, whether the heading is absolute, its slot."""
-
-ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_BODY, BY_WORLD = range(7)
-"""Kinds of positions: Lane, Road (and Route), World, RelativeLane, RelativeRoad, RelativeObject,
-RelativeWorld."""
-
-
 LANES, GROUND = -1, -2
 """What is asked for instead of a node: the lanes of the road network; and where they all are."""
 
@@ -58,6 +65,22 @@ def fail(status, state):
     if state.ending[STATUS] == 0:
         state.ending[STATUS] = status
     state.ending[STOPS] = 1
+
+
+@inlined_kernel
+def end_lateral(e, state):
+    """End the action that moves an entity across its path, if any."""
+    if state.lateral_action[e] >= 0:
+        state.action_ended[state.lateral_action[e]] = True
+    state.lateral_action[e] = state.to[e] = -1
+
+
+@inlined_kernel
+def end_follow(e, state):
+    """End the action that leads an entity along a trajectory, if any."""
+    if state.follow_action[e] >= 0:
+        state.action_ended[state.follow_action[e]] = True
+    state.follow_action[e] = state.follow[e] = -1
 
 
 @inlined_kernel
@@ -139,12 +162,12 @@ def lane_place(c, plan, roads, state):
     """
     row, spot = plan.places[c], roads.spots[c]
     s, aside = spot[2], spot[3]
-    if row[KIND] == ON_LANE:
+    if row[PLACE_KIND] == ON_LANE:
         s, aside = state.slots[row[ALONG]], state.slots[row[ACROSS]]
     node = find_node(roads.nodes, roads.ends, int(spot[0]), int(spot[1]), s)
     if node < 0:
         return -1, 0.0, 0.0
-    way = roads.nodes[node, TRAFFIC] if row[KIND] == ON_LANE else 1
+    way = roads.nodes[node, TRAFFIC] if row[PLACE_KIND] == ON_LANE else 1
     return facing(roads.nodes, node, way), s, aside * way
 
 
@@ -166,10 +189,10 @@ def lane_place_by(c, plan, roads, state):
     node, s = walk(roads.nodes, roads.ends, node, s, metres)
     if node < 0:
         return -1, 0.0, 0.0
-    if row[KIND] == BY_ROAD:
+    if row[PLACE_KIND] == BY_ROAD:
         return node, s, own + offset
     way = roads.nodes[node, WAY]  # the road may run the other way round now
-    node = find_lane(roads.nodes, node, beside(roads.nodes[node, LANE], row[COUNT] * way), way)
+    node = find_lane(roads.nodes, node, beside(roads.nodes[node, LANE], row[LANES_LEFT] * way), way)
     if node >= 0 and roads.nodes[node, TRAFFIC] != way:
         return node ^ 1, s, -offset
     return node, s, offset
@@ -180,16 +203,16 @@ def world_place(c, k, plan, state, record):
     """Return (x, y, heading) of a World, RelativeObject or RelativeWorld position."""
     row = plan.places[c]
     u, w, h = state.slots[row[ALONG]], state.slots[row[ACROSS]], state.slots[row[HEADING]]
-    if row[KIND] == IN_WORLD:
+    if row[PLACE_KIND] == IN_WORLD:
         return u, w, h
     e = row[WHOSE]
     x, y, own = record.x[e, k], record.y[e, k], record.h[e, k]
     if not row[ABSOLUTE]:
         h += own
-    if row[KIND] == BY_WORLD:
+    if row[PLACE_KIND] == BY_WORLD:
         return x + u, y + w, h
-    c, s = math.cos(own), math.sin(own)
-    return x + u * c - w * s, y + u * s + w * c, h
+    ahead, aside = math.cos(own), math.sin(own)
+    return x + u * ahead - w * aside, y + u * aside + w * ahead, h
 
 
 @kernel
@@ -198,8 +221,8 @@ def pose_of(c, k, plan, roads, state, record):
 
     Where entities are is looked up as of instant k, too.
     """
-    kind = plan.places[c, KIND]
-    if kind == IN_WORLD or kind >= BY_BODY:
+    kind = plan.places[c, PLACE_KIND]
+    if kind == IN_WORLD or kind >= BY_OBJECT:
         return world_place(c, k, plan, state, record)
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
@@ -226,11 +249,11 @@ def put(e, c, k, plan, roads, state, record):
 
     Where it is then, ``place_pose`` tells. It keeps its route.
     """
-    kind = plan.places[c, KIND]
+    kind = plan.places[c, PLACE_KIND]
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
         return
-    if kind == IN_WORLD or kind >= BY_BODY:
+    if kind == IN_WORLD or kind >= BY_OBJECT:
         x, y, h = world_place(c, k, plan, state, record)
         put_in_world(e, x, y, h, roads, state)
         return

@@ -29,6 +29,7 @@ from bridgegen.simulation.embedded._codes import (
     WHO,
     WHOM,
 )
+from bridgegen.simulation.embedded._place_kernels import end_follow
 from bridgegen.simulation.embedded._speed_kernels import stop_longitudinal
 
 
@@ -69,6 +70,7 @@ def begin_delete(j, k, plan, roads, state, record):
         if running >= 0 and (e == gone or goes_by(running, plan) == gone):
             stop_lateral(running, plan, state)
             state.action_ended[running] = True
+    end_follow(gone, state)
     state.stood[gone] = 0.0
     forget(state.tracks, gone)
     for array in (state.sensors, state.around, state.attention):

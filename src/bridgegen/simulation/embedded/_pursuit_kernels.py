@@ -137,10 +137,10 @@ def follow_course(j, k, plan, roads, state, record):
 
 
 @inlined_kernel
-def _seen(e, other, k, plan, record):
+def _seen(e, other, k, plan, state, record):
     """Return the instant at which an entity sees another one: the next, if that is known."""
     first = e == 0 and plan.driver != NOBODY
-    known = plan.timed[other] >= 0 or (not first and plan.order[1, other] < plan.order[1, e])
+    known = not first and (state.timed[other] or plan.order[1, other] < plan.order[1, e])
     return min(k + 1, record.v.shape[1] - 1) if known else k
 
 
@@ -156,7 +156,7 @@ def _wanted(j, e, v, plan, state):
 def _follow_speed(j, e, k, passed, plan, state, record):
     row = plan.courses[plan.actions[j, 6]]
     ref, shape = row[REF], plan.actions[j, 2]
-    target = _wanted(j, e, record.v[ref, _seen(e, ref, k, plan, record)], plan, state)
+    target = _wanted(j, e, record.v[ref, _seen(e, ref, k, plan, state, record)], plan, state)
     if shape == STEP:
         state.command[e] = target
         return not row[CONTINUOUS]
@@ -210,7 +210,7 @@ def _keep_distance(j, e, k, plan, roads, state, record):
     """Keep, or reach, a distance: at once if nothing limits it, else as by a spring."""
     row = plan.courses[plan.actions[j, 6]]
     ref, side = row[REF], state.course[e, SIDE_TAKEN]
-    seen = _seen(e, ref, k, plan, record) if row[UNLIMITED] and e > 0 else k
+    seen = _seen(e, ref, k, plan, state, record) if row[UNLIMITED] and e > 0 else k
     gap = state.slots[plan.actions[j, 4]]
     if row[IS_TIME_GAP]:
         gap *= record.v[ref, seen]

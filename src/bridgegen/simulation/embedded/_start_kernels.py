@@ -6,9 +6,11 @@ from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._action_kernels import begin_initially
+from bridgegen.simulation.embedded._follow_kernels import at_time
 from bridgegen.simulation.embedded._global_kernels import set_clock
-from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS
+from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS, STOPS
 from bridgegen.simulation.embedded._motion_kernels import shifted
+from bridgegen.simulation.embedded._place_kernels import body_pose, put
 from bridgegen.simulation.embedded._signal_kernels import (
     DURATION,
     enter_phase,
@@ -18,44 +20,50 @@ from bridgegen.simulation.embedded._signal_kernels import (
 
 @inlined_kernel
 def start(plan, roads, state, record):
-    """Set the state and the record's first instant; who moves by a timetable is recorded whole."""
-    n_entities, n_steps = record.x.shape
+    """Set the state and the record's first instant."""
     set_clear(state.weather)
     change(state.weather, plan.weathers, 0, state.slots)
     start_globals(plan, state)
-    for e in range(n_entities):
+    for e in range(record.x.shape[0]):
         state.on[e], state.to[e], state.route[e] = e, -1, plan.routes[e]
-        state.lateral_action[e] = state.speed_action[e] = -1
-        state.rate[e] = math.inf
+        state.lateral_action[e] = state.speed_action[e] = state.follow_action[e] = -1
+        state.rate[e], state.follow[e] = math.inf, plan.follows[e]
         state.present[e] = plan.absent[e] == 0
         if plan.comes_and_goes:
             record.present[e, 0] = state.present[e]
-        m = plan.timed[e]
-        if m >= 0:
-            for k in range(n_steps):
-                record.x[e, k] = roads.tracks[m, k, 0]
-                record.y[e, k] = roads.tracks[m, k, 1]
-                record.h[e, k] = roads.tracks[m, k, 2]
-                record.v[e, k] = roads.tracks[m, k, 3]
-                record.a[e, k] = roads.tracks[m, k, 4]
-                record.offset[e, k] = 0.0
-            state.command[e] = state.target[e] = record.v[e, 0]
-            state.station[e] = roads.tracks[m, 0, 5]
-            continue
-        length = (roads.counts[e] - 1) * roads.steps[e]
-        if not (0.0 <= state.station[e] <= length):
-            for array in (record.x, record.y, record.h, record.v, record.a, record.offset):
-                array[:] = 0.0
-            record.lights[:] = 0
-            state.ending[N_STEPS], state.ending[STATUS] = 1, OFF_ROUTE
-            return
-        x, y, h = pose(roads.paths[e], roads.counts[e], roads.steps[e], state.station[e])
-        record.x[e, 0], record.y[e, 0] = shifted(x, y, h, state.aside[e])
-        record.h[e, 0] = h
         record.v[e, 0] = min(state.slots[plan.init[e]], plan.bodies[e, 3])
         record.offset[e, 0] = 0.0
+        m = plan.follows[e]
+        if m >= 0:
+            record.x[e, 0], record.y[e, 0], record.h[e, 0], record.v[e, 0], state.station[e] = (
+                at_time(roads.timetables[m], roads.timetable_counts[m], 0.0)
+            )
+        else:
+            length = (roads.counts[e] - 1) * roads.steps[e]
+            if not (0.0 <= state.station[e] <= length):
+                _end(OFF_ROUTE, state, record)
+                return
+            x, y, h = pose(roads.paths[e], roads.counts[e], roads.steps[e], state.station[e])
+            record.x[e, 0], record.y[e, 0] = shifted(x, y, h, state.aside[e])
+            record.h[e, 0] = h
         state.command[e] = state.target[e] = record.v[e, 0]
+    for i in range(plan.starts.shape[0]):
+        e = plan.starts[i, 0]
+        put(e, plan.starts[i, 1], 0, plan, roads, state, record)
+        if state.ending[STOPS]:
+            _end(state.ending[STATUS], state, record)
+            return
+        record.x[e, 0], record.y[e, 0], record.h[e, 0] = body_pose(e, roads, state)
     begin_initially(plan, roads, state, record)
+
+
+@inlined_kernel
+def _end(status, state, record):
+    """End a row at its first instant."""
+    for array in (record.x, record.y, record.h, record.v, record.a, record.offset):
+        array[:] = 0.0
+    record.lights[:] = 0
+    state.ending[N_STEPS], state.ending[STATUS] = 1, status
 
 
 @inlined_kernel

@@ -1,14 +1,14 @@
 """How bodies that the storyboard moves go on from one instant to the next."""
 
-import math
-
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._across_kernels import CONTINUOUS
+from bridgegen.simulation.embedded._lane_kernels import continued
 from bridgegen.simulation.embedded._lateral_kernels import glide
 from bridgegen.simulation.embedded._place_kernels import (
     LANES,
     ask,
     body_pose,
+    end_follow,
     put_in_world,
     way_from,
 )
@@ -19,21 +19,11 @@ road network are to be looked at; a trajectory ends, on whichever lane is there.
 
 
 @inlined_kernel
-def move_along_timetable(e, k, plan, roads, state, record):
-    """Move an entity on whose states are recorded beforehand."""
-    if k == record.x.shape[1] - 1:
-        return
-    m = plan.timed[e]
-    state.station[e] = roads.tracks[m, k + 1, 5]
-    state.travelled[e] = state.station[e] - roads.tracks[m, 0, 5]
-    state.stood[e] = state.stood[e] + plan.dt if record.v[e, k + 1] == 0.0 else 0.0
-
-
-@inlined_kernel
 def move_along_path(e, k, plan, roads, state, record):
     """Move an entity on from instant k at the commanded speed, along its path and across it."""
     dt, before = plan.dt, record.v[e, k]
-    step = 0.5 * (before + state.command[e]) * dt
+    step = 0.0 if state.placed[e] else 0.5 * (before + state.command[e]) * dt
+    state.placed[e] = False
     ahead, tilt = step, 0.0
     j = state.lateral_action[e]
     if j >= 0:
@@ -64,9 +54,7 @@ def move_along_path(e, k, plan, roads, state, record):
     record.v[e, k + 1] = state.command[e]
     record.offset[e, k + 1] = 0.0
     record.x[e, k + 1], record.y[e, k + 1], h = body_pose(e, roads, state)
-    h += tilt
-    turns = round((h - record.h[e, k]) / (2.0 * math.pi))  # another path may count them anew
-    record.h[e, k + 1] = h - 2.0 * math.pi * turns
+    record.h[e, k + 1] = continued(h + tilt, record.h[e, k])  # another path may count them anew
 
 
 @kernel
@@ -79,6 +67,7 @@ def pass_end(e, beyond, roads, state):
         ask(0, LANES, state)
         return False
     if follows == LANDS:
+        end_follow(e, state)
         state.station[e] = (roads.counts[state.on[e]] - 1) * roads.steps[state.on[e]]
         x, y, h = body_pose(e, roads, state)
         put_in_world(e, x, y, h, roads, state)

@@ -5,11 +5,25 @@ from collections.abc import Sequence
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.simulation.embedded._codes import ADD_ENTITY, DELETE_ENTITY
+from bridgegen.simulation.embedded._codes import (
+    ADD_ENTITY,
+    ASSIGN_ROUTE,
+    DELETE_ENTITY,
+    FOLLOW,
+    TELEPORT,
+)
 from bridgegen.simulation.embedded.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.global_actions import GlobalActions
-from bridgegen.simulation.embedded.program import AlongTrajectory, LaneCheck, PathSpec, Point
+from bridgegen.simulation.embedded.positions import Positions
+from bridgegen.simulation.embedded.program import (
+    AlongTrajectory,
+    LaneCheck,
+    PathSpec,
+    Point,
+    Spot,
+)
 from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.trajectories import compile_trajectory
 
 _SPEED_CHANGE, _LANE_CHANGE, _LANE_OFFSET = 0, 1, 4
 
@@ -25,25 +39,29 @@ class Actions:
         initial: the numbers of those that begin at the start.
         courses: what moves entities along their paths.
         laterals: as ``Program.laterals`` has them.
+        routes: as ``Program.waypoints`` has them.
         lane_checks: lane changes that are known to be asked for.
         has_driver: whether a driver drives the ego, and the storyboard does not; set it first.
 
     Args:
         tables: the compiler's; takes down what cannot be run.
-        paths: of the entities.
-        points: takes the positions that actions name.
+        paths: of the entities; trajectories of events are added.
+        points: takes the positions that actions along the road name.
+        positions: takes those that others name.
         everywhere: compiles what concerns all.
     """
 
     def __init__(
-        self, tables: Tables, paths: list[PathSpec], points: list[Point],
+        self, tables: Tables, paths: list[PathSpec], points: list[Point], positions: Positions,
         everywhere: GlobalActions,
     ) -> None:  # fmt: skip
         self._tables, self._paths, self._everywhere = tables, paths, everywhere
+        self._positions = positions
+        self.routes: list[tuple[Spot, ...]] = []
         self.has_driver = False
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
-        self.courses = Courses(tables, [] if points is None else points)
+        self.courses = Courses(tables, points)
         self.rows: list[tuple[int, ...]] = []
         self.initial: list[int] = []
 
@@ -101,10 +119,7 @@ class Actions:
 
     def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
         action = wrapped.action
-        if self.is_timed(entity):
-            what = f"{type(action).__name__} of one that follows a trajectory with times"
-            self._tables.unsupported(action, what)
-        elif (row := self.courses.add(getattr(action, "action", action), entity)) is not None:
+        if (row := self.courses.add(getattr(action, "action", action), entity)) is not None:
             self.rows.append(row)
         elif isinstance(action, osc.LateralAction):
             if isinstance(action.action, osc.LaneChangeAction):
@@ -113,6 +128,11 @@ class Actions:
                 self._lane_offset(action.action, entity)
             else:
                 self._tables.unsupported(action.action, type(action.action).__name__)
+        elif isinstance(action, osc.TeleportAction):
+            place, slot = self._positions.add(action.position), self._tables.slot(0.0)
+            self.rows.append((entity, TELEPORT, 0, 0, slot, slot, place))
+        elif isinstance(action, osc.RoutingAction):
+            self._routing(action.action, entity)
         else:
             self._tables.unsupported(action, f"{type(action).__name__} in an Event")
 
@@ -125,6 +145,43 @@ class Actions:
             return
         slot = self._tables.slot(0.0)
         self.rows.append((entity, DELETE_ENTITY, 0, 0, slot, slot, 0))
+
+    def _routing(self, action: Element, entity: int) -> None:
+        slot = self._tables.slot(0.0)
+        if isinstance(action, osc.AssignRouteAction | osc.AcquirePositionAction):
+            spots = self.waypoints(action)
+            if spots:
+                row = (entity, ASSIGN_ROUTE, 0, 0, slot, slot, self.add_route(spots))
+                self.rows.append(row)
+        elif isinstance(action, osc.FollowTrajectoryAction):
+            self._refuse_driven(action, entity)
+            timing = action.time_reference.reference
+            relative = isinstance(timing, osc.Timing) and (
+                timing.domain_absolute_relative is osc.ReferenceContext.RELATIVE
+            )
+            number = sum(isinstance(one, AlongTrajectory) for one in self._paths)
+            path = compile_trajectory(self._tables, action)
+            self._paths.append(path)
+            offset = self._tables.slot(path.start)
+            self.rows.append((entity, FOLLOW, 0, int(relative), offset, slot, number))
+        else:
+            self._tables.unsupported(action, f"{type(action).__name__} in an Event")
+
+    def waypoints(
+        self, action: osc.AssignRouteAction | osc.AcquirePositionAction
+    ) -> tuple[Spot, ...]:
+        """Return the places that a route passes, or the one that it leads to."""
+        if isinstance(action, osc.AcquirePositionAction):
+            found = [self._positions.spot(action.position)]
+        else:
+            found = [self._positions.spot(one.position) for one in action.route.waypoints]
+        return tuple(one for one in found if one is not None)
+
+    def add_route(self, spots: tuple[Spot, ...]) -> int:
+        """Return the number of a route, a new one if it is new."""
+        if spots not in self.routes:
+            self.routes.append(spots)
+        return self.routes.index(spots) + 1
 
     def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
         shape, dimension, value = self.courses.dynamics(action.dynamics)

@@ -17,16 +17,18 @@ from bridgegen.openx.openscenario.declarations import (
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.resolve import texts_resolved
-from bridgegen.openx.openscenario.values import Value
-from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT
+from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT, WHOSE
 from bridgegen.simulation.embedded.actions import Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
 from bridgegen.simulation.embedded.courses import LONGITUDINAL, first_speed
 from bridgegen.simulation.embedded.global_actions import GlobalActions
+from bridgegen.simulation.embedded.positions import Positions
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
     LanePoint,
+    LaneSpot,
+    Nowhere,
     PathSpec,
     Point,
     Program,
@@ -91,9 +93,13 @@ class _Compiler:
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
         self.points: list[Point] = []
-        self.waypoints: list[tuple[LanePoint, ...]] = []
+        self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
         self.everywhere = GlobalActions(self.tables, scenario)
-        self.actions = Actions(self.tables, self.paths, self.points, self.everywhere)
+        self.actions = Actions(
+            self.tables, self.paths, self.points, self.positions, self.everywhere
+        )
+        self.starts: dict[int, int] = {}
+        self.routes: dict[int, int] = {}
 
     def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
         """Return the scenario as it was given without what cannot be run."""
@@ -142,6 +148,10 @@ class _Compiler:
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
         rows = elements(found, self.tables, self.triggers, self.actions)
+        trajectories = [p for p, one in enumerate(self.paths) if isinstance(one, AlongTrajectory)]
+        follows = [
+            trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
+        ]
         n_steps = round(duration / step) + 1
         if not 2 <= n_steps <= MAX_STEPS:
             self.tables.problems.append(
@@ -165,8 +175,8 @@ class _Compiler:
             slots=self.tables.slots,
             init=np.array(init, dtype=np.int64),
             paths=tuple(self.paths),
-            routes=np.array(self._routes(), dtype=np.int64),
-            waypoints=tuple(self.waypoints),
+            routes=np.array([self.routes.get(e, 0) for e in range(len(objects))], dtype=np.int64),
+            waypoints=tuple(self.actions.routes),
             lane_checks=tuple(self.actions.lane_checks),
             start_slots=np.array(start_slots, dtype=np.int64),
             aside_slots=np.array(aside_slots, dtype=np.int64),
@@ -182,6 +192,11 @@ class _Compiler:
             initial=np.array(self.actions.initial, dtype=np.int64),
             actions=table(self.actions.rows, 8),
             laterals=table(self.actions.laterals, 3),
+            trajectories=np.array(trajectories, dtype=np.int64),
+            follows=np.array(follows, dtype=np.int64),
+            starts=table(self._ordered_starts(), 2),
+            places=table(self.positions.rows, 8),
+            spots=tuple(self.positions.spots),
             weathers=everywhere.environments.rows,
             values=np.array(everywhere.values.slots, dtype=np.int64),
             lights=tuple(signals.lights),
@@ -205,14 +220,18 @@ class _Compiler:
             noise_key=self._declared_noise_key(),
         )
 
-    def _routes(self) -> list[int]:
-        """Return the number of the route that each entity starts with, 0 for none."""
-        found = []
-        for path in self.paths:
-            via = path.via if isinstance(path, AlongLanes) else ()
-            if via:
-                self.waypoints.append(via)
-            found.append(len(self.waypoints) if via else 0)
+    def _ordered_starts(self) -> list[tuple[int, int]]:
+        """Return who starts at which position, after those whose place it counts from."""
+        found: list[tuple[int, int]] = []
+        left = dict(self.starts)
+        while left:
+            ready = [
+                e for e, place in left.items() if self.positions.rows[place][WHOSE] not in left
+            ]
+            if not ready:
+                names = ", ".join(f"'{self.tables.names[e]}'" for e in left)
+                raise InputError(f"{self.place}: the starts of {names} depend on one another")
+            found += [(e, left.pop(e)) for e in ready]
         return found
 
     def _aside_slot(self, path: PathSpec) -> int:
@@ -284,8 +303,8 @@ class _Compiler:
         for one in actions.global_actions:
             self.actions.begin_with_all(one.action)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
-        starts: dict[str, tuple[Point, Value]] = {}
-        routes: dict[str, tuple[osc.Waypoint, ...]] = dict.fromkeys(self.tables.names, ())
+        starts: dict[str, osc.Position] = {}
+        routes: dict[str, osc.AssignRouteAction | osc.AcquirePositionAction] = {}
         tracks: dict[str, AlongTrajectory] = {}
         first: list[tuple[osc.PrivateAction, int]] = []
         for private in actions.privates:
@@ -293,13 +312,7 @@ class _Compiler:
             for wrapped in private.private_actions:
                 action = wrapped.action
                 if isinstance(action, osc.TeleportAction):
-                    point, aside = self.tables.point(action.position)
-                    if (
-                        has_driver and name == self.tables.names[0]
-                    ):  # the ego's driver keeps to its path
-                        aside = self.tables.literal(action.position.position, "offset", aside)
-                    if point is not None:
-                        starts[name] = point, aside
+                    starts[name] = action.position
                     continue
                 inner = getattr(action, "action", action)
                 if isinstance(inner, LONGITUDINAL):
@@ -312,8 +325,8 @@ class _Compiler:
                     first.append((wrapped, self.tables.entity(name)))
                 elif isinstance(inner, osc.FollowTrajectoryAction):
                     tracks[name] = compile_trajectory(self.tables, inner)
-                elif isinstance(inner, osc.AssignRouteAction):
-                    routes[name] = inner.route.waypoints
+                elif isinstance(inner, osc.AssignRouteAction | osc.AcquirePositionAction):
+                    routes[name] = inner
                 else:
                     self.tables.unsupported(inner, f"an initial {type(inner).__name__}")
         missing = [name for name in self.tables.names if name not in starts]
@@ -325,22 +338,47 @@ class _Compiler:
                     for name in missing
                 )
             )
-        for name in self.tables.names:
-            if name not in starts:
-                continue
-            point, aside = starts[name]
-            if name in tracks:
-                self.paths.append(tracks[name])
-            elif isinstance(point, LanePoint):
-                via = [self.tables.lane_point(one.position, aside) for one in routes[name]]
-                known = tuple(one for one in via if one is not None)
-                self.paths.append(AlongLanes(point, known, aside))
-            else:
-                self.tables.problems.append(
-                    f"{self.place}, line {point.line}: a WorldPosition is supported for an entity "
-                    "that follows a trajectory, and for no other"
-                )
-                self.tables.culprits.append(self.tables.objects[self.tables.entity(name)])
+        for e, name in enumerate(self.tables.names):
+            if name in starts:
+                track, route = tracks.get(name), routes.get(name)
+                self.paths.append(track or self._start(e, starts[name], route, has_driver))
         for one_more, entity in first:
             self.actions.begin(one_more, entity)
         return [init[name] for name in self.tables.names]
+
+    def _start(
+        self,
+        e: int,
+        position: osc.Position,
+        route: osc.AssignRouteAction | osc.AcquirePositionAction | None,
+        has_driver: bool,
+    ) -> PathSpec:
+        """Return the path that an entity starts on: along its lane, as far as the file tells."""
+        where = position.position
+        spots = () if route is None else self.actions.waypoints(route)
+        if spots:
+            self.routes[e] = self.actions.add_route(spots)
+        if not isinstance(where, osc.LanePosition) or not _faces_ahead(where.orientation):
+            self.starts[e] = self.positions.add(position)
+            return Nowhere()
+        point, aside = self.tables.point(position)
+        if has_driver and e == 0:  # it keeps to its path
+            aside = self.tables.literal(where, "offset", aside)
+        if not isinstance(point, LanePoint):
+            return Nowhere()
+        via = tuple(
+            LanePoint(one.road, one.lane, one.s, one.line)
+            for one in spots
+            if isinstance(one, LaneSpot) and one.s is not None
+        )
+        if len(via) < len(spots):
+            self.starts[e] = self.positions.add(position)
+            return Nowhere()
+        return AlongLanes(point, via, aside)
+
+
+def _faces_ahead(turned: osc.Orientation | None) -> bool:
+    """Say whether an orientation on a lane is the lane's."""
+    if turned is None or turned.h is None:
+        return True
+    return turned.h == 0.0 and turned.type is not osc.ReferenceContext.ABSOLUTE

@@ -13,10 +13,17 @@ import numpy as np
 from bridgegen.arrays import Float, Int
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
-from bridgegen.openx.opendrive.lanes import borders
-from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.lanes import borders, lane_at, section_index
+from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import Piece
 from bridgegen.openx.opendrive.routes import Place, Route
+from bridgegen.simulation.embedded.program import (
+    LaneSpot,
+    RoadSpot,
+    RouteSpot,
+    Spot,
+    WorldSpot,
+)
 
 STEP = 0.2
 """Between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
@@ -58,19 +65,91 @@ class Lanes:
         ways: per route the nodes that it leads along; number 0 is no route: straight on.
     """
 
-    def __init__(self, model: OpenDrive, routes: Sequence[Sequence[Place]]) -> None:
-        """Make the tables of a road network.
-
-        Args:
-            model: the road network.
-            routes: the places that each route passes.
-
-        Raises:
-            InputError: a place is not on a lane, or none leads from one to the next.
-        """
+    def __init__(self, model: OpenDrive) -> None:
         self.graph = LaneGraph(model)
         self.nodes = self._nodes()
-        self.ways: list[list[int]] = [[], *(self._way(places) for places in routes)]
+        self.ways: list[list[int]] = [[]]
+
+    def add_route(self, spots: Sequence[Spot]) -> None:
+        """Add the route that passes some positions.
+
+        Raises:
+            InputError: one is not on a lane, or no lane leads from one to the next.
+        """
+        self.ways.append(self._way([self._on_lane(spot) for spot in spots]))
+
+    def locate(self, spot: Spot) -> tuple[int, int, float, float]:
+        """Return number of the road, lane id, s and how far left of the lane's centre [m].
+
+        Left is that of the reference line. s is NaN where rows may vary it.
+
+        Raises:
+            InputError: it is not on the road network.
+        """
+        model = self.graph.model
+        if isinstance(spot, LaneSpot):
+            road, lane, s, aside = model.road(spot.road), spot.lane, spot.s, 0.0
+            if s is not None:
+                lane_at(road, lane, s)
+        elif isinstance(spot, WorldSpot):
+            road, lane, s, aside = self._under(spot)
+        else:
+            road, s = self._along(spot)
+            t = spot.t if isinstance(spot, RoadSpot) else spot.aside
+            lane, aside = self._beside(road, s, t)
+            if isinstance(spot, RouteSpot) and spot.lane is not None:
+                lane_at(road, spot.lane, s)
+                lane, aside = spot.lane, spot.aside
+        return model.roads.index(road), lane, math.nan if s is None else s, aside
+
+    def _on_lane(self, spot: Spot) -> Place:
+        road, lane, s, _ = self.locate(spot)
+        return Place(self.graph.model.roads[road].id, lane, s)
+
+    def _along(self, spot: RoadSpot | RouteSpot) -> tuple[Road, float]:
+        """Return the road of a position, and its s."""
+        if isinstance(spot, RoadSpot):
+            road = self.graph.model.road(spot.road)
+            if not 0.0 <= spot.s <= road.length:
+                raise InputError(f"road {road.id} is {road.length:g} m long, got s={spot.s:g} m")
+            return road, spot.s
+        places = [self._on_lane(one) for one in spot.waypoints]
+        left, s = spot.path_s, places[0].s
+        for i, number in enumerate(self._way(places)):
+            node, (entry, leave) = self.graph.nodes[number], self.graph.ends[number].tolist()
+            s = entry if i else s
+            if left <= abs(leave - s):
+                return self.graph.model.road(node.road_id), s + left * node.way
+            left -= abs(leave - s)
+        raise InputError(f"the route is shorter than pathS={spot.path_s:g} m")
+
+    def _beside(self, road: Road, s: float, t: float) -> tuple[int, float]:
+        """Return the lane at, or nearest to, some t [m], and how far left of its centre that is."""
+        index = section_index(road, s)
+        edges = borders(road, index, np.array([s]))
+        best = (math.inf, 0, 0.0)
+        for lane in road.sections[index].lanes:
+            inner, outer = edges[lane.id - (1 if lane.id > 0 else -1)][0], edges[lane.id][0]
+            beyond = max(t - max(inner, outer), min(inner, outer) - t, 0.0)
+            best = min(best, (beyond, lane.id, t - 0.5 * (inner + outer)), key=lambda one: one[0])
+        if not best[1]:
+            raise InputError(f"road {road.id} has no lanes at s={s:g} m")
+        return best[1], best[2]
+
+    def _under(self, spot: WorldSpot) -> tuple[Road, int, float, float]:
+        """Return road, lane, s and offset of the lane that a point of the world is on."""
+        from bridgegen.simulation.embedded._lane_kernels import nearest_lane  # numba is slow
+
+        points, nodes = self.graph.ground
+        number = nearest_lane(points, nodes, spot.x, spot.y, spot.h)
+        if number < 0:
+            raise InputError(f"no lane leads past x={spot.x:g} m, y={spot.y:g} m")
+        at = np.flatnonzero((nodes == number) | (nodes == number ^ 1))
+        away = np.hypot(points[at, 0] - spot.x, points[at, 1] - spot.y)
+        low, high = sorted(self.graph.ends[number].tolist())
+        node = self.graph.nodes[number]
+        s = low + (high - low) * int(np.argmin(away)) / (len(at) - 1)
+        return self.graph.model.road(node.road_id), node.lane_id, s, 0.0
 
     def _nodes(self) -> Int:
         graph = self.graph

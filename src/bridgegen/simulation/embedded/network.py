@@ -42,8 +42,9 @@ class Network:
         for p, model in enumerate(models):
             for i, point in enumerate(program.points):
                 self._points[p, i] = position(program, model, point)
-        self.station: Float = np.array([each.station for each in self._ways])
-        self.sides: Float = np.array([each.sides for each in self._ways], dtype=np.float64)
+        e = len(program.names)
+        self.station: Float = np.array([each.station[:e] for each in self._ways])
+        self.sides: Float = np.array([each.sides[:e] for each in self._ways], dtype=np.float64)
         self._zones: list[list[Float]] = [[] for _ in models]
         pairs = zip(models, self._ways, strict=True)
         self.scene = stacked([_scene(program, model, ways) for model, ways in pairs])
@@ -66,7 +67,7 @@ class Network:
             self.tables = self._tables()
 
     def _tables(self) -> Roads:
-        program, ways = self._program, self._ways
+        ways = self._ways
         paths = padded([[path.table for path in each.paths] for each in ways], 6)
         spans = padded([[path.spans for path in each.paths] for each in ways], 11)
         counts = _numbers([[len(path.table) for path in each.paths] for each in ways])
@@ -76,9 +77,6 @@ class Network:
             each.lanes.graph.ground if each.lanes and each.has_ground else NO_GROUND
             for each in ways
         ]
-        tracks = np.array([each.tracks for each in ways])
-        if not tracks.size:
-            tracks = np.zeros((len(ways), 0, program.n_steps, 6))
         nodes = max(each.numbers.shape[1] for each in ways)
         return Roads(
             paths=paths,
@@ -89,7 +87,9 @@ class Network:
             span_counts=_numbers([[len(path.spans) for path in each.paths] for each in ways]),
             zones=self._find_zones(paths, counts, steps[:, :, 0, 0]),
             points=self._points,
-            tracks=tracks,
+            spots=np.array([each.spots for each in ways]),
+            timetables=padded([each.timetables for each in ways], 10),
+            timetable_counts=_numbers([list(map(len, each.timetables)) for each in ways]),
             nodes=_stacked([each.nodes if each else np.empty((0, 7), np.int64) for each in lanes]),
             ends=_stacked([each.graph.ends if each else np.empty((0, 2)) for each in lanes]),
             ways=np.stack(

@@ -62,18 +62,82 @@ class AlongLanes:
 
 
 @dataclass(frozen=True)
+class Bend:
+    """A clothoid: its first and last curvature [1/m], its length [m], a kink at its start [rad]."""
+
+    first: float
+    last: float
+    length: float
+    kink: float = 0.0
+
+
+@dataclass(frozen=True)
 class AlongTrajectory:
-    """A path from point to point in straight lines.
+    """A path from point to point in straight lines, or from one point along bends.
 
     Attributes:
         points: the vertices.
         line: of the action in the file.
-        times: when to be at each vertex [s], increasing; empty: at the entity's own speed.
+        times: when to be at each vertex, or end of a bend [s], increasing; empty: at the entity's
+            own speed.
+        bends: one after the other.
+        start: how far along it one begins [m].
     """
 
     points: tuple[Point, ...]
     line: int
     times: tuple[float, ...] = ()
+    bends: tuple[Bend, ...] = ()
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class Nowhere:
+    """The path of an entity whose start depends on the roads or on others; it leaves it at once."""
+
+
+@dataclass(frozen=True)
+class LaneSpot:
+    """A lane of a road; ``s`` [m] is None where rows may vary it."""
+
+    road: str
+    lane: int
+    s: float | None
+    line: int
+
+
+@dataclass(frozen=True)
+class RoadSpot:
+    """A point by its road's coordinates [m]."""
+
+    road: str
+    s: float
+    t: float
+    line: int
+
+
+@dataclass(frozen=True)
+class WorldSpot:
+    """A point of the world [m], with a heading [rad]."""
+
+    x: float
+    y: float
+    h: float
+    line: int
+
+
+@dataclass(frozen=True)
+class RouteSpot:
+    """A point so far along a route [m], on a lane and left of its centre, or left of the road."""
+
+    waypoints: tuple["Spot", ...]
+    path_s: float
+    lane: int | None
+    aside: float
+    line: int
+
+
+Spot = LaneSpot | RoadSpot | WorldSpot | RouteSpot
 
 
 @dataclass(frozen=True)
@@ -93,7 +157,7 @@ class LaneCheck:
     line: int
 
 
-PathSpec = AlongLanes | AlongTrajectory
+PathSpec = AlongLanes | AlongTrajectory | Nowhere
 
 
 @dataclass(frozen=True)
@@ -110,7 +174,13 @@ class Program:
         parameters: the numeric parameters with their declared values.
         slots: S distinct values.
         init: ``(E,)`` slot of each entity's initial speed.
-        paths: E ways: entity e starts on path e. Others are planned as they are needed.
+        paths: E ways, entity e starts on path e, and the trajectories that events lead along.
+            Others are planned as they are needed.
+        trajectories: ``(M,)`` the path of each trajectory.
+        follows: ``(E,)`` the trajectory by whose times an entity moves at first, -1 for none.
+        starts: ``(·, 2)`` entities that start at a position, and its number.
+        places: ``(·, 8)`` positions, see ``_codes``.
+        spots: per position what its road network has to resolve.
         routes: ``(E,)`` the route that each starts with, 0 for none; route r has the places of
             ``waypoints[r - 1]``.
         waypoints: the places that each route passes.
@@ -169,7 +239,7 @@ class Program:
     init: Int
     paths: tuple[PathSpec, ...]
     routes: Int
-    waypoints: tuple[tuple[LanePoint, ...], ...]
+    waypoints: tuple[tuple[Spot, ...], ...]
     lane_checks: tuple[LaneCheck, ...]
     start_slots: Int
     aside_slots: Int
@@ -185,6 +255,11 @@ class Program:
     initial: Int
     actions: Int
     laterals: Int
+    trajectories: Int
+    follows: Int
+    starts: Int
+    places: Int
+    spots: tuple[Spot | None, ...]
     weathers: Int
     values: Int
     lights: tuple[str, ...]
@@ -214,13 +289,6 @@ class Program:
             weathers[:, FRICTION_SCALE] = UNSAID
             changed = replace(changed, weathers=weathers)
         return changed
-
-    @cached_property
-    def timed(self) -> Int:
-        """``(E,)``: the number of an entity's timetable, -1 for one that moves by itself."""
-        paths = self.paths[: len(self.names)]
-        is_timed = np.array([isinstance(one, AlongTrajectory) and bool(one.times) for one in paths])
-        return np.where(is_timed, np.cumsum(is_timed) - 1, -1).astype(np.int64)
 
     @cached_property
     def box(self) -> Float:

@@ -9,7 +9,9 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.simulation.embedded.program import AlongTrajectory, LanePoint, Point
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.simulation.embedded.clothoids import bends
+from bridgegen.simulation.embedded.program import AlongTrajectory, Bend, LanePoint, Point
 from bridgegen.simulation.embedded.tables import Tables
 
 STEP = 0.2
@@ -17,57 +19,65 @@ STEP = 0.2
 
 LONGEST = 100_000.0  # m, a trajectory
 
-SAME_TIME = 1e-9  # s, an instant this close to a vertex's is the vertex's
-
 Corner = tuple[float, float, float | None]
 """A vertex: x, y [m], and the heading [rad] if it states one."""
 
 
 def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> AlongTrajectory:
     """Return the path of a trajectory; what cannot be run is taken down in ``tables``."""
-    mode = action.trajectory_following_mode.following_mode
-    if mode is not osc.FollowingMode.POSITION:
-        tables.unsupported(action.trajectory_following_mode, f'followingMode="{mode}"')
-    if action.initial_distance_offset not in (None, 0.0):
-        tables.unsupported(action, f'initialDistanceOffset="{action.initial_distance_offset}"')
     trajectory = action.trajectory_ref.trajectory
     if trajectory.closed is not False:
         tables.unsupported(trajectory, 'a Trajectory with closed="true"')
-    line = trajectory.shape.shape
-    if not isinstance(line, osc.Polyline):
+    line, timing = trajectory.shape.shape, action.time_reference.reference
+    curve: tuple[Bend, ...] = ()
+    if isinstance(line, osc.Polyline):
+        positions = [vertex.position for vertex in line.vertices]
+        stated = [
+            None if vertex.time is None else tables.literal(vertex, "time", vertex.time)
+            for vertex in line.vertices
+        ]
+    elif isinstance(line, osc.Clothoid | osc.ClothoidSpline):
+        origin, curve, ends = bends(tables, line)
+        positions, stated = [origin], list(ends)
+    else:
         tables.unsupported(line, type(line).__name__)
         return AlongTrajectory((), action.line)
-    vertices = line.vertices
-    points: list[Point] = []
-    for vertex in vertices:
-        point, aside = tables.point(vertex.position)
-        if isinstance(point, LanePoint):
-            where = vertex.position.position
-            s = tables.literal(where, "s", point.s)
-            aside = tables.literal(where, "offset", aside)
-            point = LanePoint(point.road, point.lane, s, point.line, aside)
-        if point is not None:
-            points.append(point)
-    timing = action.time_reference.reference
-    times = () if isinstance(timing, osc.NoTime) else _times(tables, timing, vertices)
-    return AlongTrajectory(tuple(points), action.line, times)
+    points = [point for one in positions if (point := _point(tables, one)) is not None]
+    elements = line.vertices if isinstance(line, osc.Polyline) else (line,) * len(stated)
+    times = () if isinstance(timing, osc.NoTime) else _times(tables, timing, stated, elements)
+    start = tables.literal(action, "initialDistanceOffset", action.initial_distance_offset or 0.0)
+    if times and start:
+        tables.unsupported(action, f'initialDistanceOffset="{start:g}" in a trajectory with times')
+    return AlongTrajectory(tuple(points), action.line, times, curve, start)
 
 
-def _times(tables: Tables, timing: osc.Timing, vertices: Sequence[osc.Vertex]) -> tuple[float, ...]:
-    """Return when to be at each vertex [s]; an initial action's time is the simulation's."""
+def _point(tables: Tables, position: osc.Position) -> Point | None:
+    point, aside = tables.point(position)
+    if not isinstance(point, LanePoint):
+        return point
+    where = position.position
+    s, aside = tables.literal(where, "s", point.s), tables.literal(where, "offset", aside)
+    return LanePoint(point.road, point.lane, s, point.line, aside)
+
+
+def _times(
+    tables: Tables, timing: osc.Timing, stated: Sequence[float | None], where: Sequence[Element]
+) -> tuple[float, ...]:
+    """Return when to be at each vertex [s]: a stated time, scaled and then moved."""
     scale = tables.literal(timing, "scale", timing.scale)
     offset = tables.literal(timing, "offset", timing.offset)
     times: list[float] = []
-    for vertex in vertices:
-        if vertex.time is None:
-            tables.unsupported(vertex, "a Vertex without a time in a trajectory with times")
+    for time, element in zip(stated, where, strict=True):
+        what = f"a {type(element).__name__}"
+        if time is None:
+            tables.unsupported(element, f"{what} without a time in a trajectory with times")
             continue
-        times.append(scale * tables.literal(vertex, "time", vertex.time) + offset)
+        times.append(scale * time + offset)
         if not math.isfinite(times[-1]):
-            tables.unsupported(vertex, f"a Vertex at {times[-1]:g} s")
+            tables.unsupported(element, f"{what} at {times[-1]:g} s")
         elif len(times) > 1 and not times[-1] > times[-2]:
             tables.unsupported(
-                vertex, f"a Vertex at {times[-1]:g} s after one at {times[-2]:g} s (not later)"
+                element, f"{what} at {times[-1]:g} s after one at {times[-2]:g} s (not later)"
             )
     return tuple(times)
 
@@ -110,46 +120,25 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
     return np.stack([x_s, y_s, h_s, np.cos(h_s), np.sin(h_s), np.zeros_like(s)], axis=1), step
 
 
-def timetable(corners: Sequence[Corner], times: Sequence[float], instants: Float) -> Float:
-    """Return the states of who follows a trajectory by its times.
+def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
+    """Return when who follows a trajectory by its times is where.
 
-    Position is linear between two vertices, and exactly a vertex's at its time. Heading turns the
-    short way round between two vertices that state one, and else is the direction of travel. Speed
-    is distance by time, at a vertex that of the segment which ends there. Before the first vertex
-    and after the last one the entity stands.
+    Position is linear between two vertices. Heading turns the short way round between two that
+    state one, and else is the direction of travel. Before the first vertex the entity stands.
 
     Args:
         corners: V ≥ 2 vertices.
         times: their times [s], increasing.
-        instants: ``(T,)`` [s], increasing.
 
     Returns:
-        ``(T, 6)``: x, y [m], heading [rad] (continuous), speed [m/s], acceleration up to the next
-        instant [m/s²] (at the end of the trajectory what it was before), metres travelled.
+        ``(V - 1, 10)``, a row per segment; see ``_follow_kernels``.
     """
     clock = np.asarray(times, dtype=np.float64)
     place = np.array([corner[:2] for corner in corners], dtype=np.float64)
-    leg = np.hypot(*np.diff(place, axis=0).T)
-    knots = np.concatenate([[0.0], np.cumsum(leg)])
-    after = np.searchsorted(clock, instants - SAME_TIME)  # the vertex that comes now or next
-    moving = (instants >= clock[0] - SAME_TIME) & (after < len(clock))
-    i = np.clip(after, 1, len(clock) - 1) - 1
-    span = clock[i + 1] - clock[i]
-    u = np.clip((instants - clock[i]) / span, 0.0, 1.0)
-    u[np.abs(instants - clock[i + 1]) <= SAME_TIME] = 1.0
-    at_end = u == 1.0  # start + 1·(end - start) may miss the end by a rounding
+    knots = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place, axis=0).T))])
     begins, ends = _headings(corners, place)
-    table = np.empty((len(instants), 6))
-    table[:, :2] = np.where(
-        at_end[:, None], place[i + 1], place[i] + u[:, None] * (place[i + 1] - place[i])
-    )
-    table[:, 2] = np.unwrap(np.where(at_end, ends[i], begins[i] + u * (ends[i] - begins[i])))
-    table[:, 3] = np.where(moving, leg[i] / span, 0.0)
-    table[:, 4] = np.append(np.diff(table[:, 3]) / np.diff(instants), 0.0)
-    table[:, 5] = knots[i] + u * leg[i]
-    last = np.flatnonzero(moving)[-1:]
-    table[last, 4] = table[last - 1, 4] if last > 0 else 0.0
-    return table
+    columns = (clock[:-1], clock[1:], *place[:-1].T, *place[1:].T, begins, ends)
+    return np.stack((*columns, knots[:-1], knots[1:]), axis=1)
 
 
 def _headings(corners: Sequence[Corner], place: Float) -> tuple[Float, Float]:

@@ -11,7 +11,6 @@ from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
 from bridgegen.openx.opendrive.lanes import lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import (
-    Place,
     Route,
     Step,
     Stretch,
@@ -19,12 +18,14 @@ from bridgegen.openx.opendrive.routes import (
     plan_route,
 )
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
+from bridgegen.simulation.embedded import clothoids
 from bridgegen.simulation.embedded.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
     LaneCheck,
     LanePoint,
+    Nowhere,
     Point,
     Program,
 )
@@ -36,6 +37,7 @@ LANES, GROUND = -1, -2  # asked for instead of a node, see ``_place_kernels``
 
 _MOST_STRETCHES = 1000
 _NO_SPANS = np.empty((0, 11))
+_NO_TIMES = np.empty((0, 10))
 
 
 class Ways:
@@ -47,7 +49,8 @@ class Ways:
         station: per entity a, b: who starts at s on the first road starts a + b·s along its path.
         sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
             trajectory.
-        tracks: per entity with a timetable its ``(T, 6)`` states (``trajectories.timetable``).
+        timetables: per trajectory ``trajectories.timetable``, without rows if it has no times.
+        spots: ``(C, 4)`` per position of the file: number of its road, lane, s, left of its centre.
         lanes: the lanes of the road network, None while nobody has asked for them.
         has_ground: whether somebody has asked where all of them are.
         numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
@@ -62,7 +65,7 @@ class Ways:
         self.paths: list[Path] = []
         self.station: list[tuple[float, float]] = []
         self.sides: list[int] = []
-        self.tracks: list[Float] = []
+        self.timetables: list[Float] = []
         self.lanes: Lanes | None = None
         self.has_ground = False
         self.numbers: Int = np.empty((len(program.waypoints) + 1, 0), dtype=np.int64)
@@ -70,14 +73,20 @@ class Ways:
             try:
                 if isinstance(spec, AlongTrajectory):
                     self._add_trajectory(spec)
+                elif isinstance(spec, Nowhere):
+                    self._add_line(polyline([(0.0, 0.0, 0.0)], may_stand=True), ENDS)
                 else:
                     self._add_lanes(number, spec)
             except InputError as error:
-                who = f"route of '{program.names[number]}'"
+                who = f"trajectory {number - len(program.names)}"
+                if number < len(program.names):
+                    who = f"route of '{program.names[number]}'"
                 raise InputError(f"{program.place}: {who}: {error}") from None
-        if len(program.laterals):
+        self.spots = np.full((len(program.spots), 4), np.nan)
+        if len(program.laterals) or len(program.spots):
             self.plan(0, LANES)
             self._check_lane_changes()
+            self._find_spots()
 
     def plan(self, route: int, node: int) -> None:
         """Plan what a row has asked for; see ``ask`` in ``_place_kernels``."""
@@ -97,9 +106,10 @@ class Ways:
         if self.lanes is not None:
             return
         program = self._program
-        places = [[Place(*_place(program, one)) for one in via] for via in program.waypoints]
-        self.lanes = lanes = Lanes(self._model, places)
-        self.numbers = np.full((len(places) + 1, len(lanes.nodes)), UNKNOWN)
+        self.lanes = lanes = Lanes(self._model)
+        for spots in program.waypoints:
+            lanes.add_route(spots)
+        self.numbers = np.full((len(lanes.ways), len(lanes.nodes)), UNKNOWN)
         for i, route in enumerate(self.routes):
             if route is not None:
                 chain = [lanes.graph.numbers[_node(self._model, step)] for step in route.steps]
@@ -186,14 +196,35 @@ class Ways:
 
     def _add_trajectory(self, spec: AlongTrajectory) -> None:
         corners = [_corner(self._program, self._model, point) for point in spec.points]
-        table, step = polyline(corners, may_stand=bool(spec.times))
+        if spec.bends:
+            x, y, h = corners[0]
+            line = clothoids.sampled(x, y, h or 0.0, spec.bends)
+            corners = [(x, y, h) for x, y, h in line[0][:, :3].tolist()]
+        else:
+            line = polyline(corners, may_stand=bool(spec.times))
+        times: Sequence[float] = spec.times
+        if spec.bends and times:
+            knots = np.cumsum([0.0, *(bend.length for bend in spec.bends)])
+            times = np.interp(np.arange(len(corners)) * line[1], knots, times).tolist()
+        self.timetables.append(timetable(corners, times) if times else _NO_TIMES)
+        self._add_line(line, LANDS, spec.start)
+
+    def _add_line(self, line: tuple[Float, float], follows: int, start: float = 0.0) -> None:
         self.routes.append(None)
-        self.paths.append(Path(table, step, _NO_SPANS, LANDS))
-        self.station.append((0.0, 0.0))
+        self.paths.append(Path(*line, _NO_SPANS, follows))
+        self.station.append((start, 0.0))
         self.sides.append(0)
-        if spec.times:
-            instants = np.arange(self._program.n_steps, dtype=np.float64) * self._program.time_step
-            self.tracks.append(timetable(corners, spec.times, instants))
+
+    def _find_spots(self) -> None:
+        """Find the positions of the file that do not depend on where entities are."""
+        assert self.lanes is not None
+        for row, spot in zip(self.spots, self._program.spots, strict=True):
+            if spot is not None:
+                try:
+                    row[:] = self.lanes.locate(spot)
+                except InputError as error:
+                    place = f"{self._program.place}, line {spot.line}"
+                    raise InputError(f"{place}: {error}") from None
 
 
 def position(program: Program, model: OpenDrive, point: Point) -> tuple[float, float]:

@@ -1,0 +1,101 @@
+"""Clothoids as lines to follow: curvature that changes evenly from one end of an arc to the other.
+
+Source: ASAM OpenSCENARIO XML 1.3, Clothoid and ClothoidSpline.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.geometry import TURN_LIMIT, evaluate
+from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, Spiral
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.simulation.embedded.program import Bend
+from bridgegen.simulation.embedded.tables import Tables
+
+STEP = 0.2  # m, between two samples at most
+
+
+def bends(
+    tables: Tables, line: osc.Clothoid | osc.ClothoidSpline
+) -> tuple[osc.Position, tuple[Bend, ...], tuple[float | None, ...]]:
+    """Return where a clothoid, or a chain of them, starts, its bends, and when to be at their ends.
+
+    What cannot be run is taken down in ``tables``. Rows may not vary it.
+    """
+
+    def number(element: osc.Clothoid | osc.ClothoidSplineSegment, name: str) -> float:
+        words = name.split("_")
+        shown = words[0] + "".join(word.capitalize() for word in words[1:])
+        return tables.literal(element, shown, getattr(element, name) or 0.0)
+
+    def time(value: object) -> float | None:
+        return None if value is None else tables.declared(value)  # type: ignore[arg-type]
+
+    if isinstance(line, osc.Clothoid):
+        rate = "curvature_dot" if line.curvature_prime is None else "curvature_prime"
+        length, first = number(line, "length"), number(line, "curvature")
+        bend = Bend(first, first + number(line, rate) * length, length)
+        return line.position, (bend,), (time(line.start_time), time(line.stop_time))
+    found: list[Bend] = []
+    times: list[float | None] = []
+    for segment in line.segments:
+        if found and segment.position_start is not None:
+            tables.unsupported(segment.position_start, "a PositionStart after the first segment's")
+        found.append(
+            Bend(
+                number(segment, "curvature_start"),
+                number(segment, "curvature_end"),
+                number(segment, "length"),
+                number(segment, "h_offset"),
+            )
+        )
+        times.append(time(segment.time_start))
+    start = line.segments[0].position_start
+    if start is None:
+        tables.unsupported(line, "a ClothoidSpline without a PositionStart")
+        start = osc.Position(osc.WorldPosition(0.0, 0.0))
+    return start, tuple(found), (*times, time(line.time_end))
+
+
+def sampled(x: float, y: float, h: float, line: Sequence[Bend]) -> tuple[Float, float]:
+    """Return a chain of bends from a pose as a path, and its step [m].
+
+    Returns:
+        ``(L, 6)``: x, y [m], heading [rad], its cosine and sine, curvature [1/m].
+
+    Raises:
+        InputError: it has no length, or turns without end.
+    """
+    length = sum(bend.length for bend in line)
+    if not (0.0 < length < math.inf):
+        raise InputError(f"a clothoid must have a length, got {length:g} m")
+    step = length / math.ceil(length / STEP)
+    s = np.arange(round(length / step) + 1) * step
+    table = np.empty((len(s), 6))
+    station = 0.0
+    for bend in line:
+        if bend.length <= 0.0:
+            continue
+        turn = bend.length * max(abs(bend.first), abs(bend.last))
+        if not turn <= TURN_LIMIT:
+            raise InputError(f"a clothoid must turn by at most {TURN_LIMIT:g} rad, got {turn:g}")
+        geometry = Geometry(0.0, x, y, h + bend.kink, bend.length, _shape(bend))
+        here = s >= station - 1e-9
+        curve = evaluate(geometry, np.append(s[here] - station, bend.length))
+        for column, values in enumerate((curve.x, curve.y, curve.h)):
+            table[here, column] = values[:-1]
+        table[here, 5] = curve.curvature[:-1]
+        x, y, h = float(curve.x[-1]), float(curve.y[-1]), float(curve.h[-1])
+        station += bend.length
+    table[:, 3], table[:, 4] = np.cos(table[:, 2]), np.sin(table[:, 2])
+    return table, step
+
+
+def _shape(bend: Bend) -> Line | Arc | Spiral:
+    if bend.first != bend.last:
+        return Spiral(bend.first, bend.last)
+    return Arc(bend.first) if bend.first else Line()

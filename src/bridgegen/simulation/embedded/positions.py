@@ -1,0 +1,140 @@
+"""Positions of a scenario file as a table: what the rollout needs to find one when it is asked for.
+
+Their numbers may vary by row, but for those that only the roads can resolve: t of a RoadPosition,
+and where on a route a RoutePosition is.
+"""
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.simulation.embedded._codes import (
+    BY_LANES,
+    BY_OBJECT,
+    BY_ROAD,
+    BY_WORLD,
+    IN_WORLD,
+    ON_LANE,
+    ON_ROAD,
+)
+from bridgegen.simulation.embedded.program import (
+    LaneSpot,
+    RoadSpot,
+    RouteSpot,
+    Spot,
+    WorldSpot,
+)
+from bridgegen.simulation.embedded.tables import Tables
+
+RELATIVE_SINCE = 3
+"""The minor version from which a missing type of an Orientation means relative."""
+
+
+class Positions:
+    """The positions of a scenario file.
+
+    Attributes:
+        rows: ``(·, 8)`` as ``_codes`` names the columns.
+        spots: per position what its road network has to resolve, None where there is nothing.
+
+    Args:
+        tables: the compiler's; takes down what cannot be run.
+        minor_version: of the file's OpenSCENARIO.
+    """
+
+    def __init__(self, tables: Tables, minor_version: int) -> None:
+        self._tables, self._minor = tables, minor_version
+        self.rows: list[tuple[int, ...]] = []
+        self.spots: list[Spot | None] = []
+
+    def add(self, position: osc.Position) -> int:
+        """Return a position's number; what cannot be run is taken down."""
+        where = position.position
+        if isinstance(where, osc.LanePosition):
+            spot = self._lane_spot(where)
+            return self._append(where, ON_LANE, where.s, where.offset or 0.0, spot=spot)
+        if isinstance(where, osc.WorldPosition):
+            return self._append(where, IN_WORLD, where.x, where.y, heading=where.h)
+        if isinstance(where, osc.RoadPosition | osc.RoutePosition):
+            return self._append(where, ON_ROAD, 0.0, 0.0, spot=self.spot(position))
+        if isinstance(where, osc.RelativeLanePosition):
+            by_lane = where.ds_lane is not None
+            metres = where.ds_lane if where.ds_lane is not None else where.ds
+            return self._append(
+                where, BY_LANES, metres or 0.0, where.offset or 0.0, whose=where.entity_ref,
+                count=int(self._tables.literal(where, "dLane", where.d_lane)), by_lane=by_lane,
+            )  # fmt: skip
+        if isinstance(where, osc.RelativeRoadPosition):
+            return self._append(where, BY_ROAD, where.ds, where.dt, whose=where.entity_ref)
+        if isinstance(where, osc.RelativeObjectPosition):
+            return self._append(where, BY_OBJECT, where.dx, where.dy, whose=where.entity_ref)
+        if isinstance(where, osc.RelativeWorldPosition):
+            return self._append(where, BY_WORLD, where.dx, where.dy, whose=where.entity_ref)
+        self._tables.unsupported(where, type(where).__name__)
+        return 0
+
+    def spot(self, position: osc.Position) -> Spot | None:
+        """Return a position that does not depend on where entities are; others are taken down.
+
+        Rows may not vary it, but for s on a lane: a way leads there by its declared value.
+        """
+        where, literal = position.position, self._tables.literal
+        if isinstance(where, osc.WorldPosition):
+            x, y, h = (
+                literal(where, name, getattr(where, name) or 0.0) for name in ("x", "y", "h")
+            )
+            return WorldSpot(x, y, h, where.line)
+        if isinstance(where, osc.LanePosition):
+            spot, s = self._lane_spot(where), self._tables.declared(where.s)
+            return spot and LaneSpot(spot.road, spot.lane, s, where.line)
+        if isinstance(where, osc.RoadPosition):
+            road = self._tables.text(where.road_id)
+            s, t = literal(where, "s", where.s), literal(where, "t", where.t)
+            return RoadSpot(road, s, t, where.line)
+        if isinstance(where, osc.RoutePosition):
+            return self._route_spot(where)
+        self._tables.unsupported(where, f"{type(where).__name__} here")
+        return None
+
+    def _lane_spot(self, where: osc.LanePosition) -> LaneSpot | None:
+        text = self._tables.text(where.lane_id)
+        try:
+            lane = int(text)
+        except ValueError:
+            self._tables.unsupported(where, f'laneId="{text}" (a whole number is needed)')
+            return None
+        varies = isinstance(where.s, osc.ParameterRef | Expr)
+        s = None if varies else self._tables.declared(where.s)
+        return LaneSpot(self._tables.text(where.road_id), lane, s, where.line)
+
+    def _route_spot(self, where: osc.RoutePosition) -> RouteSpot | None:
+        literal = self._tables.literal
+        found = [self.spot(one.position) for one in where.route_ref.route.waypoints]
+        waypoints = tuple(one for one in found if one is not None)
+        inner = where.in_route_position.position
+        if isinstance(inner, osc.PositionOfCurrentEntity):
+            self._tables.unsupported(inner, "FromCurrentEntity")
+            return None
+        s = literal(inner, "pathS", inner.path_s)
+        if isinstance(inner, osc.PositionInRoadCoordinates):
+            return RouteSpot(waypoints, s, None, literal(inner, "t", inner.t), where.line)
+        aside = literal(inner, "laneOffset", inner.lane_offset or 0.0)
+        return RouteSpot(waypoints, s, int(self._tables.text(inner.lane_id)), aside, where.line)
+
+    def _append(
+        self, where: Element, kind: int, u: Value, w: Value, *, whose: object = None,
+        count: int = 0, by_lane: bool = False, heading: Value | None = None,
+        spot: Spot | None = None,
+    ) -> int:  # fmt: skip
+        turned = getattr(where, "orientation", None)
+        absolute = kind == IN_WORLD
+        if turned is not None:
+            heading = turned.h
+            absolute = turned.type is osc.ReferenceContext.ABSOLUTE or (
+                turned.type is None and self._minor < RELATIVE_SINCE
+            )
+        entity = -1 if whose is None else self._tables.entity(whose)
+        slots = (self._tables.slot(u), self._tables.slot(w))
+        h = self._tables.slot(heading or 0.0)
+        self.rows.append((kind, entity, count, *slots, int(absolute), h, int(by_lane)))
+        self.spots.append(spot)
+        return len(self.rows) - 1

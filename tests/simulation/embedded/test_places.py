@@ -1,0 +1,217 @@
+"""Where entities are put and where they go, on the generated crossroads, worked by hand.
+
+Leg C's road 3 runs north from the junction: lane 1 leads south at x = -1.75, s counts from the
+junction's edge at y = 13. Lane -1 leads north at x = 1.75.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import InputError
+from bridgegen.simulation.rollout import STATUS_MESSAGES
+
+from .storyboards import after, events, lane, lateral, run, scenario, speeding, start
+
+EGO = start("ego", lane(1, 1, 90.0), 0.0)
+DT = 0.05
+THIRD = lane(3, 1, 50.0)
+
+
+def position(tag, turn="", **numbers):
+    words = " ".join(f'{name}="{value}"' for name, value in numbers.items())
+    return f"<Position><{tag} {words}>{turn}</{tag}></Position>"
+
+
+def orientation(h, kind="relative"):
+    return f'<Orientation type="{kind}" h="{h}"/>'
+
+
+def placed(where, speed=0.0, *rows, other=THIRD, parameters="", ego=EGO, **values):
+    """The bv somewhere, at first; the third, if it matters, 50 m up the road, southbound."""
+    third = start("third", other, 0.0)
+    text = scenario(("ego", "bv", "third"), ego + third + start("bv", where, speed),
+                    events(*rows), parameters=parameters)  # fmt: skip
+    return run(text, **values)
+
+
+def pose(rollout, k=0, e=1, row=0):
+    return tuple(float(array[row, e, k]) for array in (rollout.x, rollout.y, rollout.h))
+
+
+def there(rollout, x, y, h, k=0):
+    found = pose(rollout, k)
+    assert found[:2] == (pytest.approx(x, abs=1e-6), pytest.approx(y, abs=1e-6))
+    assert math.remainder(found[2] - h, math.tau) == pytest.approx(0.0, abs=1e-6)
+
+
+SOUTH, NORTH, WEST = -math.pi / 2, math.pi / 2, math.pi
+
+
+@pytest.mark.parametrize(
+    ("where", "expected"),
+    [
+        (position("WorldPosition", x=3.0, y=4.0, h=1.0), (3.0, 4.0, 1.0)),
+        (position("LanePosition", roadId=3, laneId=2, s=20, offset=0.5), (-5.75, 33.0, SOUTH)),
+        (position("LanePosition", orientation(math.pi), roadId=3, laneId=1, s=20),
+         (-1.75, 33.0, NORTH)),
+        (position("LanePosition", orientation(0.1), roadId=3, laneId=1, s=20),
+         (-1.75, 33.0, SOUTH + 0.1)),
+        (position("LanePosition", orientation(2.0, "absolute"), roadId=3, laneId=1, s=20),
+         (-1.75, 33.0, 2.0)),
+        (position("RoadPosition", roadId=3, s=20, t=1.0), (-1.0, 33.0, NORTH)),
+        (position("RoadPosition", orientation(math.pi), roadId=3, s=20, t=1.75),
+         (-1.75, 33.0, SOUTH)),
+        (position("RelativeWorldPosition", entityRef="third", dx=2.0, dy=-3.0),
+         (0.25, 60.0, SOUTH)),
+        (position("RelativeObjectPosition", orientation(0.3), entityRef="third", dx=2.0, dy=-3.0),
+         (-4.75, 61.0, SOUTH + 0.3)),
+        (position("RelativeRoadPosition", entityRef="third", ds=-10.0, dt=-3.5),
+         (1.75, 53.0, NORTH)),
+        (position("RelativeLanePosition", entityRef="third", dLane=1, ds=5.0, offset=0.25),
+         (-5.5, 68.0, SOUTH)),
+        (position("RelativeLanePosition", entityRef="third", dLane=-1, dsLane=5.0, offset=0.25),
+         (-5.0, 58.0, SOUTH)),
+        (position("RelativeLanePosition", entityRef="third", dLane=1, dsLane=-5.0),
+         (1.75, 68.0, NORTH)),
+    ],
+)  # fmt: skip
+def test_positions(where, expected):
+    rollout = placed(where)
+    assert rollout.status[0] == 0
+    there(rollout, *expected)
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        position("RelativeLanePosition", entityRef="third", dLane=1, ds=5.0),
+        position("RelativeObjectPosition", entityRef="third", dx=12.0, dy=1.0),
+        position("WorldPosition", x=-1.5, y=40.0, h=SOUTH),
+        position("RoadPosition", roadId=3, s=10, t=-2.0),
+    ],
+)
+def test_a_teleport_is_there_at_the_next_instant_and_goes_on_from_there(where):
+    at_first = placed(where, 8.0)
+    act = (f"<TeleportAction>{where}</TeleportAction>",)
+    rollout = placed(lane(1, -1, 30.0), 8.0, ("e", "bv", act[0], after(1.0)))
+    k = round(1.0 / DT) + 1
+    for array, one in ((rollout.x, at_first.x), (rollout.y, at_first.y), (rollout.h, at_first.h)):
+        shift = array[0, 1, k] - one[0, 1, 0]  # headings may count whole turns anew
+        np.testing.assert_allclose(array[0, 1, k:], one[0, 1, : 201 - k] + shift, atol=1e-9)
+    assert pose(rollout, k)[:2] == pytest.approx(pose(at_first)[:2], abs=1e-9)
+    assert (rollout.v[0, 1] == 8.0).all()
+
+
+def test_there_and_back():
+    """Who is put elsewhere and then back goes on as if it had stayed where it was put."""
+    away = position("WorldPosition", x=300.0, y=300.0, h=0.0)
+    back = position("LanePosition", roadId=3, laneId=1, s=80)
+    rollout = placed(
+        lane(3, 1, 80.0), 5.0,
+        ("away", "bv", f"<TeleportAction>{away}</TeleportAction>", after(1.0)),
+        ("back", "bv", f"<TeleportAction>{back}</TeleportAction>", after(2.0)),
+    )  # fmt: skip
+    k = round(2.0 / DT) + 1
+    there(rollout, 300.0, 300.0, 0.0, round(1.0 / DT) + 1)
+    stayed = placed(lane(3, 1, 80.0), 5.0)
+    np.testing.assert_allclose(rollout.y[0, 1, k:], stayed.y[0, 1, : 201 - k], atol=1e-9)
+    np.testing.assert_allclose(rollout.x[0, 1, k:], stayed.x[0, 1, : 201 - k], atol=1e-9)
+
+
+def test_off_the_lanes_one_goes_straight_ahead():
+    rollout = placed(position("WorldPosition", x=40.0, y=40.0, h=0.6), 5.0)
+    far = 5.0 * 10.0
+    there(rollout, 40 + far * math.cos(0.6), 40 + far * math.sin(0.6), 0.6, -1)
+
+
+def test_the_present_pose_of_another_counts():
+    """2 m ahead of and 1 m to the left of the third, which has moved for two seconds."""
+    ahead = position("RelativeObjectPosition", entityRef="third", dx=2.0, dy=1.0)
+    rollout = placed(
+        lane(1, -1, 30.0), 0.0,
+        ("go", "third", speeding(5.0, "step time 0"), after(0.0)),
+        ("e", "bv", f"<TeleportAction>{ahead}</TeleportAction>", after(2.0)),
+    )  # fmt: skip
+    k = round(2.0 / DT)
+    x, y, _ = pose(rollout, k, 2)
+    there(rollout, x + 1.0, y - 2.0, SOUTH, k + 1)
+
+
+def test_rows_may_vary_a_position():
+    where = position("RelativeLanePosition", entityRef="third", dLane=0, ds="$gap")
+    parameter = '<ParameterDeclaration name="gap" parameterType="double" value="5"/>'
+    rollout = placed(where, parameters=parameter, gap=[5.0, 10.0, -20.0])
+    for row, gap in enumerate((5.0, 10.0, -20.0)):
+        assert pose(rollout, row=row)[:2] == pytest.approx((-1.75, 63.0 + gap), abs=1e-6)
+        alone = placed(where, parameters=parameter, gap=[gap])
+        assert pose(alone) == pose(rollout, row=row)
+
+
+def test_a_position_that_is_nowhere():
+    with pytest.raises(InputError, match=r"test.xosc, line \d+: road 3 has lanes"):
+        placed(position("LanePosition", orientation(math.pi), roadId=3, laneId=7, s=20))
+    rollout = placed(position("RelativeLanePosition", entityRef="third", dLane=9, ds=0))
+    assert STATUS_MESSAGES[int(rollout.status[0])] == "a position that is not on the road network"
+
+
+def test_straight_on_across_the_junction():
+    """Without a route, the way leads to the opposite leg."""
+    rollout = placed(lane(3, 1, 20.0), 10.0)
+    assert rollout.y[0, 1, -1] == pytest.approx(33.0 - 100.0, abs=1e-6)
+    assert rollout.x[0, 1, -1] == pytest.approx(-1.75, abs=1e-6)
+
+
+def test_a_lane_that_is_not_the_own_may_be_driven_against_its_traffic():
+    where = position("LanePosition", orientation(math.pi), roadId=3, laneId=1, s=20)
+    rollout = placed(where, 10.0)
+    assert rollout.y[0, 1, 100] == pytest.approx(33.0 + 50.0, abs=1e-6)
+
+
+def routing(*places):
+    waypoints = "".join(f'<Waypoint routeStrategy="shortest">{one}</Waypoint>' for one in places)
+    return f"""<RoutingAction><AssignRouteAction><Route name="r" closed="false">{waypoints}
+</Route></AssignRouteAction></RoutingAction>"""
+
+
+def acquiring(place):
+    return f"<RoutingAction><AcquirePositionAction>{place}</AcquirePositionAction></RoutingAction>"
+
+
+@pytest.mark.parametrize("action", [
+    routing(lane(3, 1, 80.0), lane(4, -1, 40.0)),
+    acquiring(lane(4, -1, 40.0)),
+    acquiring(position("RoadPosition", roadId=4, s=40, t=-1.0)),
+    acquiring(position("WorldPosition", x=53.0, y=-1.75, h=0.0)),
+])  # fmt: skip
+def test_a_route_at_run_time_leads_round_the_corner(action):
+    """From leg C to leg D in the east: left at the junction, then on along the leg."""
+    rollout = placed(lane(3, 1, 80.0), 15.0, ("e", "bv", action, after(1.0)))
+    plain = placed(lane(3, 1, 80.0), 15.0, ego=EGO)
+    k = round(1.0 / DT)
+    np.testing.assert_array_equal(rollout.y[0, 1, : k + 1], plain.y[0, 1, : k + 1])
+    assert rollout.x[0, 1, -1] > 20.0
+    assert math.remainder(rollout.h[0, 1, -1], math.tau) == pytest.approx(0.0, abs=1e-6)
+    steps = np.hypot(np.diff(rollout.x[0, 1]), np.diff(rollout.y[0, 1]))
+    np.testing.assert_allclose(steps, 15.0 * DT, rtol=2e-3)
+
+
+def test_a_lane_change_keeps_the_route():
+    """On the outer lane there is no way to the left: the way goes straight on, and no row fails."""
+    route = routing(lane(3, 1, 80.0), lane(4, -1, 40.0))
+    rollout = placed(
+        lane(3, 1, 80.0), 10.0,
+        ("r", "bv", route, after(0.5)),
+        ("e", "bv", lateral(-1, "linear time 1", "bv"), after(1.0)),
+        ("f", "bv", lateral(1, "linear time 1", "bv"), after(3.0)),
+    )  # fmt: skip
+    assert rollout.status[0] == 0
+    assert rollout.x[0, 1, -1] > 5.0
+
+
+def test_a_route_that_cannot_be_reached_fails_the_row():
+    """Leg C's inbound lane is not reached from its own outbound one, which leaves the network."""
+    text = placed(lane(3, -1, 50.0), 5.0, ("e", "bv", acquiring(lane(4, -1, 40.0)), after(1.0)))
+    message = "no lane leads from where an entity is to its route"
+    assert STATUS_MESSAGES[int(text.status[0])] == message
