@@ -35,12 +35,13 @@ def said(individuals: Individuals) -> set[tuple[str, str, str]]:
         for one in individuals.of_class("Parameter")
         if individuals.text(one, "has_axis") == "static"
     }
+    unsaid = static | fixed
     rules = {value for one in fixed for value in individuals.texts(one, "constraint")}
     found = set()
     for subject, predicate, value, _ in individuals.quads:
         text = value.value if isinstance(value, ox.Literal) else None
         about_term = isinstance(subject, ox.NamedNode) and subject.value.startswith(BG)
-        if subject in static | fixed or value in fixed or (about_term and text in rules):
+        if subject in unsaid or value in fixed or (about_term and text in rules):
             continue
         if value in static and value not in places and local_name(value) != "road_network":
             continue

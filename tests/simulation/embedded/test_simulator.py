@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
 
@@ -251,7 +252,7 @@ for driver in ("route-follower", "reference"):
     for disabled in ("0", "1"):
         done = subprocess.run(
             [sys.executable, "-c", code],
-            env={"NUMBA_DISABLE_JIT": disabled, "PATH": "/usr/bin:/bin", "HOME": "/nonexistent"},
+            env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
             capture_output=True, text=True, check=True, timeout=300,
         )  # fmt: skip
         outputs.append([json.loads(line) for line in done.stdout.splitlines()])
