@@ -8,6 +8,7 @@ from bridgegen.simulation.embedded._across_kernels import (
 )
 from bridgegen.simulation.embedded._codes import (
     ASSIGN_ROUTE,
+    CONTROL,
     DELETE_ENTITY,
     FIRST_GLOBAL,
     FOLLOW,
@@ -17,6 +18,7 @@ from bridgegen.simulation.embedded._codes import (
     SPEED_CHANGE,
     TELEPORT,
 )
+from bridgegen.simulation.embedded._control_kernels import begin_control, is_steered
 from bridgegen.simulation.embedded._follow_kernels import (
     begin_follow,
     begin_route,
@@ -34,7 +36,9 @@ from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, sto
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k: a branch per kind; what is over at once says so."""
     kind = plan.actions[j, 1]
-    if plan.comes_and_goes and is_pointless(j, plan, state):
+    steers_ego = kind in (LANE_CHANGE, LANE_OFFSET, FOLLOW) and plan.actions[j, 0] == 0
+    in_vain = steers_ego and is_steered(plan, state)  # its driver does
+    if in_vain or (plan.comes_and_goes and is_pointless(j, plan, state)):
         state.action_ended[j] = True
     elif kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
         begin_longitudinal(j, k, plan, roads, state, record)
@@ -42,6 +46,8 @@ def begin(j, k, plan, roads, state, record):
         begin_lane_change(j, k, plan, roads, state, record)
     elif kind == LANE_OFFSET:
         begin_lane_offset(j, k, plan, roads, state, record)
+    elif kind == CONTROL:
+        begin_control(j, k, plan, roads, state, record)
     elif kind == DELETE_ENTITY:
         begin_delete(j, k, plan, roads, state, record)
     elif kind == TELEPORT:

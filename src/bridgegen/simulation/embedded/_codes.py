@@ -17,9 +17,12 @@ STARTED, ENDED, STOPPED, SKIPPED = range(4)
 # Program.actions, columns that the storyboard reads; the others are their kinds' own.
 WHOM, SELECTS = 0, 7
 SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = range(5)
-ADD_ENTITY, DELETE_ENTITY = 20, 21
+ADD_ENTITY, DELETE_ENTITY, CONTROL = 20, 21, 22
 FIRST_GLOBAL = 100  # whose first column is a light, a controller, a value, not an entity
 TIME_CHANGE, PHASE_CHANGE, VALUE_SET, VALUE_ADD, VALUE_MULTIPLY = range(100, 105)
+
+# State.drives: what of the ego its driver does.
+LATERALLY, LONGITUDINALLY = 0, 1
 
 # Program.conditions: first and past-the-last probe, how they count, edge, delay in steps.
 PROBES, PROBES_END, QUANTITY, EDGE, DELAY = range(5)

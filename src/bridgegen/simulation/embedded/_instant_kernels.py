@@ -4,7 +4,8 @@ import math
 
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego.drivers import NOBODY
-from bridgegen.simulation.embedded._ego_kernels import move_ego
+from bridgegen.simulation.embedded._codes import LONGITUDINALLY
+from bridgegen.simulation.embedded._control_kernels import is_steered, move_paced, move_steered
 from bridgegen.simulation.embedded._follow_kernels import move_by_timetable
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
 from bridgegen.simulation.embedded._presence_kernels import stay_away
@@ -35,8 +36,11 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move everybody on to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
-    if plan.driver != NOBODY:
-        x, y, h = move_ego(k, demanded, curvature, plan, roads, state, record)
+    if is_steered(plan, state):
+        x, y, h = move_steered(k, demanded, curvature, plan, roads, state, record)
+        first = 1
+    elif plan.driver != NOBODY and state.drives[LONGITUDINALLY] == 1:
+        move_paced(k, demanded, plan, roads, state, record)
         first = 1
     for e in range(first, record.x.shape[0]):  # those who look at nobody come first
         state.timed[e] = state.present[e] and state.follow[e] >= 0

@@ -54,6 +54,7 @@ class Plan(NamedTuple):
     time_passes: int
     absent: Int
     comes_and_goes: int
+    drives: Int
     weathers: Int
     driver: int
     ideal_perception: int
@@ -117,6 +118,7 @@ class State(NamedTuple):
         phase_now: ``(K,)`` int64, the phase that each controller is in,
         phase_until: ``(K,)`` [s], and until when.
         present: ``(E,)`` bool, who is there.
+        drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] since it last moved.
         route: ``(E,)`` int64, the route that a body follows where it can; 0: none.
@@ -176,6 +178,7 @@ class State(NamedTuple):
     phase_now: Int
     phase_until: Float
     present: Bool
+    drives: Int
     travelled: Float
     stood: Float
     route: Int

@@ -10,8 +10,10 @@ from bridgegen.simulation.embedded._codes import (
     ASSIGN_ROUTE,
     DELETE_ENTITY,
     FOLLOW,
+    LATERALLY,
     TELEPORT,
 )
+from bridgegen.simulation.embedded.controllers import Controllers
 from bridgegen.simulation.embedded.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.global_actions import GlobalActions
 from bridgegen.simulation.embedded.positions import Positions
@@ -30,6 +32,9 @@ _SPEED_CHANGE, _LANE_CHANGE, _LANE_OFFSET = 0, 1, 4
 
 _BY_TIME = 1
 
+CONTROLLING = osc.ActivateControllerAction | osc.ControllerAction
+"""The actions on who drives."""
+
 
 class Actions:
     """What events change.
@@ -41,7 +46,6 @@ class Actions:
         laterals: as ``Program.laterals`` has them.
         routes: as ``Program.waypoints`` has them.
         lane_checks: lane changes that are known to be asked for.
-        has_driver: whether a driver drives the ego, and the storyboard does not; set it first.
 
     Args:
         tables: the compiler's; takes down what cannot be run.
@@ -49,16 +53,17 @@ class Actions:
         points: takes the positions that actions along the road name.
         positions: takes those that others name.
         everywhere: compiles what concerns all.
+        controllers: compiles who drives.
     """
 
     def __init__(
         self, tables: Tables, paths: list[PathSpec], points: list[Point], positions: Positions,
-        everywhere: GlobalActions,
+        everywhere: GlobalActions, controllers: Controllers,
     ) -> None:  # fmt: skip
         self._tables, self._paths, self._everywhere = tables, paths, everywhere
-        self._positions = positions
+        self._positions, self._controllers = positions, controllers
+        self._driven: list[Element] = []
         self.routes: list[tuple[Spot, ...]] = []
-        self.has_driver = False
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
         self.courses = Courses(tables, points)
@@ -133,13 +138,18 @@ class Actions:
             self.rows.append((entity, TELEPORT, 0, 0, slot, slot, place))
         elif isinstance(action, osc.RoutingAction):
             self._routing(action.action, entity)
+        elif isinstance(action, CONTROLLING):
+            if (row := self._controllers.row(action, entity)) is not None:
+                self.rows.append(row)
         else:
             self._tables.unsupported(action, f"{type(action).__name__} in an Event")
 
     def _presence(self, action: osc.EntityAction) -> None:
         """Add an action by which an entity comes or goes."""
         entity = self._tables.entity(action.entity_ref)
-        self._refuse_driven(action.action, entity)
+        if entity == 0 and self._controllers.has_driver:
+            what = f"a {type(action.action).__name__} of the ego, which a driver drives,"
+            self._tables.unsupported(action.action, what)
         if isinstance(action.action, osc.AddEntityAction):
             self._tables.unsupported(action, type(action.action).__name__)
             return
@@ -154,7 +164,7 @@ class Actions:
                 row = (entity, ASSIGN_ROUTE, 0, 0, slot, slot, self.add_route(spots))
                 self.rows.append(row)
         elif isinstance(action, osc.FollowTrajectoryAction):
-            self._refuse_driven(action, entity)
+            self._note_driven(action, entity)
             timing = action.time_reference.reference
             relative = isinstance(timing, osc.Timing) and (
                 timing.domain_absolute_relative is osc.ReferenceContext.RELATIVE
@@ -185,7 +195,7 @@ class Actions:
 
     def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
         shape, dimension, value = self.courses.dynamics(action.dynamics)
-        self._refuse_driven(action, entity)
+        self._note_driven(action, entity)
         target = action.lane_change_target.target
         other, lanes, lane = -1, None, None
         if isinstance(target, osc.RelativeTargetLane):
@@ -203,7 +213,7 @@ class Actions:
         self.rows.append((entity, _LANE_CHANGE, shape, dimension, offset, value, row))
 
     def _lane_offset(self, action: osc.LaneOffsetAction, entity: int) -> None:
-        self._refuse_driven(action, entity)
+        self._note_driven(action, entity)
         target, other = action.lane_offset_target.target, -1
         if isinstance(target, osc.RelativeTargetLaneOffset):
             other = self._tables.entity(target.entity_ref)
@@ -223,10 +233,20 @@ class Actions:
         self.laterals.append((other, count or 0, int(continuous)))
         return len(self.laterals) - 1
 
-    def _refuse_driven(self, action: Element, entity: int) -> None:
-        if entity == 0 and self.has_driver:
-            what = f"a {type(action).__name__} of the ego, which a driver drives,"
-            self._tables.unsupported(action, what)
+    def _note_driven(self, action: Element, entity: int) -> None:
+        """Note what only the storyboard can do; see ``refuse_driven``."""
+        if entity == 0 and self._controllers.has_driver:
+            self._driven.append(action)
+
+    def refuse_driven(self) -> None:
+        """Take down what moves the ego across where a driver steers it all the time.
+
+        To be called when all actions are known.
+        """
+        if not self._controllers.may_rest(LATERALLY):
+            for action in self._driven:
+                what = f"a {type(action).__name__} of the ego, which a driver drives,"
+                self._tables.unsupported(action, what)
 
     def _shape(self, element: Element, shape: osc.DynamicsShape | osc.ParameterRef) -> int:
         if isinstance(shape, osc.ParameterRef):

@@ -18,8 +18,9 @@ from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT, WHOSE
-from bridgegen.simulation.embedded.actions import Actions
+from bridgegen.simulation.embedded.actions import CONTROLLING, Actions
 from bridgegen.simulation.embedded.bodies import kind, measures
+from bridgegen.simulation.embedded.controllers import Controllers
 from bridgegen.simulation.embedded.courses import LONGITUDINAL, first_speed
 from bridgegen.simulation.embedded.global_actions import GlobalActions
 from bridgegen.simulation.embedded.positions import Positions
@@ -95,8 +96,9 @@ class _Compiler:
         self.points: list[Point] = []
         self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
         self.everywhere = GlobalActions(self.tables, scenario)
+        self.controllers = Controllers(self.tables, scenario)
         self.actions = Actions(
-            self.tables, self.paths, self.points, self.positions, self.everywhere
+            self.tables, self.paths, self.points, self.positions, self.everywhere, self.controllers
         )
         self.starts: dict[int, int] = {}
         self.routes: dict[int, int] = {}
@@ -128,9 +130,10 @@ class _Compiler:
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
+        self.controllers.has_driver, self.controllers.replaces = has_driver, driver is not None
         init = self._init(has_driver)
         chosen = driver or self._declared_driver()
-        self.actions.has_driver = has_driver = chosen is not STORYBOARD
+        self.controllers.has_driver = has_driver = chosen is not STORYBOARD
         if driver and self.actions.is_timed(0):
             self.tables.problems.append(
                 f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
@@ -148,6 +151,7 @@ class _Compiler:
         self.triggers.add(storyboard.stop_trigger)
         duration = self.triggers.stop_time or DEFAULT_DURATION
         rows = elements(found, self.tables, self.triggers, self.actions)
+        self.actions.refuse_driven()
         trajectories = [p for p, one in enumerate(self.paths) if isinstance(one, AlongTrajectory)]
         follows = [
             trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
@@ -212,6 +216,7 @@ class _Compiler:
             time_passes=int(time is not None and time[1]),
             absent=np.zeros(len(objects), dtype=np.int64),
             comes_and_goes=self.actions.has_comings_and_goings,
+            drives=np.array(self.controllers.drives, dtype=np.int64),
             driver=chosen if ideal is None else chosen.idealised(ideal),
             time_step=step,
             n_steps=n_steps,
@@ -259,8 +264,8 @@ class _Compiler:
     def _declared_driver(self) -> Driver:
         if self.actions.is_timed(0):
             return STORYBOARD
-        for controller in self.tables.objects[0].object_controllers:
-            properties = controller.controller.properties
+        for controller in self.controllers.of_ego():
+            properties = controller.properties
             name = properties.get(DRIVER) if properties else None
             if name is not None:
                 if is_spec(str(name)):
@@ -283,8 +288,8 @@ class _Compiler:
         return STORYBOARD
 
     def _declared_noise_key(self) -> int | None:
-        for controller in self.tables.objects[0].object_controllers:
-            properties = controller.controller.properties
+        for controller in self.controllers.of_ego():
+            properties = controller.properties
             text = properties.get(NOISE_KEY) if properties else None
             if text is not None:
                 if not (str(text).isdecimal() and int(str(text)) < 2**64):
@@ -313,6 +318,9 @@ class _Compiler:
                 action = wrapped.action
                 if isinstance(action, osc.TeleportAction):
                     starts[name] = action.position
+                    continue
+                if isinstance(action, CONTROLLING):
+                    self.controllers.begin(action, self.tables.entity(name))
                     continue
                 inner = getattr(action, "action", action)
                 if isinstance(inner, LONGITUDINAL):

@@ -219,6 +219,7 @@ class Program:
         time_passes: whether that date passes.
         absent: ``(E,)`` 1 for who is not there before it is added, else 0.
         comes_and_goes: whether there are such, or somebody is deleted.
+        drives: ``(2,)`` whether the driver steers, and sets the speed, at the start.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
@@ -272,6 +273,7 @@ class Program:
     time_passes: int
     absent: Int
     comes_and_goes: bool
+    drives: Int
     driver: Driver
     time_step: float
     n_steps: int

@@ -1,0 +1,166 @@
+"""Who moves the ego, where a file switches controllers on and off: the storyboard, or its driver.
+
+The ego's driver is the controller that names it (`declarations.DRIVER`); one that the user names
+takes the place of whatever controller the file gives the ego. No other controller is known here:
+it may be given to an entity, but not switched on. An entity without one that is on is moved by the
+storyboard, as by the standard's default controller.
+"""
+
+from collections.abc import Iterator
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import DRIVER
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.simulation.embedded._codes import CONTROL, LATERALLY, LONGITUDINALLY
+from bridgegen.simulation.embedded.tables import Tables
+
+UNSAID = -1
+
+Part = osc.AssignControllerAction | osc.ActivateControllerAction | osc.OverrideControllerValueAction
+"""What an action does to controllers."""
+
+Switching = osc.AssignControllerAction | osc.ActivateControllerAction
+
+_SWITCHES = {LATERALLY: "lateral", LONGITUDINALLY: "longitudinal"}
+
+
+class Controllers:
+    """Whether the ego's driver drives it, from the start on and from events on.
+
+    Attributes:
+        has_driver: whether there is one; set it before actions are added.
+        replaces: whether it is one that the user names.
+
+    Args:
+        tables: the compiler's; takes down what cannot be run.
+        scenario: the file.
+    """
+
+    def __init__(self, tables: Tables, scenario: osc.OpenScenario) -> None:
+        self._tables, self._scenario = tables, scenario
+        self.has_driver = self.replaces = False
+        self._first = {LATERALLY: UNSAID, LONGITUDINALLY: UNSAID}
+        self._later: dict[int, list[int]] = {LATERALLY: [], LONGITUDINALLY: []}
+
+    @property
+    def drives(self) -> tuple[int, int]:
+        """Whether the driver steers, and sets the speed, at the start: 1 or 0.
+
+        Where the start does not say, it does, unless the first event that says anything switches
+        it on.
+        """
+        lateral, longitudinal = (
+            first if first != UNSAID else int(self._later[which][:1] != [1])
+            for which, first in self._first.items()
+        )
+        return lateral, longitudinal
+
+    def may_rest(self, which: int) -> bool:
+        """Say whether the driver does not steer, or set the speed, at some time."""
+        return not self.drives[which] or 0 in self._later[which]
+
+    def of_ego(self) -> Iterator[osc.Controller]:
+        """Yield the controllers that the ego has from the start on, in the order of the file."""
+        ego = self._tables.objects[0]
+        for one in ego.object_controllers:
+            yield one.controller
+        for private in self._scenario.storyboard.init.actions.privates:
+            for wrapped in private.private_actions if private.entity_ref == ego.name else ():
+                for part in _parts(wrapped.action):
+                    if isinstance(part, osc.AssignControllerAction):
+                        yield _controller(part)
+
+    def begin(self, action: Element, entity: int) -> None:
+        """Take an action of the start."""
+        for which, switched in self._switched(action, entity).items():
+            if switched != UNSAID:
+                self._first[which] = switched
+
+    def row(self, action: Element, entity: int) -> tuple[int, ...] | None:
+        """Return the row of an action of an event, None if it changes nothing."""
+        for part in _parts(action):
+            if isinstance(part, osc.AssignControllerAction) and _names_driver(_controller(part)):
+                self._tables.unsupported(part, "another driver than at the start")
+        switched = self._switched(action, entity)
+        for which, one in switched.items():
+            if one != UNSAID:
+                self._later[which].append(one)
+        if all(one == UNSAID for one in switched.values()):
+            return None
+        slot = self._tables.slot(0.0)
+        return entity, CONTROL, switched[LATERALLY], switched[LONGITUDINALLY], slot, slot, 0
+
+    def _switched(self, action: Element, entity: int) -> dict[int, int]:
+        """Return what an action switches on (1) and off (0) of what the driver does."""
+        found = {LATERALLY: UNSAID, LONGITUDINALLY: UNSAID}
+        for part in _parts(action):
+            if isinstance(part, osc.OverrideControllerValueAction):
+                self._refuse_override(part)
+                continue
+            is_drivers = entity == 0 and self.has_driver and self._is_drivers(part)
+            for which, name in _SWITCHES.items():
+                prefix = "activate_" if isinstance(part, osc.AssignControllerAction) else ""
+                value = getattr(part, prefix + name)
+                if value is None:
+                    continue
+                on = self._tables.truth(value)
+                if is_drivers:
+                    found[which] = int(on)
+                elif on:
+                    self._refuse(part, entity)
+                    break
+        return found
+
+    def _is_drivers(self, part: Switching) -> bool:
+        """Say whether an action is on the controller that the ego's driver is, or stands for."""
+        if self.replaces:
+            return True
+        if isinstance(part, osc.AssignControllerAction):
+            return _names_driver(_controller(part))
+        wanted = part.object_controller_ref or part.controller_ref
+        mine = {str(one.name) for one in self.of_ego() if _names_driver(one)}
+        for one in self._tables.objects[0].object_controllers:
+            if _names_driver(one.controller) and one.name is not None:
+                mine.add(str(one.name))
+        return wanted is None or self._tables.text(wanted) in mine
+
+    def _refuse(self, part: Element, entity: int) -> None:
+        what = f"switching on a controller of '{self._tables.names[entity]}' that is not known here"
+        hint = " (a driver in its place: --ego NAME)" if entity == 0 else ""
+        self._tables.unsupported(part, what + hint)
+
+    def _refuse_override(self, part: osc.OverrideControllerValueAction) -> None:
+        """Refuse to hold pedals, wheel and gear, which nobody has here; to let go of them is fine.
+
+        The vehicles are moved by speeds, accelerations and curvatures.
+        """
+        pedals = (
+            part.throttle, part.brake, part.clutch, part.parking_brake, part.steering_wheel,
+            part.gear,
+        )  # fmt: skip
+        for pedal in pedals:
+            if pedal is not None and self._tables.truth(pedal.active):
+                name = type(pedal).__name__
+                self._tables.unsupported(part, f"{name} in an OverrideControllerValueAction")
+
+
+def _parts(action: Element) -> Iterator[Part]:
+    """Yield what an action does to controllers; nothing if it is on something else."""
+    if isinstance(action, osc.ActivateControllerAction):
+        yield action
+    elif isinstance(action, osc.ControllerAction):
+        parts = (
+            action.assign_controller_action,
+            action.override_controller_value_action,
+            action.activate_controller_action,
+        )
+        yield from (part for part in parts if part is not None)
+
+
+def _controller(part: osc.AssignControllerAction) -> osc.Controller:
+    one = part.controller
+    return one.controller if isinstance(one, osc.ObjectController) else one
+
+
+def _names_driver(one: osc.Controller) -> bool:
+    return one.properties is not None and one.properties.get(DRIVER) is not None
