@@ -7,9 +7,22 @@ the instants are 0.05 s apart. A car is 4 m long, its front 3.4 m ahead of its r
 import numpy as np
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.ego import DRIVERS
+from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.openx.openscenario.read import read
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
-from .storyboards import after, condition, lane, near, run, scenario, speed_action, start
+from .storyboards import (
+    after,
+    condition,
+    crossroads,
+    lane,
+    near,
+    run,
+    scenario,
+    speed_action,
+    start,
+)
 
 EGO = start("ego", lane(1, 1, 90.0), 0.0)
 
@@ -156,6 +169,127 @@ def test_sensors_do_not_see_who_is_gone():
     assert (seen[1, 40:] <= 0).all()
     assert (seen[2, 42:200:2] > 0).mean() > 0.9  # whom it hid
     assert (seen[2, 20:40:2] > 0).mean() < 0.5
+
+
+LATER = start("cv", lane(3, 2, 50.0), 0.0)
+"""bv has no place at the start."""
+
+
+def test_who_has_no_place_at_the_start_is_there_once_it_is_added():
+    """At 2 s, 60 m from the junction; it goes at once, with the speed that the start gives it."""
+    fast = start("bv", lane(3, 1, 95.0), 8.0)
+    fast = fast.replace(
+        f"<PrivateAction><TeleportAction>{lane(3, 1, 95.0)}</TeleportAction></PrivateAction>", ""
+    )
+    come = ("come", (add("bv", lane(3, 1, 60.0)),), after(2.0))
+    rollout = scene(come, privates=fast + LATER)
+    assert there(rollout, "bv") == (40, 201)
+    where = scene(privates=start("bv", lane(3, 1, 60.0), 8.0) + LATER)
+    for name in ("x", "y", "v"):
+        states, wanted = getattr(rollout, name)[0, 1, 40:], getattr(where, name)[0, 1, :161]
+        assert states == pytest.approx(wanted, abs=1e-6), name
+    assert np.isinf(rollout.distance[0, 1, :40]).all()
+    assert np.isfinite(rollout.distance[0, 1, 40:]).all()
+
+
+def test_what_an_event_asks_of_whom_it_adds_counts_whatever_stands_first():
+    for actions in (
+        (add("bv", lane(3, 1, 60.0)), speed(5.0)),
+        (speed(5.0), add("bv", lane(3, 1, 60.0))),
+    ):
+        rollout = scene(("come", actions, after(2.0)), privates=LATER, actor="bv")
+        y = rollout.y[0, 1]
+        assert y[40] - y[60] == pytest.approx(5.0 - 0.5 * 5.0 * 0.05), actions
+
+
+def test_an_addition_at_the_start_is_a_teleport():
+    first = f"<GlobalAction>{add('bv', lane(3, 1, 60.0))}</GlobalAction>"
+    text = scenario(("ego", "bv"), EGO, environment=first)
+    rollout, wanted = (
+        run(text),
+        run(scenario(("ego", "bv"), EGO + start("bv", lane(3, 1, 60.0), 0.0))),
+    )
+    assert rollout.present.size == 0
+    assert (rollout.x == wanted.x).all()
+    assert (rollout.y == wanted.y).all()
+
+
+def test_who_is_deleted_at_the_start_is_not_there():
+    gone = f"<GlobalAction>{delete('bv')}</GlobalAction>"
+    text = scenario(("ego", "bv"), EGO + start("bv", lane(3, 1, 60.0), 0.0), environment=gone)
+    assert not run(text).present[0, 1].any()
+
+
+def test_who_was_deleted_may_be_added_again():
+    """bv goes at 1 s, at 10 m/s, comes back at 3 s, 90 m from the junction, and goes on so."""
+    rows = (
+        ("gone", (delete("bv"),), after(1.0)),
+        ("come", (add("bv", lane(3, 1, 90.0)),), after(3.0)),
+    )
+    for ego in ("route-follower", "reference", "fsm"):
+        rollout = scene(*rows, ego=ego)
+        present = rollout.present[0, 1]
+        assert present[:20].all()
+        assert not present[20:60].any()
+        assert present[60:].all()
+        assert rollout.v[0, 1, 60:100] == pytest.approx(10.0)
+        travelled = rollout.y[0, 1, 60] - rollout.y[0, 1, 60:101]
+        assert travelled == pytest.approx(0.5 * np.arange(41)), ego
+    # all that it has travelled since the start counts: 10 m, and 20 m until 5 s
+    text = condition("bv", '<TraveledDistanceCondition value="29.9"/>')
+    rollout = scene(*rows, ("seen", (speed(3.0),), text), actor="ego")
+    assert rollout.began[0, 2] == 100
+
+
+def test_who_is_there_already_is_not_added():
+    rollout = scene(("come", (add("bv", lane(3, 1, 60.0)),), after(2.0)))
+    assert (rollout.y[0, 1] == scene().y[0, 1]).all()
+
+
+def test_a_place_by_somebody_who_is_not_there_ends_the_row():
+    behind = """<Position><RelativeObjectPosition entityRef="cv" dx="-10" dy="0"/></Position>"""
+    come = ("come", (add("bv", behind),), after(2.0))
+    assert scene(come, privates=LATER).status[0] == 0
+    gone = ("gone", (delete("cv"),), after(1.0))
+    assert scene(gone, come, privates=LATER).status[0] == 4
+
+
+def test_who_is_never_there_is_a_mistake():
+    with pytest.raises(InputError, match="'bv' needs an initial TeleportAction, or an AddEntity"):
+        scene(privates=LATER)
+    come = ("come", (add("ego", lane(3, 1, 60.0)),), after(2.0))
+    text = scenario(("ego", "cv"), LATER, act(come))
+    with pytest.raises(InputError, match="'ego' needs an initial"):
+        run(text)
+    assert not run(text, None).present[0, 0, :40].any()  # the storyboard's ego may come later
+
+
+def test_a_driver_of_one_s_own_is_told_who_is_there():
+    """Tracks of who is not there have state 0, with ideal perception and without."""
+    rows = (
+        ("gone", (delete("bv"),), after(1.0)),
+        ("come", (add("bv", lane(3, 1, 80.0)),), after(3.0)),
+    )
+    privates = start("ego", lane(3, 1, 95.0), 0.0) + start("bv", lane(3, 1, 70.0), 0.0) + LATER
+    text = scenario(("ego", "bv", "cv"), privates, act(*rows))
+    for ideal in ((), ("perception",)):
+        made = EmbeddedSimulator(
+            read(text.encode(), "test.xosc"), "test", driver=DRIVERS["reference"].idealised(ideal)
+        )
+        batch = made.batch(made.roads([crossroads()]), np.zeros(1, dtype=np.int64), {})
+        batch.start()
+        seen = np.zeros((201, 2))
+        tracks, route = np.zeros((1, 2, 12)), np.zeros((1, 3, 4))
+        stop, light = np.zeros(1), np.zeros(1, dtype=np.int8)
+        for k in range(201):
+            batch.before_driver(k)
+            batch.observe(k, 1.0, route, tracks, stop, light)
+            seen[k] = tracks[0, :, 0]
+            batch.after_driver(k, np.zeros(1), np.zeros(1))
+        assert (seen[12:20, 0] == 2).all(), ideal
+        assert (seen[20:60, 0] == 0).all(), ideal
+        assert (seen[72:, 0] == 2).all(), ideal
+        assert (seen[12:20, 1] == seen[72, 1]).all(), ideal
 
 
 def test_the_ego_that_a_driver_drives_does_not_go():

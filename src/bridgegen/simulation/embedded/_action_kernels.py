@@ -7,6 +7,7 @@ from bridgegen.simulation.embedded._across_kernels import (
     stop_lateral,
 )
 from bridgegen.simulation.embedded._codes import (
+    ADD_ENTITY,
     ASSIGN_ROUTE,
     CONTROL,
     DELETE_ENTITY,
@@ -27,7 +28,7 @@ from bridgegen.simulation.embedded._follow_kernels import (
 )
 from bridgegen.simulation.embedded._global_kernels import begin_global
 from bridgegen.simulation.embedded._motion_kernels import STEP
-from bridgegen.simulation.embedded._presence_kernels import begin_delete, is_pointless
+from bridgegen.simulation.embedded._presence_kernels import begin_add, begin_delete, is_pointless
 from bridgegen.simulation.embedded._pursuit_kernels import start_at_speed
 from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, stop_longitudinal
 
@@ -48,6 +49,8 @@ def begin(j, k, plan, roads, state, record):
         begin_lane_offset(j, k, plan, roads, state, record)
     elif kind == CONTROL:
         begin_control(j, k, plan, roads, state, record)
+    elif kind == ADD_ENTITY:
+        begin_add(j, k, plan, roads, state, record)
     elif kind == DELETE_ENTITY:
         begin_delete(j, k, plan, roads, state, record)
     elif kind == TELEPORT:

@@ -4,7 +4,9 @@ from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._action_kernels import begin, stop
 from bridgegen.simulation.embedded._codes import (
     ACTION,
+    ADD_ENTITY,
     COMPLETE,
+    CONTROL,
     COUNT,
     END,
     EVENT_NUMBER,
@@ -60,12 +62,16 @@ def trigger_event(x, k, plan, roads, state, record):
         state.phase[y] = RUNNING
         enter(y, STARTED, state)
     select(plan.elements[x, START], k, plan, state)
-    for j in range(plan.elements[x, FIRST], plan.elements[x, LAST]):
-        state.action_ended[j] = False
-        if plan.actions[j, SELECTS] and not state.selected[plan.actions[j, WHOM]]:
-            state.action_ended[j] = True
-        else:
-            begin(j, k, plan, roads, state, record)
+    # All begin at once: who is there, and who drives, is clear before anybody is told what to do.
+    for turn in range(2):
+        for j in range(plan.elements[x, FIRST], plan.elements[x, LAST]):
+            if (plan.actions[j, 1] in (ADD_ENTITY, CONTROL)) != (turn == 0):
+                continue
+            state.action_ended[j] = False
+            if plan.actions[j, SELECTS] and not state.selected[plan.actions[j, WHOM]]:
+                state.action_ended[j] = True
+            else:
+                begin(j, k, plan, roads, state, record)
 
 
 @kernel

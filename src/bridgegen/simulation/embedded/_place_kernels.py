@@ -249,7 +249,10 @@ def put(e, c, k, plan, roads, state, record):
 
     Where it is then, ``place_pose`` tells. It keeps its route.
     """
-    kind = plan.places[c, PLACE_KIND]
+    kind, other = plan.places[c, PLACE_KIND], plan.places[c, WHOSE]
+    if other >= 0 and not state.present[other]:
+        fail(NO_PLACE, state)
+        return
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
         return

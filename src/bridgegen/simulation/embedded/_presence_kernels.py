@@ -29,7 +29,8 @@ from bridgegen.simulation.embedded._codes import (
     WHO,
     WHOM,
 )
-from bridgegen.simulation.embedded._place_kernels import end_follow
+from bridgegen.simulation.embedded._memory_kernels import OK, STATUS
+from bridgegen.simulation.embedded._place_kernels import body_pose, end_follow, put
 from bridgegen.simulation.embedded._speed_kernels import stop_longitudinal
 
 
@@ -51,6 +52,24 @@ def is_pointless(j, plan, state):
     if kind >= FIRST_GLOBAL or kind == ADD_ENTITY:
         return False
     return not state.present[plan.actions[j, WHOM]] or (other >= 0 and not state.present[other])
+
+
+@kernel
+def begin_add(j, k, plan, roads, state, record):
+    """Begin, and end, action j: its entity is there from instant k on, where it says.
+
+    Its speed is what the storyboard asked of it last. Who is there already stays where it is.
+    """
+    e = plan.actions[j, WHOM]
+    state.action_ended[j] = True
+    if state.present[e]:
+        return
+    put(e, plan.actions[j, 6], k, plan, roads, state, record)
+    if state.ending[STATUS] != OK:
+        return
+    state.present[e] = record.present[e, k] = True
+    record.x[e, k], record.y[e, k], record.h[e, k] = body_pose(e, roads, state)
+    record.v[e, k] = state.command[e]
 
 
 @kernel

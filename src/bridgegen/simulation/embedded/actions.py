@@ -82,9 +82,7 @@ class Actions:
 
     def begin_with_all(self, action: Element) -> None:
         """Add what concerns all from the start on."""
-        if isinstance(action, osc.EntityAction):
-            self._tables.unsupported(action, f"an initial {type(action.action).__name__}")
-        elif isinstance(action, osc.ParameterAction | osc.VariableAction):
+        if isinstance(action, osc.ParameterAction | osc.VariableAction):
             for row in self._everywhere.rows(action):
                 self.initial.append(len(self.rows))
                 self.rows.append((*row, 0))
@@ -150,11 +148,10 @@ class Actions:
         if entity == 0 and self._controllers.has_driver:
             what = f"a {type(action.action).__name__} of the ego, which a driver drives,"
             self._tables.unsupported(action.action, what)
+        kind, place, slot = DELETE_ENTITY, 0, self._tables.slot(0.0)
         if isinstance(action.action, osc.AddEntityAction):
-            self._tables.unsupported(action, type(action.action).__name__)
-            return
-        slot = self._tables.slot(0.0)
-        self.rows.append((entity, DELETE_ENTITY, 0, 0, slot, slot, 0))
+            kind, place = ADD_ENTITY, self._positions.add(action.action.position)
+        self.rows.append((entity, kind, 0, 0, slot, slot, place))
 
     def _routing(self, action: Element, entity: int) -> None:
         slot = self._tables.slot(0.0)

@@ -1,6 +1,6 @@
 """From an OpenSCENARIO file to a `Program`, or to all that the rollout cannot do with it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from bridgegen.openx.openscenario.declarations import (
     NOISE_KEY,
     TIME_STEP,
 )
-from bridgegen.openx.openscenario.element import walk
+from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.resolve import texts_resolved
 from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT, WHOSE
@@ -41,6 +41,9 @@ from bridgegen.simulation.embedded.triggers import MAX_STEPS, Triggers
 
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
+
+Way = osc.AssignRouteAction | osc.AcquirePositionAction
+"""What gives an entity a route."""
 
 
 def compile_storyboard(
@@ -101,6 +104,7 @@ class _Compiler:
             self.tables, self.paths, self.points, self.positions, self.everywhere, self.controllers
         )
         self.starts: dict[int, int] = {}
+        self.absent: list[int] = []
         self.routes: dict[int, int] = {}
 
     def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
@@ -214,8 +218,8 @@ class _Compiler:
             ),
             first_time=first_time,
             time_passes=int(time is not None and time[1]),
-            absent=np.zeros(len(objects), dtype=np.int64),
-            comes_and_goes=self.actions.has_comings_and_goings,
+            absent=np.array([e in self.absent for e in range(len(objects))], dtype=np.int64),
+            comes_and_goes=bool(self.absent) or self.actions.has_comings_and_goings,
             drives=np.array(self.controllers.drives, dtype=np.int64),
             driver=chosen if ideal is None else chosen.idealised(ideal),
             time_step=step,
@@ -306,10 +310,11 @@ class _Compiler:
         for command in actions.user_defined_actions:
             self.tables.unsupported(command, "UserDefinedAction")
         for one in actions.global_actions:
-            self.actions.begin_with_all(one.action)
+            if not isinstance(one.action, osc.EntityAction):
+                self.actions.begin_with_all(one.action)
         init = dict.fromkeys(self.tables.names, self.tables.slot(0.0))
-        starts: dict[str, osc.Position] = {}
-        routes: dict[str, osc.AssignRouteAction | osc.AcquirePositionAction] = {}
+        starts = dict(self._added(actions.global_actions))
+        routes: dict[str, Way] = {}
         tracks: dict[str, AlongTrajectory] = {}
         first: list[tuple[osc.PrivateAction, int]] = []
         for private in actions.privates:
@@ -333,16 +338,25 @@ class _Compiler:
                     first.append((wrapped, self.tables.entity(name)))
                 elif isinstance(inner, osc.FollowTrajectoryAction):
                     tracks[name] = compile_trajectory(self.tables, inner)
-                elif isinstance(inner, osc.AssignRouteAction | osc.AcquirePositionAction):
+                elif isinstance(inner, Way):
                     routes[name] = inner
                 else:
                     self.tables.unsupported(inner, f"an initial {type(inner).__name__}")
-        missing = [name for name in self.tables.names if name not in starts]
+        later = dict(self._added(walk(self.scenario.storyboard)))
+        self.absent = [
+            e
+            for e, name in enumerate(self.tables.names)
+            if name not in starts and name in later and not (e == 0 and has_driver)
+        ]
+        waiting = {self.tables.names[e] for e in self.absent}
+        self.absent += self._deleted(actions.global_actions)
+        missing = [name for name in self.tables.names if name not in {*starts, *waiting}]
         if missing and not self.tables.problems:
             self.tables.culprits += [one for one in self.tables.objects if str(one.name) in missing]
             raise InputError(
                 *(
-                    f"{self.place}: entity '{name}' needs an initial TeleportAction"
+                    f"{self.place}: entity '{name}' needs an initial TeleportAction, or "
+                    "an AddEntityAction"
                     for name in missing
                 )
             )
@@ -350,15 +364,46 @@ class _Compiler:
             if name in starts:
                 track, route = tracks.get(name), routes.get(name)
                 self.paths.append(track or self._start(e, starts[name], route, has_driver))
+            elif name in waiting:
+                self.paths.append(self._nowhere(e, tracks.get(name), routes.get(name)))
         for one_more, entity in first:
             self.actions.begin(one_more, entity)
         return [init[name] for name in self.tables.names]
+
+    def _added(self, elements: Iterable[Element]) -> Iterator[tuple[str, osc.Position]]:
+        """Yield whom actions among some elements add, and where."""
+        for one in elements:
+            action = one.action if isinstance(one, osc.GlobalAction) else None
+            if isinstance(action, osc.EntityAction) and isinstance(
+                action.action, osc.AddEntityAction
+            ):
+                yield self.tables.text(action.entity_ref), action.action.position
+
+    def _deleted(self, actions: Iterable[osc.GlobalAction]) -> list[int]:
+        """Return the entities that are deleted at the start."""
+        return [
+            self.tables.entity(one.action.entity_ref)
+            for one in actions
+            if isinstance(one.action, osc.EntityAction)
+            and isinstance(one.action.action, osc.DeleteEntityAction)
+        ]
+
+    def _nowhere(self, e: int, track: AlongTrajectory | None, route: Way | None) -> Nowhere:
+        """Return the path of an entity that is not there yet; it keeps the route that it gets."""
+        if track is not None:
+            self.tables.problems.append(
+                f"{self.place}, line {track.line}: an initial FollowTrajectoryAction of "
+                f"'{self.tables.names[e]}', which is not there, is not supported"
+            )
+        if route is not None and (spots := self.actions.waypoints(route)):
+            self.routes[e] = self.actions.add_route(spots)
+        return Nowhere()
 
     def _start(
         self,
         e: int,
         position: osc.Position,
-        route: osc.AssignRouteAction | osc.AcquirePositionAction | None,
+        route: Way | None,
         has_driver: bool,
     ) -> PathSpec:
         """Return the path that an entity starts on: along its lane, as far as the file tells."""
