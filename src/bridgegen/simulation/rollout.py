@@ -19,8 +19,9 @@ STATUS_MESSAGES = {
     21: "the driver did not answer in time",
     22: "the driver's process ended",
     23: "the driver answered what is no control",
-    4: "a position that is not on the road network, or by an entity that is not there",
+    4: "a position that is not on the road network",
     5: "no lane leads from where an entity is to its route",
+    6: "a position that counts from an entity which is not there",
 }
 
 FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}

@@ -251,7 +251,7 @@ def test_a_place_by_somebody_who_is_not_there_ends_the_row():
     come = ("come", (add("bv", behind),), after(2.0))
     assert scene(come, privates=LATER).status[0] == 0
     gone = ("gone", (delete("cv"),), after(1.0))
-    assert scene(gone, come, privates=LATER).status[0] == 4
+    assert scene(gone, come, privates=LATER).status[0] == 6
 
 
 def test_who_is_never_there_is_a_mistake():

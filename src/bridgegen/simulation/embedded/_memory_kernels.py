@@ -16,7 +16,8 @@ from bridgegen.compiled import borrowed, bundled, inlined_kernel
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
-OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY = range(6)  # see rollout.STATUS_MESSAGES
+# See rollout.STATUS_MESSAGES.
+OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE = range(7)
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
 

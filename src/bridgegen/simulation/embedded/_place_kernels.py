@@ -45,7 +45,13 @@ from bridgegen.simulation.embedded._lane_kernels import (
     turned,
     walk,
 )
-from bridgegen.simulation.embedded._memory_kernels import NO_PLACE, STATUS, STOPS, UNPLANNED
+from bridgegen.simulation.embedded._memory_kernels import (
+    NO_PLACE,
+    NOT_THERE,
+    STATUS,
+    STOPS,
+    UNPLANNED,
+)
 from bridgegen.simulation.embedded._motion_kernels import nearest, shifted
 
 LANES, GROUND = -1, -2
@@ -251,7 +257,7 @@ def put(e, c, k, plan, roads, state, record):
     """
     kind, other = plan.places[c, PLACE_KIND], plan.places[c, WHOSE]
     if other >= 0 and not state.present[other]:
-        fail(NO_PLACE, state)
+        fail(NOT_THERE, state)
         return
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
