@@ -9,6 +9,9 @@ from bridgegen.pipeline import Pipeline
 
 IDEAL = {"perceiving": (), "all ideal": ("perception", "prediction", "control")}
 
+ROUND = {"cut-out": IDEAL, "jam-tail-in-fog": ("all ideal",)}
+"""Where, and with which driver, somebody who stands is gone round, by the lane to the left."""
+
 
 @pytest.mark.parametrize("ideal", IDEAL)
 @pytest.mark.parametrize("name", names())
@@ -16,13 +19,25 @@ def test_defaults_are_driven_without_harm(name: str, ideal: str) -> None:
     scenario = load(name)
     space = scenario.space()
     pipeline = Pipeline(scenario, space, ego="reference", ideal=IDEAL[ideal])
-    rollout = pipeline.rollout(space.row({})[np.newaxis])
+    row = space.row({})
+    rollout = pipeline.rollout(row[np.newaxis])
     wanted = ("n_collision", "r_red", "l_offset", "d_min")
     found = dict(zip(wanted, measures.evaluate(rollout, wanted)[0], strict=True))
     assert rollout.status[0] == 0
     assert found["n_collision"] == 0
     assert found["r_red"] == 0
-    assert found["l_offset"] < 0.5
     assert found["d_min"] > 0.3
+    if ideal in ROUND.get(name, ()):
+        lane = space.values(row)["lane_width"]
+        offset = rollout.offset[0, 0, : rollout.n_steps[0]]
+        beside = offset > 0.5 * lane
+        astray = np.minimum(np.abs(offset), np.abs(offset - lane)) > 0.5
+        assert beside.any()
+        assert np.diff(beside).sum() <= 2  # out, and back
+        assert astray.sum() * rollout.time_step < 2 * 5.0  # s, between two lanes
+        assert not astray[-1]
+        assert -0.5 < offset.min() < offset.max() < lane + 0.5
+    else:
+        assert found["l_offset"] < 0.5
     travelled = np.hypot(*np.diff([rollout.x[0, 0], rollout.y[0, 0]], axis=1)).sum()
     assert travelled > 20.0  # standing still would be harmless, too

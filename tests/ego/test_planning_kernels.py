@@ -16,6 +16,7 @@ from bridgegen.ego._emergency_kernels import boxes_meet, must_brake
 from bridgegen.ego._following_kernels import follow, idm, keep_distance, stop_for
 from bridgegen.ego._lights_kernels import stop_at_lights
 from bridgegen.ego._prediction_kernels import LOST, PASSAGE, add_straight, predict
+from bridgegen.ego._shift_kernels import UNSHIFTED as STAYS
 from bridgegen.ego._speed_kernels import bend_speed, limit_speed, sight_speed
 from bridgegen.ego._surroundings_kernels import AROUND, surround
 from bridgegen.ego._yielding_kernels import find_zone, time_to, yield_to_all
@@ -49,7 +50,7 @@ def tracked(*rows: tuple[float, float, float, float, int]) -> Float:
 def seen(path: Float, s: float, tracks: Float) -> Float:
     """The tracks from a path."""
     found = np.zeros((len(tracks), AROUND))
-    surround(path, len(path), DS, s, 100.0, 0.1, tracks, found)
+    surround(path, len(path), DS, s, 15.0, 100.0, 0.1, tracks, found)
     return found
 
 
@@ -92,17 +93,17 @@ def test_who_is_beside_or_behind_is_not_followed() -> None:
     path = line(0.0, 0.0, 0.0, 200.0)
     for x, y in ((20.0, 3.5), (-10.0, 0.0)):
         around = seen(path, 10.0, tracks := tracked((x, y, 0.0, 0.0, kinds.CAR)))
-        assert keep_distance(around, tracks, 10.0, 3.65, 0.85, 0.95, 0.0, 10.0) == math.inf
+        assert keep_distance(around, tracks, 10.0, 3.65, 0.85, 0.95, STAYS, 10.0) == math.inf
     around = seen(path, 10.0, tracks := tracked((40.0, 0.5, 0.0, 0.0, kinds.CAR)))
-    assert keep_distance(around, tracks, 10.0, 3.65, 0.85, 0.95, 0.0, 10.0) < 0.0
+    assert keep_distance(around, tracks, 10.0, 3.65, 0.85, 0.95, STAYS, 10.0) < 0.0
 
 
 def test_who_moves_into_the_way_is_followed_before_arriving() -> None:
     path = line(0.0, 0.0, 0.0, 200.0)
     tracks = tracked((30.0, 3.0, 0.0, 10.0, kinds.CAR))
-    straight = keep_distance(seen(path, 10.0, tracks), tracks, 10.0, 3.65, 0.85, 0.95, 0.0, 15.0)
+    straight = keep_distance(seen(path, 10.0, tracks), tracks, 10.0, 3.65, 0.85, 0.95, STAYS, 15.0)
     tracks[1, track.VY] = -1.0
-    drifting = keep_distance(seen(path, 10.0, tracks), tracks, 10.0, 3.65, 0.85, 0.95, 0.0, 15.0)
+    drifting = keep_distance(seen(path, 10.0, tracks), tracks, 10.0, 3.65, 0.85, 0.95, STAYS, 15.0)
     assert straight == math.inf
     assert drifting < 0.0
 
@@ -193,15 +194,15 @@ def passage(zone: Float, q: float, w: float) -> Float:
 
 def test_who_comes_first_goes_first() -> None:
     zone = crossing()[2]
-    first = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, passage(zone, 30.0, 10.0), 1)
+    first = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 30.0, 10.0), 1)
     assert first < 0.0  # it is 20 m away, as the ego is
-    late = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, passage(zone, 0.0, 5.0), 1)
+    late = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 0.0, 5.0), 1)
     assert late == math.inf  # 10 s away: the ego has passed
-    gone = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, passage(zone, 80.0, 10.0), 1)
+    gone = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 80.0, 10.0), 1)
     assert gone == math.inf
-    standing = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, passage(zone, 30.0, 0.0), 1)
+    standing = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 30.0, 0.0), 1)
     assert standing == math.inf
-    blocking = yield_to_all(35.0, 10.0, 10.0, 3.65, 0.85, passage(zone, 50.0, 0.0), 1)
+    blocking = yield_to_all(35.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 50.0, 0.0), 1)
     assert blocking < 0.0
 
 
@@ -209,8 +210,8 @@ def test_one_does_not_wait_in_somebody_elses_way() -> None:
     near, far = np.array([40.0, 46.0, 40.0, 46.0, 0.0]), np.array([47.0, 52.0, 47.0, 52.0, 0.0])
     only = passage(far, 37.0, 5.0)
     both = np.concatenate([only, passage(near, 0.0, 2.0)])
-    before_far = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, only, 1)
-    before_near = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, both, 2)
+    before_far = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, only, 1)
+    before_near = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, both, 2)
     assert before_far == pytest.approx(stop_for(47.0 - 33.65, 6.0))
     assert before_near == pytest.approx(stop_for(40.0 - 33.65, 6.0))
 
@@ -277,7 +278,7 @@ def test_one_slows_for_somebody_at_the_kerb_and_for_a_crosswalk_that_is_hidden()
 
     def speed(tracks: Float, crosswalks: Float, town: bool = True) -> float:
         around = seen(path, 30.0, tracks)
-        return float(careful_speed(around, tracks, crosswalks, 30.0, 3.65, 0.95, 0.0, town, GRIP))
+        return float(careful_speed(around, tracks, crosswalks, 30.0, 3.65, 0.95, STAYS, town, GRIP))
 
     kerb = tracked((45.0, 2.5, 0.0, 0.0, kinds.PEDESTRIAN))
     far = tracked((45.0, 9.0, 0.0, 0.0, kinds.PEDESTRIAN))
@@ -309,7 +310,7 @@ def test_full_braking_is_for_what_nothing_else_avoids() -> None:
     def brakes(x: float, y: float, h: float, v: float) -> bool:
         tracks = tracked((x, y, h, v, kinds.CAR))
         around = seen(path, 30.0, tracks)
-        return bool(must_brake(path, len(path), DS, 30.0, 12.0, CAR, 0.0, around, tracks, GRIP))
+        return bool(must_brake(path, len(path), DS, 30.0, 12.0, CAR, STAYS, around, tracks, GRIP))
 
     assert brakes(42.0, 0.0, 0.0, 0.0)
     assert not brakes(80.0, 0.0, 0.0, 0.0)

@@ -9,6 +9,7 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._following_kernels import COMFORT_DECELERATION
+from bridgegen.ego._shift_kernels import aside_at
 from bridgegen.ego._surroundings_kernels import (
     ACROSS,
     ALONG,
@@ -51,17 +52,18 @@ def slow_to(speed, distance):
 
 
 @kernel
-def careful_speed(around, tracks, crosswalks, s, front, half_width, aside, in_town, friction_limit):
+def careful_speed(around, tracks, crosswalks, s, front, half_width, shift, in_town, friction_limit):
     """Return the speed [m/s] that those beside the route and what they hide allow; +inf if any."""
     best = math.inf
     for e in range(1, around.shape[0]):
         if around[e, NEAR] == 0.0 or around[e, AT] + around[e, HALF_LENGTH] < s:
             continue
         kind = tracks[e, KIND]
+        distance = around[e, AT] - around[e, HALF_LENGTH] - s - front
+        aside = aside_at(shift, s + max(distance, 0.0))
         room = abs(around[e, ASIDE] - aside) - around[e, HALF_WIDTH] - half_width
         if room < 0.0 or math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS:
             continue
-        distance = around[e, AT] - around[e, HALF_LENGTH] - s - front
         if kind in (PEDESTRIAN, ANIMAL):
             if room < AT_SIDE or at_crosswalk(crosswalks, around[e, AT]):
                 best = min(best, slow_to(safe_speed(room, friction_limit), distance))

@@ -4,6 +4,7 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose
+from bridgegen.ego._shift_kernels import aside_at
 from bridgegen.ego._surroundings_kernels import (
     ACROSS,
     ALONG,
@@ -44,12 +45,12 @@ def boxes_meet(dx, dy, h, half_length, half_width, other_h, other_length, other_
 
 
 @kernel
-def must_brake(path, n, ds, s, v, body, aside, around, tracks, friction_limit):
+def must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
     """Return whether only full braking is left.
 
-    The ego goes on along its route, ``aside`` [m] left of it. Who drives along the road is taken to
-    follow its bends, everybody else to go straight on. A body that meets the ego's rear half does
-    not count: braking would not help.
+    The ego goes on along its route, or beside it by a ``shift``. Who drives along the road is taken
+    to follow its bends, everybody else to go straight on. A body that meets the ego's rear half
+    does not count: braking would not help.
     """
     if v < 0.5:
         return False
@@ -63,12 +64,13 @@ def must_brake(path, n, ds, s, v, body, aside, around, tracks, friction_limit):
         closing = v - around[e, ALONG]
         reach = around[e, HALF_LENGTH] + 0.5 * length + MARGIN
         room = around[e, HALF_WIDTH] + 0.5 * width + MARGIN
-        beside = around[e, ASIDE] - aside
         parallel = abs(around[e, COSINE]) > PARALLEL
         t = STEP
         while t <= look:
+            aside = aside_at(shift, s + v * t)
             if parallel:
                 along = ahead - closing * t
+                beside = around[e, ASIDE] - aside
                 meets = abs(along) < reach and abs(beside + around[e, ACROSS] * t) < room
             else:
                 px, py, ph = pose(path, n, ds, s + v * t)

@@ -8,6 +8,7 @@ heuristic: a short gap to somebody who is not slower needs no hard braking).
 import math
 
 from bridgegen.compiled import kernel
+from bridgegen.ego._shift_kernels import aside_at
 from bridgegen.ego._surroundings_kernels import (
     ACROSS,
     ALONG,
@@ -80,16 +81,17 @@ def stop_for(distance, v):
 
 
 @kernel
-def keep_distance(around, tracks, s, front, rear, half_width, aside, v):
+def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
     """Return the acceleration [m/s²] that those ahead on the ego's strip ask for; +inf if none.
 
-    The ego's centre line is ``aside`` [m] left of its route.
+    The ego's centre line leaves its route by a ``shift``; what counts is where it is by then.
     """
     asked = math.inf
     for e in range(1, around.shape[0]):
         if around[e, NEAR] == 0.0 or around[e, AT] + around[e, HALF_LENGTH] < s - rear:
             continue
-        beside = around[e, ASIDE] - aside
+        rear_end = around[e, AT] - around[e, HALF_LENGTH]
+        beside = around[e, ASIDE] - aside_at(shift, max(rear_end - front, s))
         space = abs(beside) - around[e, HALF_WIDTH] - half_width
         kind = tracks[e, KIND]
         least = SIDE_GAP_ON_FOOT if kind in (BICYCLE, PEDESTRIAN) else SIDE_GAP
@@ -99,7 +101,7 @@ def keep_distance(around, tracks, s, front, rear, half_width, aside, v):
             continue  # it is not to be followed; whether both meet is a matter of time
         if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
             continue
-        gap = around[e, AT] - around[e, HALF_LENGTH] - s - front
+        gap = rear_end - s - front
         if gap < 0.0 and around[e, AT] < s + front:
             continue  # beside us: braking would not part us
         speed = around[e, ALONG] if moves else 0.0

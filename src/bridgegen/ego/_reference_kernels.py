@@ -16,10 +16,17 @@ from bridgegen.ego._following_kernels import (
     COMFORT_DECELERATION,
     keep_distance,
 )
+from bridgegen.ego._lane_change_kernels import (
+    LAST,
+    change_lane,
+    look_back,
+    shift_of,
+)
 from bridgegen.ego._lights_kernels import stop_at_lights
 from bridgegen.ego._perception_kernels import perceive
 from bridgegen.ego._prediction_kernels import predict, predict_truly
-from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego._route_follower_kernels import hold_speed, preview
+from bridgegen.ego._shift_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, sight
 from bridgegen.ego._speed_kernels import (
     FAST_ROAD,
@@ -29,13 +36,13 @@ from bridgegen.ego._speed_kernels import (
     scan_length,
     sight_speed,
 )
-from bridgegen.ego._surroundings_kernels import surround
+from bridgegen.ego._surroundings_kernels import BEHIND, surround
 from bridgegen.ego._yielding_kernels import yield_to_all
 
 PLANNED, NEXT_PLAN, STOPS_FOR = control.SIZE, control.SIZE + 1, control.SIZE + 2
 """What it plans to do [m/s²], when it thinks again [s], and 1 + the light that it stops for."""
 
-MIND = control.SIZE + 3
+MIND = LAST
 
 CYCLE = 0.1  # s, between two plans
 PLANNING_REACH = 30.0  # m, how far it looks at least …
@@ -51,7 +58,7 @@ def reach_of(v):
 @kernel
 def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, light_seen,
          in_town, around, tracks, passages, n_passages, crosswalks, stop_stations, lights,
-         mind):  # fmt: skip
+         elapsed, mind):  # fmt: skip
     """Return the acceleration [m/s²] that the planner wants.
 
     Args:
@@ -75,6 +82,7 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
         crosswalks: that the route leads over.
         stop_stations: of the stop lines of lights, +inf where not on the route [m].
         lights: their states.
+        elapsed: since it was asked last [s].
         mind: see above.
     """
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
@@ -84,19 +92,27 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
         crosswalks, stop_stations = crosswalks[:0], stop_stations[:0]
     else:
         speed = min(speed, limit_speed(road, road_n, ds, s, v))
+    asked = math.inf
+    if road_n > 0:
+        asked = change_lane(
+            road, road_n, ds, s, v, speed, front, rear, half_width, around, tracks, passages,
+            n_passages, crosswalks, stop_stations, seen, friction_limit, elapsed, mind,
+        )  # fmt: skip
+    shift = shift_of(mind) if road_n > 0 else UNSHIFTED
     careful = careful_speed(
-        around, tracks, crosswalks, s, front, half_width, 0.0, in_town, friction_limit
+        around, tracks, crosswalks, s, front, half_width, shift, in_town, friction_limit
     )
-    speed = min(speed, careful)
+    speed = min(speed, careful, shift_speed(shift, s, friction_limit))
     wanted = min(max(hold_speed(v, speed), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
+    wanted = min(wanted, asked)
     asked, stops_for = stop_at_lights(
         stop_stations, lights, s, front, v, light_seen, int(mind[STOPS_FOR]) - 1
     )
     mind[STOPS_FOR] = stops_for + 1.0
     wanted = min(wanted, asked)
-    wanted = min(wanted, keep_distance(around, tracks, s, front, rear, half_width, 0.0, v))
-    wanted = min(wanted, yield_to_all(s, v, speed, front, rear, passages, n_passages))
-    if must_brake(path, n, ds, s, v, body, 0.0, around, tracks, friction_limit):
+    wanted = min(wanted, keep_distance(around, tracks, s, front, rear, half_width, shift, v))
+    wanted = min(wanted, yield_to_all(s, v, speed, front, rear, shift, passages, n_passages))
+    if must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
         wanted = -friction_limit
     return max(wanted, -friction_limit)
 
@@ -128,7 +144,8 @@ def drive(k, curvature, friction_limit, plan_, roads, state, record):
         path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
         road_n = n if known else 0
         body, ahead = plan_.bodies[0], reach_of(v)
-        surround(path, n, ds, s, ahead, max(CYCLE, plan_.dt), state.tracks, state.around)
+        elapsed, behind = max(CYCLE, plan_.dt), look_back(mind, BEHIND)
+        surround(path, n, ds, s, behind, ahead, elapsed, state.tracks, state.around)
         if plan_.ideal_prediction and known:
             count = predict_truly(
                 path, n, ds, s, ahead, body[1], state.tracks, roads.paths, roads.counts,
@@ -150,6 +167,11 @@ def drive(k, curvature, friction_limit, plan_, roads, state, record):
         mind[PLANNED] = plan(
             path, roads.road, n, road_n, ds, s, v, body, state.command[0], friction_limit, seen,
             light_seen, in_town, state.around, state.tracks, state.passages, count,
-            roads.crosswalks, roads.stops, state.lights, mind,
+            roads.crosswalks, roads.stops, state.lights, elapsed, mind,
+        )  # fmt: skip
+    if shift_of(mind) != UNSHIFTED and state.on[0] == 0:
+        curvature = pursue_beside(
+            roads.paths[0], roads.counts[0], roads.steps[0], s, shift_of(mind), record.x[0, k],
+            record.y[0, k], record.h[0, k], preview(v),
         )  # fmt: skip
     return control.actuate(mind, mind[PLANNED], curvature, plan_.dt, plan_.ideal_control)

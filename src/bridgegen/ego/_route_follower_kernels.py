@@ -9,10 +9,15 @@ SPEED_TIME = 0.5  # s, time constant of the speed controller
 
 
 @kernel
+def preview(v):
+    """Return how far ahead [m] of the rear axle the point lies that it steers for."""
+    return min(max(PREVIEW * v, PREVIEW_MIN), PREVIEW_MAX)
+
+
+@kernel
 def steer(path, n, ds, s, x, y, h, v):
     """Return the curvature [1/m] that follows the path (pure pursuit)."""
-    ahead = min(max(PREVIEW * v, PREVIEW_MIN), PREVIEW_MAX)
-    return pursue(path, n, ds, s, x, y, h, ahead)
+    return pursue(path, n, ds, s, x, y, h, preview(v))
 
 
 @kernel

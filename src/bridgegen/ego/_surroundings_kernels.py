@@ -21,24 +21,25 @@ AROUND = 9
 
 MEMORY_OF_GAIN = 0.3  # s, over which that is smoothed
 
-BEHIND = 15.0  # m, how far back it looks
+BEHIND = 15.0  # m, how far back it looks at least
 REACH = 25.0  # m, how far to the side
 COARSE = 3.0  # m, between the points of the route that are tried first
 
 
 @kernel
-def surround(path, n, ds, s, ahead, elapsed, tracks, around):
-    """Fill ``around``; ``ahead`` is how far along its route from s the ego looks [m].
+def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
+    """Fill ``around``.
 
-    ``elapsed`` [s] have passed since this was done last.
+    ``behind`` and ``ahead`` [m] are how far along its route from s the ego looks; ``elapsed``
+    [s] have passed since this was done last.
     """
     share = 1.0 - math.exp(-elapsed / MEMORY_OF_GAIN)
     stride = max(int(COARSE / ds), 1)
-    first = max(int((s - BEHIND) / ds), 0)
+    first = max(int((s - behind) / ds), 0)
     last = min(int((s + ahead) / ds) + stride, n - 1)
-    middle = min(max(int((s + 0.5 * (ahead - BEHIND)) / ds), 0), n - 1)
+    middle = min(max(int((s + 0.5 * (ahead - behind)) / ds), 0), n - 1)
     mx, my = path[middle, X], path[middle, Y]
-    widest = 0.5 * (ahead + BEHIND) + REACH
+    widest = 0.5 * (ahead + behind) + REACH
     for e in range(1, tracks.shape[0]):
         was_near = around[e, NEAR] > 0.0
         around[e, NEAR] = 0.0

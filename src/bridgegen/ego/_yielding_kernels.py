@@ -13,6 +13,7 @@ import math
 from bridgegen.compiled import kernel
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, follow, stop_for
 from bridgegen.ego._path_kernels import COS, SIN, X, Y
+from bridgegen.ego._shift_kernels import aside_at
 
 SIDE_MARGIN = 0.6  # m, kept to another body's side
 TIME_MARGIN = 1.0  # s, kept between two bodies' turns at one point
@@ -25,6 +26,7 @@ STATION, SPEED, FRONT, REAR, WHO = 5, 6, 7, 8, 9
 SCAN_STEP = 0.5  # m, between the points of a way that are looked at
 SAME_WAY = 0.9  # cosine of the heading difference above which two ways go on together
 STANDING = 0.1  # m/s, who is slower stands
+ELSEWHERE = 1.5  # m beside its route, the ego is not in the way of who joins that
 
 
 @kernel
@@ -120,11 +122,25 @@ def keep_clear(s, front, rear, length, zone, q, w, other_rear, stop):
 
 
 @kernel
-def yield_to_all(s, v, pace, front, rear, passages, count):
-    """Return the acceleration [m/s²] that all predicted passages ask for; +inf if none does."""
+def is_left(shift, s, passage):
+    """Say whether the ego is in another lane where somebody comes, or is, to go its route's way."""
+    if passage[4] == 0.0 or shift[0] == shift[1] == 0.0:
+        return False
+    place = max(s, passage[0], passage[1] - passage[3] + passage[STATION])
+    return abs(aside_at(shift, place)) > ELSEWHERE
+
+
+@kernel
+def yield_to_all(s, v, pace, front, rear, shift, passages, count):
+    """Return the acceleration [m/s²] that all predicted passages ask for; +inf if none does.
+
+    Who comes into a lane that the ego's ``shift`` has left, or will have, asks for nothing.
+    """
     asked, stop = math.inf, math.inf
     for i in range(count):
         one = passages[i]
+        if is_left(shift, s, one):
+            continue
         follows, stops = give_way(
             s, v, pace, front, rear, one, one[STATION], one[SPEED], one[FRONT], one[REAR]
         )
@@ -135,6 +151,8 @@ def yield_to_all(s, v, pace, front, rear, passages, count):
         before = stop
         for i in range(count):
             one = passages[i]
+            if is_left(shift, s, one):
+                continue
             stop = keep_clear(
                 s, front, rear, front + rear, one, one[STATION], one[SPEED], one[REAR], stop
             )

@@ -81,7 +81,7 @@ REFERENCE = Driver(
     "reference",
     1,
     "Perceives, predicts, plans and controls: follows its route, slows for bends, keeps its "
-    "distance, stops at red, yields and brakes by predicted conflict.",
+    "distance, goes round who stands, stops at red, yields and brakes by predicted conflict.",
     frozenset(STAGES),
 )
 UN_R157 = Driver(
