@@ -75,7 +75,7 @@ PRIVATE_ACTIONS = {
     "LateralDistanceAction": _lateral(
         '<LateralDistanceAction entityRef="ego" continuous="true" freespace="true" distance="1"/>'
     ),
-    "SynchronizeAction": f"""<SynchronizeAction masterEntityRef="ego"><TargetPositionMaster>
+    "SynchronizeAction": """<SynchronizeAction masterEntityRef="ego"><TargetPositionMaster>
 <LanePosition roadId="3" laneId="1" s="90"/></TargetPositionMaster><TargetPosition>
 <LanePosition roadId="2" laneId="1" s="90"/></TargetPosition></SynchronizeAction>""",
     "TeleportAction": f"<TeleportAction><Position>{HERE}</Position></TeleportAction>",
@@ -214,9 +214,9 @@ SHAPES = {
     "Polyline": _LINE,
     "Clothoid": """<Clothoid curvature="0.01" curvaturePrime="0" length="30"><Position>
 <WorldPosition x="0" y="0"/></Position></Clothoid>""",
-    "ClothoidSpline": """<ClothoidSpline><ClothoidSplineSegment curvatureStart="0" curvatureEnd="0.01"
-length="30"><PositionStart><WorldPosition x="0" y="0"/></PositionStart></ClothoidSplineSegment>
-</ClothoidSpline>""",
+    "ClothoidSpline": """<ClothoidSpline><ClothoidSplineSegment curvatureStart="0"
+curvatureEnd="0.01" length="30"><PositionStart><WorldPosition x="0" y="0"/></PositionStart>
+</ClothoidSplineSegment></ClothoidSpline>""",
     "Nurbs": """<Nurbs order="2"><ControlPoint><Position><WorldPosition x="0" y="0"/></Position>
 </ControlPoint><ControlPoint><Position><WorldPosition x="9" y="0"/></Position></ControlPoint>
 <Knot value="0"/><Knot value="0"/><Knot value="1"/><Knot value="1"/></Nurbs>""",
