@@ -135,16 +135,18 @@ def test_conditions_fire_when_they_hold():
         assert fired * rollout.time_step == pytest.approx(seconds, abs=0.11), text
 
 
-def test_standing_still():
-    text = '<StandStillCondition duration="2"/>'
+@pytest.mark.parametrize(("duration", "instant"), [(0, 40), (0.05, 41), (2, 80)])
+def test_standing_still(duration, instant):
+    """It stands from 2 s on, and goes again at 5 s; before, it moved."""
+    text = f'<StandStillCondition duration="{duration}"/>'
     rollout = driven(
         5.0,
         ("stop", "bv", speeding(0.0, "linear rate 5"), after(1.0)),
-        ("go", "bv", speeding(5.0, "step time 0"), condition("bv", text)),
+        ("seen", "ego", speeding(0.0, "step time 0"), condition("bv", text)),
+        ("go", "bv", speeding(5.0, "step time 0"), after(5.0)),
     )
     assert rollout.v[0, 1, at(rollout, 2.0)] == pytest.approx(0.0, abs=1e-9)
-    assert rollout.v[0, 1, at(rollout, 3.9)] == 0.0
-    assert rollout.v[0, 1, at(rollout, 4.2)] == 5.0
+    assert rollout.began[0, 1] == instant
 
 
 def test_a_later_action_overrides_a_running_one():

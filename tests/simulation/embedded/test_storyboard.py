@@ -272,6 +272,36 @@ def test_a_delay_on_a_state():
     assert began(told(watched_, seen))["seen"] == 70
 
 
+@pytest.mark.parametrize(
+    "dynamics", ["linear rate 2", "linear time 2", "cubic time 2", "sinusoidal time 2"]
+)
+def test_an_action_ends_when_it_is_there_whatever_its_steps_add_up_to(dynamics):
+    """From 5 to 9 m/s from 1 s on; a tenth of a metre per second is no binary number."""
+    faster = event("e", speeding(9.0, dynamics), trigger(after(1.0)))
+    seen = act(marker("seen", state("event", "e", "completeState")), name="b")
+    assert began(told(act(group(maneuver(faster))), seen))["seen"] == 60
+
+
+def test_a_speed_is_a_limit_when_it_is_whatever_its_steps_add_up_to():
+    """It slows down from 5 m/s from 1 s on, and is no faster than 3 m/s at 2 s."""
+    slower = event("e", speeding(1.0, "linear rate 2"), trigger(after(1.0)))
+    text = '<SpeedCondition value="3" rule="{}"/>'
+    rows = {
+        "falls": by("any", "bv", text=text.format("greaterThan"), edge="falling"),
+        "equals": by("any", "bv", text=text.format("equalTo")),
+        "below": by("any", "bv", text=text.format("lessThan")),
+    }
+    seen = (event(name, AT_ONCE, trigger(row)) for name, row in rows.items())
+    groups = group(maneuver(slower)), group(maneuver(*seen), actors="cv", name="g2")
+    instants = began(told(act(*groups)))
+    assert instants == {"e": 20, "falls": 40, "equals": 40, "below": 41}
+
+
+def test_a_delay_is_over_at_the_first_instant_after_it():
+    late = event("e", AT_ONCE, trigger(after(1.0, delay=1.02)))
+    assert began(told(act(group(maneuver(late))))) == {"e": 41}
+
+
 @pytest.mark.parametrize("delay", ["4.95", "1e5", "99999999999999999999", "INF"])
 def test_a_delay_longer_than_the_scenario_never_ends(delay):
     """It lasts 10 s: a delay of 4.95 s on 5 s is over just in time."""

@@ -9,7 +9,7 @@ from bridgegen.ego._speed_kernels import bend_speed
 from bridgegen.ego._un_r157_kernels import drive_un_r157
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego.drivers import NOBODY
-from bridgegen.simulation.embedded._motion_kernels import bicycle
+from bridgegen.simulation.embedded._motion_kernels import bicycle, standing
 from bridgegen.simulation.embedded._travel_kernels import ENDS, pass_end
 
 
@@ -65,7 +65,7 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
     p = state.on[0]
     record.a[0, k] = given
     state.travelled[0] += step
-    state.stood[0] = state.stood[0] + dt if after == 0.0 else 0.0
+    state.stood[0] = standing(state.stood[0], v, after, dt)
     if k < record.x.shape[1] - 1:
         record.x[0, k + 1], record.y[0, k + 1] = x, y
         record.h[0, k + 1], record.v[0, k + 1] = h, after

@@ -6,6 +6,7 @@ A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the colu
 from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._lane_kernels import continued, station_of
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
+from bridgegen.simulation.embedded._motion_kernels import standing
 from bridgegen.simulation.embedded._place_kernels import (
     LANES,
     ask,
@@ -113,7 +114,7 @@ def move_by_timetable(e, k, plan, roads, state, record):
     x, y, h, v, station = at_time(table, n, t)
     state.travelled[e] += station - state.station[e]
     state.station[e] = station
-    state.stood[e] = state.stood[e] + plan.dt if v == 0.0 else 0.0
+    state.stood[e] = standing(state.stood[e], record.v[e, k], v, plan.dt)
     if state.speed_action[e] < 0:
         state.command[e] = state.target[e] = v
     record.a[e, k] = (v - record.v[e, k]) / plan.dt

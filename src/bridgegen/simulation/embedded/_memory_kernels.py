@@ -121,7 +121,7 @@ class State(NamedTuple):
         present: ``(E,)`` bool, who is there.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
         travelled: ``(E,)`` [m] since the start.
-        stood: ``(E,)`` [s] since it last moved.
+        stood: ``(E,)`` [s] for how long it has stood.
         route: ``(E,)`` int64, the route that a body follows where it can; 0: none.
         on: ``(E,)`` int64, the path that it is on; -1: none, it goes straight along its line,
         station: ``(E,)`` [m] along it,

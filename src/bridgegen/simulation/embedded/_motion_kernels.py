@@ -7,6 +7,8 @@ from bridgegen.ego._path_kernels import X, Y, project
 
 STEP, LINEAR, CUBIC, SINUSOIDAL = 0, 1, 2, 3
 RATE, TIME, DISTANCE = 0, 1, 2
+SAME_SPEED, SAME_TIME = 1e-9, 1e-9  # m/s, s, what is less is rounding
+STANDS = 1e-6  # m/s, who is slower stands
 SEARCH_STEP = 5.0  # m, between the points at which a foot on another path is first looked for
 
 
@@ -41,6 +43,12 @@ def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, dt):
 def ramped(value, target, most):
     """Return a value moved towards its target by no more than so much."""
     return value + min(max(target - value, -most), most)
+
+
+@kernel
+def standing(stood, before, after, dt):
+    """Return for how long a body has stood [s] at the end of a step, by its speeds [m/s]."""
+    return stood + dt if before <= STANDS and after <= STANDS else 0.0
 
 
 @kernel

@@ -22,7 +22,12 @@ from bridgegen.simulation.embedded._codes import (
     TRAVELED_DISTANCE,
     WHO,
 )
-from bridgegen.simulation.embedded._relation_kernels import compare, compare_times
+from bridgegen.simulation.embedded._motion_kernels import STANDS
+from bridgegen.simulation.embedded._relation_kernels import (
+    SAME_VALUE,
+    compare,
+    compare_times,
+)
 
 
 @inlined_kernel
@@ -45,8 +50,8 @@ def look(p, k, plan, state, record):
     if kind == SPEED:
         return compare(record.v[e, k], rule, limit)
     if kind == TRAVELED_DISTANCE:
-        return state.travelled[e] >= limit
-    return state.stood[e] >= limit  # STAND_STILL
+        return state.travelled[e] >= limit - SAME_VALUE
+    return record.v[e, k] <= STANDS and state.stood[e] >= limit - SAME_VALUE  # STAND_STILL
 
 
 @kernel

@@ -59,7 +59,13 @@ from bridgegen.simulation.embedded._course_kernels import (
     profile_speed,
     spring,
 )
-from bridgegen.simulation.embedded._motion_kernels import STEP, nearest, ramped
+from bridgegen.simulation.embedded._motion_kernels import (
+    SAME_SPEED,
+    SAME_TIME,
+    STEP,
+    nearest,
+    ramped,
+)
 
 NEAR = 0.1  # m, a distance that is missed by less is reached
 ASIDE = 10.0  # m, a place that is farther from a path does not lie on it
@@ -125,7 +131,7 @@ def follow_course(j, k, plan, roads, state, record):
     elif kind == SPEED_PROFILE:
         n = state.profile_rows[e]
         state.command[e] = max(profile_speed(state.profile[e], n, passed), 0.0)
-        over = passed >= state.profile[e, n - 1, 0]
+        over = passed >= state.profile[e, n - 1, 0] - SAME_TIME
     elif kind == KEEP_DISTANCE:
         over = _keep_distance(j, e, k, plan, roads, state, record)
     else:
@@ -168,7 +174,8 @@ def _follow_speed(j, e, k, passed, plan, state, record):
         after = target
     most = plan.bodies[e, 4] if after > before else plan.bodies[e, 5]
     state.command[e] = ramped(before, after, most * plan.dt)
-    return passed >= state.speed_lasts[e] and state.command[e] == target and not row[CONTINUOUS]
+    is_there = abs(state.command[e] - target) <= SAME_SPEED
+    return passed >= state.speed_lasts[e] - SAME_TIME and is_there and not row[CONTINUOUS]
 
 
 @kernel

@@ -45,12 +45,15 @@ from bridgegen.simulation.embedded._global_kernels import time_of_day
 
 AT_END = 1e-6  # m
 SAME_TIME = 1e-6  # s, the rounding of a date
+SAME_VALUE = 1e-9  # of any unit, the rounding of what is summed up step by step
 SAME_ANGLE = 1e-9  # rad, the rounding of a turn
 
 
 @kernel
 def compare(value, rule, limit):
-    """Apply an OpenSCENARIO Rule."""
+    """Apply an OpenSCENARIO Rule; what is the limit up to rounding is the limit."""
+    if abs(value - limit) <= SAME_VALUE:
+        value = limit
     if rule == GREATER:
         return value > limit
     if rule == LESS:

@@ -5,7 +5,7 @@ import math
 from bridgegen.compiled import inlined_kernel
 from bridgegen.simulation.embedded._codes import RELATIVE_SPEED
 from bridgegen.simulation.embedded._course_kernels import change_time, changed
-from bridgegen.simulation.embedded._motion_kernels import LINEAR, RATE, STEP, ramped
+from bridgegen.simulation.embedded._motion_kernels import LINEAR, RATE, SAME_SPEED, STEP, ramped
 from bridgegen.simulation.embedded._pursuit_kernels import begin_course, follow_course
 
 
@@ -63,6 +63,6 @@ def command_speed(e, k, plan, roads, state, record):
         )
     else:
         state.command[e] = ramped(state.command[e], state.target[e], state.rate[e] * plan.dt)
-    if j >= 0 and state.command[e] == state.target[e]:
+    if j >= 0 and abs(state.command[e] - state.target[e]) <= SAME_SPEED:
         state.action_ended[j] = True
         state.speed_action[e] = -1

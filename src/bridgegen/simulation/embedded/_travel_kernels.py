@@ -4,6 +4,7 @@ from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._across_kernels import CONTINUOUS
 from bridgegen.simulation.embedded._lane_kernels import continued
 from bridgegen.simulation.embedded._lateral_kernels import glide
+from bridgegen.simulation.embedded._motion_kernels import SAME_TIME, standing
 from bridgegen.simulation.embedded._place_kernels import (
     LANES,
     ask,
@@ -41,10 +42,10 @@ def move_along_path(e, k, plan, roads, state, record):
             station, step = length, 0.5 * before * dt
             state.command[e] = state.target[e] = 0.0
     state.travelled[e] += step
-    state.stood[e] = state.stood[e] + dt if state.command[e] == 0.0 else 0.0
+    state.stood[e] = standing(state.stood[e], before, state.command[e], dt)
     record.a[e, k] = (state.command[e] - before) / dt
     state.station[e] = station
-    if j >= 0 and state.lateral_passed[e] >= state.lateral_lasts[e]:
+    if j >= 0 and state.lateral_passed[e] >= state.lateral_lasts[e] - SAME_TIME:
         state.to[e] = -1
         if not plan.laterals[plan.actions[j, 6], CONTINUOUS]:
             state.action_ended[j] = True

@@ -18,6 +18,9 @@ _EDGES = {
     osc.ConditionEdge.NONE: codes.NO_EDGE, osc.ConditionEdge.RISING: codes.RISING,
     osc.ConditionEdge.FALLING: codes.FALLING, osc.ConditionEdge.RISING_OR_FALLING: codes.EITHER,
 }  # fmt: skip
+SAME_STEP = 1e-6
+"""Steps that a delay may be off by rounding."""
+
 MAX_STEPS = 100_000
 """Instants that a run may have."""
 
@@ -87,7 +90,7 @@ class Triggers:
         seconds = self._tables.literal(condition, "delay", condition.delay)
         delay = MAX_STEPS  # no run is longer: it never comes
         if seconds < MAX_STEPS * self._time_step:
-            delay = max(round(seconds / self._time_step), 0)
+            delay = max(math.ceil(seconds / self._time_step - SAME_STEP), 0)
         kind, quantity = condition.condition, codes.ANY
         if isinstance(kind, osc.ByValueCondition):
             probes = self._probes.by_value(kind.condition)
