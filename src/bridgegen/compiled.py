@@ -5,6 +5,7 @@ calls from another file would go unnoticed. Here the cache folder's name is a di
 of every private module, kernels and what they read: change one, and all are compiled again.
 """
 
+import ctypes
 import gc
 import hashlib
 import os
@@ -16,6 +17,8 @@ from typing import Any
 
 import numba
 import numba.extending
+import numpy as np
+from llvmlite import ir
 from numba.core import cgutils, event
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
@@ -184,11 +187,42 @@ def _bundled(_: Any, value: Any) -> Any:
     return Bundle(value)(value), generate
 
 
+def _called_at(_: Any, address: Any, arrays: Any) -> Any:
+    """In a kernel: call the machine code at an address with where each array lies, and how long.
+
+    Its signature in C is ``void f(void *, intptr_t, …)``, a pair for each array, which must be
+    contiguous.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values = []
+        for i, member in enumerate(arrays):
+            part = builder.extract_value(arguments[1], i)
+            view = context.make_array(member)(context, builder, part)
+            values += [
+                builder.bitcast(view.data, cgutils.voidptr_t),
+                builder.extract_value(view.shape, 0),
+            ]
+        code = ir.FunctionType(ir.VoidType(), [value.type for value in values])
+        builder.call(builder.inttoptr(arguments[0], code.as_pointer()), values)
+        return context.get_dummy_value()
+
+    return numba.types.void(address, arrays), generate
+
+
 def _itself(array: Any) -> Any:
     return array
 
 
+def _call(address: int, arrays: tuple[np.ndarray, ...]) -> None:
+    """Do in Python what ``_called_at`` does in a kernel."""
+    kinds = [ctypes.c_void_p, ctypes.c_ssize_t] * len(arrays)
+    given = (one for array in arrays for one in (array.ctypes.data, len(array)))
+    ctypes.CFUNCTYPE(None, *kinds)(address)(*given)
+
+
 if numba.config.DISABLE_JIT:
     borrowed = bundled = _itself
+    call_at = _call
 else:
-    borrowed, bundled = map(numba.extending.intrinsic, (_borrowed, _bundled))
+    borrowed, bundled, call_at = map(numba.extending.intrinsic, (_borrowed, _bundled, _called_at))

@@ -154,9 +154,7 @@ class Pipeline:
         self._roads: Network | None = None
         if not {*self.source.static_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
-        # The user's driver is one, and has all rows at once.
-        self._n_threads = 1 if self.driver.is_own else os.cpu_count() or 1
-        self._threads = ThreadPoolExecutor(self._n_threads, "rollout")
+        self._threads = ThreadPoolExecutor(os.cpu_count() or 1, "rollout")
 
     def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
         """Set the objective: the given one, or the scenario's, sampled where it says so.
@@ -252,7 +250,8 @@ class Pipeline:
 
     def _in_chunks(self, work: Callable[[Float], T], X: Float) -> list[T]:
         """Do chunk by chunk of the rows, on all cores; the kernels run without the GIL."""
-        size = max(1, min(self.simulator.rows_at_once, -(-len(X) // self._n_threads)))
+        each = -(-len(X) // self.simulator.runs_at_once)
+        size = max(1, min(self.simulator.rows_at_once, each))
         chunks = [X[i : i + size] for i in range(0, len(X), size)] or [X]
         return list(self._threads.map(work, chunks))
 

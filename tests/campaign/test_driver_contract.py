@@ -9,8 +9,8 @@ from bridgegen.cli import app
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 
 
-def broken(name):
-    checks = list(check_driver(f"{DRIVERS}:{name}", ["crossroads-s1"], time_limit=0.5))
+def broken(name, file=DRIVERS):
+    checks = list(check_driver(f"{file}:{name}", ["crossroads-s1"], time_limit=0.5))
     assert len(checks) == 6
     return {check.rule: check.problem for check in checks if check.problem}
 
@@ -18,6 +18,14 @@ def broken(name):
 @pytest.mark.parametrize("name", ["Cruises", "LooksAhead"])
 def test_a_good_driver_keeps_everything(name):
     assert broken(name) == {}
+
+
+def test_a_compiled_driver_keeps_everything_or_is_found_out():
+    compiled = DRIVERS.with_name("compiled_drivers.py")
+    assert broken("looks_ahead", compiled) == {}
+    found = broken("nan_fast", compiled)
+    assert list(found) == ["every row is driven to its end"]
+    assert "acceleration must be finite, got nan" in found["every row is driven to its end"]
 
 
 def test_a_driver_that_mixes_its_scenarios_is_found_out():

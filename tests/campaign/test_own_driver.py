@@ -10,10 +10,11 @@ from bridgegen.pipeline import simulate_file
 from bridgegen.store import Store
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
+COMPILED = DRIVERS.with_name("compiled_drivers.py")
 
 
-def search(tmp_path, name, budget=30, **kwargs):
-    ego = f"{DRIVERS}:{name}"
+def search(tmp_path, name, budget=30, file=DRIVERS, **kwargs):
+    ego = f"{file}:{name}"
     out = tmp_path / name
     return campaign.run_search(
         "crossroads-s1", algorithm="random", budget=budget, ego=ego, out=out, keep=2, **kwargs
@@ -30,12 +31,13 @@ def test_a_search_outlives_its_driver(tmp_path):
         assert len(store.failures()) == count
 
 
-def test_what_a_folder_or_file_names_is_not_imported(tmp_path):
-    run = search(tmp_path, "Cruises")
+@pytest.mark.parametrize(("file", "name"), [(DRIVERS, "Cruises"), (COMPILED, "cruises")])
+def test_what_a_folder_or_file_names_is_not_imported(tmp_path, file, name):
+    run = search(tmp_path, name, file=file)
     ego = run.settings.ego
     with pytest.raises(InputError, match=f"--ego {ego}"):
         campaign.resume(run.folder)
-    with pytest.raises(InputError, match=r"must be .*Cruises, got reference"):
+    with pytest.raises(InputError, match=rf"must be .*{name}, got reference"):
         campaign.resume(run.folder, ego="reference")
     assert campaign.resume(run.folder, ego=ego).summary == run.summary
     assert run.scenarios
@@ -46,10 +48,17 @@ def test_what_a_folder_or_file_names_is_not_imported(tmp_path):
     assert again.metrics["d_min"] in kept.to_list()
 
 
-def test_a_driver_that_cannot_be_made_is_told_before_the_search(tmp_path):
-    with pytest.raises(InputError, match="OSError: no weights"):
-        search(tmp_path, "CannotBeMade")
-    assert not (tmp_path / "CannotBeMade").exists()
+@pytest.mark.parametrize(
+    ("file", "name", "message"),
+    [
+        (DRIVERS, "CannotBeMade", "OSError: no weights"),
+        (COMPILED, "misspelt", "there is no field 'curvatur'"),
+    ],
+)
+def test_a_driver_that_cannot_be_made_is_told_before_the_search(tmp_path, file, name, message):
+    with pytest.raises(InputError, match=message):
+        search(tmp_path, name, file=file)
+    assert not (tmp_path / name).exists()
 
 
 def test_a_time_limit_is_for_drivers_of_ones_own(tmp_path):

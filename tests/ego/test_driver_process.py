@@ -83,7 +83,7 @@ def test_what_is_answered_for_an_ended_scenario_is_not_looked_at(process):
     [
         ("CannotBeMade", r"OSError: no weights \(drivers.py:\d+\)"),
         ("LacksAct", "must have the methods reset and act, lacks act"),
-        ("NoSuch", "must have a class 'NoSuch'"),
+        ("NoSuch", "must have a class, or a compiled driver, 'NoSuch'"),
     ],
 )
 def test_a_driver_that_cannot_be_made_is_an_error_of_the_users(process, name, message):

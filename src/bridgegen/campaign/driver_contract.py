@@ -51,7 +51,8 @@ def check_driver(
     """Yield what was tried on a driver, one after the other.
 
     Args:
-        spec: ``package.module:Class``, ``file.py:Class`` or ``file.fmu``.
+        spec: ``package.module:Class``, ``file.py:Class``, a compiled driver's function, or
+            ``file.fmu``.
         scenarios: names of the catalogue, or paths.
         time_limit: [s] that one call may take.
 

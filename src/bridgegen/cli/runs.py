@@ -13,7 +13,10 @@ from bridgegen.errors import InputError
 
 TimeLimit = Annotated[
     float | None,
-    typer.Option(help="Seconds that one call of a driver of your own may take.", show_default="10"),
+    typer.Option(
+        help="Seconds that a call of a driver of your own may take; of a compiled one, a scenario.",
+        show_default="10",
+    ),
 ]
 Ideal = Annotated[
     str | None,
@@ -59,7 +62,7 @@ def search(
         str | None,
         typer.Option(
             help="Who drives: see 'bridgegen list drivers'; or your own: module:Class, "
-            "file.py:Class, file.fmu.",
+            "file.py:Class (or a compiled driver's function), file.fmu.",
             show_default="the scenario's choice",
         ),
     ] = None,
@@ -246,7 +249,9 @@ def simulate(
 
 @app.command("check-driver")
 def check_driver(
-    driver: Annotated[str, typer.Argument(help="module:Class, file.py:Class or file.fmu.")],
+    driver: Annotated[
+        str, typer.Argument(help="module:Class, file.py:Class, file.py:function, file.fmu.")
+    ],
     scenario: Annotated[
         list[str] | None,
         typer.Option(help="Try it in this one; may be repeated.", show_default="four that ship"),

@@ -17,6 +17,7 @@ import sys
 import threading
 import traceback
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
@@ -24,6 +25,7 @@ from typing import IO, Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.ego.compiled import CompiledDriver
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
 from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
 from bridgegen.errors import InputError
@@ -48,9 +50,16 @@ class DriverProcess:
     """A driver that lives in another process; begun when it is first needed.
 
     Args:
-        spec: ``package.module:Class``, ``file.py:Class``, or a co-simulation unit, ``file.fmu``.
+        spec: ``package.module:Class``, ``file.py:Class``, the same of a compiled driver's function,
+            or a co-simulation unit, ``file.fmu``.
         time_limit: seconds that a call may take.
+
+    Attributes:
+        memory: how many numbers a compiled driver keeps; None of one that is asked in Python. Known
+            when the process has begun.
     """
+
+    memory: int | None
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
         if not 0.0 < time_limit < float("inf"):
@@ -85,7 +94,7 @@ class DriverProcess:
         reader.start()
         self._end = weakref.finalize(self, _end, process, reader)
         try:
-            self._answer(START_SECONDS)
+            self.memory = self._answer(START_SECONDS)
         except DriverError as error:
             self.close()
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
@@ -110,13 +119,40 @@ class DriverProcess:
         demanded: tuple[Float, Float] = self._ask("act", observation)
         return demanded
 
+    def call(
+        self,
+        function: Callable[..., Any],
+        *arguments: Any,
+        progress: Callable[[], int] | None = None,
+        seconds: float | None = None,
+    ) -> Any:
+        """Have a function of ours called in the process, with the compiled driver's address first.
+
+        Args:
+            function: importable by its name.
+            arguments: of the function, besides.
+            progress: what changes while it gets on; the limit is for each change.
+            seconds: the limit; the driver's by default.
+
+        Raises:
+            DriverError: it raised, timed out or died.
+            InputError: the driver cannot be made.
+        """
+        self.start()
+        return self._ask("call", function, *arguments, progress=progress, seconds=seconds)
+
     def close(self) -> None:
         """End the process, if it is running; so does this object's end."""
         if self._process is not None:
             self._end()
         self._process = None
 
-    def _ask(self, *request: Any) -> Any:
+    def _ask(
+        self,
+        *request: Any,
+        progress: Callable[[], int] | None = None,
+        seconds: float | None = None,
+    ) -> Any:
         process = self._process
         assert process is not None
         assert process.stdin is not None
@@ -125,14 +161,19 @@ class DriverProcess:
         except OSError:
             self.close()
             raise DriverError("died", "its process has ended") from None
-        return self._answer(self.time_limit)
+        return self._answer(seconds or self.time_limit, progress)
 
-    def _answer(self, seconds: float) -> Any:
-        try:
-            kind, *rest = self._answers.get(timeout=seconds)
-        except queue.Empty:
-            self.close()
-            raise DriverError("timed out", f"no answer within {seconds:g} s") from None
+    def _answer(self, seconds: float, progress: Callable[[], int] | None = None) -> Any:
+        so_far = progress() if progress else 0
+        while True:
+            try:
+                kind, *rest = self._answers.get(timeout=seconds)
+                break
+            except queue.Empty:
+                before, so_far = so_far, progress() if progress else so_far
+                if so_far == before:
+                    self.close()
+                    raise DriverError("timed out", f"no answer within {seconds:g} s") from None
         if kind == "answer":
             return rest[0]
         if kind == "died":
@@ -179,11 +220,12 @@ def _read(pipe: IO[bytes]) -> Any:
 # --- In the other process -------------------------------------------------------------------------
 
 
-def make(spec: str) -> BatchDriver:
+def make(spec: str) -> BatchDriver | CompiledDriver:
     """Make a driver.
 
     Raises:
-        InputError: no such module, file or class, or the class lacks ``reset`` or ``act``.
+        InputError: no such module, file or class, or the class lacks ``reset`` or ``act``; or a
+            function that is no compiled driver, or that cannot be compiled.
     """
     if spec.endswith(".fmu"):
         from bridgegen.ego.fmu import FmuDriver
@@ -195,8 +237,11 @@ def make(spec: str) -> BatchDriver:
     except ImportError as error:
         raise InputError(f"{where} cannot be imported: {error}") from error
     found = getattr(module, name, None)
+    if isinstance(found, CompiledDriver):
+        assert found.address  # it compiles
+        return found
     if not isinstance(found, type):
-        raise InputError(f"{where} must have a class '{name}'")
+        raise InputError(f"{where} must have a class, or a compiled driver, '{name}'")
     lacking = [one for one in ("reset", "act") if not callable(getattr(found, one, None))]
     if lacking:
         raise InputError(f"{name} must have the methods reset and act, lacks {', '.join(lacking)}")
@@ -251,16 +296,20 @@ def serve(spec: str, requests: IO[bytes], answers: IO[bytes]) -> None:
     except Exception as error:
         _write(answers, ("raised", _told(error)))
         return
-    _write(answers, ("answer", None))
+    _write(answers, ("answer", driver.memory if isinstance(driver, CompiledDriver) else None))
     while True:
         try:
             what, *rest = _read(requests)
         except EOFError:
             return
         try:
-            if what == "reset":
+            message: tuple[str, Any]
+            if isinstance(driver, CompiledDriver):
+                function, *arguments = rest
+                message = ("answer", function(driver.address, *arguments))
+            elif what == "reset":
                 driver.reset(*rest)
-                message: tuple[str, Any] = ("answer", None)
+                message = ("answer", None)
             else:
                 message = ("answer", checked(driver.act(*rest), rest[0].running))
         except DriverError as error:

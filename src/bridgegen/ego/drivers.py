@@ -106,8 +106,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
     """Return a driver by name, with some of its stages ideal.
 
     Args:
-        name: of one that ships, or a user's own: ``package.module:Class``, ``file.py:Class``,
-            ``file.fmu``. It is not looked at before it drives.
+        name: of one that ships, or a user's own: ``package.module:Class``, ``file.py:Class``
+            (or a compiled driver's function), ``file.fmu``. It is not looked at before it drives.
         ideal: stages.
         time_limit: [s] that one call of a user's own may take.
 

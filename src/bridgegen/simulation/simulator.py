@@ -25,6 +25,10 @@ class Simulator(Protocol[Roads]):
         """How many rows a call of ``run`` had best be given."""
 
     @property
+    def runs_at_once(self) -> int:
+        """How many calls of ``run`` had best go on at a time, each in a thread."""
+
+    @property
     def time_step(self) -> float:
         """Between two recorded instants [s]."""
 

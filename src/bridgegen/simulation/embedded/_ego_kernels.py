@@ -8,8 +8,9 @@ from bridgegen.ego._route_follower_kernels import hold_speed, steer
 from bridgegen.ego._speed_kernels import bend_speed
 from bridgegen.ego._un_r157_kernels import drive_un_r157
 from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.ego.drivers import NOBODY
+from bridgegen.ego.drivers import NOBODY, OWN
 from bridgegen.simulation.embedded._motion_kernels import bicycle, standing
+from bridgegen.simulation.embedded._own_driver_kernels import ask
 from bridgegen.simulation.embedded._travel_kernels import ENDS, pass_end
 
 
@@ -21,6 +22,8 @@ def demand(k, plan, roads, state, record):
     """
     if plan.driver == NOBODY:
         return 0.0, 0.0
+    if plan.driver == OWN:
+        return ask(k, plan, roads, state, record)
     p, s, v = state.on[0], state.station[0], record.v[0, k]
     path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
     curvature = steer(path, n, ds, s, record.x[0, k], record.y[0, k], record.h[0, k], v)

@@ -18,6 +18,7 @@ N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
 # See rollout.STATUS_MESSAGES.
 OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE = range(7)
+RAISED, NO_CONTROL = 20, 23  # of a driver of the user's own
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
 
@@ -57,7 +58,9 @@ class Plan(NamedTuple):
     comes_and_goes: int
     drives: Int
     weathers: Int
+    scene: Float
     driver: int
+    driver_code: int
     ideal_perception: int
     ideal_prediction: int
     ideal_control: int
@@ -158,7 +161,12 @@ class State(NamedTuple):
         around: ``(E, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
         passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
         feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
-        mind: ``(MIND,)`` what else it keeps in mind; see ``ego._reference_kernels``.
+        mind: ``(·,)`` what else it keeps in mind; see ``ego._reference_kernels``, or what a
+            compiled driver of the user's own asks for.
+        told: ``(·,)`` what such a driver is told, see ``_own_driver_kernels``,
+        ahead: ``(·, 4)`` of its route,
+        others: ``(·, TRACK)`` and of the others,
+        answer: ``(·,)`` and what it answers.
     """
 
     slots: Float
@@ -219,6 +227,10 @@ class State(NamedTuple):
     passages: Float
     feet: Float
     mind: Float
+    told: Float
+    ahead: Float
+    others: Float
+    answer: Float
 
 
 class Record(NamedTuple):

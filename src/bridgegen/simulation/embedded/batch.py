@@ -14,12 +14,14 @@ from bridgegen.ego._surroundings_kernels import AROUND
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego._weather_columns import WEATHER
 from bridgegen.ego.detections import DETECTION
+from bridgegen.ego.interface import ROUTE_POINTS
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
 from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
 from bridgegen.simulation.embedded._observation_kernels import observe_rows
+from bridgegen.simulation.embedded._own_driver_kernels import ANSWER, TOLD
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
@@ -37,6 +39,7 @@ class Batch:
         roads: P road networks, made ready for it.
         rows: ``(N,)`` int64 in 0..P-1, the road network of each row.
         values: ``(N,)`` float64 per parameter; see `Simulator.run`.
+        own_memory: how many numbers a compiled driver of the user's own keeps; None without one.
 
     Attributes:
         record: x, y, h, v, a, offset ``(N, E, T)`` and more, up to the present instant.
@@ -47,7 +50,12 @@ class Batch:
     """
 
     def __init__(
-        self, program: Program, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]
+        self,
+        program: Program,
+        roads: Network,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        own_memory: int | None = None,
     ) -> None:
         n = len(rows)
         if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
@@ -57,7 +65,7 @@ class Batch:
         key = np.full(n, program.noise_key or 0, dtype=np.uint64)
         if program.noise_key is None:
             key = noise_key({**program.parameters, **_known(program, values)}, n)
-        self.state = _state(program, roads, rows, program.fill(values, n), key)
+        self.state = _state(program, roads, rows, program.fill(values, n), key, own_memory)
         self.record = _record(program, n)
         self._messages: dict[int, str] = {}
 
@@ -67,9 +75,14 @@ class Batch:
         running: Bool = self.state.ending[:, memory.N_STEPS] == 0
         return running
 
-    def run(self) -> Rollout:
-        """Roll all rows out with the compiled driver; runs without the GIL."""
-        self._do(kernels.simulate_rows)
+    def run(self, simulate_rows: Callable[..., Any] = kernels.simulate_rows) -> Rollout:
+        """Roll all rows out with the compiled driver; runs without the GIL.
+
+        Args:
+            simulate_rows: that kernel, or what has it called elsewhere, and returns messages by
+                row.
+        """
+        self._do(simulate_rows)
         return self.rollout()
 
     def start(self) -> None:
@@ -102,10 +115,13 @@ class Batch:
         """
         self._do(kernels.after_drivers, k, demanded, curvature)
 
-    def _do(self, kernel: Callable[..., None], *arguments: int | Float) -> None:
+    def _do(self, kernel: Callable[..., Any], *arguments: int | Float) -> None:
         """Call a kernel; rows for which a way is not planned yet do the same again when it is."""
         before = _copied(self.state), self.record.began.copy()
-        kernel(*arguments, self._plan, self._roads.tables, self._rows, self.state, self.record)
+        messages = kernel(
+            *arguments, self._plan, self._roads.tables, self._rows, self.state, self.record
+        )
+        self._messages |= messages or {}
         while (
             again := np.flatnonzero(self.state.ending[:, memory.STATUS] == memory.UNPLANNED)
         ).size:
@@ -115,7 +131,10 @@ class Batch:
             record = _taken(self.record, again)
             record.began[:] = before[1][again]
             mine = (one[again] if isinstance(one, np.ndarray) else one for one in arguments)
-            kernel(*mine, self._plan, self._roads.tables, self._rows[again], state, record)
+            messages = kernel(
+                *mine, self._plan, self._roads.tables, self._rows[again], state, record
+            )
+            self._messages |= {int(again[row]): text for row, text in (messages or {}).items()}
             _put_back(self.state, state, again)
             _put_back(self.record, record, again)
 
@@ -217,12 +236,19 @@ def _plan(program: Program) -> memory.Plan:
         comes_and_goes=int(program.comes_and_goes),
         drives=program.drives,
         weathers=program.weathers,
+        scene=_scene(program),
         driver=program.driver.code,
+        driver_code=0,
         ideal_perception=int("perception" in program.driver.ideal),
         ideal_prediction=int("prediction" in program.driver.ideal),
         ideal_control=int("control" in program.driver.ideal),
         dt=program.time_step,
     )
+
+
+def _scene(program: Program) -> Float:
+    """Return what a compiled driver of the user's own is told of the scene."""
+    return np.array([program.time_step, program.n_steps, *program.bodies[0, :7]])
 
 
 Rows = TypeVar("Rows", memory.State, memory.Record)
@@ -246,7 +272,12 @@ def _put_back(rows: Rows, part: Rows, some: Int) -> None:
 
 
 def _state(
-    program: Program, roads: Network, rows: Int, slots: Float, key: npt.NDArray[np.uint64]
+    program: Program,
+    roads: Network,
+    rows: Int,
+    slots: Float,
+    key: npt.NDArray[np.uint64],
+    own_memory: int | None,
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what is not 0."""
     n, n_entities = len(rows), len(program.names)
@@ -265,6 +296,10 @@ def _state(
     at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
     longest_delay = int(program.conditions[:, DELAY].max(initial=0))
+
+    def shown(*shape: int) -> tuple[int, ...]:
+        return (0, *shape[1:]) if own_memory is None else shape
+
     profile_size = 3 * len(program.entries) + 5 if len(program.entries) else 0
     return memory.State(
         slots=slots,
@@ -297,7 +332,10 @@ def _state(
         course=zeros(e, COURSE_MEMORY), profile=zeros(e, profile_size, 4), profile_rows=numbers(e),
         attention=zeros(e, 3),
         key=key[:, None], sensors=zeros(e, MEMORY), tracks=zeros(e, TRACK), around=zeros(e, AROUND),
-        passages=zeros(2 * e + n_ways, PASSAGE), feet=np.full((n, n_ways), LOST), mind=zeros(MIND),
+        passages=zeros(2 * e + n_ways, PASSAGE), feet=np.full((n, n_ways), LOST),
+        mind=zeros(MIND if own_memory is None else own_memory),
+        told=zeros(TOLD), ahead=zeros(*shown(ROUTE_POINTS, 4)), others=zeros(*shown(e - 1, TRACK)),
+        answer=zeros(ANSWER),
     )  # fmt: skip
 
 

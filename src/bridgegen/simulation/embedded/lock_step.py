@@ -17,7 +17,7 @@ from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
 
-def drive(
+def drive_in_lock_step(
     program: Program, setup: Callable[[Int], Batch], n: int, driver: DriverProcess
 ) -> Rollout:
     """Roll out rows 0 … n − 1 with a user's driver.

@@ -1,7 +1,8 @@
 """The embedded simulator: N rows of parameters against one compiled storyboard."""
 
-import threading
+import os
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Int
 from bridgegen.ego import Driver
-from bridgegen.ego.driver_process import DriverProcess
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard
@@ -18,6 +18,7 @@ from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
+    from bridgegen.simulation.embedded.own_driver import OwnDriver
 
 
 CHUNK = 128
@@ -25,6 +26,9 @@ CHUNK = 128
 
 LOCK_STEP_ROWS = 1024
 """Rows that a driver in Python drives at a time: a thousand take it little longer than one."""
+
+SHARED, BYTES = 16 * 2**20, 112
+"""Bytes to share with a compiled driver's process at a time, and what an entity's instant takes."""
 
 
 class EmbeddedSimulator:
@@ -60,8 +64,6 @@ class EmbeddedSimulator:
         self.program = compile_storyboard(
             storyboard, place, driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
         )
-        self._process: DriverProcess | None = None
-        self._turn = threading.Lock()
 
     @property
     def driver(self) -> str:
@@ -71,7 +73,19 @@ class EmbeddedSimulator:
     @property
     def rows_at_once(self) -> int:
         """See `Simulator`."""
-        return LOCK_STEP_ROWS if self.program.driver.is_own else CHUNK
+        if not self.program.driver.is_own:
+            return CHUNK
+        if self._own.memory is None:
+            return LOCK_STEP_ROWS
+        instants = len(self.program.names) * self.program.n_steps
+        return max(1, min(CHUNK, SHARED // (BYTES * instants)))
+
+    @property
+    def runs_at_once(self) -> int:
+        """See `Simulator`."""
+        if self.program.driver.is_own and self._own.memory is None:
+            return 1  # the user's driver is one, and has all rows at once
+        return os.cpu_count() or 1
 
     @property
     def time_step(self) -> float:
@@ -111,27 +125,23 @@ class EmbeddedSimulator:
         Raises:
             InputError: see `Simulator`; or a user's driver that cannot be made.
         """
-        if self.program.changed(driver=driver).driver.is_own:
-            return self._in_lock_step(roads, rows, values, dry=dry)
-        return self.batch(roads, rows, values, driver=driver, dry=dry).run()
-
-    def _in_lock_step(
-        self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike], *, dry: bool
-    ) -> Rollout:
-        """Roll out with the user's driver, of which there is one."""
-        from bridgegen.simulation.embedded.lock_step import drive
-
-        driver = self.program.driver
+        chosen = self.program.changed(driver=driver)
+        if not chosen.driver.is_own:
+            return self.batch(roads, rows, values, driver=driver, dry=dry).run()
+        own, memory = self._own, self._own.memory
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
-            return self.batch(roads, rows[at], taken, dry=dry)
+            return self.batch(roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory)
 
-        with self._turn:
-            if self._process is None:
-                self._process = DriverProcess(driver.name, driver.time_limit)
-            return drive(self.program.changed(dry=dry), some, len(rows), self._process)
+        return own.drive(chosen.changed(dry=dry), some, len(rows))
+
+    @cached_property
+    def _own(self) -> "OwnDriver":
+        from bridgegen.simulation.embedded.own_driver import OwnDriver  # numba is slow to import
+
+        return OwnDriver(self.program.driver)
 
     def batch(
         self,
@@ -141,8 +151,18 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        own_memory: int | None = None,
     ) -> "Batch":
-        """Set N rows up, for a driver that is asked at every instant; arguments as of ``run``."""
+        """Set N rows up, for a driver that is asked at every instant.
+
+        Args:
+            roads: as of ``run``, and so are those that follow.
+            rows: row i's road network.
+            values: by parameter.
+            driver: another one.
+            dry: the road.
+            own_memory: see `Batch`.
+        """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
-        return Batch(self.program.changed(driver=driver, dry=dry), roads, rows, values)
+        return Batch(self.program.changed(driver=driver, dry=dry), roads, rows, values, own_memory)
