@@ -1,6 +1,7 @@
 """Handed-over scenarios in other flavours: they say it otherwise, and mean the same."""
 
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,43 @@ def test_recording_a_recording_changes_nothing(catalogue, tmp_path):
     a, b = bg.simulate_file(first), bg.simulate_file(second)
     assert np.array_equal(a.rollout.x, b.rollout.x)
     assert np.abs(a.rollout.v[:, 0] - b.rollout.v[:, 0]).max() < 1e-6
+
+
+def test_who_comes_and_goes_does_so_in_a_recording(catalogue, tmp_path):
+    """The other car of S3 goes after 1 s, and comes back 35 m before the junction after 2 s."""
+    text = catalogue["crossroads-s3"].read_text("utf-8")
+
+    def event(name: str, seconds: float, action: str) -> str:
+        return f"""<Event name="{name}" priority="parallel" maximumExecutionCount="1">
+<Action name="{name}"><GlobalAction><EntityAction entityRef="bv">{action}</EntityAction>
+</GlobalAction></Action><StartTrigger><ConditionGroup><Condition name="c" delay="0"
+conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="{seconds}"
+rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup></StartTrigger></Event>"""
+
+    place = '<Position><LanePosition roadId="4" laneId="1" s="35"/></Position>'
+    events = event("goes", 1.0, "<DeleteEntityAction/>")
+    events += event("comes", 2.0, f"<AddEntityAction>{place}</AddEntityAction>")
+    story = f"""<Story name="visits"><Act name="visits"><ManeuverGroup name="visits"
+maximumExecutionCount="1"><Actors selectTriggeringEntities="false"/><Maneuver name="visits">{events}
+</Maneuver></ManeuverGroup><StartTrigger><ConditionGroup><Condition name="c" delay="0"
+conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="0" rule="greaterOrEqual"/>
+</ByValueCondition></Condition></ConditionGroup></StartTrigger></Act></Story>"""
+    before, stop, after = text.rpartition("<StopTrigger>")
+    source = tmp_path / "visits.xosc"
+    source.write_text(before + story + stop + after, "utf-8")
+    shutil.copy(catalogue["crossroads-s3"].with_suffix(".xodr"), tmp_path)
+    path, _ = export(source, "recorded", out=tmp_path / "out")
+    assert validate_file(path) == []
+    a, b = bg.simulate_file(source).rollout, bg.simulate_file(path).rollout
+    n = a.n_steps[0]
+    present = a.present[0, :, :n]
+    assert not present[1, 20:40].any()
+    assert present[1, 40:].all()
+    assert np.array_equal(b.present[0, :, :n], present)
+    for field in ("x", "y", "h"):
+        assert np.array_equal(
+            getattr(a, field)[0, :, :n][present], getattr(b, field)[0, :, :n][present]
+        )
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -149,7 +149,8 @@ def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
         array[0, :, : rollout.n_steps[0]] for array in (rollout.x, rollout.y, rollout.h, rollout.v)
     )
     began = rollout.began[0].tolist()
-    recording = Recording(rollout.names, rollout.time_step, x, y, h, v, began)
+    present = rollout.present[0, :, : rollout.n_steps[0]] if rollout.present.size else None
+    recording = Recording(rollout.names, rollout.time_step, x, y, h, v, began, present)
     return recorded(_resolved(scenario, path), recording)
 
 

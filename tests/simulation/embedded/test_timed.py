@@ -72,6 +72,14 @@ def test_linear_between_vertices_and_on_at_its_last_speed():
     assert out.status[0] == 0
 
 
+def test_a_trajectory_at_the_start_is_a_place_to_start_at():
+    there = timed("bv", *LINE)
+    alone = there[: there.index("<PrivateAction>")] + there[there.index("<PrivateAction>\n<Rout") :]
+    a, b = (play(scenario(("ego", "bv"), EGO + one)) for one in (there, alone))
+    assert (a.x == b.x).all()
+    assert (a.y == b.y).all()
+
+
 def test_the_ego_too_and_nobody_drives_it():
     text = scenario(("ego", "bv"), timed("ego", *LINE) + start("bv", lane(1, -1, 10), 10))
     out = play(text)

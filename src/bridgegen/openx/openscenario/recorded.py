@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.versions import at, at_once
@@ -36,6 +36,7 @@ class Recording:
         h: ``(E, K)`` [rad], heading, continuous.
         v: ``(E, K)`` [m/s], ≥ 0.
         began: per event, in the order of the file, the instant at which it began; -1 if never.
+        present: ``(E, K)`` bool, who is there; None where everybody always is.
     """
 
     names: Sequence[str]
@@ -45,6 +46,14 @@ class Recording:
     h: Float
     v: Float
     began: Sequence[int]
+    present: Bool | None = None
+
+    def stays(self, e: int) -> list[tuple[int, int]]:
+        """Return the first and the last instant of each time in which an entity is there."""
+        k = self.x.shape[1]
+        there = np.ones(k, np.bool_) if self.present is None else self.present[e]
+        edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0))
+        return [(first, end - 1) for first, end in edges.reshape(-1, 2).tolist()]
 
 
 def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenario:
@@ -60,6 +69,11 @@ def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenar
     board = scenario.storyboard
     start = replace(
         board.init.actions,
+        global_actions=tuple(
+            one
+            for one in board.init.actions.global_actions
+            if not isinstance(one.action, osc.EntityAction)
+        ),
         privates=tuple(_private(recording, e) for e in range(len(recording.names))),
     )
     bodies = [
@@ -87,13 +101,26 @@ def _turning(body: Body) -> Body:
 
 
 def _private(recording: Recording, e: int) -> osc.Private:
-    """Return where an entity starts, how fast, and its timetable."""
-    name, dynamics = recording.names[e], (osc.DynamicsShape.STEP, osc.DynamicsDimension.TIME, 0.0)
+    """Return how fast an entity starts and, if it is there, where, and its timetable."""
+    stays, actions = recording.stays(e), []
+    first = stays[0][0] if stays else 0
     speed = osc.SpeedAction(
-        osc.TransitionDynamics(*dynamics),
-        osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(float(recording.v[e, 0]))),
+        osc.TransitionDynamics(osc.DynamicsShape.STEP, osc.DynamicsDimension.TIME, 0.0),
+        osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(float(recording.v[e, first]))),
     )
-    vertices = tuple(_vertices(recording, e))
+    actions.append(osc.PrivateAction(osc.LongitudinalAction(speed)))
+    if stays and first == 0:
+        place, follow = _timetable(recording, e, *stays[0])
+        actions = [osc.PrivateAction(osc.TeleportAction(place)), *actions, follow]
+    return osc.Private(recording.names[e], tuple(actions))
+
+
+def _timetable(
+    recording: Recording, e: int, first: int, last: int
+) -> tuple[osc.Position, osc.PrivateAction]:
+    """Return where an entity is at an instant, and the way that it takes until a later one."""
+    vertices = tuple(_vertices(recording, e, first, last))
+    name = recording.names[e]
     follow = osc.FollowTrajectoryAction(
         osc.TimeReference(osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)),
         osc.TrajectoryFollowingMode(osc.FollowingMode.POSITION),
@@ -101,20 +128,42 @@ def _private(recording: Recording, e: int) -> osc.Private:
             osc.Trajectory(f"{name}_recorded", False, osc.Shape(osc.Polyline(vertices)))
         ),
     )
-    actions = (
-        osc.TeleportAction(vertices[0].position),
-        osc.LongitudinalAction(speed),
-        osc.RoutingAction(follow),
-    )
-    return osc.Private(name, tuple(osc.PrivateAction(one) for one in actions))
+    return vertices[0].position, osc.PrivateAction(osc.RoutingAction(follow))
 
 
-def _vertices(recording: Recording, e: int) -> Iterator[osc.Vertex]:
+def _comings_and_goings(recording: Recording) -> Iterator[osc.ManeuverGroup]:
+    """Yield who comes and goes when, and what way those take who come."""
+    step, k = recording.time_step, recording.x.shape[1]
+    for e, name in enumerate(recording.names):
+        events = []
+        for number, (first, last) in enumerate(recording.stays(e), 1):
+            if first > 0:
+                place, follow = _timetable(recording, e, first, last)
+                come = osc.GlobalAction(osc.EntityAction(name, osc.AddEntityAction(place)))
+                event = _timed_event(f"{name}_comes_{number}", first * step, (come, follow))
+                events.append(event)
+            if last < k - 1:
+                gone = osc.GlobalAction(osc.EntityAction(name, osc.DeleteEntityAction()))
+                events.append(_timed_event(f"{name}_goes_{number}", (last + 1) * step, (gone,)))
+        if events:
+            actors = osc.Actors(False, (osc.EntityRef(name),))
+            maneuver = osc.Maneuver(f"{name}_presence", tuple(events))
+            yield osc.ManeuverGroup(f"{name}_presence", 1, actors, (maneuver,))
+
+
+def _timed_event(
+    name: str, seconds: float, parts: Sequence[osc.GlobalAction | osc.PrivateAction]
+) -> osc.Event:
+    actions = tuple(osc.Action(f"{name}_{i}", part) for i, part in enumerate(parts, 1))
+    return osc.Event(name, osc.Priority.PARALLEL, actions, at(seconds, f"{name}_at"), 1)
+
+
+def _vertices(recording: Recording, e: int, first: int, last: int) -> Iterator[osc.Vertex]:
     x, y, h, v = (getattr(recording, field)[e] for field in ("x", "y", "h", "v"))
-    step, last = recording.time_step, len(x) - 1
+    step = recording.time_step
     still = (np.diff(x) == 0.0) & (np.diff(y) == 0.0) & (np.diff(h) == 0.0)
-    for k in range(last + 1):
-        if not (0 < k < last and still[k - 1] and still[k]):
+    for k in range(first, last + 1):
+        if not (first < k < last and still[k - 1] and still[k]):
             yield _vertex(k * step, x[k], y[k], h[k])
         if k < last and abs(v[k] - v[k + 1]) > SAME_SPEED and not still[k]:
             share = v[k] / (v[k] + v[k + 1])
@@ -124,8 +173,8 @@ def _vertices(recording: Recording, e: int) -> Iterator[osc.Vertex]:
                 y[k] + share * (y[k + 1] - y[k]),
                 0.5 * (h[k] + h[k + 1]),
             )
-    if last == 0:  # stopped at once: a line has two ends
-        yield _vertex(step, x[0], y[0], h[0])
+    if last == first:  # stopped at once: a line has two ends
+        yield _vertex((last + 1) * step, x[last], y[last], h[last])
 
 
 def _vertex(time: float, x: float, y: float, h: float) -> osc.Vertex:
@@ -155,11 +204,18 @@ def _stories(board: osc.Storyboard, recording: Recording) -> Iterator[osc.Story]
                 acts.append(osc.Act(act.name, tuple(groups), at_once()))
         if acts:
             yield osc.Story(story.name, tuple(acts))
+    if presence := tuple(_comings_and_goings(recording)):
+        yield osc.Story("presence", (osc.Act("presence", presence, at_once()),))
 
 
 def _event(event: osc.Event, seconds: float) -> Iterator[osc.Event]:
     """Yield the event with its actions that concern all, if it began and has any."""
-    actions = tuple(one for one in event.actions if isinstance(one.action, osc.GlobalAction))
+    actions = tuple(
+        one
+        for one in event.actions
+        if isinstance(one.action, osc.GlobalAction)
+        and not isinstance(one.action.action, osc.EntityAction)
+    )
     if actions and seconds >= 0.0:
         yield replace(event, actions=actions, start_trigger=at(seconds, f"{event.name}_began"))
 

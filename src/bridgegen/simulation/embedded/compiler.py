@@ -346,11 +346,11 @@ class _Compiler:
         self.absent = [
             e
             for e, name in enumerate(self.tables.names)
-            if name not in starts and name in later and not (e == 0 and has_driver)
+            if name not in {*starts, *tracks} and name in later and not (e == 0 and has_driver)
         ]
         waiting = {self.tables.names[e] for e in self.absent}
         self.absent += self._deleted(actions.global_actions)
-        missing = [name for name in self.tables.names if name not in {*starts, *waiting}]
+        missing = [name for name in self.tables.names if name not in {*starts, *tracks, *waiting}]
         if missing and not self.tables.problems:
             self.tables.culprits += [one for one in self.tables.objects if str(one.name) in missing]
             raise InputError(
@@ -361,11 +361,12 @@ class _Compiler:
                 )
             )
         for e, name in enumerate(self.tables.names):
-            if name in starts:
-                track, route = tracks.get(name), routes.get(name)
-                self.paths.append(track or self._start(e, starts[name], route, has_driver))
+            if name in tracks:  # there it starts
+                self.paths.append(tracks[name])
+            elif name in starts:
+                self.paths.append(self._start(e, starts[name], routes.get(name), has_driver))
             elif name in waiting:
-                self.paths.append(self._nowhere(e, tracks.get(name), routes.get(name)))
+                self.paths.append(self._nowhere(e, routes.get(name)))
         for one_more, entity in first:
             self.actions.begin(one_more, entity)
         return [init[name] for name in self.tables.names]
@@ -388,13 +389,8 @@ class _Compiler:
             and isinstance(one.action.action, osc.DeleteEntityAction)
         ]
 
-    def _nowhere(self, e: int, track: AlongTrajectory | None, route: Way | None) -> Nowhere:
+    def _nowhere(self, e: int, route: Way | None) -> Nowhere:
         """Return the path of an entity that is not there yet; it keeps the route that it gets."""
-        if track is not None:
-            self.tables.problems.append(
-                f"{self.place}, line {track.line}: an initial FollowTrajectoryAction of "
-                f"'{self.tables.names[e]}', which is not there, is not supported"
-            )
         if route is not None and (spots := self.actions.waypoints(route)):
             self.routes[e] = self.actions.add_route(spots)
         return Nowhere()
