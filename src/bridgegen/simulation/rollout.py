@@ -22,6 +22,7 @@ STATUS_MESSAGES = {
     4: "a position that is not on the road network",
     5: "no lane leads from where an entity is to its route",
     6: "a position that counts from an entity which is not there",
+    7: "the ego's driver is on no lane",
 }
 
 FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}

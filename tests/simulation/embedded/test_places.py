@@ -12,7 +12,17 @@ import pytest
 from bridgegen.errors import InputError
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
-from .storyboards import after, events, lane, lateral, run, scenario, speeding, start
+from .storyboards import (
+    after,
+    events,
+    lane,
+    lateral,
+    reaches,
+    run,
+    scenario,
+    speeding,
+    start,
+)
 
 EGO = start("ego", lane(1, 1, 90.0), 0.0)
 DT = 0.05
@@ -215,3 +225,139 @@ def test_a_route_that_cannot_be_reached_fails_the_row():
     text = placed(lane(3, -1, 50.0), 5.0, ("e", "bv", acquiring(lane(4, -1, 40.0)), after(1.0)))
     message = "no lane leads from where an entity is to its route"
     assert STATUS_MESSAGES[int(text.status[0])] == message
+
+
+def seen_at(where, *rows, who="bv", tolerance=1.0, speed=5.0, at=None, parameters="", **values):
+    """Return when the bv, southbound from s = 80, reaches a position, by row."""
+    arrived = ("seen", "ego", speeding(0.0, "step time 0"), reaches(who, where, tolerance))
+    cars = start("bv", lane(3, 1, 80.0), speed) + start("third", at or THIRD, 0.0)
+    text = scenario(("ego", "bv", "third"), EGO + cars, events(*rows, arrived),
+                    parameters=parameters)  # fmt: skip
+    return run(text, ego=None, **values).began[:, -1]
+
+
+@pytest.mark.parametrize(
+    ("where", "metres"),
+    [
+        # the third stands at s = 50, 30 m ahead: so many metres until it is within 1 m
+        (position("RelativeObjectPosition", entityRef="third", dx=5.0, dy=0.0), 34.0),
+        (position("RelativeLanePosition", entityRef="third", dLane=0, ds=5.0), 24.0),
+        (position("RelativeRoadPosition", entityRef="third", ds=-5.0, dt=0.0), 34.0),
+        (position("RoadPosition", roadId=3, s=70, t=-1.75 + 3.5), 9.0),
+        (position("LanePosition", orientation(1.0), roadId=3, laneId=1, s=70), 9.0),
+        (position("RelativeWorldPosition", entityRef="third", dx=0.0, dy=10.0), 19.0),
+    ],
+)
+def test_conditions_look_where_positions_are_now(where, metres):
+    found = seen_at(where)
+    assert found[0] == pytest.approx(metres / 5.0 / DT, abs=1.01)
+
+
+def test_a_condition_s_position_moves_with_who_it_counts_from():
+    """2 m ahead of the third, which leaves at 1 s with 2 m/s: 31 - 5·t - 2·(t - 1) m to go."""
+    go = ("go", "third", speeding(-2.0 + 4.0, "step time 0"), after(1.0))
+    ahead = position("RelativeObjectPosition", entityRef="third", dx=2.0, dy=0.0)
+    found = seen_at(ahead, go)
+    # both go south: the gap of 32 m shrinks by 5 m in the first second, then by 3 m/s, to 1 m
+    assert found[0] == pytest.approx((1.0 + (32.0 - 5.0 - 1.0) / 3.0) / DT, abs=1.01)
+
+
+def test_rows_may_vary_a_condition_s_position():
+    where = position("LanePosition", roadId=3, laneId=1, s="$there")
+    parameter = '<ParameterDeclaration name="there" parameterType="double" value="70"/>'
+    found = seen_at(where, parameters=parameter, there=[70.0, 60.0, 30.0])
+    assert found == pytest.approx(np.array([9.0, 19.0, 49.0]) / 5.0 / DT, abs=1.01)
+
+
+def test_a_condition_on_a_position_that_is_nowhere_is_not_met():
+    where = position("RelativeLanePosition", entityRef="third", dLane=9, ds=0.0)
+    assert seen_at(where, tolerance=1000.0)[0] == -1
+
+
+def test_a_route_position_of_an_entity_is_where_it_is():
+    where = f"""<Position><RoutePosition><RouteRef><Route name="r" closed="false">
+<Waypoint routeStrategy="shortest">{lane(3, 1, 80.0)}</Waypoint>
+<Waypoint routeStrategy="shortest">{lane(1, -1, 80.0)}</Waypoint></Route></RouteRef>
+<InRoutePosition><FromCurrentEntity entityRef="third"/></InRoutePosition></RoutePosition>
+</Position>"""
+    assert seen_at(where)[0] == pytest.approx(29.0 / 5.0 / DT, abs=1.01)
+    there(placed(where), -1.75, 63.0, NORTH)  # its heading counts from the reference line
+
+
+def test_acquiring_a_position_is_over_when_it_is_reached():
+    """At 15 m/s from s = 80 on: at s = 20, 60 m on, after 4 s."""
+    over = """<Condition name="c" delay="0" conditionEdge="none"><ByValueCondition>
+<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="e"
+state="completeState"/></ByValueCondition></Condition>"""
+    act = acquiring(lane(3, 1, 20.0))
+    rollout = placed(
+        lane(3, 1, 80.0), 15.0, ("e", "bv", act, after(1.0)),
+        ("then", "bv", speeding(1.0, "step time 0"), over),
+    )  # fmt: skip
+    assert rollout.began[0, 1] == pytest.approx(4.0 / DT, abs=1.01)
+    replaced = placed(
+        lane(3, 1, 80.0), 15.0, ("e", "bv", act, after(1.0)),
+        ("f", "bv", routing(lane(3, 1, 80.0), lane(1, -1, 40.0)), after(2.0)),
+        ("then", "bv", speeding(1.0, "step time 0"), over),
+    )  # fmt: skip
+    assert replaced.began[0, 2] == pytest.approx(2.0 / DT, abs=1.01)
+
+
+@pytest.mark.parametrize("target", [
+    position("RelativeObjectPosition", entityRef="third", dx=0.0, dy=0.0),
+    position("RelativeLanePosition", entityRef="third", dLane=0, ds=0.0),
+    position("RoadPosition", roadId=3, s=50, t=-1.75 + 3.5),
+    lane(3, 1, 50.0),
+])  # fmt: skip
+def test_synchronising_at_positions_of_all_kinds(target):
+    """The ego is 40 m from its place at 8 m/s, the bv 30 m from its own: 5 s, so 6 m/s."""
+    own = position("RoadPosition", roadId=1, s=50, t=1.75)
+    tags = {"TargetPositionMaster": own, "TargetPosition": target}
+    places = "".join(
+        f"<{tag}>{place.removeprefix('<Position>').removesuffix('</Position>')}</{tag}>"
+        for tag, place in tags.items()
+    )
+    sync = f'<SynchronizeAction masterEntityRef="ego">{places}</SynchronizeAction>'
+    rollout = placed(
+        lane(3, 1, 80.0), 6.0, ("s", "bv", sync, after(0.0)), ego=start("ego", lane(1, 1, 90), 8.0)
+    )
+    assert rollout.y[0, 1, 100] == pytest.approx(63.0, abs=0.2)
+
+
+@pytest.mark.parametrize("driver", ["route-follower", "reference", "un-r157", "fsm"])
+def test_an_ego_with_a_driver_is_put_elsewhere_and_goes_on(driver):
+    """From leg A's inbound lane to leg C's, where it goes on south at the speed that it had."""
+    act = f"<TeleportAction>{lane(3, 1, 80.0)}</TeleportAction>"
+    text = scenario(("ego",), start("ego", lane(1, 1, 90.0), 8.0),
+                    events(("e", "ego", act, after(1.0))))  # fmt: skip
+    rollout = run(text, ego=driver)
+    k = round(1.0 / DT) + 1
+    assert pose(rollout, k, 0)[:2] == pytest.approx((-1.75, 93.0), abs=1e-6)
+    assert math.remainder(pose(rollout, k, 0)[2] - SOUTH, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert rollout.v[0, 0, k] == rollout.v[0, 0, k - 1]
+    after_it = rollout.y[0, 0, k + 1 : k + 60]
+    assert (np.diff(after_it) < 0.0).all()
+    assert np.abs(rollout.x[0, 0, k : k + 60] + 1.75).max() < 0.05
+    assert np.abs(rollout.offset[0, 0, k : k + 60]).max() < 0.05
+
+
+def test_an_ego_with_a_driver_takes_a_route_at_run_time():
+    """From leg C left to leg D in the east, though it began with no route."""
+    act = routing(lane(3, 1, 80.0), lane(4, -1, 40.0))
+    rollout = run(
+        scenario(("ego",), start("ego", lane(3, 1, 40.0), 8.0), events(("e", "ego", act, after(1))))
+    )
+    assert rollout.status[0] == 0
+    assert rollout.x[0, 0, -1] > 0.0
+    assert math.remainder(rollout.h[0, 0, -1], math.tau) == pytest.approx(0.0, abs=0.1)
+
+
+def test_an_ego_with_a_driver_needs_a_lane():
+    away = position("WorldPosition", x=300.0, y=300.0, h=0.0)
+    act = f"<TeleportAction>{away}</TeleportAction>"
+    rollout = run(
+        scenario(("ego",), start("ego", lane(3, 1, 60.0), 8.0), events(("e", "ego", act, after(1))))
+    )
+    assert rollout.status[0] != 0
+    assert "lane" in STATUS_MESSAGES[int(rollout.status[0])]
+    assert rollout.n_steps[0] == round(1.0 / DT) + 1

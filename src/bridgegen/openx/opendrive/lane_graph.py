@@ -44,6 +44,18 @@ class Ground(NamedTuple):
     nodes: Int
 
 
+class Cells(NamedTuple):
+    """All lanes but those of type "none", cut across every ``GROUND_STEP`` along the road.
+
+    Attributes:
+        corners: ``(Q, 8)`` float64: x, y [m] of four corners, one after the other around a cell.
+        nodes: ``(Q,)`` int64, the node of each, along its lane's traffic.
+    """
+
+    corners: Float
+    nodes: Int
+
+
 class LaneGraph:
     """The lanes of a road network.
 
@@ -213,3 +225,27 @@ class LaneGraph:
                     number = self.numbers[Node(road.id, index, lane_id, way)]
                     nodes.append(np.full(len(s), number))
         return Ground(np.concatenate(points), np.concatenate(nodes))
+
+    @cached_property
+    def cells(self) -> Cells:
+        """Where all lanes are, as cells."""
+        corners, nodes = [np.empty((0, 8))], [np.empty(0, np.int64)]
+        for road in self.model.roads:
+            for index, section in enumerate(road.sections):
+                length = section_end(road, index) - section.s
+                lanes = [lane.id for lane in section.lanes if lane.type != "none"]
+                if not lanes or length <= 0.0:
+                    continue
+                s = section.s + np.linspace(
+                    0.0, length, max(2, math.ceil(length / GROUND_STEP) + 1)
+                )
+                line, edges = reference_line(road, s), borders(road, index, s)
+                sine, cosine = np.sin(line.h), np.cos(line.h)
+                for lane_id in lanes:
+                    sides = (edges[lane_id - int(math.copysign(1, lane_id))], edges[lane_id])
+                    (ax, ay), (bx, by) = ((line.x - t * sine, line.y + t * cosine) for t in sides)
+                    around = (ax[:-1], ay[:-1], bx[:-1], by[:-1], bx[1:], by[1:], ax[1:], ay[1:])
+                    corners.append(np.stack(around, axis=1))
+                    node = Node(road.id, index, lane_id, road.direction(lane_id))
+                    nodes.append(np.full(len(s) - 1, self.numbers[node]))
+        return Cells(np.concatenate(corners), np.concatenate(nodes))

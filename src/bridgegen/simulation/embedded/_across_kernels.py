@@ -46,7 +46,7 @@ def stop_lateral(j, plan, state):
 
 
 @inlined_kernel
-def _take_lane(e, k, roads, state, record):
+def take_lane(e, k, roads, state, record):
     """Return (node, s, t) of the lane that an entity is on; it follows no trajectory any more.
 
     Node -1: it is on none, or the lanes are not known yet; the row ends.
@@ -65,7 +65,7 @@ def _take_lane(e, k, roads, state, record):
 
 @inlined_kernel
 def _lane_of(e, k, roads, state, record):
-    """Return (node, t) of the lane that another entity is on, as ``_take_lane``."""
+    """Return (node, t) of the lane that another entity is on, as ``take_lane``."""
     node, _, t = node_under(e, roads, state)
     if node >= 0:
         return node, t
@@ -90,7 +90,7 @@ def _lane_of(e, k, roads, state, record):
 def begin_lane_change(j, k, plan, roads, state, record):
     """Begin action j, a LaneChangeAction: onto the other lane's way, still aside of it."""
     e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
-    node, s, _ = _take_lane(e, k, roads, state, record)
+    node, s, _ = take_lane(e, k, roads, state, record)
     if node < 0:
         return
     lane = row[COUNT]
@@ -133,7 +133,7 @@ def begin_lane_change(j, k, plan, roads, state, record):
 def begin_lane_offset(j, k, plan, roads, state, record):
     """Begin action j, a LaneOffsetAction; an offset counts to the left of the reference line."""
     e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
-    node, _, t = _take_lane(e, k, roads, state, record)
+    node, _, t = take_lane(e, k, roads, state, record)
     if node < 0:
         return
     way, value = roads.nodes[node, WAY], state.slots[plan.actions[j, 4]]

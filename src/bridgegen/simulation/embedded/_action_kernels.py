@@ -6,13 +6,16 @@ from bridgegen.simulation.embedded._across_kernels import (
     begin_lane_offset,
     stop_lateral,
 )
+from bridgegen.simulation.embedded._aside_kernels import begin_lateral_distance
 from bridgegen.simulation.embedded._codes import (
+    ACQUIRE,
     ADD_ENTITY,
     ASSIGN_ROUTE,
     CONTROL,
     DELETE_ENTITY,
     FIRST_GLOBAL,
     FOLLOW,
+    KEEP_ASIDE,
     LANE_CHANGE,
     LANE_OFFSET,
     RELATIVE_SPEED,
@@ -25,6 +28,7 @@ from bridgegen.simulation.embedded._follow_kernels import (
     begin_route,
     begin_teleport,
     stop_follow,
+    stop_route,
 )
 from bridgegen.simulation.embedded._global_kernels import begin_global
 from bridgegen.simulation.embedded._motion_kernels import STEP
@@ -53,10 +57,12 @@ def begin(j, k, plan, roads, state, record):
         begin_add(j, k, plan, roads, state, record)
     elif kind == DELETE_ENTITY:
         begin_delete(j, k, plan, roads, state, record)
+    elif kind == KEEP_ASIDE:
+        begin_lateral_distance(j, k, plan, roads, state, record)
     elif kind == TELEPORT:
         begin_teleport(j, k, plan, roads, state, record)
-    elif kind == ASSIGN_ROUTE:
-        begin_route(j, plan, roads, state)
+    elif kind in (ASSIGN_ROUTE, ACQUIRE):
+        begin_route(j, k, plan, roads, state, record)
     elif kind == FOLLOW:
         begin_follow(j, k, plan, roads, state)
     else:
@@ -79,7 +85,9 @@ def stop(j, k, plan, roads, state, record):
     kind = plan.actions[j, 1]
     if kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
         stop_longitudinal(j, plan, state)
-    elif kind in (LANE_CHANGE, LANE_OFFSET):
+    elif kind in (LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE):
         stop_lateral(j, plan, state)
     elif kind == FOLLOW:
         stop_follow(j, k, plan, roads, state, record)
+    elif kind == ACQUIRE:
+        stop_route(j, plan, state)

@@ -31,16 +31,23 @@ NO_EDGE, RISING, FALLING, EITHER = range(4)
 
 # Program.probes: what is looked at, by whom and at whom (-1: at a place), the rule and the slot of
 # what it is compared with; how a distance is measured; a second slot; whether seldom asked for.
+# A place is one of the points that do not move, or, AT_MARK, one of ``State.marks``.
 PROBE, WHO, OTHER, RULE, LIMIT, PLACE, MEASURE, SYSTEM, BOXES, WITHIN, CLOSELY = range(11)
 NEVER_TRUE, SIMULATION_TIME, ELEMENT_STATE, VALUE, TIME_OF_DAY, LIGHT_STATE, LIGHT_PHASE = range(7)
 FIRST_BY_ENTITY = 10
 SPEED, SPEED_DIFFERENCE, ACCELERATING, TRAVELED_DISTANCE, STAND_STILL = range(10, 15)
 ANGLE, RELATIVE_ANGLE, COLLISION, COLLISION_WITH_TYPE, END_OF_ROAD = range(15, 20)
-DISTANCE, TIME_TO_COLLISION, TIME_HEADWAY = range(20, 23)
+OFFROAD, CLEARANCE = 20, 21
+DISTANCE, TIME_TO_COLLISION, TIME_HEADWAY = range(30, 33)
+AT_POINT, AT_MARK = -1, -2
 GREATER, LESS, EQUAL, GREATER_EQUAL, LESS_EQUAL, NOT_EQUAL = range(6)
 EUCLIDIAN, LONGITUDINAL, LATERAL = range(3)
 TOTAL, VERTICAL = 0, 3  # with LONGITUDINAL and LATERAL, the directions of a speed
-ENTITY_SYSTEM, PATH_SYSTEM, WORLD_SYSTEM = range(3)
+ENTITY_SYSTEM, PATH_SYSTEM, WORLD_SYSTEM, ROAD_SYSTEM = range(4)
+
+# Program.clearances: which of ``ranges``, whether lanes of the other direction count; then by
+# entity whether it counts.
+RANGES, RANGES_END, OPPOSITE, COUNTS = range(4)
 
 # Program.actions: the kinds that move along the road by Program.courses; the others are numbered
 # in _action_kernels.
@@ -57,7 +64,9 @@ FINAL, FINAL_VALUE, STEADY, STEADY_VALUE = 5, 6, 7, 8
 NO_FINAL, FINAL_SPEED, FINAL_DELTA, FINAL_FACTOR = range(4)
 NOT_STEADY, STEADY_DISTANCE, STEADY_TIME = range(3)
 COURSE_WIDTH = 12
+IS_PRESENT = 1  # of a lateral distance: the one there is; also 2 to 4 and 10, 11 as of a distance
 EITHER_SIDE, BEHIND, AHEAD = 0, 1, -1
+LEFT_SIDE, RIGHT_SIDE = 1, -1
 
 # State.course: what a course keeps.
 SIDE_TAKEN, ACCELERATION, FOOT, FOOT_PATH = range(4)  # of a distance
@@ -70,4 +79,4 @@ PLACE_KIND, WHOSE, LANES_LEFT, ALONG, ACROSS, ABSOLUTE, HEADING, BY_LANE = range
 ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_OBJECT, BY_WORLD = range(7)
 
 # Program.actions: kinds of those that say where an entity is, and where it goes.
-TELEPORT, ASSIGN_ROUTE, FOLLOW = 30, 31, 32
+TELEPORT, ASSIGN_ROUTE, FOLLOW, ACQUIRE, KEEP_ASIDE = range(30, 35)

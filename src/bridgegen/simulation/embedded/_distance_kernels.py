@@ -11,6 +11,7 @@ from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import COS, SIN, X, Y, pose, project
 from bridgegen.simulation._box_kernels import box_gap
 from bridgegen.simulation.embedded._codes import (
+    AT_MARK,
     BOXES,
     DISTANCE,
     ENTITY_SYSTEM,
@@ -46,6 +47,15 @@ class Scene(NamedTuple):
     counts: Int
     steps: Float
     points: Float
+    marks: Float
+    along: Int
+    spans: Float
+    span_counts: Int
+    nodes: Int
+    cells: Float
+    cell_nodes: Int
+    clearances: Int
+    ranges: Float
     x: Float
     y: Float
     h: Float
@@ -65,8 +75,10 @@ def scene_of(plan, roads, state, record):
     return Scene(
         plan.probes, state.slots, state.values, state.clock, state.held, state.lights,
         state.phase_now, plan.bodies, plan.objects, state.on, state.station, roads.paths,
-        roads.counts, roads.steps, roads.points, record.x, record.y, record.h, record.v, record.a,
-        state.observed, state.present, plan.dt,
+        roads.counts, roads.steps, roads.points, state.marks, state.along, roads.spans,
+        roads.span_counts, roads.nodes, roads.cells, roads.cell_nodes, plan.clearances,
+        plan.ranges, record.x, record.y, record.h, record.v, record.a, state.observed,
+        state.present, plan.dt,
     )  # fmt: skip
 
 
@@ -94,9 +106,11 @@ def look_ahead(p, k, scene):
             scene.bodies[other, 2],
         )
     else:
-        place = scene.probes[p, PLACE]
-        ox, oy, oh, w = scene.points[place, 0], scene.points[place, 1], 0.0, 0.0
-        length = width = ahead = 0.0
+        at = scene.marks if other == AT_MARK else scene.points
+        ox, oy = at[scene.probes[p, PLACE], 0], at[scene.probes[p, PLACE], 1]
+        if math.isnan(ox):  # there is no such place
+            return False, 0.0
+        oh = w = length = width = ahead = 0.0
     if measure == EUCLIDIAN:
         gap, closing = as_the_crow_flies(ox - x, oy - y, v, h, w, oh)
         if free:

@@ -59,13 +59,12 @@ def ego_is_through(plan, roads, state):
 @inlined_kernel
 def move_ego(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k; return its new x, y [m] and heading [rad]."""
-    v, dt = record.v[0, k], plan.dt
+    v, dt, p = record.v[0, k], plan.dt, state.on[0]
     x, y, h, after, given = bicycle(
         record.x[0, k], record.y[0, k], record.h[0, k], v, demanded, curvature,
         plan.bodies[0, 3:7], state.weather[FRICTION], dt,
     )  # fmt: skip
     step = 0.5 * (v + after) * dt
-    p = state.on[0]
     record.a[0, k] = given
     state.travelled[0] += step
     state.stood[0] = standing(state.stood[0], v, after, dt)
@@ -75,6 +74,7 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
         state.station[0], record.offset[0, k + 1] = project(
             roads.paths[p], roads.counts[p], roads.steps[p], state.station[0] + step, x, y
         )
+        state.aside[0] = record.offset[0, k + 1]
         at_end = state.station[0] >= (roads.counts[p] - 1) * roads.steps[p]
         if at_end and (p > 0 or state.route[0] == 0):
             pass_end(0, 0.0, roads, state)

@@ -3,7 +3,10 @@
 A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the columns below.
 """
 
-from bridgegen.compiled import kernel
+import math
+
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.simulation.embedded._codes import ACQUIRE
 from bridgegen.simulation.embedded._lane_kernels import continued, station_of
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
 from bridgegen.simulation.embedded._motion_kernels import standing
@@ -15,6 +18,7 @@ from bridgegen.simulation.embedded._place_kernels import (
     end_lateral,
     fail,
     node_under,
+    pose_of,
     put,
     put_in_world,
     way_from,
@@ -23,6 +27,8 @@ from bridgegen.simulation.embedded._place_kernels import (
 BEGINS, ENDS_AT, X, Y, X_END, Y_END, H, H_END, PASSED, PASSED_END = range(10)
 """When a segment begins and ends [s]; x, y [m] of both; the headings [rad]; metres travelled."""
 
+ABREAST = 5.0  # m, a position is passed so far aside at most
+NEAR = 0.1  # m, who is so close to a position is there
 SAME_TIME = 1e-9  # s, an instant this close to a vertex's is the vertex's
 
 
@@ -38,8 +44,11 @@ def begin_teleport(j, k, plan, roads, state, record):
 
 
 @kernel
-def begin_route(j, plan, roads, state):
-    """Begin, and end, action j: the entity follows a route from where it is."""
+def begin_route(j, k, plan, roads, state, record):
+    """Begin action j: the entity follows a route from where it is.
+
+    An AssignRouteAction is over at once, an AcquirePositionAction when it is there.
+    """
     e, route = plan.actions[j, 0], plan.actions[j, 6]
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
@@ -56,7 +65,45 @@ def begin_route(j, plan, roads, state):
         state.on[e] = p
         state.station[e] = station_of(roads.spans[p], roads.span_counts[p], node, s)
     state.route[e] = route
-    state.action_ended[j] = True
+    end_quest(e, state)
+    if plan.actions[j, 1] == ACQUIRE:
+        state.goal[e, 0], state.goal[e, 1], _ = pose_of(
+            plan.actions[j, 3], k, plan, roads, state, record
+        )
+        state.goal_action[e] = j
+    else:
+        state.action_ended[j] = True
+
+
+@inlined_kernel
+def end_quest(e, state):
+    """End the action that sends an entity to a position, if any."""
+    if state.goal_action[e] >= 0:
+        state.action_ended[state.goal_action[e]] = True
+    state.goal_action[e] = -1
+
+
+@inlined_kernel
+def stop_route(j, plan, state):
+    """Stop action j, an AcquirePositionAction: the entity keeps its route."""
+    if state.goal_action[plan.actions[j, 0]] == j:
+        state.goal_action[plan.actions[j, 0]] = -1
+
+
+@inlined_kernel
+def arrive(k, plan, state, record):
+    """End the actions that send entities to positions which they pass, or stand at, at instant k.
+
+    Also to one abreast of them: the way there may lead along a lane beside it.
+    """
+    for e in range(record.x.shape[0]):
+        if state.goal_action[e] < 0:
+            continue
+        c, s = math.cos(record.h[e, k]), math.sin(record.h[e, k])
+        dx, dy = state.goal[e, 0] - record.x[e, k], state.goal[e, 1] - record.y[e, k]
+        ahead, aside = c * dx + s * dy, c * dy - s * dx
+        if abs(aside) <= ABREAST and -record.v[e, k] * plan.dt - NEAR <= ahead <= NEAR:
+            end_quest(e, state)
 
 
 @kernel
@@ -65,6 +112,7 @@ def begin_follow(j, k, plan, roads, state):
     e, m = plan.actions[j, 0], plan.actions[j, 6]
     end_lateral(e, state)
     end_follow(e, state)
+    end_quest(e, state)
     state.on[e], state.aside[e], state.turn[e] = plan.trajectories[m], 0.0, 0.0
     state.station[e] = state.slots[plan.actions[j, 4]]
     state.follow_action[e] = j

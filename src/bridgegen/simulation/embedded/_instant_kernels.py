@@ -4,10 +4,17 @@ import math
 
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego.drivers import NOBODY
-from bridgegen.simulation.embedded._codes import LONGITUDINALLY
+from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._control_kernels import is_steered, move_paced, move_steered
-from bridgegen.simulation.embedded._follow_kernels import move_by_timetable
-from bridgegen.simulation.embedded._memory_kernels import N_STEPS, NOT_FINITE, STATUS, STOPS
+from bridgegen.simulation.embedded._follow_kernels import arrive, move_by_timetable
+from bridgegen.simulation.embedded._memory_kernels import (
+    N_STEPS,
+    NOT_FINITE,
+    OFF_LANES,
+    STATUS,
+    STOPS,
+)
+from bridgegen.simulation.embedded._place_kernels import fail
 from bridgegen.simulation.embedded._presence_kernels import stay_away
 from bridgegen.simulation.embedded._signal_kernels import run_controllers
 from bridgegen.simulation.embedded._speed_kernels import command_speed
@@ -23,10 +30,14 @@ def before_driver(k, plan, roads, state, record):
         k * plan.dt, plan.controllers, plan.phases, plan.changes, state.slots, state.phase_now,
         state.phase_until, state.lights,
     )  # fmt: skip
+    arrive(k, plan, state, record)
     finish(k, plan, state)
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)
     command_speed(0, k, plan, roads, state, record)
+    drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
+    if plan.driver != NOBODY and drives and state.on[0] < 0:  # drivers keep to lanes
+        fail(OFF_LANES, state)
     for i in range(state.lights.shape[0]):
         record.lights[i, k] = state.lights[i]
 

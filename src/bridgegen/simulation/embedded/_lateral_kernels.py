@@ -121,18 +121,18 @@ def inverse(shape, share):
 
 
 @kernel
-def approach(error, speed, most_speed, most_acceleration, most_deceleration, step, dt):
-    """Return (way across [m], speed across) of a body that closes a distance across its path.
+def approach(left, speed, most_speed, most_acceleration, most_deceleration, dt):
+    """Return (way across [m], speed across [m/s]) of a body that closes a distance across its path.
 
-    As fast as its limits let it, and so that it can stop there; ``error`` is what is left [m].
-    Without limits it is there at once; it never moves farther across than it moves.
+    As fast as its limits let it, so that it can stop where nothing is left: after a step at v a
+    deceleration d takes it v²/(2·d) farther, so v·dt + v²/(2·d) is what is left at most.
     """
-    if most_acceleration == math.inf and most_speed == math.inf:
-        moved = error
-    else:
-        wanted = min(math.sqrt(2.0 * most_deceleration * abs(error)), most_speed, abs(error) / dt)
-        wanted = math.copysign(wanted, error)
-        change = (most_acceleration if abs(wanted) > abs(speed) else most_deceleration) * dt
-        speed += min(max(wanted - speed, -change), change)
-        moved = speed * dt
-    return moved, moved / dt
+    wanted = min(most_speed, abs(left) / dt)
+    if most_deceleration < math.inf:
+        least = most_deceleration * dt
+        stops = math.sqrt(least * least + 2.0 * most_deceleration * abs(left)) - least
+        wanted = min(wanted, stops)
+    wanted = math.copysign(wanted, left)
+    change = (most_acceleration if abs(wanted) > abs(speed) else most_deceleration) * dt
+    speed += min(max(wanted - speed, -change), change)
+    return speed * dt, speed

@@ -17,7 +17,7 @@ from bridgegen.compiled import borrowed, bundled, inlined_kernel
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
 # See rollout.STATUS_MESSAGES.
-OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE = range(7)
+OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE, OFF_LANES = range(8)
 RAISED, NO_CONTROL = 20, 23  # of a driver of the user's own
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
@@ -38,6 +38,9 @@ class Plan(NamedTuple):
     groups: Int
     conditions: Int
     probes: Int
+    marks: Int
+    clearances: Int
+    ranges: Float
     looks_closely: int
     elements: Int
     courses: Int
@@ -89,6 +92,8 @@ class Roads(NamedTuple):
     ways: Int
     ground: Float
     ground_nodes: Int
+    cells: Float
+    cell_nodes: Int
     road: Float
     stops: Float
     crosswalks: Float
@@ -114,6 +119,9 @@ class State(NamedTuple):
         stamps: ``(X, 4)`` int64, the number of its last start, end, stop and skip,
         looked: ``(P, 2)`` int64, the last number when a probe looked: before this instant; at all.
         held: ``(P,)`` [s], how long a probe has seen what must last.
+        marks: ``(M, 3)`` x, y [m], heading [rad] of the places that probes look at; NaN: nowhere.
+        along: ``(P,)`` int64, the path along which a probe measures that asks for clearance; -1:
+            none.
         action_ended: ``(J,)`` bool.
         selected: ``(E,)`` bool, the entities that made the present event's trigger fire.
         values: ``(U,)``, the parameters and variables that change.
@@ -137,12 +145,14 @@ class State(NamedTuple):
         lateral_lasts: ``(E,)`` [s] or [m], how long,
         lateral_passed: ``(E,)`` [s] or [m], what of it has passed,
         lateral_origin: ``(E,)`` [m], how far left of its path it began,
-        lateral_target: ``(E,)`` [m], how far left of its path it ends.
+        lateral_target: ``(E,)`` [m], how far left of its path it ends; see ``_aside_kernels``.
         follow: ``(E,)`` int64, the trajectory whose timetable moves it; -1: none,
         follow_action: ``(E,)`` int64, the action that leads it along a trajectory; -1: none,
         follow_began: ``(E,)`` [s], when the times of the timetable begin.
         timed: ``(E,)`` bool, a timetable moves it at this instant.
         placed: ``(E,)`` bool, it was put where it is at this instant, and does not move on.
+        goal: ``(E, 2)`` [m], the position that it is sent to,
+        goal_action: ``(E,)`` int64, by which action; -1: none.
         wanted: ``(2,)`` int64, the route and the node of the way that is not planned yet.
         speed_action: ``(E,)`` int64, the action that changes its speed; -1: none,
         speed_began: ``(E,)`` [s], since when,
@@ -179,6 +189,8 @@ class State(NamedTuple):
     stamps: Int
     looked: Int
     held: Float
+    marks: Float
+    along: Int
     action_ended: Bool
     selected: Bool
     values: Float
@@ -208,6 +220,8 @@ class State(NamedTuple):
     follow_began: Float
     timed: Bool
     placed: Bool
+    goal: Float
+    goal_action: Int
     wanted: Int
     speed_action: Int
     speed_began: Float

@@ -106,6 +106,21 @@ def way_from(route, node, roads, state):
     return path
 
 
+@kernel
+def way_ahead(e, roads, state):
+    """Return the path that an entity would take from its lane on if it were put there now.
+
+    Its own may end where lanes fork. -1: it is on no lane, or the path is asked for.
+    """
+    node, _, _ = node_under(e, roads, state)
+    if node < 0:
+        return -1
+    path = roads.ways[state.route[e], node]
+    if path == -1:
+        ask(state.route[e], node, state)
+    return path if path != -2 else state.on[e]
+
+
 @inlined_kernel
 def node_under(e, roads, state):
     """Return (node, s, t) of an entity's place on its path; node -1 if it is on no lane."""
@@ -227,7 +242,9 @@ def pose_of(c, k, plan, roads, state, record):
 
     Where entities are is looked up as of instant k, too.
     """
-    kind = plan.places[c, PLACE_KIND]
+    kind, other = plan.places[c, PLACE_KIND], plan.places[c, WHOSE]
+    if other >= 0 and not state.present[other]:
+        return math.nan, math.nan, math.nan
     if kind == IN_WORLD or kind >= BY_OBJECT:
         return world_place(c, k, plan, state, record)
     if roads.nodes.shape[0] == 0:
@@ -247,6 +264,20 @@ def pose_of(c, k, plan, roads, state, record):
     x, y = shifted(x, y, h, aside)
     turn = state.slots[plan.places[c, HEADING]]
     return x, y, turn if plan.places[c, ABSOLUTE] else h + turn
+
+
+@kernel
+def place_at(number, k, plan, roads, state, record):
+    """Return (x, y) of a place as it is at instant k: of a point, or, from -1 down, of a position.
+
+    If there is no such place, the row ends.
+    """
+    if number >= 0:
+        return roads.points[number, 0], roads.points[number, 1]
+    x, y, _ = pose_of(-1 - number, k, plan, roads, state, record)
+    if math.isnan(x):
+        fail(NO_PLACE, state)
+    return x, y
 
 
 @kernel

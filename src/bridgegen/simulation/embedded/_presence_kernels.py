@@ -15,6 +15,7 @@ from bridgegen.simulation.embedded._codes import (
     DISTANCE,
     FIRST_BY_ENTITY,
     FIRST_GLOBAL,
+    KEEP_ASIDE,
     LANE_CHANGE,
     LANE_OFFSET,
     OTHER,
@@ -29,6 +30,7 @@ from bridgegen.simulation.embedded._codes import (
     WHO,
     WHOM,
 )
+from bridgegen.simulation.embedded._follow_kernels import end_quest
 from bridgegen.simulation.embedded._memory_kernels import OK, STATUS
 from bridgegen.simulation.embedded._place_kernels import body_pose, end_follow, put
 from bridgegen.simulation.embedded._speed_kernels import stop_longitudinal
@@ -38,7 +40,7 @@ from bridgegen.simulation.embedded._speed_kernels import stop_longitudinal
 def goes_by(j, plan):
     """Return the entity by which action j moves its own, -1 if none."""
     kind = plan.actions[j, 1]
-    if RELATIVE_SPEED <= kind < FIRST_GLOBAL:
+    if RELATIVE_SPEED <= kind < FIRST_GLOBAL or kind == KEEP_ASIDE:
         return plan.courses[plan.actions[j, 6], REF]
     if kind in (LANE_CHANGE, LANE_OFFSET):
         return plan.laterals[plan.actions[j, 6], OF]
@@ -90,6 +92,7 @@ def begin_delete(j, k, plan, roads, state, record):
             stop_lateral(running, plan, state)
             state.action_ended[running] = True
     end_follow(gone, state)
+    end_quest(gone, state)
     state.stood[gone] = 0.0
     forget(state.tracks, gone)
     for array in (state.sensors, state.around, state.attention):

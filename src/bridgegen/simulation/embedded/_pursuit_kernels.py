@@ -66,6 +66,7 @@ from bridgegen.simulation.embedded._motion_kernels import (
     nearest,
     ramped,
 )
+from bridgegen.simulation.embedded._place_kernels import place_at
 
 NEAR = 0.1  # m, a distance that is missed by less is reached
 ASIDE = 10.0  # m, a place that is farther from a path does not lie on it
@@ -107,9 +108,12 @@ def begin_course(j, k, plan, roads, state, record):
         state.course[e, SIDE_TAKEN] = side
         state.course[e, ACCELERATION] = 0.0
     else:
-        own, master = row[OWN_PLACE], row[MASTER_PLACE]
-        state.course[e, OWN_X], state.course[e, OWN_Y] = roads.points[own]
-        state.course[e, MASTER_X], state.course[e, MASTER_Y] = roads.points[master]
+        state.course[e, OWN_X], state.course[e, OWN_Y] = place_at(
+            row[OWN_PLACE], k, plan, roads, state, record
+        )
+        state.course[e, MASTER_X], state.course[e, MASTER_Y] = place_at(
+            row[MASTER_PLACE], k, plan, roads, state, record
+        )
         state.course[e, LEFT] = state.course[e, MASTER_LEFT] = math.inf
 
 
@@ -143,7 +147,7 @@ def follow_course(j, k, plan, roads, state, record):
 
 
 @inlined_kernel
-def _seen(e, other, k, plan, state, record):
+def seen_at(e, other, k, plan, state, record):
     """Return the instant at which an entity sees another one: the next, if that is known."""
     first = e == 0 and plan.driver != NOBODY
     known = not first and (state.timed[other] or plan.order[1, other] < plan.order[1, e])
@@ -162,7 +166,7 @@ def _wanted(j, e, v, plan, state):
 def _follow_speed(j, e, k, passed, plan, state, record):
     row = plan.courses[plan.actions[j, 6]]
     ref, shape = row[REF], plan.actions[j, 2]
-    target = _wanted(j, e, record.v[ref, _seen(e, ref, k, plan, state, record)], plan, state)
+    target = _wanted(j, e, record.v[ref, seen_at(e, ref, k, plan, state, record)], plan, state)
     if shape == STEP:
         state.command[e] = target
         return not row[CONTINUOUS]
@@ -217,7 +221,7 @@ def _keep_distance(j, e, k, plan, roads, state, record):
     """Keep, or reach, a distance: at once if nothing limits it, else as by a spring."""
     row = plan.courses[plan.actions[j, 6]]
     ref, side = row[REF], state.course[e, SIDE_TAKEN]
-    seen = _seen(e, ref, k, plan, state, record) if row[UNLIMITED] and e > 0 else k
+    seen = seen_at(e, ref, k, plan, state, record) if row[UNLIMITED] and e > 0 else k
     gap = state.slots[plan.actions[j, 4]]
     if row[IS_TIME_GAP]:
         gap *= record.v[ref, seen]

@@ -7,14 +7,17 @@ import math
 
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import pose, project
+from bridgegen.simulation.embedded._clearance_kernels import find_cell, is_clear
 from bridgegen.simulation.embedded._codes import (
     ACCELERATING,
     ANGLE,
+    CLEARANCE,
     CLOSELY,
     COLLISION,
     COLLISION_WITH_TYPE,
     DISTANCE,
     END_OF_ROAD,
+    ENTITY_SYSTEM,
     EQUAL,
     GREATER,
     GREATER_EQUAL,
@@ -26,10 +29,12 @@ from bridgegen.simulation.embedded._codes import (
     LIMIT,
     LONGITUDINAL,
     MEASURE,
+    OFFROAD,
     OTHER,
     PATH_SYSTEM,
     PROBE,
     RELATIVE_ANGLE,
+    ROAD_SYSTEM,
     RULE,
     SPEED_DIFFERENCE,
     SYSTEM,
@@ -38,10 +43,19 @@ from bridgegen.simulation.embedded._codes import (
     VALUE,
     WHO,
     WITHIN,
-    WORLD_SYSTEM,
 )
 from bridgegen.simulation.embedded._distance_kernels import apart, borrow_scene, look_ahead
 from bridgegen.simulation.embedded._global_kernels import time_of_day
+from bridgegen.simulation.embedded._lane_kernels import (
+    LEAVE,
+    NODE,
+    STATION,
+    T_LEAVE,
+    WAY,
+    T,
+    span_at,
+    turned,
+)
 
 AT_END = 1e-6  # m
 SAME_TIME = 1e-6  # s, the rounding of a date
@@ -110,15 +124,18 @@ def look_one(p, k, scene):
                 return True
         return False
     if kind in (ANGLE, RELATIVE_ANGLE):
-        off = angle_of(p, k, scene) - limit
-        off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
-        return abs(off) <= scene.slots[scene.probes[p, WITHIN]] + SAME_ANGLE
+        defined, angle = angle_of(p, k, scene)
+        off = abs(turned(angle, limit))
+        return defined and off <= scene.slots[scene.probes[p, WITHIN]] + SAME_ANGLE
     if kind == END_OF_ROAD:
         path = scene.on[e]
         length = (scene.counts[path] - 1) * scene.steps[path]
-        at_end = scene.present[e] and path >= 0 and scene.station[e] >= length - AT_END
-        scene.held[p] = scene.held[p] + scene.dt if at_end else -scene.dt
-        return at_end and scene.held[p] >= limit - AT_END
+        return lasts(p, k, path >= 0 and scene.station[e] >= length - AT_END, limit, scene)
+    if kind == OFFROAD:
+        on_road = find_cell(scene.cells, 0, scene.x[e, k], scene.y[e, k]) >= 0
+        return lasts(p, k, not on_road, limit, scene)
+    if kind == CLEARANCE:
+        return is_clear(p, k, scene)
     if kind == SPEED_DIFFERENCE:
         turn = scene.h[other, k] - scene.h[e, k]
         along, aside = scene.v[other, k] * math.cos(turn), scene.v[other, k] * math.sin(turn)
@@ -151,19 +168,54 @@ def touch(e, other, k, scene):
 
 
 @inlined_kernel
+def lasts(p, k, seen, limit, scene):
+    """Return whether a probe has seen so long [s] what it sees now."""
+    seen = seen and scene.present[scene.probes[p, WHO]]
+    before = scene.held[p] if k > 0 else -scene.dt
+    scene.held[p] = before + scene.dt if seen else -scene.dt
+    return seen and scene.held[p] >= limit - AT_END
+
+
+@inlined_kernel
 def angle_of(p, k, scene):
-    """Return the heading that a condition looks at [rad], by the system that it is measured in."""
+    """Return (whether it is defined, the heading that a condition looks at [rad]).
+
+    It is measured from the axis of its system; of one entity from another's, the one's by its axis
+    from the other's by its own.
+    """
     e, other, system = scene.probes[p, WHO], scene.probes[p, OTHER], scene.probes[p, SYSTEM]
-    if scene.probes[p, PROBE] == RELATIVE_ANGLE:
-        return scene.h[other, k] - scene.h[e, k]
-    if system == WORLD_SYSTEM:
-        return scene.h[e, k]
+    h, axis = scene.h[e, k], axis_of(e, k, system, scene)
+    if scene.probes[p, PROBE] == ANGLE:
+        if system == ENTITY_SYSTEM:
+            return True, 0.0
+        return not math.isnan(axis), h - axis
+    other_axis = axis_of(other, k, system, scene)
+    defined = not (math.isnan(axis) or math.isnan(other_axis))
+    return defined, (scene.h[other, k] - other_axis) - (h - axis)
+
+
+@inlined_kernel
+def axis_of(e, k, system, scene):
+    """Return the heading of an entity's path, or of the reference line of its road [rad].
+
+    0 in other systems; NaN where it has none: off the paths, or off the lanes.
+    """
     path = scene.on[e]
-    if system != PATH_SYSTEM or path < 0:
+    if system not in (PATH_SYSTEM, ROAD_SYSTEM):
         return 0.0
+    if path < 0 or (system == ROAD_SYSTEM and scene.span_counts[path] == 0):
+        return math.nan
     table, n, ds = scene.paths[path], scene.counts[path], scene.steps[path]
     s, _ = project(table, n, ds, scene.station[e], scene.x[e, k], scene.y[e, k])
-    return scene.h[e, k] - pose(table, n, ds, s)[2]
+    h = pose(table, n, ds, s)[2]
+    if system == PATH_SYSTEM:
+        return h
+    spans = scene.spans[path]
+    i = span_at(spans, scene.span_counts[path], s)
+    way = scene.nodes[int(spans[i, NODE]), WAY]
+    length = spans[i, LEAVE] - spans[i, STATION]
+    slope = way * (spans[i, T_LEAVE] - spans[i, T]) / length if length > 0.0 else 0.0
+    return h - math.asin(min(max(slope, -1.0), 1.0)) - (0.0 if way > 0 else math.pi)
 
 
 @inlined_kernel

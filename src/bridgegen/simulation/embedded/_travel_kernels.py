@@ -2,6 +2,8 @@
 
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._across_kernels import CONTINUOUS
+from bridgegen.simulation.embedded._aside_kernels import keep_aside
+from bridgegen.simulation.embedded._codes import KEEP_ASIDE
 from bridgegen.simulation.embedded._lane_kernels import continued
 from bridgegen.simulation.embedded._lateral_kernels import glide
 from bridgegen.simulation.embedded._motion_kernels import SAME_TIME, standing
@@ -25,9 +27,12 @@ def move_along_path(e, k, plan, roads, state, record):
     dt, before = plan.dt, record.v[e, k]
     step = 0.0 if state.placed[e] else 0.5 * (before + state.command[e]) * dt
     state.placed[e] = False
-    ahead, tilt = step, 0.0
+    ahead, tilt, reached = step, 0.0, False
     j = state.lateral_action[e]
-    if j >= 0:
+    keeps_aside = j >= 0 and plan.actions[j, 1] == KEEP_ASIDE
+    if keeps_aside:
+        ahead, tilt, reached = keep_aside(j, k, step, plan, roads, state, record)
+    elif j >= 0:
         state.aside[e], ahead, state.lateral_passed[e], tilt = glide(
             plan.actions[j, 2], plan.actions[j, 3], state.lateral_lasts[e],
             state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], step, dt,
@@ -45,11 +50,13 @@ def move_along_path(e, k, plan, roads, state, record):
     state.stood[e] = standing(state.stood[e], before, state.command[e], dt)
     record.a[e, k] = (state.command[e] - before) / dt
     state.station[e] = station
-    if j >= 0 and state.lateral_passed[e] >= state.lateral_lasts[e] - SAME_TIME:
+    over = state.lateral_passed[e] >= state.lateral_lasts[e] - SAME_TIME
+    if not keeps_aside and j >= 0 and over:
         state.to[e] = -1
-        if not plan.laterals[plan.actions[j, 6], CONTINUOUS]:
-            state.action_ended[j] = True
-            state.lateral_action[e] = -1
+        reached = not plan.laterals[plan.actions[j, 6], CONTINUOUS]
+    if reached:
+        state.action_ended[j] = True
+        state.lateral_action[e] = -1
     if k == record.x.shape[1] - 1:
         return
     record.v[e, k + 1] = state.command[e]

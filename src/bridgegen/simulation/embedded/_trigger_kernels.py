@@ -7,6 +7,7 @@ from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import (
     ALL,
     ANY,
+    CLEARANCE,
     CLOSELY,
     DELAY,
     EDGE,
@@ -23,6 +24,7 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._distance_kernels import scene_of
 from bridgegen.simulation.embedded._memory_kernels import TICKS, view
+from bridgegen.simulation.embedded._place_kernels import pose_of, way_ahead
 from bridgegen.simulation.embedded._presence_kernels import leave_out_absent
 from bridgegen.simulation.embedded._probe_kernels import is_in_state, look
 from bridgegen.simulation.embedded._relation_kernels import look_closely
@@ -31,7 +33,14 @@ from bridgegen.simulation.embedded._relation_kernels import look_closely
 @inlined_kernel
 def observe(k, plan, roads, state, record):
     """Take down what all probes see at instant k, and which conditions that makes true."""
+    for i in range(plan.marks.shape[0]):
+        state.marks[i, 0], state.marks[i, 1], state.marks[i, 2] = pose_of(
+            plan.marks[i], k, plan, roads, state, record
+        )
     if plan.looks_closely:
+        for p in range(plan.probes.shape[0]):
+            if plan.probes[p, PROBE] == CLEARANCE:
+                state.along[p] = way_ahead(plan.probes[p, WHO], roads, state)
         look_closely(k, scene_of(plan, roads, state, record))
     for p in range(plan.probes.shape[0]):
         if plan.probes[p, CLOSELY] == 0:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded._codes import (
+    ACQUIRE,
     ADD_ENTITY,
     ASSIGN_ROUTE,
     DELETE_ENTITY,
@@ -21,7 +22,6 @@ from bridgegen.simulation.embedded.program import (
     AlongTrajectory,
     LaneCheck,
     PathSpec,
-    Point,
     Spot,
 )
 from bridgegen.simulation.embedded.tables import Tables
@@ -50,14 +50,13 @@ class Actions:
     Args:
         tables: the compiler's; takes down what cannot be run.
         paths: of the entities; trajectories of events are added.
-        points: takes the positions that actions along the road name.
-        positions: takes those that others name.
+        positions: takes the places that they name.
         everywhere: compiles what concerns all.
         controllers: compiles who drives.
     """
 
     def __init__(
-        self, tables: Tables, paths: list[PathSpec], points: list[Point], positions: Positions,
+        self, tables: Tables, paths: list[PathSpec], positions: Positions,
         everywhere: GlobalActions, controllers: Controllers,
     ) -> None:  # fmt: skip
         self._tables, self._paths, self._everywhere = tables, paths, everywhere
@@ -66,7 +65,7 @@ class Actions:
         self.routes: list[tuple[Spot, ...]] = []
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
-        self.courses = Courses(tables, points)
+        self.courses = Courses(tables, positions)
         self.rows: list[tuple[int, ...]] = []
         self.initial: list[int] = []
 
@@ -122,15 +121,15 @@ class Actions:
 
     def _private(self, wrapped: osc.PrivateAction, entity: int) -> None:
         action = wrapped.action
-        if (row := self.courses.add(getattr(action, "action", action), entity)) is not None:
+        inner = getattr(action, "action", action)
+        if isinstance(action, osc.LateralAction):
+            self._note_driven(inner, entity)
+        if (row := self.courses.add(inner, entity)) is not None:
             self.rows.append(row)
-        elif isinstance(action, osc.LateralAction):
-            if isinstance(action.action, osc.LaneChangeAction):
-                self._lane_change(action.action, entity)
-            elif isinstance(action.action, osc.LaneOffsetAction):
-                self._lane_offset(action.action, entity)
-            else:
-                self._tables.unsupported(action.action, type(action.action).__name__)
+        elif isinstance(inner, osc.LaneChangeAction):
+            self._lane_change(inner, entity)
+        elif isinstance(inner, osc.LaneOffsetAction):
+            self._lane_offset(inner, entity)
         elif isinstance(action, osc.TeleportAction):
             place, slot = self._positions.add(action.position), self._tables.slot(0.0)
             self.rows.append((entity, TELEPORT, 0, 0, slot, slot, place))
@@ -158,8 +157,10 @@ class Actions:
         if isinstance(action, osc.AssignRouteAction | osc.AcquirePositionAction):
             spots = self.waypoints(action)
             if spots:
-                row = (entity, ASSIGN_ROUTE, 0, 0, slot, slot, self.add_route(spots))
-                self.rows.append(row)
+                kind, place = ASSIGN_ROUTE, 0
+                if isinstance(action, osc.AcquirePositionAction):
+                    kind, place = ACQUIRE, self._positions.add(action.position)
+                self.rows.append((entity, kind, 0, place, slot, slot, self.add_route(spots)))
         elif isinstance(action, osc.FollowTrajectoryAction):
             self._note_driven(action, entity)
             timing = action.time_reference.reference
@@ -192,7 +193,6 @@ class Actions:
 
     def _lane_change(self, action: osc.LaneChangeAction, entity: int) -> None:
         shape, dimension, value = self.courses.dynamics(action.dynamics)
-        self._note_driven(action, entity)
         target = action.lane_change_target.target
         other, lanes, lane = -1, None, None
         if isinstance(target, osc.RelativeTargetLane):
@@ -210,7 +210,6 @@ class Actions:
         self.rows.append((entity, _LANE_CHANGE, shape, dimension, offset, value, row))
 
     def _lane_offset(self, action: osc.LaneOffsetAction, entity: int) -> None:
-        self._note_driven(action, entity)
         target, other = action.lane_offset_target.target, -1
         if isinstance(target, osc.RelativeTargetLaneOffset):
             other = self._tables.entity(target.entity_ref)

@@ -31,7 +31,6 @@ from bridgegen.simulation.embedded.program import (
     LaneSpot,
     Nowhere,
     PathSpec,
-    Point,
     Program,
 )
 from bridgegen.simulation.embedded.storyboard import elements, nodes
@@ -96,12 +95,11 @@ class _Compiler:
         self.tables = Tables(scenario, place)
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
-        self.points: list[Point] = []
         self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
         self.everywhere = GlobalActions(self.tables, scenario)
         self.controllers = Controllers(self.tables, scenario)
         self.actions = Actions(
-            self.tables, self.paths, self.points, self.positions, self.everywhere, self.controllers
+            self.tables, self.paths, self.positions, self.everywhere, self.controllers
         )
         self.starts: dict[int, int] = {}
         self.absent: list[int] = []
@@ -130,7 +128,7 @@ class _Compiler:
             )
         storyboard = self.scenario.storyboard
         found = nodes(storyboard)
-        self.triggers = Triggers(self.tables, step, found, self.points, self.everywhere)
+        self.triggers = Triggers(self.tables, step, found, self.positions, self.everywhere)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
@@ -192,7 +190,10 @@ class _Compiler:
             groups=table(self.triggers.groups, 2),
             conditions=conditions,
             probes=table(self.triggers.probes, 11),
-            points=tuple(self.points),
+            points=tuple(self.positions.points),
+            marks=np.array(self.triggers.looks.marks, dtype=np.int64),
+            clearances=table(self.triggers.looks.clearances, 3 + len(objects)),
+            ranges=np.array(self.triggers.looks.ranges, dtype=np.float64).reshape(-1, 2),
             elements=table(rows, 10),
             courses=table(self.actions.courses.rows, COURSE_WIDTH),
             entries=table(self.actions.courses.entries, 2),

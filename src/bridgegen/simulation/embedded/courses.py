@@ -1,10 +1,12 @@
-"""The actions that move an entity along its path, as rows of integers."""
+"""The actions that move an entity along its path, or by another one, as rows of integers."""
+
+import math
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.program import Point
+from bridgegen.simulation.embedded.positions import Positions
 from bridgegen.simulation.embedded.tables import Tables
 
 SPEED_CHANGE = 0
@@ -21,6 +23,11 @@ _SIDES = {
     osc.LongitudinalDisplacement.ANY: codes.EITHER_SIDE,
     osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY: codes.BEHIND,
     osc.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY: codes.AHEAD,
+}  # fmt: skip
+_LATERAL_SIDES = {
+    osc.LateralDisplacement.ANY: codes.EITHER_SIDE,
+    osc.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY: codes.LEFT_SIDE,
+    osc.LateralDisplacement.RIGHT_TO_REFERENCED_ENTITY: codes.RIGHT_SIDE,
 }  # fmt: skip
 _ALONG = (
     osc.CoordinateSystem.LANE, osc.CoordinateSystem.ROAD, osc.CoordinateSystem.TRAJECTORY,
@@ -44,7 +51,7 @@ def first_speed(action: object) -> Value | None:
 
 
 class Courses:
-    """Compiles longitudinal actions; what cannot be run is taken down in ``tables``.
+    """Compiles longitudinal actions and lateral distances; takes down what cannot be run.
 
     Attributes:
         rows: as ``Program.courses`` has them.
@@ -53,17 +60,17 @@ class Courses:
 
     Args:
         tables: the compiler's.
-        points: takes the positions of synchronisations.
+        positions: takes those of synchronisations.
     """
 
-    def __init__(self, tables: Tables, points: list[Point]) -> None:
-        self._tables, self._points = tables, points
+    def __init__(self, tables: Tables, positions: Positions) -> None:
+        self._tables, self._positions = tables, positions
         self.rows: list[Row] = []
         self.entries: list[tuple[int, int]] = []
         self.pairs: list[tuple[int, int]] = []
 
     def add(self, action: object, entity: int) -> Row | None:
-        """Return an action's row of ``Program.actions``; None if it moves nobody along a path."""
+        """Return an action's row of ``Program.actions``; None if it is none of these."""
         match action:
             case osc.SpeedAction():
                 return self._speed(action, entity)
@@ -71,6 +78,8 @@ class Courses:
                 return self._profile(action, entity)
             case osc.LongitudinalDistanceAction():
                 return self._distance(action, entity)
+            case osc.LateralDistanceAction():
+                return self._lateral_distance(action, entity)
             case osc.SynchronizeAction():
                 return self._synchronise(action, entity)
         return None
@@ -139,30 +148,51 @@ class Courses:
                 action, "a LongitudinalDistanceAction without distance or timeGap, or with both,"
             )
         row[codes.IS_TIME_GAP] = int(action.time_gap is not None)
-        row[codes.CONTINUOUS] = int(self._flag(action, "continuous", action.continuous))
-        row[codes.FREESPACE] = int(self._flag(action, "freespace", action.freespace))
         side = osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY
         if action.displacement is not None:
             side = self._tables.choice(osc.LongitudinalDisplacement, action.displacement)
         row[codes.SIDE] = _SIDES[side]
+        self._keep_off(row, action)
+        slot = self._tables.slot(given[0] if given else 0.0)
+        return entity, codes.KEEP_DISTANCE, 0, 0, slot, slot, self._keep(row)
+
+    def _lateral_distance(self, action: osc.LateralDistanceAction, entity: int) -> Row:
+        row = self._row(entity, action.entity_ref)
+        row[codes.IS_PRESENT] = int(action.distance is None)
+        side = osc.LateralDisplacement.ANY
+        if action.displacement is not None:
+            side = self._tables.choice(osc.LateralDisplacement, action.displacement)
+        row[codes.SIDE] = _LATERAL_SIDES[side]
+        self._keep_off(row, action)
+        slot = self._tables.slot(action.distance or 0.0)
+        return entity, codes.KEEP_ASIDE, 0, 0, slot, slot, self._keep(row)
+
+    def _keep_off(
+        self, row: list[int], action: osc.LongitudinalDistanceAction | osc.LateralDistanceAction
+    ) -> None:
+        """Take down how a distance to another entity is measured, and how fast it may change."""
+        row[codes.CONTINUOUS] = int(self._flag(action, "continuous", action.continuous))
+        row[codes.FREESPACE] = int(self._flag(action, "freespace", action.freespace))
         system = osc.CoordinateSystem.ENTITY
         if action.coordinate_system is not None:
             system = self._tables.choice(osc.CoordinateSystem, action.coordinate_system)
         if system is osc.CoordinateSystem.WORLD:
             self._tables.unsupported(action, 'coordinateSystem="world"')
         row[codes.BY_BODY] = int(system not in _ALONG)
-        limits = action.dynamic_constraints
-        row[codes.UNLIMITED] = int(
-            limits is None or (limits.max_acceleration is None and limits.max_deceleration is None)
-        )
+        limits = action.dynamic_constraints or osc.DynamicConstraints()
+        bounds = [limits.max_acceleration, limits.max_deceleration]
+        if isinstance(action, osc.LateralDistanceAction):
+            bounds.append(limits.max_speed)
+            for rate in (limits.max_acceleration_rate, limits.max_deceleration_rate):
+                if rate is not None and rate != math.inf:
+                    self._tables.unsupported(limits, "a rate of a lateral acceleration")
+        row[codes.UNLIMITED] = int(all(one is None for one in bounds))
         self._limit(row, limits)
-        slot = self._tables.slot(given[0] if given else 0.0)
-        return entity, codes.KEEP_DISTANCE, 0, 0, slot, slot, self._keep(row)
 
     def _synchronise(self, action: osc.SynchronizeAction, entity: int) -> Row:
         row = self._row(entity, action.master_entity_ref)
-        row[codes.OWN_PLACE] = self._place(action.target_position)
-        row[codes.MASTER_PLACE] = self._place(action.target_position_master)
+        row[codes.OWN_PLACE] = self._positions.place(action.target_position)
+        row[codes.MASTER_PLACE] = self._positions.place(action.target_position_master)
         row[codes.TOLERANCE] = self._optional(action.target_tolerance)
         row[codes.MASTER_TOLERANCE] = self._optional(action.target_tolerance_master)
         if action.final_speed is not None:
@@ -206,15 +236,6 @@ class Courses:
 
     def _optional(self, value: Value | None) -> int:
         return -1 if value is None else self._tables.slot(value)
-
-    def _place(self, position: osc.Position) -> int:
-        point = self._tables.lane_point(position)
-        if point is None:
-            return 0
-        if isinstance(point.s, osc.ParameterRef | Expr):
-            self._tables.unsupported(position.position, f's="{point.s}" of a SynchronizeAction')
-        self._points.append(point)
-        return len(self._points) - 1
 
     def _flag(self, element: Element, name: str, value: Value) -> bool:
         if not isinstance(value, bool):

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego.scene import Scene, beside, stacked, survey
-from bridgegen.openx.opendrive.lane_graph import Ground
+from bridgegen.openx.opendrive.lane_graph import Cells, Ground
 from bridgegen.openx.opendrive.lanes import section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Stretch
@@ -17,6 +17,7 @@ from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.ways import UNKNOWN, Ways, padded, position
 
 NO_GROUND = Ground(np.empty((0, 4)), np.empty(0, np.int64))
+NO_CELLS = Cells(np.empty((0, 8)), np.empty(0, np.int64))
 
 
 class Network:
@@ -77,6 +78,10 @@ class Network:
             each.lanes.graph.ground if each.lanes and each.has_ground else NO_GROUND
             for each in ways
         ]
+        cells = [
+            each.graph.cells if each and self._program.looks_at_lanes else NO_CELLS
+            for each in lanes
+        ]
         nodes = max(each.numbers.shape[1] for each in ways)
         return Roads(
             paths=paths,
@@ -104,6 +109,8 @@ class Network:
             ),
             ground=_stacked([ground.points for ground in grounds]),
             ground_nodes=_stacked([ground.nodes for ground in grounds]),
+            cells=_stacked([each.corners for each in cells]),
+            cell_nodes=_stacked([each.nodes for each in cells]),
             **self.scene._asdict(),
         )
 

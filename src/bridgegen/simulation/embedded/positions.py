@@ -4,6 +4,8 @@ Their numbers may vary by row, but for those that only the roads can resolve: t 
 and where on a route a RoutePosition is.
 """
 
+from dataclasses import replace
+
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Expr, Value
@@ -17,7 +19,9 @@ from bridgegen.simulation.embedded._codes import (
     ON_ROAD,
 )
 from bridgegen.simulation.embedded.program import (
+    LanePoint,
     LaneSpot,
+    Point,
     RoadSpot,
     RouteSpot,
     Spot,
@@ -29,12 +33,28 @@ RELATIVE_SINCE = 3
 """The minor version from which a missing type of an Orientation means relative."""
 
 
+def is_fixed(position: osc.Position) -> bool:
+    """Say whether a position is the same whatever rows and entities do, and is told by the file.
+
+    One on a lane, by numbers, or one of the world.
+    """
+    where = position.position
+    if isinstance(where, osc.LanePosition) and where.orientation is None:
+        numbers: tuple[Value | None, ...] = (where.s, where.offset)
+    elif isinstance(where, osc.WorldPosition):
+        numbers = (where.x, where.y)
+    else:
+        return False
+    return not any(isinstance(one, osc.ParameterRef | Expr) for one in numbers)
+
+
 class Positions:
     """The positions of a scenario file.
 
     Attributes:
         rows: ``(·, 8)`` as ``_codes`` names the columns.
         spots: per position what its road network has to resolve, None where there is nothing.
+        points: the places that are the same whatever rows and entities do.
 
     Args:
         tables: the compiler's; takes down what cannot be run.
@@ -45,6 +65,19 @@ class Positions:
         self._tables, self._minor = tables, minor_version
         self.rows: list[tuple[int, ...]] = []
         self.spots: list[Spot | None] = []
+        self.points: list[Point] = []
+
+    def place(self, position: osc.Position) -> int:
+        """Return the number of a place: of a point, or, from -1 down, of a position."""
+        if not is_fixed(position):
+            return -1 - self.add(position)
+        point, aside = self._tables.point(position)
+        if isinstance(point, LanePoint):
+            point = replace(point, aside=self._tables.declared(aside))
+        if point is None:
+            return 0
+        self.points.append(point)
+        return len(self.points) - 1
 
     def add(self, position: osc.Position) -> int:
         """Return a position's number; what cannot be run is taken down."""
@@ -54,6 +87,10 @@ class Positions:
             return self._append(where, ON_LANE, where.s, where.offset or 0.0, spot=spot)
         if isinstance(where, osc.WorldPosition):
             return self._append(where, IN_WORLD, where.x, where.y, heading=where.h)
+        if isinstance(where, osc.RoutePosition) and isinstance(
+            inner := where.in_route_position.position, osc.PositionOfCurrentEntity
+        ):  # where it is on its road
+            return self._append(where, BY_ROAD, 0.0, 0.0, whose=inner.entity_ref)
         if isinstance(where, osc.RoadPosition | osc.RoutePosition):
             return self._append(where, ON_ROAD, 0.0, 0.0, spot=self.spot(position))
         if isinstance(where, osc.RelativeLanePosition):

@@ -1,5 +1,6 @@
 """What a condition looks at: one probe for each triggering entity or element of the storyboard."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.global_actions import GlobalActions
-from bridgegen.simulation.embedded.program import LanePoint, Point
+from bridgegen.simulation.embedded.positions import Positions
 from bridgegen.simulation.embedded.tables import Tables
 from bridgegen.simulation.embedded.values import EQUALITY, seconds
 
@@ -64,6 +65,7 @@ _SYSTEMS = {
     osc.CoordinateSystem.TRAJECTORY: codes.PATH_SYSTEM,
     osc.CoordinateSystem.WORLD: codes.WORLD_SYSTEM,
 }  # fmt: skip
+_ANGLE_SYSTEMS = _SYSTEMS | {osc.CoordinateSystem.ROAD: codes.ROAD_SYSTEM}
 _DIRECTIONS = {
     osc.DirectionalDimension.LONGITUDINAL: codes.LONGITUDINAL,
     osc.DirectionalDimension.LATERAL: codes.LATERAL,
@@ -106,15 +108,21 @@ class Probes:
     Args:
         tables: the compiler's.
         nodes: the storyboard's elements.
-        points: takes the positions that probes name.
+        positions: takes the places that probes name.
         everywhere: knows lights, controllers and values.
+
+    Attributes:
+        marks, clearances, ranges: as `Program` has them.
     """
 
     def __init__(
-        self, tables: Tables, nodes: "Sequence[Node]", points: list[Point],
+        self, tables: Tables, nodes: "Sequence[Node]", positions: Positions,
         everywhere: GlobalActions,
     ) -> None:  # fmt: skip
-        self._tables, self._nodes, self._points = tables, nodes, points
+        self._tables, self._nodes, self._positions = tables, nodes, positions
+        self.marks: list[int] = []
+        self.clearances: list[tuple[int, ...]] = []
+        self.ranges: list[tuple[float, float]] = []
         self._signals, self._values = everywhere.signals, everywhere.values
 
     def by_value(self, condition: Element) -> list[Probe]:
@@ -184,8 +192,15 @@ class Probes:
             case osc.EndOfRoadCondition():
                 return Probe(codes.END_OF_ROAD, limit=one.duration)
             case osc.ReachPositionCondition():
-                rule, place = codes.LESS_EQUAL, self._place(one.position)
-                return Probe(codes.DISTANCE, other=-1, rule=rule, limit=one.tolerance, place=place)
+                where, place = self._place(one.position)
+                return Probe(
+                    codes.DISTANCE, other=where, rule=codes.LESS_EQUAL, limit=one.tolerance,
+                    place=place,
+                )  # fmt: skip
+            case osc.OffroadCondition():
+                return Probe(codes.OFFROAD, limit=one.duration)
+            case osc.RelativeClearanceCondition():
+                return self._clearance(one)
             case osc.CollisionCondition(target=osc.EntityRef() as target):
                 return Probe(codes.COLLISION, other=self._tables.entity(target.entity_ref))
             case osc.CollisionCondition(target=osc.ByObjectType() as target):
@@ -203,30 +218,46 @@ class Probes:
         self._tables.unsupported(one, type(one).__name__)
         return Probe(codes.NEVER_TRUE)
 
-    def _place(self, position: osc.Position) -> int:
-        """Return the number of a place that rows may not vary."""
-        point, aside = self._tables.point(position)
-        if isinstance(point, LanePoint):
-            where = position.position
-            s = self._tables.literal(where, "s", point.s)
-            aside = self._tables.literal(where, "offset", aside)
-            point = replace(point, s=s, aside=aside)
-        if point is None:
-            return 0
-        self._points.append(point)
-        return len(self._points) - 1
+    def _place(self, position: osc.Position) -> tuple[int, int]:
+        """Return of which kind a place is, and its number among those of its kind."""
+        place = self._positions.place(position)
+        if place >= 0:
+            return codes.AT_POINT, place
+        self.marks.append(-1 - place)
+        return codes.AT_MARK, len(self.marks) - 1
+
+    def _clearance(self, one: osc.RelativeClearanceCondition) -> Probe:
+        """Return the probe of a condition on the lanes around an entity."""
+        first = len(self.ranges)
+        for lanes in one.relative_lane_ranges:
+            ends = ((lanes.from_, "from", -math.inf), (lanes.to, "to", math.inf))
+            low, high = (
+                unsaid if end is None else self._tables.literal(lanes, name, end)
+                for end, name, unsaid in ends
+            )
+            if low > high:
+                self._tables.unsupported(lanes, f'from="{low:g}" to="{high:g}" (none between)')
+            self.ranges.append((low, high))
+        named = [e for ref in one.entity_refs for e in self._tables.members(ref.entity_ref)]
+        counts = [int(not named or e in named) for e in range(len(self._tables.names))]
+        opposite = int(self._tables.truth(one.opposite_lanes))
+        self.clearances.append((first, len(self.ranges), opposite, *counts))
+        return Probe(
+            codes.CLEARANCE, other=len(self.clearances) - 1, limit=one.distance_forward or 0.0,
+            within=one.distance_backward or 0.0, freespace=self._tables.truth(one.free_space),
+        )  # fmt: skip
 
     def _pair(self, one: Pair) -> Probe:
         """Return the probe of a condition on a distance to an entity or a place."""
-        other, place = -1, 0
+        place = 0
         if isinstance(one, osc.DistanceCondition):
-            place = self._place(one.position)
+            other, place = self._place(one.position)
         elif isinstance(one, osc.TimeToCollisionCondition):
             target = one.target.target
             if isinstance(target, osc.EntityRef):
                 other = self._tables.entity(target.entity_ref)
             else:
-                place = self._place(target)
+                other, place = self._place(target)
         else:
             other = self._tables.entity(one.entity_ref)
         measure, system = self._measure(one)
@@ -265,14 +296,14 @@ class Probes:
         system = codes.WORLD_SYSTEM
         if one.coordinate_system is not None:
             chosen = self._tables.choice(osc.CoordinateSystem, one.coordinate_system)
-            system = _SYSTEMS[chosen]
-            if isinstance(one, osc.AngleCondition) and chosen is osc.CoordinateSystem.ROAD:
-                self._tables.unsupported(one, 'coordinateSystem="road" of an angle')
+            system = _ANGLE_SYSTEMS[chosen]
         within = one.angle_tolerance
         if isinstance(one, osc.AngleCondition):
             return Probe(codes.ANGLE, limit=one.angle, system=system, within=within)
         other = self._tables.entity(one.entity_ref)
-        return Probe(codes.RELATIVE_ANGLE, other=other, limit=one.angle, within=within)
+        return Probe(
+            codes.RELATIVE_ANGLE, other=other, limit=one.angle, system=system, within=within
+        )
 
     def _element_state(self, one: osc.StoryboardElementStateCondition) -> list[Probe]:
         """Return a probe for each element that bears the name, or ends in the path of names."""

@@ -18,6 +18,15 @@ from bridgegen.ego._weather_columns import FRICTION_SCALE
 from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.simulation.embedded._codes import (
+    ANGLE,
+    CLEARANCE,
+    OFFROAD,
+    PROBE,
+    RELATIVE_ANGLE,
+    ROAD_SYSTEM,
+    SYSTEM,
+)
 
 UNSAID = -1  # the slot of what an environment leaves as it was
 
@@ -194,7 +203,11 @@ class Program:
         probes: ``(·, 11)`` kind, entity, other entity or -1 for a point, rule, slot, point,
             measure, coordinate system, whether between boxes, a second slot, whether it is one
             of those that are seldom asked for.
-        points: positions that probes name.
+        points: places that probes name, which are the same whatever rows and entities do.
+        marks: ``(M,)`` the other places that they name, as positions.
+        clearances: ``(·, 3 + E)`` first and past-the-last range, whether lanes of the other
+            direction count, and by entity whether it counts.
+        ranges: ``(·, 2)`` of lanes to the left, the ends included.
         elements: ``(X, 10)`` of the storyboard: kind, parent, first element after it, start and
             stop trigger, priority, executions at most, first and past-the-last action, event.
         courses: ``(·, 12)`` what a kind of motion along the path needs besides, by kind; ``_codes``
@@ -249,6 +262,9 @@ class Program:
     conditions: Int
     probes: Int
     points: tuple[Point, ...]
+    marks: Int
+    clearances: Int
+    ranges: Float
     elements: Int
     courses: Int
     entries: Int
@@ -280,6 +296,13 @@ class Program:
     fixed: Mapping[str, str]
     event_names: tuple[str, ...] = ()
     noise_key: int | None = None
+
+    @property
+    def looks_at_lanes(self) -> bool:
+        """Whether conditions ask which lanes entities are on, or how these lie on their road."""
+        kinds, systems = self.probes[:, PROBE], self.probes[:, SYSTEM]
+        turns = np.isin(kinds, (ANGLE, RELATIVE_ANGLE)) & (systems == ROAD_SYSTEM)
+        return bool((np.isin(kinds, (OFFROAD, CLEARANCE)) | turns).any())
 
     def changed(self, *, driver: Driver | None = None, dry: bool = False) -> "Program":
         """Return the program with another driver, or with a road that is dry all the time."""

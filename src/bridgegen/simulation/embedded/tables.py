@@ -143,16 +143,6 @@ class Tables:
             return None, 0.0
         return self._on_lane(where), where.offset or 0.0
 
-    def lane_point(self, position: osc.Position, aside: Value = 0.0) -> LanePoint | None:
-        """Return a position on a lane, ``aside`` of its centre; others are not supported."""
-        where = position.position
-        if not isinstance(where, osc.LanePosition):
-            self.unsupported(where, f"{type(where).__name__} here")
-            return None
-        if where.offset not in (None, 0.0, aside):
-            self.unsupported(where, f'offset="{where.offset}" (other than {aside})')
-        return self._on_lane(where)
-
     def _on_lane(self, where: osc.LanePosition) -> LanePoint | None:
         turned = where.orientation
         if turned is not None and any(

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.global_actions import GlobalActions
+from bridgegen.simulation.embedded.positions import Positions
 from bridgegen.simulation.embedded.probes import Probe, Probes
-from bridgegen.simulation.embedded.program import Point
 from bridgegen.simulation.embedded.tables import Tables
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Triggers:
 
     Attributes:
         triggers, groups, conditions, probes: as `Program` has them.
-        points: positions that probes name.
+        looks: makes the probes, and has their tables.
         stop_time: latest simulation time [s] that the first trigger, the scenario's end, names.
     """
 
@@ -43,18 +43,17 @@ class Triggers:
         tables: Tables,
         time_step: float,
         nodes: "Sequence[Node]",
-        points: list[Point],
+        positions: Positions,
         everywhere: GlobalActions,
     ) -> None:
         self.triggers: list[tuple[int, int]] = []
         self.groups: list[tuple[int, int]] = []
         self.conditions: list[tuple[int, ...]] = []
         self.probes: list[tuple[int, ...]] = []
-        self.points = points
         self.stop_time = 0.0
         self._tables = tables
         self._time_step = time_step
-        self._probes = Probes(tables, nodes, self.points, everywhere)
+        self.looks = Probes(tables, nodes, positions, everywhere)
 
     def add(self, trigger: osc.Trigger | None) -> int:
         """Append a trigger and return its number; -1 if it is missing."""
@@ -93,7 +92,7 @@ class Triggers:
             delay = max(math.ceil(seconds / self._time_step - SAME_STEP), 0)
         kind, quantity = condition.condition, codes.ANY
         if isinstance(kind, osc.ByValueCondition):
-            probes = self._probes.by_value(kind.condition)
+            probes = self.looks.by_value(kind.condition)
             if isinstance(kind.condition, osc.SimulationTimeCondition):
                 self._note_end(kind.condition, delay)
         else:
@@ -101,7 +100,7 @@ class Triggers:
             rule = self._tables.choice(osc.TriggeringEntitiesRule, who.triggering_entities_rule)
             quantity = _QUANTITIES[rule]
             entities = [e for ref in who.entity_refs for e in self._tables.members(ref.entity_ref)]
-            probes = self._probes.by_entity(kind.entity_condition.condition, entities)
+            probes = self.looks.by_entity(kind.entity_condition.condition, entities)
         if len(self._tables.problems) > known or not probes:
             probes, quantity = [Probe(codes.NEVER_TRUE)], codes.ANY
         first = len(self.probes)

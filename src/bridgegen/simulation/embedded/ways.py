@@ -83,7 +83,7 @@ class Ways:
                     who = f"route of '{program.names[number]}'"
                 raise InputError(f"{program.place}: {who}: {error}") from None
         self.spots = np.full((len(program.spots), 4), np.nan)
-        if len(program.laterals) or len(program.spots):
+        if len(program.laterals) or len(program.spots) or program.looks_at_lanes:
             self.plan(0, LANES)
             self._check_lane_changes()
             self._find_spots()
