@@ -158,7 +158,7 @@ def _print_metrics(values: Mapping[str, float]) -> None:
     width = max(len(name) for name in values)
     for name, value in values.items():
         unit = METRICS[name].unit
-        print(f"{name:<{width}}  {value!r}{'' if unit == '1' else ' ' + unit}")
+        print(f"{name:<{width}}  {value:.6g}{'' if unit == '1' else ' ' + unit}")
 
 
 def _finite(values: Mapping[str, float]) -> dict[str, float | None]:
