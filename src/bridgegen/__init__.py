@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, resume, run_search
     from bridgegen.odd.reader import load
-    from bridgegen.pipeline import simulate_file
+    from bridgegen.simulate import simulate_file
 
 __all__ = ["Run", "load", "resume", "run_search", "simulate_file"]
 
@@ -19,7 +19,7 @@ _HOMES = {
     "load": "bridgegen.odd.reader",
     "resume": "bridgegen.campaign",
     "run_search": "bridgegen.campaign",
-    "simulate_file": "bridgegen.pipeline",
+    "simulate_file": "bridgegen.simulate",
 }
 
 

@@ -8,7 +8,6 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -18,20 +17,15 @@ from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause, Counterfactual, causes, require
-from bridgegen.errors import FileFormatError, InputError
+from bridgegen.errors import InputError
 from bridgegen.objective import CLASSIFYING, Objective, Thresholds, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
-from bridgegen.openx.convert import roads_of
 from bridgegen.openx.opendrive.road_map import RoadMap
-from bridgegen.openx.openscenario import validate as openscenario_validate
-from bridgegen.openx.openscenario.declarations import CAUSE
-from bridgegen.openx.openscenario.model import OpenScenario
-from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.source import ConcreteScenario, Source, source_of
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+from bridgegen.simulation.rollout import Rollout
 from bridgegen.simulation.simulator import Simulator
 
 T = TypeVar("T")
@@ -300,88 +294,3 @@ def metrics_of(
     """
     terms = (term.metric for term in scenario.objective.terms)
     return measures.to_record(driver, (*terms, *CLASSIFYING, *also))
-
-
-@dataclass(frozen=True)
-class FileResult:
-    """What one scenario file came to.
-
-    Attributes:
-        driver: who drove the ego.
-        status: "ok", or why there is no result.
-        seconds: simulated until the stop trigger fired [s].
-        parameters: the file's numeric parameters.
-        metrics: by name, in the metric's unit.
-        rollout: the motion, N = 1.
-        cause: what the search that handed the file over found its harm put down to, as its header
-            says; None where it says nothing, or another driver than the file's drives.
-    """
-
-    driver: str
-    status: str
-    seconds: float
-    parameters: Mapping[str, float]
-    metrics: Mapping[str, float]
-    rollout: Rollout
-    cause: str | None = None
-
-
-def simulate_file(
-    path: Path,
-    *,
-    ego: str | None = None,
-    ideal: Iterable[str] | None = None,
-    time_limit: float | None = None,
-    metrics: Sequence[str] | None = None,
-    time_step: float | None = None,
-    skipped: list[str] | None = None,
-) -> FileResult:
-    """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
-
-    Args:
-        path: the ``.xosc`` file.
-        ego: the ego's driver; what the file's controller says by default.
-        ideal: stages of the driver to be ideal; what the file's controller says by default, none
-            with another ``ego``.
-        time_limit: [s] that one call of a user's own driver may take.
-        metrics: names; all that the driver gives rise to by default.
-        time_step: [s]; what the file's header says by default.
-        skipped: takes a sentence for each thing that is not supported, which is left out then
-            instead of refused, with the event, action, entity or condition group around it.
-
-    Raises:
-        InputError: a time step out of range, or a stage that the driver has not.
-        FileFormatError: a file is missing, malformed or inconsistent.
-        UnsupportedError: an element that the simulator cannot run, by name and line.
-        UnknownNameError: no such driver, stage or metric.
-    """
-    driver = egos.get(ego, time_limit=time_limit) if ego else None
-    scenario = read_scenario(path, skipped=skipped)
-    roads = roads_of(scenario, path)
-    problems = openscenario_validate.problems(scenario, roads)
-    if problems:
-        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    simulator = EmbeddedSimulator(
-        scenario, str(path), driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
-    )
-    held = measures.held_by(simulator.program.driver)
-    names = measures.existing(tuple(measures.METRICS), held)
-    if metrics:
-        names = measures.require(metrics, held, f"the driver '{simulator.driver}'")
-    rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
-    values = measures.evaluate(rollout, names)[0]
-    return FileResult(
-        driver=simulator.driver,
-        status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
-        seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
-        parameters=simulator.parameters,
-        metrics=dict(zip(names, values.tolist(), strict=True)),
-        rollout=rollout,
-        cause=_stated_cause(scenario) if ego is None and ideal is None else None,
-    )
-
-
-def _stated_cause(scenario: OpenScenario) -> str | None:
-    properties = scenario.file_header.properties
-    stated = properties.get(CAUSE) if properties else None
-    return None if stated is None else str(stated)

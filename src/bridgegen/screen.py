@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bridgegen.metrics.measure import Measured
     from bridgegen.odd.coverage import Coverage, ParameterBins
     from bridgegen.odd.scenario import ParameterLine
-    from bridgegen.pipeline import FileResult
+    from bridgegen.simulate import FileResult
 
 _STAGES = {
     "compile": "compiling",

@@ -7,7 +7,8 @@ import bridgegen as bg
 from bridgegen.campaign.handover import write_scenario
 from bridgegen.campaign.validate import validate_file
 from bridgegen.odd.reader import load, names
-from bridgegen.pipeline import Pipeline, simulate_file
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import simulate_file
 from bridgegen.store import Store
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from bridgegen import campaign
 from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.pipeline import simulate_file
+from bridgegen.simulate import simulate_file
 from bridgegen.store import Store
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"

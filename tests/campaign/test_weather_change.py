@@ -9,7 +9,8 @@ from bridgegen.odd.reader import load
 from bridgegen.odd.starter import start_scenario
 from bridgegen.ontology.files import load as load_owl
 from bridgegen.ontology.questions import ask
-from bridgegen.pipeline import Pipeline, simulate_file
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import simulate_file
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ from bridgegen.openx.convert import roads_of
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.to_owl.scenario import individuals_from_openscenario
-from bridgegen.pipeline import Pipeline, simulate_file
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import simulate_file
 
 
 def test_stages_are_told_in_the_order_of_the_work() -> None:

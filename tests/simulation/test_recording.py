@@ -15,7 +15,8 @@ from bridgegen.cli import main
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, UnknownNameError
 from bridgegen.metrics.measure import measure_recording
 from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline, simulate_file
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import simulate_file
 from bridgegen.simulation import recording as module
 from bridgegen.simulation.recording import boxes_of, read_recording
 from bridgegen.simulation.trace import write_trace

@@ -9,7 +9,8 @@ from bridgegen.campaign.handover import write_scenario
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline, simulate_file
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import simulate_file
 from bridgegen.simulation.trace import COLUMNS, MORE, write_trace
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from bridgegen.campaign.handover import FOLDER
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import FileFormatError, InputError, StorageError, UnknownNameError
-from bridgegen.openx.convert import roads_of
+from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
 from bridgegen.openx.openscenario.declarations import DRIVER, NOISE_KEY
@@ -20,7 +20,7 @@ from bridgegen.openx.openscenario.resolve import resolved
 from bridgegen.openx.openscenario.versions import VERSIONS, to_version
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.xml import read_bytes
-from bridgegen.pipeline import simulate_file
+from bridgegen.simulate import simulate_file
 from bridgegen.store import Store
 
 EXPORT = "export"

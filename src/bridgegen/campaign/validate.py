@@ -8,8 +8,9 @@ from bridgegen.ontology import reasoner
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.convert import roads_of, scenario_of
+from bridgegen.openx.convert import scenario_of
 from bridgegen.openx.file_scenario import load_file_scenario
+from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.openx.openscenario import read as openscenario_read

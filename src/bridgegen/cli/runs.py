@@ -215,8 +215,8 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
-    from bridgegen.pipeline import simulate_file
     from bridgegen.screen import print_file_result
+    from bridgegen.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
 
     stages = None if ideal is None else split(ideal)

@@ -3,28 +3,25 @@
 import os
 from pathlib import Path
 
-from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.odd.reader import names as scenario_names
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
+from bridgegen.openx.logic_file import logic_file, roads_of
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import write as opendrive_write
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import digest_of
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.to_owl.losses import losses
-from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
-from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
-from bridgegen.openx.openscenario.values import ParameterRef
 from bridgegen.openx.xml import read_bytes
 
 
@@ -129,26 +126,3 @@ def scenario_of(individuals: Individuals) -> LogicalScenario | None:
             for name in individuals.texts(one, "has_name")}  # fmt: skip
     known = said.intersection(scenario_names())
     return load_scenario(known.pop()) if len(said) == len(known) == 1 else None
-
-
-def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
-    """Read the map that a scenario file names.
-
-    Raises:
-        FileFormatError: it names none, or the map cannot be read.
-    """
-    return opendrive_read.read(path.parent / logic_file(scenario, path))
-
-
-def logic_file(scenario: OpenScenario, path: Path) -> str:
-    """Return the path of the map that a scenario file names, as it does.
-
-    Raises:
-        FileFormatError: it names none.
-    """
-    named = scenario.road_network.logic_file
-    if named is None:
-        raise FileFormatError(f"{path}: RoadNetwork needs a LogicFile, the OpenDRIVE map")
-    if isinstance(named.filepath, ParameterRef):
-        return str(parameters.values(scenario)[named.filepath.name])
-    return named.filepath

@@ -15,7 +15,7 @@ from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.convert import logic_file
+from bridgegen.openx.logic_file import logic_file
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario import distributions as dst

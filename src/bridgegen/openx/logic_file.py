@@ -1,0 +1,33 @@
+"""The OpenDRIVE map that an OpenSCENARIO file names."""
+
+from pathlib import Path
+
+from bridgegen.errors import FileFormatError
+from bridgegen.openx.opendrive import read as opendrive_read
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.values import ParameterRef
+
+
+def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
+    """Read the map that a scenario file names.
+
+    Raises:
+        FileFormatError: it names none, or the map cannot be read.
+    """
+    return opendrive_read.read(path.parent / logic_file(scenario, path))
+
+
+def logic_file(scenario: OpenScenario, path: Path) -> str:
+    """Return the path of the map that a scenario file names, as it does.
+
+    Raises:
+        FileFormatError: it names none.
+    """
+    named = scenario.road_network.logic_file
+    if named is None:
+        raise FileFormatError(f"{path}: RoadNetwork needs a LogicFile, the OpenDRIVE map")
+    if isinstance(named.filepath, ParameterRef):
+        return str(parameters.values(scenario)[named.filepath.name])
+    return named.filepath

@@ -1,0 +1,106 @@
+"""One scenario file, whoever wrote it: read, rolled out and measured.
+
+The stages are the pipeline's; of its search, nothing is imported here, for this must start fast.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen import ego as egos
+from bridgegen import metrics as measures
+from bridgegen.errors import FileFormatError
+from bridgegen.openx.logic_file import roads_of
+from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+
+
+@dataclass(frozen=True)
+class FileResult:
+    """What one scenario file came to.
+
+    Attributes:
+        driver: who drove the ego.
+        status: "ok", or why there is no result.
+        seconds: simulated until the stop trigger fired [s].
+        parameters: the file's numeric parameters.
+        metrics: by name, in the metric's unit.
+        rollout: the motion, N = 1.
+        cause: what the search that handed the file over found its harm put down to, as its header
+            says; None where it says nothing, or another driver than the file's drives.
+    """
+
+    driver: str
+    status: str
+    seconds: float
+    parameters: Mapping[str, float]
+    metrics: Mapping[str, float]
+    rollout: Rollout
+    cause: str | None = None
+
+
+def simulate_file(
+    path: Path,
+    *,
+    ego: str | None = None,
+    ideal: Iterable[str] | None = None,
+    time_limit: float | None = None,
+    metrics: Sequence[str] | None = None,
+    time_step: float | None = None,
+    skipped: list[str] | None = None,
+) -> FileResult:
+    """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
+
+    Args:
+        path: the ``.xosc`` file.
+        ego: the ego's driver; what the file's controller says by default.
+        ideal: stages of the driver to be ideal; what the file's controller says by default, none
+            with another ``ego``.
+        time_limit: [s] that one call of a user's own driver may take.
+        metrics: names; all that the driver gives rise to by default.
+        time_step: [s]; what the file's header says by default.
+        skipped: takes a sentence for each thing that is not supported, which is left out then
+            instead of refused, with the event, action, entity or condition group around it.
+
+    Raises:
+        InputError: a time step out of range, or a stage that the driver has not.
+        FileFormatError: a file is missing, malformed or inconsistent.
+        UnsupportedError: an element that the simulator cannot run, by name and line.
+        UnknownNameError: no such driver, stage or metric.
+    """
+    driver = egos.get(ego, time_limit=time_limit) if ego else None
+    scenario = read_scenario(path, skipped=skipped)
+    roads = roads_of(scenario, path)
+    problems = openscenario_validate.problems(scenario, roads)
+    if problems:
+        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
+    simulator = EmbeddedSimulator(
+        scenario, str(path), driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
+    )
+    held = measures.held_by(simulator.program.driver)
+    names = measures.existing(tuple(measures.METRICS), held)
+    if metrics:
+        names = measures.require(metrics, held, f"the driver '{simulator.driver}'")
+    rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
+    values = measures.evaluate(rollout, names)[0]
+    return FileResult(
+        driver=simulator.driver,
+        status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
+        seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
+        parameters=simulator.parameters,
+        metrics=dict(zip(names, values.tolist(), strict=True)),
+        rollout=rollout,
+        cause=_stated_cause(scenario) if ego is None and ideal is None else None,
+    )
+
+
+def _stated_cause(scenario: OpenScenario) -> str | None:
+    properties = scenario.file_header.properties
+    stated = properties.get(CAUSE) if properties else None
+    return None if stated is None else str(stated)
