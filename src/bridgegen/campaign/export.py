@@ -9,7 +9,7 @@ from pathlib import Path
 from bridgegen.campaign.handover import FOLDER
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import FileFormatError, InputError, StorageError, UnknownNameError
-from bridgegen.openx.logic_file import roads_of
+from bridgegen.openx.logic_file import logic_file, roads_of
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
 from bridgegen.openx.openscenario.declarations import DRIVER, NOISE_KEY
@@ -85,9 +85,7 @@ def _export(path: Path, flavour: Flavour, folder: Path) -> list[Path]:
     roads = roads_of(scenario, path)
     if problems := validate.problems(scenario, roads):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    logic_file = scenario.road_network.logic_file
-    assert logic_file is not None  # roads_of has read it
-    road_map = path.parent / str(logic_file.filepath)
+    road_map = path.parent / logic_file(scenario, path)
     made = _moved(flavour(scenario, path), path, road_map.name, folder)
     files = {folder / path.name: to_xml(made), folder / road_map.name: read_bytes(road_map)}
     try:

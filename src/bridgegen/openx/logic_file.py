@@ -4,18 +4,20 @@ from pathlib import Path
 
 from bridgegen.errors import FileFormatError
 from bridgegen.openx.opendrive import read as opendrive_read
-from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.values import ParameterRef
 
 
 def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
-    """Read the map that a scenario file names.
+    """Read the map that a scenario file names; one without roads where it names none.
 
     Raises:
-        FileFormatError: it names none, or the map cannot be read.
+        FileFormatError: the map cannot be read.
     """
+    if scenario.road_network.logic_file is None:
+        return OpenDrive(Header(1, 7))
     return opendrive_read.read(path.parent / logic_file(scenario, path))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bridgegen.errors import InputError
+from bridgegen.pipeline import simulate_file
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 from .storyboards import (
@@ -361,3 +362,24 @@ def test_an_ego_with_a_driver_needs_a_lane():
     assert rollout.status[0] != 0
     assert "lane" in STATUS_MESSAGES[int(rollout.status[0])]
     assert rollout.n_steps[0] == round(1.0 / DT) + 1
+
+
+NOWHERE = """<OpenDRIVE><header revMajor="1" revMinor="7"/></OpenDRIVE>"""
+
+
+@pytest.mark.parametrize("network", ["", '<LogicFile filepath="map.xodr"/>'])
+def test_without_roads_everybody_goes_by_the_world(tmp_path, network):
+    """A file may name no map, or one without roads: ahead is where a body's nose points."""
+    ahead = position("WorldPosition", x=10, y=20, h=math.pi / 2)
+    privates = start("ego", ahead, 2.0) + start("bv", position("WorldPosition", x=0, y=0), 0.0)
+    text = scenario(("ego", "bv"), privates)
+    (tmp_path / "map.xodr").write_text(NOWHERE)
+    file = tmp_path / "s.xosc"
+    file.write_text(text.replace('<LogicFile filepath="map.xodr"/>', network))
+    rollout = simulate_file(file).rollout
+    assert rollout.status[0] == 0
+    assert rollout.x[0, 0] == pytest.approx(10.0)
+    assert rollout.y[0, 0, 200] == pytest.approx(40.0)
+    file.write_text(text.replace("map.xodr", "none.xodr"))
+    with pytest.raises(InputError, match=r"none\.xodr: cannot be read"):
+        simulate_file(file)

@@ -254,6 +254,15 @@ def test_a_place_by_somebody_who_is_not_there_ends_the_row():
     assert scene(gone, come, privates=LATER).status[0] == 6
 
 
+def test_who_comes_back_may_count_from_where_it_went():
+    """bv goes after 1 s, 85 m from the junction, and comes back 20 m nearer to it."""
+    own = """<Position><RelativeLanePosition entityRef="bv" dLane="0" dsLane="20"/></Position>"""
+    come = ("come", (add("bv", own),), after(3.0))
+    rollout = scene(("gone", (delete("bv"),), after(1.0)), come)
+    assert rollout.y[0, 1, 20] - rollout.y[0, 1, 60] == pytest.approx(20.0)
+    assert scene(come, privates=LATER).status[0] == 6  # it has never been anywhere
+
+
 def test_who_is_never_there_is_a_mistake():
     with pytest.raises(InputError, match="'bv' needs an initial TeleportAction, or an AddEntity"):
         scene(privates=LATER)

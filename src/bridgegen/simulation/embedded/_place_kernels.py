@@ -287,8 +287,9 @@ def put(e, c, k, plan, roads, state, record):
     Where it is then, ``place_pose`` tells. It keeps its route.
     """
     kind, other = plan.places[c, PLACE_KIND], plan.places[c, WHOSE]
-    if other >= 0 and not state.present[other]:
-        fail(NOT_THERE, state)
+    is_there = other < 0 or state.present[other]
+    if not is_there and not (other == e and record.present[e, :k].any()):
+        fail(NOT_THERE, state)  # who comes back may count from where it went
         return
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)

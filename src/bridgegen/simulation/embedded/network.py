@@ -74,6 +74,7 @@ class Network:
         counts = _numbers([[len(path.table) for path in each.paths] for each in ways])
         steps = padded([[np.full((1, 1), path.step) for path in each.paths] for each in ways], 1)
         lanes = [each.lanes for each in ways]
+        known = int(any(lanes))  # that there are none is known, too
         grounds = [
             each.lanes.graph.ground if each.lanes and each.has_ground else NO_GROUND
             for each in ways
@@ -95,8 +96,10 @@ class Network:
             spots=np.array([each.spots for each in ways]),
             timetables=padded([each.timetables for each in ways], 10),
             timetable_counts=_numbers([list(map(len, each.timetables)) for each in ways]),
-            nodes=_stacked([each.nodes if each else np.empty((0, 7), np.int64) for each in lanes]),
-            ends=_stacked([each.graph.ends if each else np.empty((0, 2)) for each in lanes]),
+            nodes=_stacked(
+                [each.nodes if each else np.empty((0, 7), np.int64) for each in lanes], known
+            ),
+            ends=_stacked([each.graph.ends if each else np.empty((0, 2)) for each in lanes], known),
             ways=np.stack(
                 [
                     np.pad(
@@ -183,9 +186,9 @@ def _numbers(rows: Sequence[Sequence[int]]) -> Int:
     return whole
 
 
-def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:
+def _stacked(tables: Sequence[np.ndarray], least: int = 0) -> np.ndarray:
     """Return tables as one array; shorter ones are filled up with rows of -1: nobody's."""
-    longest = max(map(len, tables))
+    longest = max(least, *map(len, tables))
     return np.stack(
         [
             np.concatenate([one, np.full((longest - len(one), *one.shape[1:]), -1, one.dtype)])
