@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bridgegen.errors import InputError
-from bridgegen.pipeline import simulate_file
+from bridgegen.simulate import simulate_file
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 from .storyboards import (

@@ -41,7 +41,7 @@ from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, sto
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k: a branch per kind; what is over at once says so."""
     kind = plan.actions[j, 1]
-    steers_ego = kind in (LANE_CHANGE, LANE_OFFSET, FOLLOW) and plan.actions[j, 0] == 0
+    steers_ego = kind in (LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE, FOLLOW) and plan.actions[j, 0] == 0
     in_vain = steers_ego and is_steered(plan, state)  # its driver does
     if in_vain or (plan.comes_and_goes and is_pointless(j, plan, state)):
         state.action_ended[j] = True
