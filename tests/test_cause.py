@@ -125,3 +125,48 @@ def test_only_the_cause_that_is_asked_for_counts_and_F_is_as_ever():
     assert (some.F == all_of_them.F).all()
     assert (some.critical == (all_of_them.cause == Cause.PLANNING)).all()
     assert 0 < some.critical.sum() < all_of_them.critical.sum()
+
+
+CLEAR = {
+    "fog_density": 0.0,
+    "precipitation": 0.0,
+    "cloudiness": 0.0,
+    "wind_intensity": 0.0,
+    "sun_altitude_angle": 20.0,
+}
+
+
+def test_what_the_reference_does_not_see_in_thick_fog_is_perception_s_fault():
+    scenario = load("left-across-path")
+    space, moving = scenario.space(), scenario.space(axes=("participants",))
+    pipeline = Pipeline(scenario, space, ego="reference", seek_causes=True)
+    seeing = Pipeline(scenario, space, ego="reference", ideal=("perception",))
+    for one in (pipeline, seeing):
+        one.choose_objective()
+    # The same participants in both weathers, none faster than the fog allows.
+    same = [
+        {name: min(value, 7.0) if name.endswith("speed") else value for name, value in row.items()}
+        for row in (
+            {name: value for name, value in moving.values(x).items() if name in moving.variables}
+            for x in moving.decode(np.random.default_rng(2).random((400, moving.n_var)))
+        )
+    ]
+    clear = np.array([space.row({**row, **CLEAR}) for row in same])
+    fog = np.array([space.row({**row, **CLEAR, "fog_density": 95.0}) for row in same])
+    in_clear, in_fog = pipeline.evaluate(clear).cause, pipeline.evaluate(fog).cause
+    by_perception = in_fog == Cause.PERCEPTION
+    assert by_perception.sum() >= 8
+    assert by_perception.sum() > 0.8 * (in_fog != Cause.NONE).sum()
+    assert (in_clear != Cause.NONE).sum() <= 2
+    assert not seeing.evaluate(fog[by_perception]).critical.any()
+
+
+def test_the_reference_s_harm_has_every_cause():
+    found = set()
+    for name in ("jam-tail-in-fog", "crossroads-s3"):
+        scenario = load(name)
+        pipeline = Pipeline(scenario, scenario.space(), ego="reference", seek_causes=True)
+        pipeline.choose_objective()
+        rows = np.random.default_rng(11).random((120, pipeline.space.n_var))
+        found |= set(pipeline.evaluate(pipeline.space.decode(rows)).cause.tolist())
+    assert found == set(Cause)

@@ -14,12 +14,12 @@ from bridgegen.ego._caution_kernels import careful_speed, safe_speed
 from bridgegen.ego._control_kernels import EMERGENCY_JERK, JERK, SIZE, actuate
 from bridgegen.ego._emergency_kernels import boxes_meet, must_brake
 from bridgegen.ego._following_kernels import follow, idm, keep_distance, stop_for
-from bridgegen.ego._lights_kernels import stop_at_lights
+from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._prediction_kernels import LOST, PASSAGE, add_straight, predict
 from bridgegen.ego._shift_kernels import UNSHIFTED as STAYS
 from bridgegen.ego._speed_kernels import bend_speed, limit_speed, sight_speed
 from bridgegen.ego._surroundings_kernels import AROUND, surround
-from bridgegen.ego._yielding_kernels import find_zone, time_to, yield_to_all
+from bridgegen.ego._yielding_kernels import coming, find_zone, time_to, yield_to_all
 from bridgegen.simulation.boxes import box_distance
 
 DS = 0.5
@@ -165,6 +165,17 @@ def test_yellow_is_a_dilemma_decided_once() -> None:
     assert stops(YELLOW, 16.0, 10.0, since=0)
 
 
+def test_a_stop_sign_is_halted_at_once_and_then_left_behind() -> None:
+    lines = np.array([50.0, 120.0])
+    assert stop_at_signs(lines, 10.0, 3.65, 8.0, 0.0) == (math.inf, 0.0)  # not urgent
+    asked, halted = stop_at_signs(lines, 36.35, 3.65, 8.0, 0.0)
+    assert asked == pytest.approx(-(8.0**2) / (2.0 * 8.5))  # v²/2s, 1.5 m before the line
+    assert halted == 0.0
+    assert stop_at_signs(lines, 44.8, 3.65, 0.1, 0.0) == (math.inf, 50.0)
+    assert stop_at_signs(lines, 44.9, 3.65, 1.0, 50.0) == (math.inf, 50.0)  # the next is far
+    assert stop_at_signs(lines, 47.0, 3.65, 6.0, 0.0)[1] == 0.0  # past the line
+
+
 # -- yielding --------------------------------------------------------------------------------------
 
 
@@ -188,30 +199,68 @@ def test_a_zone_is_where_two_bodies_would_be_too_near() -> None:
     assert math.isinf(apart[0])
 
 
-def passage(zone: Float, q: float, w: float) -> Float:
-    return np.array([[*zone, q, w, 2.25, 2.25, 1.0]])
+def passage(zone: Float, q: float, w: float, gain: float = 0.0, rank: int = 0) -> Float:
+    return np.array([[*zone, q, w, 2.25, 2.25, 1.0, gain, rank]])
 
 
 def test_who_comes_first_goes_first() -> None:
     zone = crossing()[2]
-    first = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 30.0, 10.0), 1)
+    first = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, passage(zone, 30.0, 10.0), 1)
     assert first < 0.0  # it is 20 m away, as the ego is
-    late = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 0.0, 5.0), 1)
+    late = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, passage(zone, 0.0, 5.0), 1)
     assert late == math.inf  # 10 s away: the ego has passed
-    gone = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 80.0, 10.0), 1)
+    gone = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, passage(zone, 80.0, 10.0), 1)
     assert gone == math.inf
-    standing = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 30.0, 0.0), 1)
+    standing = yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, passage(zone, 30.0, 0.0), 1)
     assert standing == math.inf
-    blocking = yield_to_all(35.0, 10.0, 10.0, 3.65, 0.85, STAYS, passage(zone, 50.0, 0.0), 1)
+    blocking = yield_to_all(35.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, passage(zone, 50.0, 0.0), 1)
     assert blocking < 0.0
+
+
+def test_who_speeds_up_comes_sooner_and_who_brakes_leaves_later() -> None:
+    assert coming(8.0, 2.0, 2.0) == pytest.approx(2.0)  # 2·2 + ½·2·2²
+    assert coming(14.0, 2.0, 2.0) == pytest.approx(3.0)  # then 6 m/s
+    assert coming(3.0, 2.0, 2.0) == pytest.approx(1.0)
+    assert coming(6.0, 4.0, -1.0) == pytest.approx(2.0)  # 4·2 − ½·2²
+    assert coming(-5.0, 2.0, 2.0) == coming(-5.0, 2.0, 0.0) == -2.5
+    zone = crossing()[2]
+
+    def asked(q: float, w: float, gain: float) -> float:
+        one = passage(zone, q, w, gain)
+        return float(yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, one, 1))
+
+    assert asked(20.0, 4.0, 0.0) == math.inf  # 6.2 s away
+    assert asked(20.0, 4.0, 3.0) < 0.0
+    assert asked(20.0, 4.0, 0.9) == math.inf  # may be noise
+
+
+def test_signs_say_who_goes_first_and_margins_follow() -> None:
+    zone = crossing()[2]
+
+    def asked(q: float, rank: int) -> float:
+        one = passage(zone, q, 10.0, 0.0, rank)
+        return float(yield_to_all(20.0, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, one, 1))
+
+    assert asked(12.0, 0) < 0.0
+    assert asked(12.0, 1) == math.inf  # 1.5 m/s² stop it before the conflict
+    assert asked(25.0, 1) < 0.0  # it can no longer stop comfortably: better not to insist
+    waits = {rank: min(q for q in range(-40, 30) if asked(q, rank) < 0.0) for rank in (0, -1)}
+    assert waits[0] - waits[-1] == pytest.approx(0.5 * 10.0, abs=1.0)  # half a second more
+
+
+def test_who_can_no_longer_stop_before_a_conflict_goes_on() -> None:
+    zone, other = crossing()[2], 30.0
+    for s, stays in ((20.0, True), (zone[0] - 3.65 - 6.0, False)):
+        asked = yield_to_all(s, 10.0, 10.0, 3.65, 0.85, STAYS, GRIP, passage(zone, other, 10.0), 1)
+        assert (asked < 0.0) == stays
 
 
 def test_one_does_not_wait_in_somebody_elses_way() -> None:
     near, far = np.array([40.0, 46.0, 40.0, 46.0, 0.0]), np.array([47.0, 52.0, 47.0, 52.0, 0.0])
     only = passage(far, 37.0, 5.0)
     both = np.concatenate([only, passage(near, 0.0, 2.0)])
-    before_far = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, only, 1)
-    before_near = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, both, 2)
+    before_far = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, GRIP, only, 1)
+    before_near = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, GRIP, both, 2)
     assert before_far == pytest.approx(stop_for(47.0 - 33.65, 6.0))
     assert before_near == pytest.approx(stop_for(40.0 - 33.65, 6.0))
 
@@ -233,14 +282,14 @@ def test_somebody_on_foot_is_expected_straight_ahead() -> None:
     path = line(0.0, 0.0, 0.0, 100.0)
     tracks = tracked((40.0, -6.0, math.pi / 2, 1.5, kinds.PEDESTRIAN))
     passages = np.zeros((4, PASSAGE))
-    assert add_straight(path, len(path), DS, 0.0, 90.0, 1.9, tracks[1], 1, passages, 0) == 1
+    assert add_straight(path, len(path), DS, 0.0, 90.0, 1.9, tracks[1], 1, 0.0, passages, 0) == 1
     enter, leave, other_enter, other_leave, merges, q, w = passages[0, :7]
     assert 0.5 * (enter + leave) == pytest.approx(40.0, abs=0.1)
     assert 0.5 * (other_enter + other_leave) == pytest.approx(6.0, abs=0.1)
     assert (merges, q) == (0.0, 0.0)
     assert w == pytest.approx(1.5)
     tracks[1, track.VY] = -1.5  # walks away
-    assert add_straight(path, len(path), DS, 0.0, 90.0, 1.9, tracks[1], 1, passages, 0) == 0
+    assert add_straight(path, len(path), DS, 0.0, 90.0, 1.9, tracks[1], 1, 0.0, passages, 0) == 0
 
 
 def test_a_vehicle_is_expected_on_the_ways_that_it_is_on() -> None:
@@ -253,8 +302,8 @@ def test_a_vehicle_is_expected_on_the_ways_that_it_is_on() -> None:
     for y, expected in ((-48.0, 2), (-20.0, 1)):
         tracks = tracked((50.0, y, math.pi / 2, 8.0, kinds.CAR))
         count = predict(
-            own, len(own), DS, 0.0, 90.0, 1.9, tracks, True, ways, counts, steps, zones,
-            np.array([0, 0, 2]), feet, passages,
+            own, len(own), DS, 0.0, 90.0, 1.9, tracks, np.zeros((2, AROUND)), True, ways, counts,
+            steps, zones, np.zeros(2, np.int64), np.array([0, 0, 2]), feet, passages,
         )  # fmt: skip
         assert count == expected
         assert passages[0, 5] == pytest.approx(y + 50.0)

@@ -1,9 +1,9 @@
-"""Traffic lights: to stop before the line, or to go on at yellow because one no longer can."""
+"""Traffic lights and stop signs: where to stop, or to go on at yellow because one no longer can."""
 
 import math
 
 from bridgegen.compiled import kernel
-from bridgegen.ego._following_kernels import STOP_MARGIN
+from bridgegen.ego._following_kernels import STOP_MARGIN, stop_for
 
 RED, RED_YELLOW, YELLOW = 1, 2, 3
 """As `Rollout.lights` has them."""
@@ -12,6 +12,26 @@ YELLOW_DECELERATION = 3.0  # m/s²; who would need more at the onset of yellow g
 # Traffic Signal Timing Manual, 3.0 m/s² (10 ft/s²)
 COMMITTED = 8.0  # m/s²; who would need more than this for a red light is past stopping
 BRAKE_FROM = 1.5  # m/s², it brakes for a light once that needs this much
+
+
+HALTED = 0.3  # m/s, below which it has come to a halt
+
+
+@kernel
+def stop_at_signs(stations, s, front, v, halted):
+    """Return (acceleration [m/s²] that stop signs ask for or +inf, where it has halted last [m]).
+
+    ``stations`` are those of their lines on the ego's route [m]; at ``halted`` and before, it has
+    stopped already.
+    """
+    for i in range(stations.shape[0]):
+        distance = stations[i] - s - front
+        if stations[i] <= halted or distance < 0.0:
+            continue
+        if v < HALTED and distance < STOP_MARGIN + 1.0:
+            return math.inf, stations[i]
+        return stop_for(distance, v), halted
+    return math.inf, halted
 
 
 @kernel

@@ -2,10 +2,11 @@
 
 A passage is a row of `PASSAGE` numbers: a conflict zone (five, see ``_yielding_kernels``), then the
 track's station on its way [m], its speed along it [m/s], how far its body reaches ahead of and
-behind that station [m], and the track. The planner reads passages, whoever predicted them.
+behind that station [m], the track, how its speed changes [m/s²], and who waits for whom
+(``right_of_way``). The planner reads passages, whoever predicted them.
 
 - A vehicle is expected on every way that the map offers from where it came, as long as it is on
-  that way, at the speed that was measured.
+  that way, at the speed that was measured, which goes on changing for a while as it did.
 - Who is on no such way (on foot, on a bicycle, off the lanes) is expected straight ahead.
 - The ideal prediction knows everybody's true way, and the one that a lane change leads to.
 """
@@ -14,12 +15,14 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import COS, SIN, X, Y, project
-from bridgegen.ego._surroundings_kernels import BEHIND
+from bridgegen.ego._surroundings_kernels import BEHIND, QUICKENING
 from bridgegen.ego._tracking_kernels import CONFIRMED, KIND, LENGTH, STATE, VX, VY, WIDTH, H
 from bridgegen.ego._tracking_kernels import X as TRACK_X
 from bridgegen.ego._tracking_kernels import Y as TRACK_Y
 from bridgegen.ego._yielding_kernels import (
     FRONT,
+    GAIN,
+    RANK,
     REAR,
     SIDE_MARGIN,
     SPEED,
@@ -29,7 +32,7 @@ from bridgegen.ego._yielding_kernels import (
 )
 from bridgegen.ego.kinds import ANIMAL, BICYCLE, PEDESTRIAN
 
-PASSAGE = 10
+PASSAGE = 12
 
 OFF_WAY = 2.0  # m beside a way's centre, or …
 TURNED = 0.6  # rad off its heading, a vehicle is not on it
@@ -64,7 +67,7 @@ def locate_on_way(way, n, ds, guess, x, y, h):
 
 
 @kernel
-def add_passage(passages, count, zone, q, w, half, e):
+def add_passage(passages, count, zone, q, w, half, e, gain, rank):
     """Append a passage; return how many there are."""
     if count == passages.shape[0]:
         return count
@@ -73,11 +76,12 @@ def add_passage(passages, count, zone, q, w, half, e):
     passages[count, STATION], passages[count, SPEED] = q, w
     passages[count, FRONT] = passages[count, REAR] = half
     passages[count, WHO] = e
+    passages[count, GAIN], passages[count, RANK] = gain, rank
     return count + 1
 
 
 @kernel
-def add_straight(path, n, ds, s, ahead, own_width, track, e, passages, count):
+def add_straight(path, n, ds, s, ahead, own_width, track, e, gain, passages, count):
     """Append the passage of a track that goes straight on, if that crosses the ego's route."""
     w = math.hypot(track[VX], track[VY])
     if w < 3.0 * STANDING or count == passages.shape[0]:
@@ -102,26 +106,27 @@ def add_straight(path, n, ds, s, ahead, own_width, track, e, passages, count):
                 own = 0.5 * (track[WIDTH] + own_width * cosine) / sine + margin
                 other = 0.5 * (own_width + track[WIDTH] * cosine) / sine + margin
                 zone = (at - own, at + own, r - other, r + other, 0.0)
-                return add_passage(passages, count, zone, 0.0, w, 0.5 * track[LENGTH], e)
+                return add_passage(passages, count, zone, 0.0, w, 0.5 * track[LENGTH], e, gain, 0)
         before = side
     return count
 
 
 @kernel
-def predict(path, n, ds, s, ahead, own_width, tracks, known, ways, counts, steps, zones, first,
-            feet, passages):  # fmt: skip
+def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, counts, steps, zones,
+            ranks, first, feet, passages):  # fmt: skip
     """Fill ``passages`` by the map and the tracks; return how many there are.
 
     ``ways`` ``(W, L, 6)`` are those that the map offers, entity e's from ``first[e]`` to
-    ``first[e + 1]``; ``zones`` ``(W, 5)`` tells where each meets the ego's route; ``feet`` ``(W,)``
-    remembers the station of the entity on it. On a route that the zones are not for (``known``),
-    everybody is expected straight ahead.
+    ``first[e + 1]``; ``zones`` ``(W, 5)`` tells where each meets the ego's route, and ``ranks``
+    ``(W,)`` who waits there; ``feet`` ``(W,)`` remembers the station of the entity on it. On a
+    route that the zones are not for (``known``), everybody is expected straight ahead.
     """
     count = 0
     for e in range(1, tracks.shape[0]):
         if tracks[e, STATE] < CONFIRMED:
             continue
         x, y, h, kind = tracks[e, TRACK_X], tracks[e, TRACK_Y], tracks[e, H], tracks[e, KIND]
+        gain = around[e, QUICKENING]
         on_way = False
         for j in range(first[e], first[e + 1] if known else first[e]):
             if feet[j] < LOST:
@@ -136,24 +141,30 @@ def predict(path, n, ds, s, ahead, own_width, tracks, known, ways, counts, steps
                 i = int(q / steps[j])
                 w = tracks[e, VX] * ways[j, i, COS] + tracks[e, VY] * ways[j, i, SIN]
                 half = 0.5 * tracks[e, LENGTH]
-                count = add_passage(passages, count, zones[j], q, max(w, 0.0), half, e)
+                count = add_passage(
+                    passages, count, zones[j], q, max(w, 0.0), half, e, gain, ranks[j]
+                )
         if not on_way or kind in (BICYCLE, PEDESTRIAN, ANIMAL):
-            count = add_straight(path, n, ds, s, ahead, own_width, tracks[e], e, passages, count)
+            count = add_straight(
+                path, n, ds, s, ahead, own_width, tracks[e], e, gain, passages, count
+            )
     return count
 
 
 @kernel
-def predict_truly(path, n, ds, s, ahead, own_width, tracks, paths, counts, steps, zones, station,
-                  on, to, foot, passages):  # fmt: skip
+def predict_truly(path, n, ds, s, ahead, own_width, tracks, around, paths, counts, steps, zones,
+                  ranks, station, on, to, foot, passages):  # fmt: skip
     """Fill ``passages`` by everybody's true way; return how many there are.
 
-    ``station`` and ``foot`` are where the entities are on the paths ``on`` and ``to`` (-1: none).
-    Who is on foot or on a bicycle goes straight on, and is given more room.
+    ``station`` and ``foot`` are where the entities are on the paths ``on`` and ``to`` (-1: none);
+    ``ranks`` say who waits for whom, of the first paths. Who is on foot or on a bicycle goes
+    straight on, and is given more room.
     """
     count = 0
     for e in range(1, tracks.shape[0]):
         if tracks[e, STATE] < CONFIRMED:
             continue
+        gain = around[e, QUICKENING]
         for turn in range(2):
             j, near = (on[e], station[e]) if turn == 0 else (to[e], foot[e])
             if j < 0 or zones[j, 0] == math.inf:
@@ -162,7 +173,10 @@ def predict_truly(path, n, ds, s, ahead, own_width, tracks, paths, counts, steps
                 paths[j], counts[j], steps[j], near, tracks[e, TRACK_X], tracks[e, TRACK_Y]
             )
             w = math.hypot(tracks[e, VX], tracks[e, VY])
-            count = add_passage(passages, count, zones[j], q, w, 0.5 * tracks[e, LENGTH], e)
+            half, rank = 0.5 * tracks[e, LENGTH], ranks[j] if j < len(ranks) else 0
+            count = add_passage(passages, count, zones[j], q, w, half, e, gain, rank)
         if tracks[e, KIND] in (BICYCLE, PEDESTRIAN, ANIMAL):
-            count = add_straight(path, n, ds, s, ahead, own_width, tracks[e], e, passages, count)
+            count = add_straight(
+                path, n, ds, s, ahead, own_width, tracks[e], e, gain, passages, count
+            )
     return count

@@ -22,7 +22,7 @@ from bridgegen.ego._lane_change_kernels import (
     look_back,
     shift_of,
 )
-from bridgegen.ego._lights_kernels import stop_at_lights
+from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._perception_kernels import perceive
 from bridgegen.ego._prediction_kernels import predict, predict_truly
 from bridgegen.ego._route_follower_kernels import hold_speed, preview
@@ -42,7 +42,10 @@ from bridgegen.ego._yielding_kernels import yield_to_all
 PLANNED, NEXT_PLAN, STOPS_FOR = control.SIZE, control.SIZE + 1, control.SIZE + 2
 """What it plans to do [m/s²], when it thinks again [s], and 1 + the light that it stops for."""
 
-MIND = LAST
+HALTED = LAST
+"""Where it has halted for a stop sign last [m]."""
+
+MIND = LAST + 1
 
 CYCLE = 0.1  # s, between two plans
 PLANNING_REACH = 30.0  # m, how far it looks at least …
@@ -57,7 +60,7 @@ def reach_of(v):
 
 @kernel
 def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, light_seen,
-         in_town, around, tracks, passages, n_passages, crosswalks, stop_stations, lights,
+         in_town, around, tracks, passages, n_passages, crosswalks, stop_stations, halts, lights,
          elapsed, mind):  # fmt: skip
     """Return the acceleration [m/s²] that the planner wants.
 
@@ -81,6 +84,7 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
         n_passages: how many passages there are.
         crosswalks: that the route leads over.
         stop_stations: of the stop lines of lights, +inf where not on the route [m].
+        halts: stations of the lines of stop signs [m].
         lights: their states.
         elapsed: since it was asked last [s].
         mind: see above.
@@ -89,7 +93,7 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
     speed = bend_speed(path, n, ds, s, v, target, friction_limit)
     speed = min(speed, sight_speed(seen, friction_limit))
     if road_n == 0:
-        crosswalks, stop_stations = crosswalks[:0], stop_stations[:0]
+        crosswalks, stop_stations, halts = crosswalks[:0], stop_stations[:0], halts[:0]
     else:
         speed = min(speed, limit_speed(road, road_n, ds, s, v))
     asked = math.inf
@@ -110,8 +114,13 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
     )
     mind[STOPS_FOR] = stops_for + 1.0
     wanted = min(wanted, asked)
+    asked, mind[HALTED] = stop_at_signs(halts, s, front, v, mind[HALTED])
+    wanted = min(wanted, asked)
     wanted = min(wanted, keep_distance(around, tracks, s, front, rear, half_width, shift, v))
-    wanted = min(wanted, yield_to_all(s, v, speed, front, rear, shift, passages, n_passages))
+    wanted = min(
+        wanted,
+        yield_to_all(s, v, speed, front, rear, shift, friction_limit, passages, n_passages),
+    )
     if must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
         wanted = -friction_limit
     return max(wanted, -friction_limit)
@@ -148,15 +157,16 @@ def drive(k, curvature, friction_limit, plan_, roads, state, record):
         surround(path, n, ds, s, behind, ahead, elapsed, state.tracks, state.around)
         if plan_.ideal_prediction and known:
             count = predict_truly(
-                path, n, ds, s, ahead, body[1], state.tracks, roads.paths, roads.counts,
-                roads.steps, roads.zones, state.station, state.on, state.to, state.foot,
-                state.passages,
+                path, n, ds, s, ahead, body[1], state.tracks, state.around, roads.paths,
+                roads.counts, roads.steps, roads.zones, roads.path_ranks, state.station, state.on,
+                state.to, state.foot, state.passages,
             )  # fmt: skip
         else:
             count = predict(
-                path, n, ds, s, ahead, body[1], state.tracks, known, roads.hypotheses,
-                roads.hypothesis_counts, roads.hypothesis_steps, roads.hypothesis_zones,
-                roads.hypothesis_first, state.feet, state.passages,
+                path, n, ds, s, ahead, body[1], state.tracks, state.around, known,
+                roads.hypotheses, roads.hypothesis_counts, roads.hypothesis_steps,
+                roads.hypothesis_zones, roads.hypothesis_ranks, roads.hypothesis_first, state.feet,
+                state.passages,
             )  # fmt: skip
         in_town = road_n > 0 and roads.road[min(int(s / ds), n - 1), LIMIT] <= FAST_ROAD
         seen = light_seen = math.inf
@@ -167,7 +177,7 @@ def drive(k, curvature, friction_limit, plan_, roads, state, record):
         mind[PLANNED] = plan(
             path, roads.road, n, road_n, ds, s, v, body, state.command[0], friction_limit, seen,
             light_seen, in_town, state.around, state.tracks, state.passages, count,
-            roads.crosswalks, roads.stops, state.lights, elapsed, mind,
+            roads.crosswalks, roads.stops, roads.halts, state.lights, elapsed, mind,
         )  # fmt: skip
     if shift_of(mind) != UNSHIFTED and state.on[0] == 0:
         curvature = pursue_beside(

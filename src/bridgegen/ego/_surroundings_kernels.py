@@ -7,7 +7,7 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import COS, SIN, X, Y, project
-from bridgegen.ego._tracking_kernels import CONFIRMED, LENGTH, STATE, VX, VY, WIDTH, H
+from bridgegen.ego._tracking_kernels import AGE, CONFIRMED, LENGTH, STATE, VX, VY, WIDTH, H
 from bridgegen.ego._tracking_kernels import X as TRACK_X
 from bridgegen.ego._tracking_kernels import Y as TRACK_Y
 
@@ -17,9 +17,12 @@ ALONG, ACROSS = 3, 4  # m/s, its velocity along the route and to the left of it
 HALF_LENGTH, HALF_WIDTH = 5, 6  # m, how far the turned box reaches along and across
 COSINE = 7  # of the angle between its heading and the route's
 GAINING = 8  # m/s², how its speed along the route has changed lately, smoothed
-AROUND = 9
+PACE = 9  # m/s, 1 more than its speed; 0 until it is known
+QUICKENING = 10  # m/s², how its speed has changed lately, smoothed
+AROUND = 11
 
-MEMORY_OF_GAIN = 0.3  # s, over which that is smoothed
+MEMORY_OF_GAIN = 0.3  # s, over which changes of speed are smoothed
+SETTLED = 1.0  # s, after which a track's speed is good enough to see it change
 
 BEHIND = 15.0  # m, how far back it looks at least
 REACH = 25.0  # m, how far to the side
@@ -44,7 +47,13 @@ def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
         was_near = around[e, NEAR] > 0.0
         around[e, NEAR] = 0.0
         if tracks[e, STATE] < CONFIRMED:
+            around[e, PACE] = around[e, QUICKENING] = 0.0
             continue
+        pace = 1.0 + math.hypot(tracks[e, VX], tracks[e, VY])
+        if around[e, PACE] > 0.0 and tracks[e, AGE] > SETTLED:
+            gain = (pace - around[e, PACE]) / elapsed
+            around[e, QUICKENING] += share * (gain - around[e, QUICKENING])
+        around[e, PACE] = pace
         x, y = tracks[e, TRACK_X], tracks[e, TRACK_Y]
         if (x - mx) ** 2 + (y - my) ** 2 > widest * widest:
             continue

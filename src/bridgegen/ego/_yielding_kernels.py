@@ -4,8 +4,9 @@ A conflict zone is a row of five: where the ego's route enters and leaves it [m]
 way does [m], and 1 if both go on together from there (a merge), else 0. No zone: infinity. A
 passage begins with its zone, see ``_prediction_kernels``.
 
-Who comes first goes first, with a margin in time; the ego gives way wherever that is in doubt, and
-does not wait where somebody else will pass (StVO § 11).
+Who comes first goes first, with a margin in time, a larger one where the ego has to wait by the
+rules; it gives way wherever that is in doubt, and does not wait where somebody else will pass (StVO
+§ 11). Where a sign makes the other wait, the ego goes first as long as the other can still stop.
 """
 
 import math
@@ -16,11 +17,18 @@ from bridgegen.ego._path_kernels import COS, SIN, X, Y
 from bridgegen.ego._shift_kernels import aside_at
 
 SIDE_MARGIN = 0.6  # m, kept to another body's side
-TIME_MARGIN = 1.0  # s, kept between two bodies' turns at one point
+TIME_MARGIN = 1.0  # s, kept between two bodies' turns at one point, …
+WAITING_MARGIN = 1.5  # … where the ego has to wait
+GOES_ON = 2.0  # s, for which others go on speeding up or braking, …
+MOST_GAIN = 3.0  # m/s², … by no more than this, …
+LEAST_GAIN = 1.0  # … if by more than this, which tracking does not invent (95 % within 0.7)
+CAN_STOP = 2.0  # m/s²; who needs less than that to stop before the conflict, can wait
+COMMITTED = 0.8  # of the friction limit; who would need more to stop before a conflict, goes on
+BUILD_UP = 0.3  # s, until the ego's own acceleration has built up
 TAIL_MARGIN = 1.0  # m, kept to the tail of who has passed
 KEEP_CLEAR_ROUNDS = 3  # zones that overlap in a row, at most
 HORIZON = 10.0  # s, how far ahead arrivals are compared
-STATION, SPEED, FRONT, REAR, WHO = 5, 6, 7, 8, 9
+STATION, SPEED, FRONT, REAR, WHO, GAIN, RANK = 5, 6, 7, 8, 9, 10, 11
 """Columns of a passage after its zone."""
 
 SCAN_STEP = 0.5  # m, between the points of a way that are looked at
@@ -77,12 +85,27 @@ def time_to(distance, v, pace):
 
 
 @kernel
-def give_way(s, v, pace, front, rear, zone, q, w, other_front, other_rear):
+def coming(distance, w, gain):
+    """Return when [s] somebody at speed w > 0 has come so far, if its speed changes for a while.
+
+    A ``gain`` < 0 must leave it some speed.
+    """
+    if gain == 0.0 or distance <= 0.0:
+        return distance / w
+    changing = (w + 0.5 * gain * GOES_ON) * GOES_ON
+    if distance <= changing:
+        return (math.sqrt(w * w + 2.0 * gain * distance) - w) / gain
+    return GOES_ON + (distance - changing) / (w + gain * GOES_ON)
+
+
+@kernel
+def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other_rear):
     """Return what one other body asks for: (an acceleration [m/s²], a station to stop at [m]).
 
     Either is +inf where it asks nothing of the kind. The ego is at station s of its route at speed
-    v, and would go on at ``pace``; the other is at q of its way, and goes on at w. Bodies reach
-    ``front`` and ``rear`` [m] ahead of and behind these stations.
+    v, and would go on at ``pace``; the other is at q of its way, at speed w which changes by
+    ``gain``; ``rank`` says who waits (``right_of_way``). Bodies reach ``front`` and ``rear`` [m]
+    ahead of and behind these stations.
     """
     merges = zone[4] > 0.0
     if s - rear > zone[1] or (q - other_rear > zone[3] and not merges):
@@ -93,18 +116,25 @@ def give_way(s, v, pace, front, rear, zone, q, w, other_front, other_rear):
         # It drives before us, or will: its place on our route, counted from the common end.
         ahead = zone[1] - (zone[3] - q)
         if ahead >= s:
-            return follow(ahead - other_rear - front - s, v, w, 0.0), math.inf
+            return follow(ahead - other_rear - front - s, v, w, min(gain, 0.0)), math.inf
         return math.inf, math.inf
     if to_enter <= 0.0:
         return math.inf, math.inf  # we are in: the way out is forward
     if w < STANDING:
         return math.inf, zone[0] if inside else math.inf
     width = 0.0 if merges else zone[3] - zone[2]
-    enters = (zone[2] - other_front - q) / w
-    leaves = enters + (width + other_front + other_rear + TAIL_MARGIN) / w
+    until = zone[2] - other_front - q
+    if rank > 0 and until > 0.0 and w * w < 2.0 * CAN_STOP * until:
+        return math.inf, math.inf
+    length = width + other_front + other_rear + TAIL_MARGIN
+    quicker = min(gain, MOST_GAIN) if gain > LEAST_GAIN else 0.0
+    slower = max(gain, -0.5 * w / GOES_ON) if gain < -LEAST_GAIN else 0.0
+    enters, leaves = coming(until, w, quicker), coming(until + length, w, slower)
+    margin = WAITING_MARGIN if rank < 0 else TIME_MARGIN
     through = front + rear + (0.0 if merges else zone[1] - zone[0])
-    arrives, clears = time_to(to_enter, v, pace), time_to(to_enter + through, v, pace)
-    if enters < HORIZON and arrives < leaves + TIME_MARGIN and clears > enters - TIME_MARGIN:
+    arrives = time_to(to_enter, v, pace)
+    clears = time_to(to_enter + through, v, pace) + BUILD_UP
+    if enters < HORIZON and arrives < leaves + margin and clears > enters - margin:
         return math.inf, zone[0]
     return math.inf, math.inf
 
@@ -131,7 +161,7 @@ def is_left(shift, s, passage):
 
 
 @kernel
-def yield_to_all(s, v, pace, front, rear, shift, passages, count):
+def yield_to_all(s, v, pace, front, rear, shift, friction_limit, passages, count):
     """Return the acceleration [m/s²] that all predicted passages ask for; +inf if none does.
 
     Who comes into a lane that the ego's ``shift`` has left, or will have, asks for nothing.
@@ -142,9 +172,12 @@ def yield_to_all(s, v, pace, front, rear, shift, passages, count):
         if is_left(shift, s, one):
             continue
         follows, stops = give_way(
-            s, v, pace, front, rear, one, one[STATION], one[SPEED], one[FRONT], one[REAR]
-        )
-        asked, stop = min(asked, follows), min(stop, stops)
+            s, v, pace, front, rear, one, one[STATION], one[SPEED], one[GAIN], one[RANK],
+            one[FRONT], one[REAR],
+        )  # fmt: skip
+        asked = min(asked, follows)
+        if v * v <= 2.0 * COMMITTED * friction_limit * (stops - front - s):
+            stop = min(stop, stops)
     if stop == math.inf:
         return asked
     for _ in range(KEEP_CLEAR_ROUNDS):

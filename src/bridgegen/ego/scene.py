@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.ego.right_of_way import STOP_SIGN, crossings, governs, right_of_way
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
@@ -45,28 +46,34 @@ class Scene(NamedTuple):
     Attributes:
         road: ``(P, L, 3)``, see `road_along`.
         stops: ``(P, S)`` [m], the stations of the stop lines of S lights on the ego's route.
+        halts: ``(P, H)`` [m], the stations of the lines of stop signs on it.
         crosswalks: ``(P, C, 4)``, see `crosswalks`.
         hypotheses: ``(P, W, L', 6)``, ways: x, y [m], heading [rad], its cosine and sine,
             curvature [1/m].
         hypothesis_counts: ``(P, W)`` int64, samples of each.
         hypothesis_steps: ``(P, W)`` [m], between two samples.
         hypothesis_zones: ``(P, W, 5)``, where each meets the ego's; see ``_yielding_kernels``.
+        hypothesis_ranks: ``(P, W)`` int64, who waits where they meet; see ``right_of_way``.
         hypothesis_first: ``(P, E + 1)`` int64: entity e's are those from ``[e]`` to ``[e + 1]``.
+        path_ranks: ``(P, E)`` int64, as `hypothesis_ranks`, of the ways that the entities take.
     """
 
     road: Float
     stops: Float
+    halts: Float
     crosswalks: Float
     hypotheses: Float
     hypothesis_counts: Int
     hypothesis_steps: Float
     hypothesis_zones: Float
+    hypothesis_ranks: Int
     hypothesis_first: Int
+    path_ranks: Int
 
 
 def survey(
     model: OpenDrive,
-    route: Route | None,
+    routes: Sequence[Route | None],
     path: Float,
     step: float,
     lights: Sequence[str],
@@ -77,8 +84,8 @@ def survey(
 
     Args:
         model: the road network.
-        route: the ego's; None off the lanes.
-        path: its samples, ``(n, 6)``.
+        routes: of the entities, the ego's first; None off the lanes.
+        path: the samples of the ego's, ``(n, 6)``.
         step: between two of them [m].
         lights: ids of the traffic lights that change.
         starts: per entity the lanes that it starts or changes to, and where [m along the road].
@@ -86,7 +93,7 @@ def survey(
     """
     from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
 
-    stops = np.full(len(lights), np.inf)
+    stops, route = np.full(len(lights), np.inf), routes[0]
     if route is not None:
         for line in reversed(stop_lines(model, route, lights)):
             stops[lights.index(line.light)] = line.station
@@ -97,6 +104,7 @@ def survey(
     tables: list[Float] = []
     steps: list[float] = []
     zones: list[Float] = []
+    ranks: list[int] = []
     first = [0]
     for e, lanes in enumerate(starts):
         for way in [way for stretch, s in lanes for way in ways_from(model, stretch, s)]:
@@ -111,6 +119,7 @@ def survey(
                 tables[-1], len(tables[-1]), way_step, bodies[e], zone,
             )  # fmt: skip
             zones.append(zone)
+            ranks.append(right_of_way(model, route, way) if route is not None else 0)
         first.append(len(tables))
     ways = np.zeros((len(tables), max(map(len, tables), default=0), 6))
     for i, table in enumerate(tables):
@@ -118,12 +127,22 @@ def survey(
     return Scene(
         road[None],
         stops[None],
+        np.array([[] if route is None else stop_signs(model, route)], dtype=np.float64),
         crosswalks(model, path, step)[None],
         ways[None],
         np.array([[len(table) for table in tables]], dtype=np.int64),
         np.array([steps], dtype=np.float64),
         np.array(zones, dtype=np.float64).reshape(1, len(zones), 5),
+        np.array([ranks], dtype=np.int64),
         np.array([first], dtype=np.int64),
+        np.array(
+            [
+                [
+                    0 if one is None or route is None else right_of_way(model, route, one)
+                    for one in routes
+                ]
+            ]
+        ),
     )
 
 
@@ -132,12 +151,15 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
     return Scene(
         _padded([scene.road for scene in scenes], np.inf),
         _padded([scene.stops for scene in scenes], np.inf),
+        _padded([scene.halts for scene in scenes], np.inf),
         _padded([scene.crosswalks for scene in scenes], np.inf),
         _padded([scene.hypotheses for scene in scenes], 0.0),
         _padded([scene.hypothesis_counts for scene in scenes], 0),
         _padded([scene.hypothesis_steps for scene in scenes], 1.0),
         _padded([scene.hypothesis_zones for scene in scenes], np.inf),
+        _padded([scene.hypothesis_ranks for scene in scenes], 0),
         _padded([scene.hypothesis_first for scene in scenes], 0),
+        _padded([scene.path_ranks for scene in scenes], 0),
     )
 
 
@@ -200,13 +222,26 @@ def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[St
         low, high = min(step.s, step.s_end), max(step.s, step.s_end)
         signals: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
         for signal in signals:
-            if signal.id not in lights or not _governs(road, signal, step.lane_id):
+            if signal.id not in lights or not governs(road, signal, step.lane_id):
                 continue
             s = _line_of(road, signal.s, step.lane_id)
             if low <= s <= high:
                 a, b = route.station(road.id, s)
                 found.append(StopLine(signal.id, a + b * s))
     return sorted(found, key=lambda one: one.station)
+
+
+def stop_signs(model: OpenDrive, route: Route) -> list[float]:
+    """Return where a route crosses the lines of stop signs [m], in its order."""
+    found: list[float] = []
+    for one in crossings(model, route):
+        road, lane = model.road(one.before.road_id), one.before.lane_id
+        for signal in road.signals:
+            if signal.type == STOP_SIGN and governs(road, signal, lane):
+                s = _line_of(road, signal.s, lane)
+                a, b = route.station(road.id, s)
+                found.append(a + b * s)
+    return sorted(found)
 
 
 def crosswalks(model: OpenDrive, path: Float, step: float) -> Float:
@@ -358,13 +393,6 @@ def _beside(road: Road, number: int, lane_id: int, s: Float) -> tuple[Float, Flo
         width = np.abs(border[other] - border[other - (1 if other > 0 else -1)])
         found.append(np.where(width >= NARROW, way * (centre(other) - centre(lane_id)), 0.0))
     return found[0], found[1]
-
-
-def _governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
-    if signal.validity:
-        return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
-    way = {"+": 1, "-": -1}.get(signal.orientation)
-    return way in (None, road.direction(lane_id))
 
 
 def _line_of(road: Road, s: float, lane_id: int) -> float:

@@ -1,9 +1,12 @@
 """The ego: what its driver demands, and what its tyres give."""
 
+import math
+
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._fsm_kernels import drive_fsm
+from bridgegen.ego._lights_kernels import stop_at_lights
 from bridgegen.ego._path_kernels import project
-from bridgegen.ego._reference_kernels import drive
+from bridgegen.ego._reference_kernels import STOPS_FOR, drive
 from bridgegen.ego._route_follower_kernels import hold_speed, steer
 from bridgegen.ego._speed_kernels import bend_speed
 from bridgegen.ego._un_r157_kernels import drive_un_r157
@@ -31,6 +34,11 @@ def demand(k, plan, roads, state, record):
         return hold_speed(v, state.command[0]), curvature
     if plan.driver == 1:
         return drive(k, curvature, state.weather[FRICTION], plan, roads, state, record)
+    front = plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
+    lines = roads.stops if p == 0 else roads.stops[:0]
+    stopping = int(state.mind[STOPS_FOR]) - 1
+    asked, stops_for = stop_at_lights(lines, state.lights, s, front, v, math.inf, stopping)
+    state.mind[STOPS_FOR] = stops_for + 1.0
     planned = bend_speed(path, n, ds, s, v, state.command[0], state.weather[FRICTION])
     if plan.driver == 2:
         demanded = drive_un_r157(
@@ -38,13 +46,13 @@ def demand(k, plan, roads, state, record):
             planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
             state.attention,
         )  # fmt: skip
-        return demanded, curvature
+        return min(demanded, asked), curvature
     demanded = drive_fsm(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
         planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
         state.attention,
     )  # fmt: skip
-    return demanded, curvature
+    return min(demanded, asked), curvature
 
 
 @inlined_kernel

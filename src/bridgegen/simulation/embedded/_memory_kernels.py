@@ -96,12 +96,15 @@ class Roads(NamedTuple):
     cell_nodes: Int
     road: Float
     stops: Float
+    halts: Float
     crosswalks: Float
     hypotheses: Float
     hypothesis_counts: Int
     hypothesis_steps: Float
     hypothesis_zones: Float
+    hypothesis_ranks: Int
     hypothesis_first: Int
+    path_ranks: Int
 
 
 class State(NamedTuple):

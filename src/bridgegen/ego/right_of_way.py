@@ -1,0 +1,119 @@
+"""Who goes first where two routes cross: by signs and the map, else by the rule of the right.
+
+Sources: StVO § 8 (right of way: signs, else who comes from the right), § 9 (who turns left waits
+for who comes towards), § 10; sign numbers of the VzKat, which our own maps use, too.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from bridgegen.openx.opendrive.furniture import Signal, SignalReference
+from bridgegen.openx.opendrive.lanes import lane_pose
+from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.openx.opendrive.routes import Route, Step
+
+STOP_SIGN = "206"
+WAIT = ("205", STOP_SIGN)
+"""Signs: give way, stop."""
+PRIORITY = ("301", "306")
+"""Signs: right of way at this junction, priority road."""
+
+THEY_WAIT, NOBODY_SAYS, WE_WAIT = 1, 0, -1
+
+AT_JUNCTION = 40.0
+"""A sign so far before a junction [m] is for that junction."""
+ASIDE = math.radians(45.0)
+"""Between the headings of two approaches: less is the same one, 180° less this the opposite one."""
+
+
+class Crossing(NamedTuple):
+    """How a route goes through a junction."""
+
+    junction: str
+    before: Step
+    inside: Step
+
+
+def right_of_way(model: OpenDrive, own: Route, other: Route) -> int:
+    """Return who waits at the first junction that two routes have in common.
+
+    ``THEY_WAIT`` only if a sign or the map makes them; where only the rule of the right would, one
+    does not count on it. ``NOBODY_SAYS`` where lights tell, or where they do not meet.
+    """
+    theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
+    for ours in crossings(model, own):
+        if ours.junction in theirs:
+            return _at(model, ours, theirs[ours.junction])
+    return NOBODY_SAYS
+
+
+def crossings(model: OpenDrive, route: Route) -> Iterator[Crossing]:
+    """Yield a route's junctions in its order; not one that it begins in."""
+    for before, step in zip(route.steps, route.steps[1:], strict=False):
+        road = model.road(step.road_id)
+        if road.is_connecting and not model.road(before.road_id).is_connecting:
+            yield Crossing(road.junction, before, step)
+
+
+def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
+    """Say whether a signal is for the traffic of a lane."""
+    if signal.validity:
+        return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
+    way = {"+": 1, "-": -1}.get(signal.orientation)
+    return way in (None, road.direction(lane_id))
+
+
+def _at(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
+    if ours.before.road_id == theirs.before.road_id:
+        return NOBODY_SAYS
+    for one in model.junction(ours.junction).priorities:
+        if (one.high, one.low) == (ours.inside.road_id, theirs.inside.road_id):
+            return THEY_WAIT
+        if (one.low, one.high) == (ours.inside.road_id, theirs.inside.road_id):
+            return WE_WAIT
+    our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
+    if any(sign.dynamic == "yes" for sign in (*our_signs, *their_signs)):
+        return NOBODY_SAYS
+    difference = _standing(our_signs) - _standing(their_signs)
+    if difference:
+        return THEY_WAIT if difference > 0 else WE_WAIT
+    from_ours = _turn(_heading(model, ours.before), _heading(model, theirs.before))
+    from_the_right = ASIDE < from_ours < math.pi - ASIDE
+    towards = abs(from_ours) >= math.pi - ASIDE
+    we_turn_left = towards and _turns_left(model, ours) and not _turns_left(model, theirs)
+    return WE_WAIT if from_the_right or we_turn_left else NOBODY_SAYS
+
+
+def _signs(model: OpenDrive, step: Step) -> list[Signal]:
+    """Return the signals that a lane passes just before a junction."""
+    road = model.road(step.road_id)
+    by_id = {signal.id: signal for each in model.roads for signal in each.signals}
+    near: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
+    return [
+        by_id[one.id]
+        for one in near
+        if one.id in by_id
+        and governs(road, one, step.lane_id)
+        and abs(one.s - step.s_end) <= AT_JUNCTION
+    ]
+
+
+def _standing(signs: list[Signal]) -> int:
+    """Return 1 on a priority road, -1 where one waits, 0 where no sign says."""
+    types = {sign.type for sign in signs}
+    return int(not types.isdisjoint(PRIORITY)) - int(not types.isdisjoint(WAIT))
+
+
+def _heading(model: OpenDrive, step: Step) -> float:
+    """Return which way a lane leads at the end of a step [rad]."""
+    return lane_pose(model.road(step.road_id), step.lane_id, step.s_end).h
+
+
+def _turn(a: float, b: float) -> float:
+    """Return b − a within ±π [rad]."""
+    return math.remainder(b - a, 2.0 * math.pi)
+
+
+def _turns_left(model: OpenDrive, one: Crossing) -> bool:
+    return _turn(_heading(model, one.before), _heading(model, one.inside)) > ASIDE

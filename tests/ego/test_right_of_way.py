@@ -1,0 +1,156 @@
+"""Who waits for whom, on the catalogue's junctions and on ones with signs."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.ego.right_of_way import NOBODY_SAYS, THEY_WAIT, WE_WAIT, right_of_way
+from bridgegen.ego.scene import stop_signs
+from bridgegen.odd.reader import load
+from bridgegen.openx.opendrive.model import OpenDrive, Priority
+from bridgegen.openx.opendrive.routes import Route
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.embedded.ways import Ways
+
+CROSSING = """
+scenario: signs
+title: A crossroads with signs
+description: The ego goes straight on from the south, another from the {leg}.
+source: StVO.
+template: crossroads
+roads: {{lanes_per_direction: 1, legs: {legs}}}
+duration: 20.0 # s
+time_step: 0.05 # s
+axes: [participants, weather]
+include: [weather]
+driver: reference
+participants:
+  ego:
+    type: car
+    start: {{leg: A, way: in, distance: 45.0}}
+    end: {{leg: C, way: out, distance: 40.0}}
+    speed: 9.0
+  other:
+    type: car
+    start: {{leg: {leg}, way: in, distance: other_at}}
+    end: {{leg: {to}, way: out, distance: 40.0}}
+    speed: 8.0
+parameters:
+  other_at: {{axis: participants, unit: m, low: 5.0, high: 50.0, default: 50.0,
+    description: Where the other starts., source: Ours.}}
+objective:
+  terms: [{{metric: d_min, weight: 1.0}}]
+  weights: fixed
+  scale: raw
+  critical: {{n_collision_above: 0, d_min_below: 0.5, v_d_at_least: 1.0}}
+"""
+
+
+def crossing(folder: Path, leg: str, to: str, **signs: str) -> Pipeline:
+    legs = ", ".join(
+        f"{name}: {{sign: {signs[name]}}}" if name in signs else f"{name}: {{}}" for name in "ABCD"
+    )
+    path = folder / "signs.yaml"
+    path.write_text(CROSSING.format(leg=leg, to=to, legs=f"{{{legs}}}"))
+    scenario = load(path)
+    return Pipeline(scenario, scenario.space())
+
+
+def routes(pipeline: Pipeline) -> tuple[OpenDrive, list[Route]]:
+    """Return the nominal road network, and the routes of ego and other."""
+    model = pipeline.concrete(pipeline.space.row({})).roads
+    found = Ways(pipeline.simulator.program, model).routes
+    return model, [one for one in found if one is not None]
+
+
+def catalogue(name: str) -> tuple[OpenDrive, list[Route]]:
+    scenario = load(name)
+    return routes(Pipeline(scenario, scenario.space()))
+
+
+@pytest.mark.parametrize(
+    ("name", "rank"),
+    [
+        (
+            "crossroads-s1",
+            WE_WAIT,
+        ),  # it comes from the west, the ego from the north: from the right
+        ("crossroads-s2", NOBODY_SAYS),  # it turns left towards the ego, and ought to wait
+        ("crossroads-s3", WE_WAIT),  # from the east, the ego from the south
+        ("crossroads-s4", WE_WAIT),
+        ("left-across-path", WE_WAIT),  # the ego turns left
+        ("roundabout-entry", WE_WAIT),  # a sign at each entry
+        ("red-light-runner", NOBODY_SAYS),  # lights tell
+        ("lead-brakes", NOBODY_SAYS),
+    ],
+)
+def test_of_the_catalogue(name: str, rank: int) -> None:
+    model, (own, other, *_) = catalogue(name)
+    assert right_of_way(model, own, other) == rank
+
+
+def test_of_two_routes_one_waits_at_most(tmp_path: Path) -> None:
+    for signs in ({}, {"A": "yield"}, {"D": "stop"}, {"A": "stop", "D": "yield"}):
+        model, (own, other) = routes(crossing(tmp_path, "D", "B", **signs))
+        ranks = right_of_way(model, own, other), right_of_way(model, other, own)
+        assert ranks in {(WE_WAIT, THEY_WAIT), (THEY_WAIT, WE_WAIT), (WE_WAIT, NOBODY_SAYS)}
+
+
+@pytest.mark.parametrize(
+    ("leg", "to", "signs", "rank"),
+    [
+        ("B", "D", {"A": "yield"}, WE_WAIT),  # from the left, on the road without signs
+        ("D", "B", {"D": "yield"}, THEY_WAIT),
+        ("D", "B", {"D": "stop", "B": "stop"}, THEY_WAIT),
+        ("D", "B", {"A": "stop", "D": "stop"}, WE_WAIT),  # both wait: from the right
+        ("B", "D", {}, NOBODY_SAYS),
+        ("C", "A", {}, NOBODY_SAYS),  # oncoming
+    ],
+)
+def test_of_signs(tmp_path: Path, leg: str, to: str, signs: dict[str, str], rank: int) -> None:
+    model, (own, other) = routes(crossing(tmp_path, leg, to, **signs))
+    assert right_of_way(model, own, other) == rank
+
+
+def test_of_the_map_s_own_priorities(tmp_path: Path) -> None:
+    model, (own, other) = routes(crossing(tmp_path, "D", "B"))
+    inside = [
+        next(one.road_id for one in each.steps if model.road(one.road_id).is_connecting)
+        for each in (own, other)
+    ]
+    junction = replace(model.junctions[0], priorities=(Priority(inside[0], inside[1]),))
+    stated = replace(model, junctions=(junction, *model.junctions[1:]))
+    assert right_of_way(stated, own, other) == THEY_WAIT
+    assert right_of_way(stated, other, own) == WE_WAIT
+
+
+def test_a_stop_sign_has_its_line_before_the_junction(tmp_path: Path) -> None:
+    model, (own, _) = routes(crossing(tmp_path, "D", "B", A="stop"))
+    (line,) = stop_signs(model, own)
+    first = next(one for one in own.steps if model.road(one.road_id).is_connecting)
+    assert line == pytest.approx(own.station(first.road_id, first.s)[0], abs=3.0)
+    assert stop_signs(*routes(crossing(tmp_path, "D", "B", A="yield"))[:1], own) == []
+
+
+def test_the_reference_halts_at_a_stop_sign_and_not_at_others(tmp_path: Path) -> None:
+    # Nobody comes for long: the other starts 50 m away, at a walk it would be too late.
+    slowest = {}
+    for sign in ("stop", "yield"):
+        pipeline = crossing(tmp_path, "D", "B", A=sign)
+        rollout = pipeline.rollout(pipeline.space.row({"other_at": 5.0})[np.newaxis])
+        v = rollout.v[0, 0, : rollout.n_steps[0]]
+        slowest[sign] = v.min()
+        assert v[-1] > 3.0  # and goes on
+    assert slowest["stop"] < 0.3
+    assert slowest["yield"] > 1.0
+
+
+def test_who_need_not_wait_goes_first_as_long_as_the_other_can_stop(tmp_path: Path) -> None:
+    first = {}
+    for name, signs in (("priority", {"D": "yield", "B": "yield"}), ("right", {})):
+        pipeline = crossing(tmp_path, "D", "B", **signs)
+        rollout = pipeline.rollout(pipeline.space.row({"other_at": 50.0})[np.newaxis])
+        first[name] = rollout.v[0, 0, : round(3.0 / rollout.time_step)].min()
+    assert first["right"] < first["priority"] - 0.5
