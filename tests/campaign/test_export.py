@@ -279,3 +279,21 @@ def test_strangers_accept_every_flavour(checkers, catalogue, tmp_path, flavour):
     for path, report in zip(paths, checkers.qc_openscenario(*paths), strict=True):
         assert report.clean, (path.name, report)
         assert not report.warnings, (path.name, report)
+
+
+def test_a_scenario_without_a_map_is_exported_alone(tmp_path):
+    text = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2025-01-01T00:00:00"
+description="" author=""/><CatalogLocations/><RoadNetwork/><Entities><ScenarioObject name="ego">
+<Pedestrian name="p" pedestrianCategory="pedestrian" mass="80"><BoundingBox><Center x="0" y="0"
+z="1"/><Dimensions width="1" length="1" height="2"/></BoundingBox></Pedestrian></ScenarioObject>
+</Entities><Storyboard><Init><Actions><Private entityRef="ego"><PrivateAction><TeleportAction>
+<Position><WorldPosition x="1" y="2"/></Position></TeleportAction></PrivateAction></Private>
+</Actions></Init><StopTrigger><ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
+<ByValueCondition><SimulationTimeCondition value="1" rule="greaterThan"/></ByValueCondition>
+</Condition></ConditionGroup></StopTrigger></Storyboard></OpenSCENARIO>"""
+    source = tmp_path / "plain.xosc"
+    source.write_text(text)
+    for flavour in FLAVOURS:
+        (only,) = export(source, flavour, out=tmp_path / flavour)
+        (there,) = (one for one in walk(read(only)) if isinstance(one, osc.TeleportAction))
+        assert (there.position.position.x, there.position.position.y) == (1.0, 2.0)

@@ -85,13 +85,17 @@ def _export(path: Path, flavour: Flavour, folder: Path) -> list[Path]:
     roads = roads_of(scenario, path)
     if problems := validate.problems(scenario, roads):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    road_map = path.parent / logic_file(scenario, path)
-    made = _moved(flavour(scenario, path), path, road_map.name, folder)
-    files = {folder / path.name: to_xml(made), folder / road_map.name: read_bytes(road_map)}
+    made, maps = flavour(scenario, path), []
+    if scenario.road_network.logic_file is not None:
+        maps = [path.parent / logic_file(scenario, path)]
+    made = _moved(made, path, [one.name for one in maps], folder)
+    files = {folder / path.name: to_xml(made)} | {
+        folder / one.name: read_bytes(one) for one in maps
+    }
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for target in files:
-            if target.exists() and any(target.samefile(one) for one in (path, road_map)):
+            if target.exists() and any(target.samefile(one) for one in (path, *maps)):
                 raise StorageError(f"{target}: is what is exported, and is not overwritten")
         for target, data in files.items():
             target.write_bytes(data)
@@ -100,15 +104,19 @@ def _export(path: Path, flavour: Flavour, folder: Path) -> list[Path]:
     return list(files)
 
 
-def _moved(scenario: osc.OpenScenario, path: Path, road_map: str, folder: Path) -> osc.OpenScenario:
-    """Return a scenario for another folder, where its map lies beside it."""
+def _moved(
+    scenario: osc.OpenScenario, path: Path, maps: Sequence[str], folder: Path
+) -> osc.OpenScenario:
+    """Return a scenario for another folder, where its map, if it has one, lies beside it."""
     roads = scenario.road_network
     scene = roads.scene_graph_file
     if scene is not None and isinstance(scene.filepath, str) and scene.filepath:
         scene = osc.File(Path(os.path.relpath(path.parent / scene.filepath, folder)).as_posix())
     return replace(
         scenario,
-        road_network=replace(roads, logic_file=osc.File(road_map), scene_graph_file=scene),
+        road_network=replace(
+            roads, logic_file=osc.File(maps[0]) if maps else None, scene_graph_file=scene
+        ),
     )
 
 

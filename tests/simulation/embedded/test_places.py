@@ -282,7 +282,27 @@ def test_a_route_position_of_an_entity_is_where_it_is():
 <InRoutePosition><FromCurrentEntity entityRef="third"/></InRoutePosition></RoutePosition>
 </Position>"""
     assert seen_at(where)[0] == pytest.approx(29.0 / 5.0 / DT, abs=1.01)
-    there(placed(where), -1.75, 63.0, NORTH)  # its heading counts from the reference line
+    there(placed(where), -1.75, 63.0, SOUTH)
+
+
+@pytest.mark.parametrize(
+    ("where", "expected"),
+    [
+        ('FromLaneCoordinates pathS="30" laneId="2" laneOffset="0.5"', (-5.75, 63.0, SOUTH)),
+        ('FromRoadCoordinates pathS="30" t="5.75"', (-5.75, 63.0, SOUTH)),
+        ('FromLaneCoordinates pathS="140" laneId="-1"', (-1.75, -47.0, SOUTH)),
+    ],
+)
+def test_a_position_on_a_route_faces_along_the_route(where, expected):
+    """The route leads south from s = 80 on road 3 at y = 93, on road 1 down from y = -13.
+
+    t and offsets count to the left of the reference line: west on road 3.
+    """
+    text = f"""<Position><RoutePosition><RouteRef><Route name="r" closed="false">
+<Waypoint routeStrategy="shortest">{lane(3, 1, 80.0)}</Waypoint>
+<Waypoint routeStrategy="shortest">{lane(1, -1, 80.0)}</Waypoint></Route></RouteRef>
+<InRoutePosition><{where}/></InRoutePosition></RoutePosition></Position>"""
+    there(placed(text), *expected)
 
 
 def test_acquiring_a_position_is_over_when_it_is_reached():

@@ -179,7 +179,8 @@ def put_in_world(e, x, y, h, roads, state):
 def lane_place(c, plan, roads, state):
     """Return (node, s, aside) of a Lane or Road position; node -1: there is no such place.
 
-    The node leads along the lane's traffic; that of a road position along the reference line.
+    The node leads along the lane's traffic; that of a road position along the reference line, of a
+    route position along the route.
     """
     row, spot = plan.places[c], roads.spots[c]
     s, aside = spot[2], spot[3]
@@ -188,7 +189,7 @@ def lane_place(c, plan, roads, state):
     node = find_node(roads.nodes, roads.ends, int(spot[0]), int(spot[1]), s)
     if node < 0:
         return -1, 0.0, 0.0
-    way = roads.nodes[node, TRAFFIC] if row[PLACE_KIND] == ON_LANE else 1
+    way = roads.nodes[node, TRAFFIC] if row[PLACE_KIND] == ON_LANE else int(spot[4])
     return facing(roads.nodes, node, way), s, aside * way
 
 

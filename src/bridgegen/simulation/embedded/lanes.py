@@ -78,15 +78,16 @@ class Lanes:
         """
         self.ways.append(self._way([self._on_lane(spot) for spot in spots]))
 
-    def locate(self, spot: Spot) -> tuple[int, int, float, float]:
-        """Return number of the road, lane id, s and how far left of the lane's centre [m].
+    def locate(self, spot: Spot) -> tuple[int, int, float, float, int]:
+        """Return number of the road, lane id, s, how far left of the lane's centre [m], and a way.
 
-        Left is that of the reference line. s is NaN where rows may vary it.
+        Left is that of the reference line. s is NaN where rows may vary it. The way is the one
+        from which headings count: 1 along the reference line, or -1; along a route, the route's.
 
         Raises:
             InputError: it is not on the road network.
         """
-        model = self.graph.model
+        model, way = self.graph.model, 1
         if isinstance(spot, LaneSpot):
             road, lane, s, aside = model.road(spot.road), spot.lane, spot.s, 0.0
             if s is not None:
@@ -94,32 +95,32 @@ class Lanes:
         elif isinstance(spot, WorldSpot):
             road, lane, s, aside = self._under(spot)
         else:
-            road, s = self._along(spot)
+            road, s, way = self._along(spot)
             t = spot.t if isinstance(spot, RoadSpot) else spot.aside
             lane, aside = self._beside(road, s, t)
             if isinstance(spot, RouteSpot) and spot.lane is not None:
                 lane_at(road, spot.lane, s)
                 lane, aside = spot.lane, spot.aside
-        return model.roads.index(road), lane, math.nan if s is None else s, aside
+        return model.roads.index(road), lane, math.nan if s is None else s, aside, way
 
     def _on_lane(self, spot: Spot) -> Place:
-        road, lane, s, _ = self.locate(spot)
+        road, lane, s, _, _ = self.locate(spot)
         return Place(self.graph.model.roads[road].id, lane, s)
 
-    def _along(self, spot: RoadSpot | RouteSpot) -> tuple[Road, float]:
-        """Return the road of a position, and its s."""
+    def _along(self, spot: RoadSpot | RouteSpot) -> tuple[Road, float, int]:
+        """Return the road of a position, its s, and which way a route leads there."""
         if isinstance(spot, RoadSpot):
             road = self.graph.model.road(spot.road)
             if not 0.0 <= spot.s <= road.length:
                 raise InputError(f"road {road.id} is {road.length:g} m long, got s={spot.s:g} m")
-            return road, spot.s
+            return road, spot.s, 1
         places = [self._on_lane(one) for one in spot.waypoints]
         left, s = spot.path_s, places[0].s
         for i, number in enumerate(self._way(places)):
             node, (entry, leave) = self.graph.nodes[number], self.graph.ends[number].tolist()
             s = entry if i else s
             if left <= abs(leave - s):
-                return self.graph.model.road(node.road_id), s + left * node.way
+                return self.graph.model.road(node.road_id), s + left * node.way, node.way
             left -= abs(leave - s)
         raise InputError(f"the route is shorter than pathS={spot.path_s:g} m")
 

@@ -89,8 +89,8 @@ class Positions:
             return self._append(where, IN_WORLD, where.x, where.y, heading=where.h)
         if isinstance(where, osc.RoutePosition) and isinstance(
             inner := where.in_route_position.position, osc.PositionOfCurrentEntity
-        ):  # where it is on its road
-            return self._append(where, BY_ROAD, 0.0, 0.0, whose=inner.entity_ref)
+        ):  # where it is
+            return self._append(where, BY_OBJECT, 0.0, 0.0, whose=inner.entity_ref)
         if isinstance(where, osc.RoadPosition | osc.RoutePosition):
             return self._append(where, ON_ROAD, 0.0, 0.0, spot=self.spot(position))
         if isinstance(where, osc.RelativeLanePosition):

@@ -50,7 +50,8 @@ class Ways:
         sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
             trajectory.
         timetables: per trajectory ``trajectories.timetable``, without rows if it has no times.
-        spots: ``(C, 4)`` per position of the file: number of its road, lane, s, left of its centre.
+        spots: ``(C, 5)`` per position of the file: number of its road, lane, s, left of its centre,
+            the way from which headings count; see `Lanes.locate`.
         lanes: the lanes of the road network, None while nobody has asked for them.
         has_ground: whether somebody has asked where all of them are.
         numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
@@ -82,7 +83,7 @@ class Ways:
                 if number < len(program.names):
                     who = f"route of '{program.names[number]}'"
                 raise InputError(f"{program.place}: {who}: {error}") from None
-        self.spots = np.full((len(program.spots), 4), np.nan)
+        self.spots = np.full((len(program.spots), 5), np.nan)
         if len(program.laterals) or len(program.spots) or program.looks_at_lanes:
             self.plan(0, LANES)
             self._check_lane_changes()
