@@ -16,7 +16,6 @@ from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose, section_end
 from bridgegen.openx.opendrive.model import Header, Lane, LaneSection, OpenDrive, Road, Width
 from bridgegen.openx.opendrive.plan_view import Arc, Cubic, Geometry, Line, Spiral
-from bridgegen.openx.opendrive.references import contacts
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.write import to_xml
 
@@ -62,7 +61,7 @@ def check_branches(model: OpenDrive, theirs: Any, junction_id: str) -> int:
     junction = model.junction(junction_id)
     lanes = 0
     for road in model.roads:
-        for end in contacts(road, junction_id):
+        for end in road.ends_at(junction_id):
             for lane in road.section_at(end).lanes:
                 if lane.type != "driving" or (road.direction(lane.id) > 0) != (end == "end"):
                     continue

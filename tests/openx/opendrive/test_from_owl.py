@@ -20,6 +20,8 @@ from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.ontology.templates import crossroads
 from bridgegen.ontology.vocabulary import bg
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.from_owl.turns import Ray, joining
+from bridgegen.openx.opendrive.geometry import along_arc
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.plan_view import Arc, Line
@@ -343,3 +345,14 @@ def test_any_value_gives_a_road_network_or_a_clear_error(data: st.DataObject) ->
         return
     assert problems(model) == []
     assert read(to_xml(model)) == model
+
+
+def test_a_slight_bend_whose_corner_is_next_to_its_end_is_wide():
+    """One arc there would have half a metre of radius."""
+    start, end = Ray(0.0, 0.0, 0.0), Ray(90.0, -0.005, -0.13)
+    line = joining(start, end, "it")
+    assert all(abs(one.shape.curvature) < 0.1 for one in line if isinstance(one.shape, Arc))
+    last = line[-1]
+    curvature = last.shape.curvature if isinstance(last.shape, Arc) else 0.0
+    there = along_arc(last.x, last.y, last.hdg, curvature, last.length)
+    assert there == pytest.approx(end, abs=1e-9)

@@ -23,6 +23,7 @@ from bridgegen.openx.opendrive.plan_view import LENGTH_LIMIT, Cubic, Geometry
 from bridgegen.openx.opendrive.user_data import UserData
 
 CONTACTS = ("start", "end")
+JUNCTION_TYPES = ("default", "direct")
 NO_JUNCTION = "-1"
 """What ``Road.junction`` says of a road that is no part of a junction."""
 
@@ -180,6 +181,15 @@ class Road:
         """Return what the road is joined to at its ``"start"`` or its ``"end"``."""
         return self.predecessor if contact == "start" else self.successor
 
+    def ends_at(self, junction_id: str) -> list[str]:
+        """Return the ends of the road, ``"start"`` and ``"end"``, that touch a junction."""
+        found = []
+        for contact in CONTACTS:
+            link = self.link(contact)
+            if link and link.element_type == "junction" and link.element_id == junction_id:
+                found.append(contact)
+        return found
+
     def section_at(self, contact: str) -> LaneSection:
         """Return the lane section at the road's ``"start"`` or its ``"end"``."""
         return self.sections[0 if contact == "start" else -1]
@@ -202,13 +212,23 @@ class LaneLink:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """The way from an incoming road into a connecting road, whose ``contact_point`` it enters."""
+    """The way from an incoming road into another, whose ``contact_point`` it enters.
+
+    That is a connecting road within the junction; in a direct junction the linked road beyond.
+    A file must name the one or the other, and the contact point (`references` sees to it).
+    """
 
     id: str = attribute("id")
     incoming_road: str = attribute("incomingRoad")
-    connecting_road: str = attribute("connectingRoad")
-    contact_point: str = attribute("contactPoint", words=CONTACTS)
+    connecting_road: str | None = attribute("connectingRoad", default=None)
+    contact_point: str = attribute("contactPoint", words=CONTACTS, default="")
     lane_links: tuple[LaneLink, ...] = children("laneLink")
+    linked_road: str | None = attribute("linkedRoad", default=None)
+
+    @property
+    def entered_road(self) -> str:
+        """The id of the road that it leads into."""
+        return self.connecting_road or self.linked_road or ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +250,10 @@ class JunctionController:
 
 @dataclass(frozen=True, slots=True)
 class Junction:
-    """Where roads meet, and the ways across."""
+    """Where roads meet, and the ways across.
+
+    In a ``direct`` one the roads themselves meet, with no connecting roads between them.
+    """
 
     id: str = attribute("id")
     name: str | None = attribute("name", default=None)
@@ -238,6 +261,12 @@ class Junction:
     priorities: tuple[Priority, ...] = children("priority")
     controllers: tuple[JunctionController, ...] = children("controller")
     user_data: tuple[UserData, ...] = children("userData")
+    type: str | None = attribute("type", default=None, words=JUNCTION_TYPES)
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether its roads meet without connecting roads."""
+        return self.type == "direct"
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,7 +344,19 @@ class OpenDrive:
             for connection in junction.connections:
                 key = (junction.id, connection.incoming_road)
                 found.setdefault(key, []).append(connection)
+                if junction.is_direct:
+                    back = self._back(junction.id, connection)
+                    found.setdefault((junction.id, back.incoming_road), []).append(back)
         return found
+
+    def _back(self, junction_id: str, connection: Connection) -> Connection:
+        """Return the same link of two roads, seen from the other one."""
+        touching = self.roads_by_id[connection.incoming_road].ends_at(junction_id)
+        links = tuple(LaneLink(one.to_lane, one.from_lane) for one in connection.lane_links)
+        return Connection(
+            connection.id, connection.entered_road, None, touching[0], links,
+            connection.incoming_road,
+        )  # fmt: skip
 
     def connecting_roads(self, junction_id: str) -> Iterator[Road]:
         """Yield the roads within a junction."""

@@ -12,7 +12,6 @@ from bridgegen.openx.opendrive.lanes import borders, breaks, points, section_end
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
 from bridgegen.openx.opendrive.outline_furniture import crosswalk_stripes, signs, stop_lines
 from bridgegen.openx.opendrive.plan_view import Line
-from bridgegen.openx.opendrive.references import contacts
 
 AREAS = ("driving", "junction", "shoulder", "sidewalk", "median", "stripe")
 """Kinds that are areas; the last point is joined to the first. A stripe is a crosswalk's."""
@@ -66,7 +65,7 @@ def outline(model: OpenDrive, junction_id: str | None = None, *, step: float = 1
 def _legs(model: OpenDrive, junction_id: str) -> list[Road]:
     """Return the roads that touch a junction and those that continue them."""
     found: dict[str, Road] = {}
-    todo = [road for road in model.roads if contacts(road, junction_id)]
+    todo = [road for road in model.roads if road.ends_at(junction_id)]
     while todo:
         road = todo.pop()
         if road.id not in found and not road.is_connecting:
@@ -131,7 +130,7 @@ def _waits(model: OpenDrive, road: Road, contact: str) -> bool:
     link = road.link(contact)
     if link is None or any(one.type == "motorway" for one in road.types):
         return False
-    legs = [one for one in model.roads if contacts(one, link.element_id) and not one.is_connecting]
+    legs = [one for one in model.roads if one.ends_at(link.element_id) and not one.is_connecting]
     told = [one for one in legs if any(s.dynamic == "yes" or s.type in _WAIT for s in one.signals)]
     return not told or road in told
 
@@ -160,7 +159,7 @@ def _junction(model: OpenDrive, junction: Junction, step: float) -> Iterator[Sha
         (road, end)
         for road in model.roads
         if not road.is_connecting
-        for end in contacts(road, junction.id)
+        for end in road.ends_at(junction.id)
         if any(lane.drivable for lane in road.section_at(end).lanes)
     ]
     if len(ends) < 2:
@@ -203,7 +202,7 @@ def _border_of_way(
 ) -> Float | None:
     """Return the right (outer) or left border of the way from one leg to another, as driven."""
     for connection in model.connections_from.get((junction.id, road.id), ()):
-        way = model.road(connection.connecting_road)
+        way = model.road(connection.entered_road)
         forward = connection.contact_point == "start"
         onward = way.link("end" if forward else "start")
         lanes = {link.to_lane for link in connection.lane_links}

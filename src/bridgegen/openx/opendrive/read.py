@@ -11,7 +11,14 @@ from lxml import etree
 from bridgegen.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.opendrive.declaration import ID, Field, plan
 from bridgegen.openx.opendrive.geometry import impossible_shape
-from bridgegen.openx.opendrive.model import Connection, Junction, LaneSection, OpenDrive, Road
+from bridgegen.openx.opendrive.model import (
+    JUNCTION_TYPES,
+    Connection,
+    Junction,
+    LaneSection,
+    OpenDrive,
+    Road,
+)
 from bridgegen.openx.opendrive.plan_view import Geometry
 from bridgegen.openx.opendrive.references import broken_references, misnumbered
 from bridgegen.openx.opendrive.user_data import PREFIX, UserData
@@ -150,7 +157,7 @@ class _Reader:
             return (item.text or "").strip()
         if role == "ids":
             return self._value(ID, str(item.get("id", "")), item)
-        if one.types[0] is Junction and item.get("type", "default") != "default":
+        if one.types[0] is Junction and item.get("type", "default") not in JUNCTION_TYPES:
             self.beyond.append((_line(item), f"{_where(item)}: type '{item.get('type')}'"))
             return None
         return self.record(one.tags[_tag(item)] if role == "choice" else one.types[0], item)

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 from bridgegen.openx.opendrive.model import (
-    CONTACTS,
     Connection,
     Junction,
     LaneSection,
@@ -55,36 +54,40 @@ def _connection(
     name = f"junction {junction.id}, connection {connection.id}"
     roads = model.roads_by_id
     incoming = roads.get(connection.incoming_road)
-    connecting = roads.get(connection.connecting_road)
+    key, road_id = "connectingRoad", connection.connecting_road
+    if junction.is_direct:
+        key, road_id = "linkedRoad", connection.linked_road
+    if road_id is None or not connection.contact_point:
+        missing = key if road_id is None else "contactPoint"
+        yield connection, f"{name}: attribute {missing} is required"
+        return
+    connecting = roads.get(road_id)
     if incoming is None:
         yield connection, f"{name}: incomingRoad '{connection.incoming_road}' is not in the file"
     if connecting is None:
-        problem = f"{name}: connectingRoad '{connection.connecting_road}' is not in the file"
+        problem = f"{name}: {key} '{road_id}' is not in the file"
         yield connection, problem
         return
-    if connecting.junction != junction.id:
+    if junction.is_direct:
+        if connection.contact_point not in connecting.ends_at(junction.id):
+            contact = connection.contact_point
+            yield (
+                connection,
+                f"{name}: the {contact} of road {road_id} has no link to this junction",
+            )
+    elif connecting.junction != junction.id:
         yield (
             connection,
             f"{name}: connectingRoad {connecting.id} must be of this junction, "
             f"got junction '{connecting.junction}'",
         )
-    if incoming and not contacts(incoming, junction.id):
+    if incoming and not incoming.ends_at(junction.id):
         yield connection, f"{name}: incomingRoad {incoming.id} has no link to this junction"
     for link in connection.lane_links:
         if incoming and not any(
             incoming.section_at(contact).lane(link.from_lane)
-            for contact in contacts(incoming, junction.id)
+            for contact in incoming.ends_at(junction.id)
         ):
             yield connection, f"{name}: road {incoming.id} has no lane {link.from_lane} there"
         if not connecting.section_at(connection.contact_point).lane(link.to_lane):
             yield connection, f"{name}: road {connecting.id} has no lane {link.to_lane} there"
-
-
-def contacts(road: Road, junction_id: str) -> list[str]:
-    """Return the ends of a road, ``"start"`` and ``"end"``, that touch a junction."""
-    found = []
-    for contact in CONTACTS:
-        link = road.link(contact)
-        if link and link.element_type == "junction" and link.element_id == junction_id:
-            found.append(contact)
-    return found

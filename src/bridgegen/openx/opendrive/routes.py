@@ -162,7 +162,7 @@ def next_stretches(model: OpenDrive, stretch: Stretch) -> Iterator[Stretch]:
         for each in connection.lane_links:
             if each.from_lane == lane.id:
                 contact = connection.contact_point
-                yield from _enter(model, connection.connecting_road, contact, each.to_lane)
+                yield from _enter(model, connection.entered_road, contact, each.to_lane)
 
 
 def _enter(model: OpenDrive, road_id: str, contact: str | None, lane_id: int) -> Iterator[Stretch]:

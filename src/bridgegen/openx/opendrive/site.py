@@ -11,7 +11,6 @@ from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.legs import heading, leads_to
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
-from bridgegen.openx.opendrive.references import contacts
 
 KNOWN_SITES = {"Town05": "965"}
 """The junction to use on a map, by the map's name, where nobody says which.
@@ -183,7 +182,7 @@ def _ends(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]]:
     """Yield the road ends with a driving lane that touch a junction."""
     for road in model.roads:
         if not road.is_connecting:
-            for end in contacts(road, junction.id):
+            for end in road.ends_at(junction.id):
                 if any(lane.drivable for lane in road.section_at(end).lanes):
                     yield road, end
 

@@ -236,8 +236,11 @@ def _junction(model: OpenDrive, junction: Junction) -> Iterator[str]:
     entered: set[str] = set()
     for connection in junction.connections:
         yield from _connection(model, junction, connection)
-        entered.add(connection.connecting_road)
-        served.update((connection.incoming_road, link.from_lane) for link in connection.lane_links)
+        entered.add(connection.entered_road)
+        for each in connection.lane_links:
+            served.add((connection.incoming_road, each.from_lane))
+            if junction.is_direct:
+                served.add((connection.entered_road, each.to_lane))
     for road in model.connecting_roads(junction.id):
         if road.id not in entered:
             yield f"junction {junction.id}: no connection leads into its road {road.id}"
@@ -255,15 +258,24 @@ def _junction(model: OpenDrive, junction: Junction) -> Iterator[str]:
 def _connection(model: OpenDrive, junction: Junction, connection: Connection) -> Iterator[str]:
     name = f"junction {junction.id}, connection {connection.id}"
     incoming = model.road(connection.incoming_road)
-    way = model.road(connection.connecting_road)
+    way = model.road(connection.entered_road)
     entry = connection.contact_point
+    if not connection.lane_links:
+        yield f"{name}: a laneLink is required, got none"
+    if junction.is_direct:
+        for each in connection.lane_links:
+            what = (
+                f"{name}: lane {each.to_lane} of road {way.id} beside lane {each.from_lane} of "
+                f"road {incoming.id}"
+            )
+            contact = incoming.ends_at(junction.id)[0]
+            yield from _gap(what, incoming, each.from_lane, contact, way, each.to_lane, entry)
+        return
     link = way.link(entry)
     if link is None or (link.element_type, link.element_id) != ("road", incoming.id):
         got = f"{link.element_type} {link.element_id}" if link else "nothing"
         yield f"{name}: the {entry} of road {way.id} must link to road {incoming.id}, got {got}"
         return
-    if not connection.lane_links:
-        yield f"{name}: a laneLink is required, got none"
     for each in connection.lane_links:
         contact = "end" if incoming.direction(each.from_lane) > 0 else "start"
         what = (

@@ -79,7 +79,8 @@ def _bends(ahead: float, aside: float, turn: float) -> list[tuple[float, float]]
             radius = tangent / math.tan(0.5 * abs(turn))
             arc = (math.copysign(1.0 / radius, turn), radius * abs(turn))
             parts = [(0.0, before - tangent), arc, (0.0, after - tangent)]
-            return [part for part in parts if part[1] > _SHORTEST]
+            if radius >= LEAST_RADIUS:  # else the corner is next to one end of a slight bend
+                return [part for part in parts if part[1] > _SHORTEST]
     return _two_arcs(ahead, aside, turn)
 
 

@@ -2,12 +2,12 @@
 
 import pyoxigraph as ox
 
+from bridgegen.errors import UnsupportedError
 from bridgegen.ontology.builder import Builder
 from bridgegen.ontology.vocabulary import tbox
 from bridgegen.openx.opendrive.from_owl.network import KINDS, MEASURES
 from bridgegen.openx.opendrive.map_names import junction_name, lane_name, part_name, road_name
 from bridgegen.openx.opendrive.model import Connection, Junction, OpenDrive, Road
-from bridgegen.openx.opendrive.references import contacts
 from bridgegen.openx.opendrive.user_data import number, said
 
 _BY_LEGS = {3: "TJunction", 4: "Crossroads"}
@@ -45,6 +45,9 @@ class Junctions:
                 self._add(junction)
 
     def _add(self, junction: Junction) -> None:
+        if junction.is_direct:
+            what = f"junction {junction.id}: a direct junction"
+            raise UnsupportedError(f"{what} cannot be said in the ontology")
         put = self._builder.put
         parts = [
             one for one in self._model.junctions
@@ -53,7 +56,7 @@ class Junctions:
         ids = [one.id for one in parts]
         inner, legs = [], []
         for road in self._model.roads:
-            touches = sum(len(contacts(road, one)) for one in ids)
+            touches = sum(len(road.ends_at(one)) for one in ids)
             if road.junction in ids or (touches == 2 and len(ids) > 1):
                 inner.append(road)
             elif touches:
@@ -86,8 +89,8 @@ class Junctions:
         put(junction_node, "has_connection", node)
         put(node, "has_connection_id", connection.id)
         put(node, "has_incoming_road", iri(road_name(connection.incoming_road)))
-        put(node, "has_connecting_road", iri(road_name(connection.connecting_road)))
-        entered = self._model.road(connection.connecting_road)
+        put(node, "has_connecting_road", iri(road_name(connection.entered_road)))
+        entered = self._model.road(connection.entered_road)
         left = self._model.road(connection.incoming_road)
         start = 0 if connection.contact_point == "start" else len(entered.sections) - 1
         end = 0 if _leaves_at(left, junction, entered, connection) == "start" else -1
@@ -113,4 +116,4 @@ def _leaves_at(left: Road, junction: Junction, entered: Road, connection: Connec
     link = entered.link(connection.contact_point)
     if link is not None and link.element_id == left.id and link.contact_point is not None:
         return link.contact_point
-    return next(iter(contacts(left, junction.id)), "end")
+    return next(iter(left.ends_at(junction.id)), "end")

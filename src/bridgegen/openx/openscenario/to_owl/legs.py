@@ -12,7 +12,6 @@ import pyoxigraph as ox
 
 from bridgegen.ontology.vocabulary import bg
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
-from bridgegen.openx.opendrive.references import contacts
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def _legs_of(roads: OpenDrive, junction: Junction) -> dict[str, Stretch]:
     """Return the roads that lead to a junction, each one once, by their ids."""
     found: dict[str, Stretch] = {}
     for road in roads.roads:
-        ends = [] if road.is_connecting else contacts(road, junction.id)
+        ends = [] if road.is_connecting else road.ends_at(junction.id)
         if len(ends) == 1 and road.id not in found:
             for one, stretch in _chain(roads, road, ends[0]):
                 if one.id in found:

@@ -1,0 +1,96 @@
+"""Direct junctions: roads that meet without connecting roads, as at a motorway's exit."""
+
+import pytest
+
+from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.openx.opendrive.lane_graph import LaneGraph
+from bridgegen.openx.opendrive.read import read
+from bridgegen.openx.opendrive.routes import plan_route
+from bridgegen.openx.opendrive.to_owl.network import individuals_from_opendrive
+from bridgegen.openx.opendrive.validate import problems
+from bridgegen.openx.opendrive.write import to_xml
+
+WIDTH = '<width sOffset="0" a="4" b="0" c="0" d="0"/>'
+
+
+def road(number: int, x: float, y: float, link: str, left: int, right: int) -> str:
+    """A straight road of 50 m to the east, with so many lanes of 4 m."""
+
+    def lanes(side: str, ids: list[int]) -> str:
+        each = "".join(f'<lane id="{i}" type="driving" level="false">{WIDTH}</lane>' for i in ids)
+        return f"<{side}>{each}</{side}>" if ids else ""
+
+    return f"""<road id="{number}" length="50" junction="-1"><link>{link}</link><planView>
+<geometry s="0" x="{x}" y="{y}" hdg="0" length="50"><line/></geometry></planView><lanes>
+<laneSection s="0">{lanes("left", list(range(left, 0, -1)))}<center>
+<lane id="0" type="none" level="false"/></center>
+{lanes("right", list(range(-1, -right - 1, -1)))}</laneSection></lanes></road>"""
+
+
+IN = '<successor elementType="junction" elementId="9"/>'
+OUT = '<predecessor elementType="junction" elementId="9"/>'
+CONNECTIONS = """<connection id="0" incomingRoad="1" linkedRoad="2" contactPoint="start">
+<laneLink from="-1" to="-1"/><laneLink from="1" to="1"/></connection>
+<connection id="1" incomingRoad="1" linkedRoad="3" contactPoint="start">
+<laneLink from="-2" to="-1"/></connection>"""
+
+
+def document(connections: str = CONNECTIONS, out: str = OUT) -> bytes:
+    """A road with an oncoming lane, whose rightmost lane goes on as a road of its own."""
+    roads = road(1, 0, 0, IN, 1, 2) + road(2, 50, 0, OUT, 1, 1) + road(3, 50, -4, out, 0, 1)
+    return f"""<OpenDRIVE><header revMajor="1" revMinor="8"/>{roads}
+<junction id="9" name="exit" type="direct">{connections}</junction></OpenDRIVE>""".encode()
+
+
+def test_lanes_go_on_in_both_directions_of_traffic():
+    model = read(document(), "exit.xodr")
+    route = plan_route(model, ("1", -2, 10.0), [], ("3", -1, 20.0))
+    assert [(step.road_id, step.lane_id) for step in route.steps] == [("1", -2), ("3", -1)]
+    assert route.length == pytest.approx(60.0)
+    back = plan_route(model, ("2", 1, 20.0), [], ("1", 1, 10.0))
+    assert [(step.road_id, step.lane_id) for step in back.steps] == [("2", 1), ("1", 1)]
+    graph = LaneGraph(model)
+    assert graph.following[graph.node("1", -1, 10.0)] == (graph.node("2", -1, 10.0),)
+    assert graph.following[graph.node("1", 1, 10.0)] == ()
+    assert list(problems(model)) == []
+
+
+def test_what_is_written_is_what_was_read():
+    model = read(document(), "exit.xodr")
+    text = to_xml(model)
+    assert b'linkedRoad="3"' in text
+    assert b'type="direct"' in text
+    assert b"connectingRoad" not in text
+    assert read(text, "again.xodr") == model
+
+
+def test_lanes_that_do_not_meet_are_named():
+    model = read(document(CONNECTIONS.replace('from="-2" to="-1"', 'from="-1" to="-1"')), "a.xodr")
+    found = list(problems(model))
+    assert any("lane -1 of road 3 beside lane -1 of road 1 must begin where" in x for x in found)
+    assert "junction 9: no way on for lane -2 of road 1" in found
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"connections": CONNECTIONS.replace("linkedRoad", "connectingRoad")}, "linkedRoad is req"),
+        ({"connections": CONNECTIONS.replace(' contactPoint="start"', "")}, "contactPoint is req"),
+        ({"connections": CONNECTIONS.replace('"3"', '"7"')}, "linkedRoad '7' is not in the file"),
+        ({"connections": CONNECTIONS.replace('to="-1"', 'to="-5"')}, "road 2 has no lane -5"),
+        ({"out": ""}, "the start of road 3 has no link to this junction"),
+    ],
+)
+def test_links_that_lead_nowhere_are_refused(wrong: dict[str, str], said: str):
+    with pytest.raises(FileFormatError, match=said):
+        read(document(**wrong), "exit.xodr")
+
+
+def test_the_ontology_has_no_words_for_it():
+    with pytest.raises(UnsupportedError, match="junction 9: a direct junction cannot be said"):
+        individuals_from_opendrive(read(document(), "exit.xodr"), "exit.xodr")
+
+
+def test_virtual_junctions_are_refused_by_name():
+    with pytest.raises(UnsupportedError, match="junction 9: type 'virtual' is not supported"):
+        read(document().replace(b'"direct"', b'"virtual"'), "exit.xodr")
