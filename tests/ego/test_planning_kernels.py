@@ -19,7 +19,14 @@ from bridgegen.ego._prediction_kernels import LOST, PASSAGE, add_straight, predi
 from bridgegen.ego._shift_kernels import UNSHIFTED as STAYS
 from bridgegen.ego._speed_kernels import bend_speed, limit_speed, sight_speed
 from bridgegen.ego._surroundings_kernels import AROUND, surround
-from bridgegen.ego._yielding_kernels import coming, find_zone, time_to, yield_to_all
+from bridgegen.ego._yielding_kernels import (
+    PART,
+    coming,
+    find_zone,
+    place_on_route,
+    time_to,
+    yield_to_all,
+)
 from bridgegen.simulation.boxes import box_distance
 
 DS = 0.5
@@ -197,6 +204,38 @@ def test_a_zone_is_where_two_bodies_would_be_too_near() -> None:
     own, far = line(0.0, 0.0, 0.0, 100.0), line(0.0, 5.0, 0.0, 100.0)
     find_zone(own, len(own), DS, CAR, far, len(far), DS, CAR, apart)
     assert math.isinf(apart[0])
+
+
+def test_ways_that_go_together_for_a_while_are_followed_not_waited_for() -> None:
+    s = np.arange(0.0, 60.0 + DS, DS)
+    h = np.clip((s - 20.0) / 12.0, 0.0, math.pi / 2)  # straight on, then a bend to the left
+    x, y = (np.concatenate([[0.0], np.cumsum(DS * f(h[:-1]))]) for f in (np.cos, np.sin))
+    left = np.stack([x, y, h, np.cos(h), np.sin(h), 0.0 * s], axis=1)
+    straight = line(0.0, 0.0, 0.0, 100.0)
+    zone = np.empty(5)
+    find_zone(straight, len(straight), DS, CAR, left, len(left), DS, CAR, zone)
+    assert zone[4] == PART
+    assert zone[0] == zone[2] == 0.0
+    assert 25.0 < zone[1] < 40.0
+    assert place_on_route(zone, 12.0) == 12.0
+    ahead = passage(zone, 22.0, 6.0)
+    asked = yield_to_all(5.0, 6.0, 6.0, 3.65, 0.85, STAYS, GRIP, ahead, 1)
+    assert asked == pytest.approx(follow(22.0 - 2.25 - 3.65 - 5.0, 6.0, 6.0, 0.0))
+    gone = passage(zone, 45.0, 6.0)
+    assert yield_to_all(5.0, 6.0, 6.0, 3.65, 0.85, STAYS, GRIP, gone, 1) == math.inf
+
+
+def test_who_has_to_wait_joins_only_if_nobody_has_to_brake_for_it() -> None:
+    zone = np.array([40.0, 80.0, 40.0, 80.0, PART])
+    far = {}
+    for rank in (0, -1):
+        rows = [passage(zone, q, 9.0, 0.0, rank) for q in np.arange(-60.0, 30.0)]
+        asked = [yield_to_all(35.0, 0.0, 8.0, 3.65, 0.85, STAYS, GRIP, one, 1) for one in rows]
+        far[rank] = min(i for i, a in enumerate(asked) if a < 0.0)
+    # From rest it enters at 2 m/s: half a second of margin more, and 7 m/s over 2 m/s².
+    assert far[0] - far[-1] == pytest.approx(
+        9.0 * (0.5 + (9.0 - math.sqrt(3.0 * 1.35)) / 2.0), abs=1
+    )
 
 
 def passage(zone: Float, q: float, w: float, gain: float = 0.0, rank: int = 0) -> Float:

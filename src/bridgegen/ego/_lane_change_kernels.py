@@ -39,6 +39,7 @@ from bridgegen.ego._surroundings_kernels import (
     NEAR,
 )
 from bridgegen.ego._tracking_kernels import KIND
+from bridgegen.ego._yielding_kernels import ACROSS as CROSSES
 from bridgegen.ego.kinds import ANIMAL, PEDESTRIAN
 
 BEFORE, AFTER, BEGINS, LENGTH, HELD_UP = range(control.SIZE + 3, control.SIZE + 8)
@@ -163,7 +164,7 @@ def waits_for_something(crosswalks, stop_stations, at):
 def somebody_crosses(passages, n_passages, s, until):
     """Say whether a passage is expected across the route up to a station."""
     for i in range(n_passages):
-        if passages[i, 4] == 0.0 and passages[i, 1] > s and passages[i, 0] < until:
+        if passages[i, 4] == CROSSES and passages[i, 1] > s and passages[i, 0] < until:
             return True
     return False
 

@@ -1,7 +1,8 @@
 """Where two ways conflict, and whether to go first.
 
 A conflict zone is a row of five: where the ego's route enters and leaves it [m], where the other's
-way does [m], and 1 if both go on together from there (a merge), else 0. No zone: infinity. A
+way does [m], and whether they are `ACROSS`, merge and go on together (`MERGE`), or go together for
+a while and `PART` again, as in a roundabout. No zone: infinity. A
 passage begins with its zone, see ``_prediction_kernels``.
 
 Who comes first goes first, with a margin in time, a larger one where the ego has to wait by the
@@ -31,6 +32,9 @@ HORIZON = 10.0  # s, how far ahead arrivals are compared
 STATION, SPEED, FRONT, REAR, WHO, GAIN, RANK = 5, 6, 7, 8, 9, 10, 11
 """Columns of a passage after its zone."""
 
+ACROSS, MERGE, PART = 0.0, 1.0, 2.0
+TOGETHER = 8.0  # m; ways that lead the same way for less only cross
+
 SCAN_STEP = 0.5  # m, between the points of a way that are looked at
 SAME_WAY = 0.9  # cosine of the heading difference above which two ways go on together
 STANDING = 0.1  # m/s, who is slower stands
@@ -44,7 +48,7 @@ def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone
     zone[:] = (math.inf, math.inf, math.inf, math.inf, 0.0)
     stride = max(int(SCAN_STEP / ds), 1)
     other_stride = max(int(SCAN_STEP / other_ds), 1)
-    last_i, last_j = -1, -1
+    last_i, along, together = -1, 0.0, 0.0
     for i in range(0, n, stride):
         nearest, at, j = side, -1, 0
         while j < other_n:
@@ -59,17 +63,15 @@ def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone
             if last_i < 0:
                 zone[0], zone[2], zone[3] = i * ds, q, q
             zone[1], zone[2], zone[3] = i * ds, min(zone[2], q), max(zone[3], q)
-            last_i, last_j = i, at
+            along = path[i, COS] * other_path[at, COS] + path[i, SIN] * other_path[at, SIN]
+            if along > SAME_WAY:
+                together += stride * ds
+            last_i = i
         elif last_i >= 0:
             break
     if last_i >= 0:
-        along = (
-            path[last_i, COS] * other_path[last_j, COS]
-            + path[last_i, SIN] * other_path[last_j, SIN]
-        )
-        zone[4] = 1.0 if along > SAME_WAY else 0.0
-        if zone[4] == 0.0:
-            # Across, the ego's width counts, too.
+        zone[4] = MERGE if along > SAME_WAY else PART if together > TOGETHER else ACROSS
+        if zone[4] == ACROSS:  # the ego's width counts, too
             zone[2] -= 0.5 * body[1]
             zone[3] += 0.5 * body[1]
 
@@ -82,6 +84,17 @@ def time_to(distance, v, pace):
     if distance <= gained:
         return (math.sqrt(v * v + 2.0 * COMFORT_ACCELERATION * distance) - v) / COMFORT_ACCELERATION
     return (pace - v) / COMFORT_ACCELERATION + (distance - gained) / pace
+
+
+@kernel
+def place_on_route(zone, q):
+    """Return where on the ego's route [m] somebody is, counted from the common end of both ways.
+
+    Of two ways that part again, from their common beginning.
+    """
+    if zone[4] == PART:
+        return zone[0] + q - zone[2]
+    return zone[1] - zone[3] + q
 
 
 @kernel
@@ -107,14 +120,14 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
     ``gain``; ``rank`` says who waits (``right_of_way``). Bodies reach ``front`` and ``rear`` [m]
     ahead of and behind these stations.
     """
-    merges = zone[4] > 0.0
-    if s - rear > zone[1] or (q - other_rear > zone[3] and not merges):
+    together = zone[4] != ACROSS
+    if s - rear > zone[1] or (q - other_rear > zone[3] and zone[4] != MERGE):
         return math.inf, math.inf
     to_enter = zone[0] - front - s  # what is left until our bumper is in
     inside = q + other_front > zone[2]
-    if merges and inside:
-        # It drives before us, or will: its place on our route, counted from the common end.
-        ahead = zone[1] - (zone[3] - q)
+    if together and inside:
+        # It drives before us, or will: its place on our route.
+        ahead = place_on_route(zone, q)
         if ahead >= s:
             return follow(ahead - other_rear - front - s, v, w, min(gain, 0.0)), math.inf
         return math.inf, math.inf
@@ -122,7 +135,7 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
         return math.inf, math.inf  # we are in: the way out is forward
     if w < STANDING:
         return math.inf, zone[0] if inside else math.inf
-    width = 0.0 if merges else zone[3] - zone[2]
+    width = 0.0 if together else zone[3] - zone[2]
     until = zone[2] - other_front - q
     if rank > 0 and until > 0.0 and w * w < 2.0 * CAN_STOP * until:
         return math.inf, math.inf
@@ -131,7 +144,10 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
     slower = max(gain, -0.5 * w / GOES_ON) if gain < -LEAST_GAIN else 0.0
     enters, leaves = coming(until, w, quicker), coming(until + length, w, slower)
     margin = WAITING_MARGIN if rank < 0 else TIME_MARGIN
-    through = front + rear + (0.0 if merges else zone[1] - zone[0])
+    if rank < 0 and together:
+        # Nor must it have to brake much for us, who may be slower.
+        margin += max(w - math.sqrt(v * v + 2.0 * COMFORT_ACCELERATION * to_enter), 0.0) / CAN_STOP
+    through = front + rear + (0.0 if together else zone[1] - zone[0])
     arrives = time_to(to_enter, v, pace)
     clears = time_to(to_enter + through, v, pace) + BUILD_UP
     if enters < HORIZON and arrives < leaves + margin and clears > enters - margin:
@@ -154,9 +170,9 @@ def keep_clear(s, front, rear, length, zone, q, w, other_rear, stop):
 @kernel
 def is_left(shift, s, passage):
     """Say whether the ego is in another lane where somebody comes, or is, to go its route's way."""
-    if passage[4] == 0.0 or shift[0] == shift[1] == 0.0:
+    if passage[4] == ACROSS or shift[0] == shift[1] == 0.0:
         return False
-    place = max(s, passage[0], passage[1] - passage[3] + passage[STATION])
+    place = max(s, passage[0], place_on_route(passage, passage[STATION]))
     return abs(aside_at(shift, place)) > ELSEWHERE
 
 
