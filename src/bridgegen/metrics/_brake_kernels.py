@@ -112,6 +112,7 @@ def required(
     low[1], slope[1] = ahead - reach, c
     low[2], slope[2] = -math.inf, c
     high, high_slope, highest = ahead + reach, c, math.inf
+    t_first = 0.0
     if abs(s) <= PARALLEL:
         if abs(left) > side:
             return 0.0
@@ -122,6 +123,9 @@ def required(
             last, stays = leaves, False
         if first > last:
             return 0.0
+        t_first = when(first, u, b)
+        if t_first == math.inf or v * t_first > high + high_slope * first:
+            return 0.0  # the ego is through before it comes, as nearly all are who drive beside it
         across, reach_across = left * c - ahead * s, wb + (abs(s) * la + abs(c) * wa)
         low[0] = min((-reach_across - across) / s, (reach_across - across) / s)
         highest = max((-reach_across - across) / s, (reach_across - across) / s)
@@ -130,9 +134,8 @@ def required(
             reach_along = math.copysign(lb + (abs(c) * la + abs(s) * wa), c)
             low[2], slope[2] = (along - reach_along) / c, 1.0 / c
             highest = min(highest, (along + reach_along + first) / c)
-    t_first = when(first, u, b)
-    if t_first == math.inf or v * t_first > min(high + high_slope * first, highest):
-        return 0.0  # the ego is through before it comes
+    if v * t_first > min(high + high_slope * first, highest):
+        return 0.0
     if c < 0.0:
         low[0], low[2] = low[2], low[0]
         slope[0], slope[2] = slope[2], slope[0]

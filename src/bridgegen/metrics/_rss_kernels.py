@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from bridgegen.arrays import Float, Int
 from bridgegen.compiled import kernel
 
@@ -49,11 +51,15 @@ def missing_share(
     n_steps: Int, p: Float, out: Float,
 ) -> None:  # fmt: skip
     """Write the largest share of the safe distances that is missing both along and across."""
-    n_rows, n_entities, _ = x.shape
+    n_rows, n_entities, n_instants = x.shape
     la, wa = half[0, 0], half[0, 1]
     ego_across = approach(0.0, 0.0, p[EGO_RESPONSE], p)
+    ego_ahead, ego_back = np.empty(n_instants), np.empty(n_instants)
     for i in range(n_rows):
         least = 1.0
+        for k in range(n_steps[i]):
+            ego_ahead[k] = approach(v[i, 0, k], 1.0, p[EGO_RESPONSE], p)
+            ego_back[k] = approach(v[i, 0, k], -1.0, p[EGO_RESPONSE], p)
         for e in range(1, n_entities):
             lb, wb = half[e, 0], half[e, 1]
             for k in range(n_steps[i]):
@@ -64,21 +70,21 @@ def missing_share(
                 c = ca * cosine[i, e, k] + sa * sine[i, e, k]
                 s = ca * sine[i, e, k] - sa * cosine[i, e, k]
                 ahead, left = dx * ca + dy * sa, dy * ca - dx * sa
-                va, vb = v[i, 0, k], v[i, e, k]
+                vb = v[i, e, k]
                 gap = abs(ahead) - (la + (abs(c) * lb + abs(s) * wb))
                 side = abs(left) - (wa + (abs(s) * lb + abs(c) * wb))
-                along = 0.0
-                if gap > 0.0:
-                    to = 1.0 if ahead > 0.0 else -1.0
-                    safe = approach(va, to, p[EGO_RESPONSE], p)
-                    safe += approach(vb, -to * c, p[OTHER_RESPONSE], p)
-                    along = share_of_safe(gap, safe)
-                    if along >= least:
-                        continue
                 across = 0.0
                 if side > 0.0:
                     to = 1.0 if left > 0.0 else -1.0
                     safe = ego_across + approach(vb, -to * s, p[OTHER_RESPONSE], p)
                     across = share_of_safe(side, p[MARGIN] + max(safe, 0.0))
+                    if across >= least:  # most are: who is in another lane
+                        continue
+                along = 0.0
+                if gap > 0.0:
+                    to = 1.0 if ahead > 0.0 else -1.0
+                    safe = ego_ahead[k] if ahead > 0.0 else ego_back[k]
+                    safe += approach(vb, -to * c, p[OTHER_RESPONSE], p)
+                    along = share_of_safe(gap, safe)
                 least = min(least, max(along, across))
         out[i] = 1.0 - least

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 CHUNK = 128
-"""Rows that one thread rolls out at a time: enough to keep it busy, few enough for its cache."""
+"""Rows that one thread rolls out at a time at most: enough to keep it busy."""
+
+CHUNK_BYTES, INSTANT_BYTES = 16 * 2**20, 112
+"""What they may record between them, and what an entity's instant takes: little to go through."""
 
 LOCK_STEP_ROWS = 1024
 """Rows that a driver in Python drives at a time: a thousand take it little longer than one."""
-
-SHARED, BYTES = 16 * 2**20, 112
-"""Bytes to share with a compiled driver's process at a time, and what an entity's instant takes."""
 
 
 class EmbeddedSimulator:
@@ -73,19 +73,21 @@ class EmbeddedSimulator:
     @property
     def rows_at_once(self) -> int:
         """See `Simulator`."""
-        if not self.program.driver.is_own:
-            return CHUNK
-        if self._own.memory is None:
+        if self._asks_python:
             return LOCK_STEP_ROWS
         instants = len(self.program.names) * self.program.n_steps
-        return max(1, min(CHUNK, SHARED // (BYTES * instants)))
+        return max(1, min(CHUNK, CHUNK_BYTES // (INSTANT_BYTES * instants)))
 
     @property
     def runs_at_once(self) -> int:
         """See `Simulator`."""
-        if self.program.driver.is_own and self._own.memory is None:
+        if self._asks_python:
             return 1  # the user's driver is one, and has all rows at once
         return os.cpu_count() or 1
+
+    @property
+    def _asks_python(self) -> bool:
+        return self.program.driver.is_own and self._own.memory is None
 
     @property
     def time_step(self) -> float:
