@@ -21,7 +21,7 @@ def share(target: tuple, *others: tuple, eye: float = EYE) -> float:
     bodies = np.zeros((len(rows), 8))
     bodies[:, [0, 1, 7]] = [row[3:] for row in rows]
     memory = np.zeros((len(rows), MEMORY))
-    place(0, x, y, h, bodies, memory)
+    place(0, np.ones(len(rows), dtype=np.bool_), x, y, h, bodies, memory)
     return visible_share(1, memory, bodies, eye)
 
 
