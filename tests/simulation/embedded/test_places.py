@@ -384,6 +384,16 @@ def test_an_ego_with_a_driver_needs_a_lane():
     assert rollout.n_steps[0] == round(1.0 / DT) + 1
 
 
+def test_a_second_teleport_at_the_start_counts_from_the_first():
+    """40 m up the road, and 15 m on from there, towards the junction; half a second later 5 m."""
+    more = position("RelativeLanePosition", entityRef="bv", dLane=0, dsLane=15)
+    more = f"<PrivateAction><TeleportAction>{more}</TeleportAction></PrivateAction></Private>"
+    bv = start("bv", lane(3, 1, 40.0), 10.0).replace("</Private>", more)
+    rollout = run(scenario(("ego", "bv"), EGO + bv))
+    assert pose(rollout)[:2] == pytest.approx((-1.75, 13.0 + 25.0), abs=1e-6)
+    assert pose(rollout, 10)[1] == pytest.approx(13.0 + 20.0, abs=1e-6)
+
+
 NOWHERE = """<OpenDRIVE><header revMajor="1" revMinor="7"/></OpenDRIVE>"""
 
 

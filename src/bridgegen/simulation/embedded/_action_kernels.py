@@ -32,6 +32,7 @@ from bridgegen.simulation.embedded._follow_kernels import (
 )
 from bridgegen.simulation.embedded._global_kernels import begin_global
 from bridgegen.simulation.embedded._motion_kernels import STEP
+from bridgegen.simulation.embedded._place_kernels import body_pose
 from bridgegen.simulation.embedded._presence_kernels import begin_add, begin_delete, is_pointless
 from bridgegen.simulation.embedded._pursuit_kernels import start_at_speed
 from bridgegen.simulation.embedded._speed_kernels import begin_longitudinal, stop_longitudinal
@@ -71,12 +72,16 @@ def begin(j, k, plan, roads, state, record):
 
 @kernel
 def begin_initially(plan, roads, state, record):
-    """Begin the actions that begin at the start; a speed that is set at once is the first one."""
+    """Begin the actions that begin at the start: what they set at once is the first state."""
     for i in range(plan.initial.shape[0]):
         j = plan.initial[i]
         begin(j, 0, plan, roads, state, record)
         if plan.actions[j, 1] == RELATIVE_SPEED and plan.actions[j, 2] == STEP:
             start_at_speed(j, plan, state, record)
+        elif plan.actions[j, 1] == TELEPORT:
+            e = plan.actions[j, 0]
+            state.placed[e] = False
+            record.x[e, 0], record.y[e, 0], record.h[e, 0] = body_pose(e, roads, state)
 
 
 @inlined_kernel

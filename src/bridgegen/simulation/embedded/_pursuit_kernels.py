@@ -59,6 +59,7 @@ from bridgegen.simulation.embedded._course_kernels import (
     profile_speed,
     spring,
 )
+from bridgegen.simulation.embedded._memory_kernels import OK, STATUS
 from bridgegen.simulation.embedded._motion_kernels import (
     SAME_SPEED,
     SAME_TIME,
@@ -128,6 +129,8 @@ def start_at_speed(j, plan, state, record):
 @kernel
 def follow_course(j, k, plan, roads, state, record):
     """Set the speed that action j asks of its entity at the instant after k; say if it is over."""
+    if state.ending[STATUS] != OK:  # its places are not known: the row ends, or begins again
+        return
     e, kind = plan.actions[j, 0], plan.actions[j, 1]
     passed = (k + 1) * plan.dt - state.speed_began[e]
     if kind == RELATIVE_SPEED:

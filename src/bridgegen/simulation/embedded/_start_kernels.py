@@ -17,8 +17,6 @@ from bridgegen.simulation.embedded._signal_kernels import (
     start_controllers,
 )
 
-SAME_PLACE = 1e-6  # m, what a length may be off by rounding
-
 
 @inlined_kernel
 def start(plan, roads, state, record):
@@ -44,7 +42,7 @@ def start(plan, roads, state, record):
             )
         else:
             length = (roads.counts[e] - 1) * roads.steps[e]
-            if not (0.0 <= state.station[e] <= length + SAME_PLACE):
+            if not (0.0 <= state.station[e] <= length):
                 _end(OFF_ROUTE, state, record)
                 return
             x, y, h = pose(roads.paths[e], roads.counts[e], roads.steps[e], state.station[e])

@@ -323,7 +323,11 @@ class _Compiler:
             for wrapped in private.private_actions:
                 action = wrapped.action
                 if isinstance(action, osc.TeleportAction):
-                    starts[name] = action.position
+                    whose = getattr(action.position.position, "entity_ref", None)
+                    if name in starts and whose is not None and self.tables.text(whose) == name:
+                        first.append((wrapped, self.tables.entity(name)))  # from where it is put
+                    else:
+                        starts[name] = action.position
                     continue
                 if isinstance(action, CONTROLLING):
                     self.controllers.begin(action, self.tables.entity(name))

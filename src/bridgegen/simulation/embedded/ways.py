@@ -213,7 +213,8 @@ class Ways:
     def _add_line(self, line: tuple[Float, float], follows: int, start: float = 0.0) -> None:
         self.routes.append(None)
         self.paths.append(Path(*line, _NO_SPANS, follows))
-        self.station.append((start, 0.0))
+        table, step = line
+        self.station.append((min(start, (len(table) - 1) * step), 0.0))
         self.sides.append(0)
 
     def _find_spots(self) -> None:
