@@ -75,8 +75,8 @@ class Observation:
             ahead, every ``ROUTE_STEP`` metres from the point beside the ego; straight on beyond
             its end.
         tracks: ``(N, M, 12)`` float64, the other participants as the sensors have them: state (0
-            none, 1 tentative, 2 confirmed, 3 coasting), x, y of the box's centre [m], heading
-            [rad], velocity in x and y [m/s], length, width [m], class (see
+            none, as of who is not there, 1 tentative, 2 confirmed, 3 coasting), x, y of the box's
+            centre [m], heading [rad], velocity in x and y [m/s], length, width [m], class (see
             ``bridgegen.ego.kinds``), confidence, seconds since last seen, seconds tracked. With
             ``--ideal perception`` they are the truth.
         stop_distance: ``(N,)`` float64 [m], from the front of the ego to the next stop line of a
