@@ -95,7 +95,8 @@ def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _compile(function: Callable[..., Any], **options: bool | str) -> Callable[..., Any]:
     numba.config.CACHE_DIR = str(cache_folder())
-    compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
+    options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:
         resolve = compiled.get_call_template
 
