@@ -247,7 +247,11 @@ class Pipeline:
         each = -(-len(X) // self.simulator.runs_at_once)
         size = max(1, min(self.simulator.rows_at_once, each))
         chunks = [X[i : i + size] for i in range(0, len(X), size)] or [X]
-        return list(self._threads.map(work, chunks))
+        try:
+            return list(self._threads.map(work, chunks))
+        except KeyboardInterrupt:
+            self.simulator.stop()
+            raise
 
     def _measure(self, X: Float) -> Float:
         return measures.evaluate(self.rollout(X), self.metrics)

@@ -141,6 +141,12 @@ class DriverProcess:
         self.start()
         return self._ask("call", function, *arguments, progress=progress, seconds=seconds)
 
+    def kill(self) -> None:
+        """End the process from another thread: who waits for it gets a `DriverError`."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
     def close(self) -> None:
         """End the process, if it is running; so does this object's end."""
         if self._process is not None:

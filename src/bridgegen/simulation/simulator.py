@@ -73,3 +73,6 @@ class Simulator(Protocol[Roads]):
         Raises:
             InputError: a road network that is not there, or a value that is not finite.
         """
+
+    def stop(self) -> None:
+        """Let what is being rolled out in other threads end soon; it is of no use afterwards."""

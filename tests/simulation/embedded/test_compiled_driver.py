@@ -1,11 +1,13 @@
 """Compiled drivers of a user's own in the simulator."""
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bridgegen.cause import Cause, counterfactuals
+from bridgegen.ego.driver_process import DriverError
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
@@ -139,6 +141,23 @@ def test_causes_are_found():
     found = pipeline.evaluate(rows(pipeline, 40))
     assert found.critical.any()
     np.testing.assert_array_equal(found.cause > 0, found.critical)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"), [("compiled_drivers.py", "hangs_fast"), ("drivers.py", "HangsFast")]
+)
+def test_a_driver_that_hangs_can_be_stopped(file, name):
+    pipeline = made(name, file=file, time_limit=100.0)
+    X = rows(pipeline, 4)
+    slow = X[X[:, pipeline.space.names.index("ego_speed")] < 7.5]
+    assert (pipeline.rollout(slow).status == 0).all()
+    with ThreadPoolExecutor(1) as threads:
+        hangs = threads.submit(pipeline.rollout, X)
+        with pytest.raises(TimeoutError):
+            hangs.result(timeout=1.0)
+        pipeline.simulator.stop()
+        with pytest.raises(DriverError, match="ended with status"):
+            hangs.result(timeout=20.0)
 
 
 def test_no_rows_at_all(cruising):

@@ -18,7 +18,11 @@ from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
 
 def drive_in_lock_step(
-    program: Program, setup: Callable[[Int], Batch], n: int, driver: DriverProcess
+    program: Program,
+    setup: Callable[[Int], Batch],
+    n: int,
+    driver: DriverProcess,
+    is_stopped: Callable[[], bool] = lambda: False,
 ) -> Rollout:
     """Roll out rows 0 … n − 1 with a user's driver.
 
@@ -27,8 +31,10 @@ def drive_in_lock_step(
         setup: makes a batch of some of the rows.
         n: how many there are.
         driver: of the user's own; its process is begun where it is not running.
+        is_stopped: whether somebody has ended it, and wants no more.
 
     Raises:
+        DriverError: it has been stopped.
         InputError: the driver cannot be made.
     """
     parts: list[tuple[Int, Rollout]] = []
@@ -39,6 +45,8 @@ def drive_in_lock_step(
         try:
             _together(program, batch, driver)
         except DriverError as error:
+            if is_stopped():
+                raise
             if len(rows) > 1:
                 half = len(rows) // 2
                 waiting += [rows[half:], rows[:half]]

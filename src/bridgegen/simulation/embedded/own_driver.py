@@ -46,7 +46,8 @@ class OwnDriver:
         self._driver = driver
         self._lock, self._turn = threading.Lock(), threading.Lock()
         self._first = self._seat()
-        self._idle = [self._first]
+        self._idle, self._seats = [self._first], [self._first]
+        self._is_stopped = threading.Event()
         self._is_known = False
 
     @property
@@ -75,14 +76,26 @@ class OwnDriver:
         """
         if self.memory is None:
             with self._turn:  # it is one, and has all rows at once
-                return drive_in_lock_step(program, setup, n, self._first.process)
+                return drive_in_lock_step(
+                    program, setup, n, self._first.process, self._is_stopped.is_set
+                )
         with self._lock:
-            seat = self._idle.pop() if self._idle else self._seat()
+            if not self._idle:
+                self._idle.append(self._seat())
+                self._seats.append(self._idle[0])
+            seat = self._idle.pop()
         try:
-            return _drive(setup, n, seat)
+            return _drive(setup, n, seat, self._is_stopped.is_set)
         finally:
             with self._lock:
                 self._idle.append(seat)
+
+    def stop(self) -> None:
+        """End the processes: what is being driven ends in a `DriverError`, and nothing follows."""
+        self._is_stopped.set()
+        with self._lock:
+            for seat in self._seats:
+                seat.process.kill()
 
     def _seat(self) -> "Seat":
         return Seat(DriverProcess(self._driver.name, self._driver.time_limit))
@@ -139,8 +152,14 @@ class Seat:
         self._roads = roads
 
 
-def _drive(setup: Callable[[Int], Batch], n: int, seat: Seat) -> Rollout:
-    """Roll rows out with a compiled driver; one that it does not bring to an end costs itself."""
+def _drive(
+    setup: Callable[[Int], Batch], n: int, seat: Seat, is_stopped: Callable[[], bool]
+) -> Rollout:
+    """Roll rows out with a compiled driver; one that it does not bring to an end costs itself.
+
+    Raises:
+        DriverError: it has been stopped.
+    """
     parts: list[tuple[Int, Rollout]] = []
     waiting = [np.arange(n)]
     while waiting:
@@ -149,6 +168,8 @@ def _drive(setup: Callable[[Int], Batch], n: int, seat: Seat) -> Rollout:
         try:
             parts.append((rows, batch.run(seat.simulate_rows)))
         except DriverError as error:
+            if is_stopped():
+                raise
             at = int(np.argmax(batch.running))  # they are driven one after the other
             waiting += [each for each in (rows[at + 1 :], rows[:at]) if len(each)]
             culprit = setup(rows[at : at + 1])

@@ -139,6 +139,11 @@ class EmbeddedSimulator:
 
         return own.drive(chosen.changed(dry=dry), some, len(rows))
 
+    def stop(self) -> None:
+        """See `Simulator`."""
+        if self.program.driver.is_own:
+            self._own.stop()
+
     @cached_property
     def _own(self) -> "OwnDriver":
         from bridgegen.simulation.embedded.own_driver import OwnDriver  # numba is slow to import
