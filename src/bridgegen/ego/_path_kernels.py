@@ -57,6 +57,16 @@ def project(path, n, ds, s, x, y):
 
 
 @kernel
+def shrinks(path, n, ds, s, d):
+    """Return how far one moves so far left of a path for each metre along it: less in left bends.
+
+    At least 0.2, as in ``project``: who is aside beyond a bend's centre does not go backwards.
+    """
+    i, _ = locate(n, ds, s)
+    return max(1.0 - path[i, CURVATURE] * d, 0.2)
+
+
+@kernel
 def pursue(path, n, ds, s, x, y, h, distance):
     """Return the curvature [1/m] of the circle through the rear axle and a point ahead.
 

@@ -236,3 +236,19 @@ def test_the_ego_too_if_nobody_drives_it():
     rollout = run(text, ego=None)
     x = rollout.x[0, 0] - rollout.x[0, 0, 0]
     assert np.abs(x[at(rollout, 3.0)]) == pytest.approx(3.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("metres", [1.0, -1.0])
+def test_who_is_aside_in_a_bend_moves_as_fast_as_it_says(metres):
+    """The bv turns left with a radius of 14.75 m, 1 m aside of its lane's centre: 7 % off there."""
+    route = (lane(3, 1, 30.0), lane(4, -1, 60.0))
+    bv = start("bv", lane(3, 1, 30.0), 8.0, *route)
+    rollout = run(scenario(("ego", "bv"), EGO + bv, events(
+        ("e", "bv", offsetting(metres, "step"), after(0.5)),
+    )))  # fmt: skip
+    steps = np.hypot(np.diff(rollout.x[0, 1]), np.diff(rollout.y[0, 1]))
+    k = round(0.5 / 0.05)
+    assert math.remainder(rollout.h[0, 1, -1], math.tau) == pytest.approx(0.0, abs=1e-6)
+    off = np.abs(np.delete(steps, k) - 8.0 * 0.05)
+    assert np.sort(off)[-5] < 1e-3  # but for the step across, and those in which the bend begins
+    assert off.max() < 0.03

@@ -179,8 +179,8 @@ def _one_change(time, acceleration, limits, out, profile):
     own = max(way * acceleration, 0.0)
     room = change + 0.5 * own * own * u
     inner = (time + own * u) ** 2 - 2.0 * (u + w) * room
-    if inner >= 0.0:
-        held = (time + own * u - math.sqrt(inner)) / (u + w) if u + w > 0.0 else change / time
+    if inner >= 0.0:  # the lesser root, without the difference that a small change would cancel
+        held = 2.0 * room / (time + own * u + math.sqrt(inner))
     else:
         held = math.sqrt(2.0 * room / (u + w))
     held = min(held, most)

@@ -125,8 +125,10 @@ def look_one(p, k, scene):
         return False
     if kind in (ANGLE, RELATIVE_ANGLE):
         defined, angle = angle_of(p, k, scene)
+        if not defined:
+            return False
         off = abs(turned(angle, limit))
-        return defined and off <= scene.slots[scene.probes[p, WITHIN]] + SAME_ANGLE
+        return off <= scene.slots[scene.probes[p, WITHIN]] + SAME_ANGLE
     if kind == END_OF_ROAD:
         path = scene.on[e]
         length = (scene.counts[path] - 1) * scene.steps[path]

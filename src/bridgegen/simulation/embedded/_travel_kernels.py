@@ -1,6 +1,7 @@
 """How bodies that the storyboard moves go on from one instant to the next."""
 
 from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.ego._path_kernels import shrinks
 from bridgegen.simulation.embedded._across_kernels import CONTINUOUS
 from bridgegen.simulation.embedded._aside_kernels import keep_aside
 from bridgegen.simulation.embedded._codes import KEEP_ASIDE
@@ -27,7 +28,7 @@ def move_along_path(e, k, plan, roads, state, record):
     dt, before = plan.dt, record.v[e, k]
     step = 0.0 if state.placed[e] else 0.5 * (before + state.command[e]) * dt
     state.placed[e] = False
-    ahead, tilt, reached = step, 0.0, False
+    ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
     j = state.lateral_action[e]
     keeps_aside = j >= 0 and plan.actions[j, 1] == KEEP_ASIDE
     if keeps_aside:
@@ -38,7 +39,11 @@ def move_along_path(e, k, plan, roads, state, record):
             state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], step, dt,
         )  # fmt: skip
         state.foot[e] += ahead
-    p, station = state.on[e], state.station[e] + ahead
+    p = state.on[e]
+    if p >= 0:
+        middle, across = state.station[e] + 0.5 * ahead, 0.5 * (aside + state.aside[e])
+        ahead /= shrinks(roads.paths[p], roads.counts[p], roads.steps[p], middle, across)
+    station = state.station[e] + ahead
     if p >= 0 and station >= (roads.counts[p] - 1) * roads.steps[p]:
         length = (roads.counts[p] - 1) * roads.steps[p]
         if pass_end(e, station - length, roads, state):
