@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from lxml import etree
 
-from bridgegen.errors import OntologyError, UnsupportedError
+from bridgegen.errors import OntologyError
 from bridgegen.ontology.vocabulary import bg, local_name, tbox
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import model as osc
@@ -68,10 +68,20 @@ def test_all_classes_are_in_these_stories():
         assert known <= seen | elsewhere
 
 
-def test_what_the_simulator_cannot_do_it_names(individuals):
-    scenario = story(individuals(), stories.PRESENCE[0])
-    with pytest.raises(UnsupportedError, match="AddEntityAction"):
-        compile_storyboard(scenario, "s.xosc")
+@pytest.mark.parametrize("number", range(len(stories.ACTIONS)))
+def test_what_is_said_of_an_entity_can_be_run(individuals, number):
+    compile_storyboard(story(individuals(), stories.ACTIONS[number]), "s.xosc")
+
+
+def test_who_comes_and_goes_can_be_run(individuals):
+    compile_storyboard(story(individuals(), *stories.PRESENCE), "s.xosc")
+
+
+@pytest.mark.parametrize("condition", stories.CONDITIONS, ids=lambda one: one[0])
+def test_every_condition_can_be_run(individuals, condition):
+    stage = stories.Stage(individuals())
+    stage.event("event", ("bv",), [stories.ACTIONS[0]], [[condition]])
+    compile_storyboard(openscenario_from_owl(stage.individuals(), "road.xodr"), "s.xosc")
 
 
 @pytest.mark.parametrize(
