@@ -69,7 +69,7 @@ def test_the_papers_run_is_too_short_to_start_afresh():
     for seed in range(5):
         pso = PSO(10, 1, seed)
         search(pso, sphere)
-        assert pso._n_starts == 1
+        assert pso._swarm.starts == 1
 
 
 def test_the_first_step_is_towards_the_best_row_only():
@@ -108,7 +108,7 @@ def test_a_failed_row_is_no_particles_best_for_long():
         F = np.full((40, 1), float(generation) * 1e6)
         F[0] = 0.0
         pso.tell(U, F, ok)
-        best = pso._pso.pop.get("F")[:, 0]
+        best = pso._swarm.algorithm.pop.get("F")[:, 0]
         assert np.isfinite(best).all()
         assert best[0] == 0.0
         if generation == 1:

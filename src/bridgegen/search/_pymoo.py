@@ -1,11 +1,16 @@
 """What the algorithms built on pymoo share. Imported only when one of them is built."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from pymoo.config import Config
 from pymoo.core.problem import Problem
+from pymoo.core.termination import NoTermination
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import Penalty
 
 
 def unit_cube(n_var: int, n_obj: int) -> Problem:
@@ -22,3 +27,72 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         Config.warnings["not_compiled"] = before
+
+
+class Generations:
+    """An algorithm of pymoo's, a generation a batch; begun afresh when it has no more to ask.
+
+    Args:
+        build: makes pymoo's algorithm, not yet set up.
+        n_var: searched parameters.
+        n_obj: objectives.
+        seed: of all that it draws.
+    """
+
+    def __init__(self, build: Callable[[], Any], n_var: int, n_obj: int, seed: int) -> None:
+        self._build, self._n_var, self._n_obj, self._seed = build, n_var, n_obj, seed
+        self._penalty = Penalty(n_obj)
+        self._asked: Any = None
+        self.starts = 0
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all and begin with a new population."""
+        with quiet():
+            self.algorithm = self._build()
+            # The budget is the campaign's; pymoo's own criteria would end the search early.
+            self.algorithm.setup(
+                unit_cube(self._n_var, self._n_obj),
+                termination=NoTermination(),
+                seed=[self._seed, self.starts],
+            )
+        self.starts += 1
+
+    def ask(self) -> Float:
+        """Return the next generation's rows."""
+        self._asked = self.algorithm.ask()
+        if self._asked is None or len(self._asked) == 0:  # every child is a known row
+            self.restart()
+            self._asked = self.algorithm.ask()
+        U: Float = np.clip(self._asked.get("X").astype(np.float64), 0.0, 1.0)
+        self._asked.set("X", U)
+        return U
+
+    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+        """Take the results of the rows that were asked.
+
+        Raises:
+            ValueError: U is not what was last asked.
+        """
+        if self._asked is None or not np.array_equal(U, self._asked.get("X")):
+            raise ValueError("U must be the rows that were last asked")
+        finite, failed = self._penalty.apply(F, ok)
+        self._asked.set("F", finite, "failed", failed)
+        living = self.algorithm.pop if self.algorithm.is_initialized else ()
+        # Who failed carries the penalty of that time; worse finite rows may have been told since,
+        # and any of them must count as better.
+        for one in living:
+            if one.get("failed"):
+                one.F = self._penalty.value
+        self.algorithm.tell(infills=self._asked)
+        self._asked = None
+
+    def restart_if_within(self, distance: float) -> None:
+        """Begin afresh once half of the population is so close to the best, in each parameter.
+
+        A population that has converged would ask for one row for ever. What it found is in the
+        store, and another start may find another kind of critical scenario.
+        """
+        best, own = self.algorithm.opt[0].get("X"), self.algorithm.pop.get("X")
+        if np.median(np.abs(own - best).max(axis=1)) < distance:
+            self.restart()

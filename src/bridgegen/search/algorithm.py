@@ -29,6 +29,16 @@ class Setting:
     high: float | None = None
 
 
+RESTART_WITHIN = Setting(
+    1e-3,
+    "begin afresh once half of the population is this close to the best row, as a share of each "
+    "parameter's range; 0: never",
+    0.0,
+    1.0,
+)
+"""The setting of an algorithm whose population converges."""
+
+
 class Algorithm(Protocol):
     """A search algorithm over the unit cube; every objective is minimised.
 

@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
-
 from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Penalty, Setting, Value, resolve
+from bridgegen.search.algorithm import Setting, Value, resolve
 
 
 class PSO:
@@ -52,41 +50,29 @@ class PSO:
     many_objective: ClassVar[bool] = False
 
     def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
-        self._values = resolve(PSO, n_var, n_obj, seed, settings)
-        self._n_var, self._seed, self._n_starts = n_var, seed, 0
-        self._penalty = Penalty(n_obj)
-        self._asked: Any = None
-        self._start()
+        from bridgegen.search._pymoo import Generations
 
-    def _start(self) -> None:
-        """Begin with a new swarm."""
-        from bridgegen.search._pymoo import quiet, unit_cube
+        self._values = resolve(PSO, n_var, n_obj, seed, settings)
+        self._swarm = Generations(self._build, n_var, n_obj, seed)
+
+    def _build(self) -> Any:
+        from pymoo.algorithms.soo.nonconvex import pso
 
         values = self._values
-        with quiet():
-            from pymoo.algorithms.soo.nonconvex import pso
-            from pymoo.core.termination import NoTermination
-
-            self._pso = pso.PSO(
-                pop_size=values["population"],
-                w=values["w"],
-                c1=values["c1"],
-                c2=values["c2"],
-                adaptive=False,
-                initial_velocity="zero",
-                max_velocity_rate=values["max_velocity"],
-                pertube_best=values["mutate_best"],
-                seed=[self._seed, self._n_starts],
-            )
-            # The budget is the campaign's; pymoo's own criteria would end the search early.
-            self._pso.setup(unit_cube(self._n_var, 1), termination=NoTermination())
-        self._n_starts += 1
+        return pso.PSO(
+            pop_size=values["population"],
+            w=values["w"],
+            c1=values["c1"],
+            c2=values["c2"],
+            adaptive=False,
+            initial_velocity="zero",
+            max_velocity_rate=values["max_velocity"],
+            pertube_best=values["mutate_best"],
+        )
 
     def ask(self) -> Float:
         """Return where the particles are, one row each."""
-        self._asked = self._pso.ask()
-        U: Float = self._asked.get("X").astype(np.float64)
-        return U
+        return self._swarm.ask()
 
     def tell(self, U: Float, F: Float, ok: Bool) -> None:
         """Move the particles' and the swarm's best rows, and from them the next velocities.
@@ -94,21 +80,5 @@ class PSO:
         Raises:
             ValueError: U is not what was last asked.
         """
-        if self._asked is None or not np.array_equal(U, self._asked.get("X")):
-            raise ValueError("U must be the rows that were last asked")
-        finite, failed = self._penalty.apply(F, ok)
-        self._asked.set("F", finite, "failed", failed)
-        # A particle whose best row is a failed one carries the penalty of that time; worse
-        # finite rows may have been told since, and any of them must count as an improvement.
-        for best in self._pso.pop if self._pso.is_initialized else ():
-            if best.get("failed"):
-                best.F = self._penalty.value
-        self._pso.tell(infills=self._asked)
-        self._asked = None
-        if self._converged():
-            self._start()
-
-    def _converged(self) -> bool:
-        best, own = self._pso.opt[0].get("X"), self._pso.pop.get("X")
-        distance = np.abs(own - best).max(axis=1)
-        return bool(np.median(distance) < self._values["restart_within"])
+        self._swarm.tell(U, F, ok)
+        self._swarm.restart_if_within(self._values["restart_within"])

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.search.algorithm import Algorithm
+from bridgegen.search.es import ES
+from bridgegen.search.ga import GA
 from bridgegen.search.grid import Grid
 from bridgegen.search.pairwise import Pairwise
 from bridgegen.search.pso import PSO
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 GROUP = "bridgegen.algorithms"
 
 ALGORITHMS: dict[str, type[Algorithm]] = {
-    cls.name: cls for cls in (Random, Sobol, Grid, Pairwise, PSO)
+    cls.name: cls for cls in (Random, Sobol, Grid, Pairwise, PSO, GA, ES)
 }
 
 

@@ -1,0 +1,61 @@
+"""An evolution strategy, pymoo's."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import RESTART_WITHIN, Setting, Value, resolve
+
+
+class ES:
+    """The best of each generation's children become the parents of the next; none lives longer.
+
+    Each individual carries its own step sizes, one a parameter, which mutate before they are used
+    (a log-normal self-adaptation); some children move by differences of parents instead. The
+    first generation is drawn anywhere, as many as there are parents.
+
+    Source: Runarsson and Yao (2005), "Search biases in constrained evolutionary optimization",
+    without its constraints.
+    """
+
+    name: ClassVar[str] = "es"
+    description: ClassVar[str] = "evolution strategy of one objective, steps self-adapted (pymoo)"
+    source: ClassVar[str] = "Runarsson and Yao (2005), doi:10.1109/TSMCC.2004.841906"
+    settings: ClassVar[Mapping[str, Setting]] = {
+        "children": Setting(
+            40, "children of a generation, and rows per batch", low=4, high=100_000
+        ),
+        "parents": Setting(
+            0.15, "share of the children that become parents; at least two", 0.01, 0.5
+        ),
+        "gamma": Setting(0.85, "length of the steps by differences of parents", 0.0, 2.0),
+        "restart_within": RESTART_WITHIN,
+    }
+    many_objective: ClassVar[bool] = False
+
+    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+        from bridgegen.search._pymoo import Generations
+
+        self._values = resolve(ES, n_var, n_obj, seed, settings)
+        self._search = Generations(self._build, n_var, n_obj, seed)
+
+    def _build(self) -> Any:
+        from pymoo.algorithms.soo.nonconvex import es
+
+        children = self._values["children"]
+        parents = min(max(2, math.ceil(children * self._values["parents"])), children // 2)
+        return es.ES(n_offsprings=children, pop_size=parents, gamma=self._values["gamma"])
+
+    def ask(self) -> Float:
+        """Return the next generation, one row each."""
+        return self._search.ask()
+
+    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+        """Select who lives on.
+
+        Raises:
+            ValueError: U is not what was last asked.
+        """
+        self._search.tell(U, F, ok)
+        self._search.restart_if_within(self._values["restart_within"])

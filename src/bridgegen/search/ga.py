@@ -1,0 +1,63 @@
+"""A genetic algorithm, pymoo's."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import RESTART_WITHIN, Setting, Value, resolve
+
+
+class GA:
+    """A population that is selected by tournament, crossed, mutated, and thinned to the best.
+
+    Crossover is simulated binary, mutation polynomial (each parameter with probability 1/n of a
+    mutated child, or 1/2 where n is one or two); a child that is a known individual is not
+    evaluated again.
+
+    Source: Deb and Agrawal (1995), "Simulated binary crossover for continuous search space";
+    elitist survival of parents and children together, as pymoo has it.
+    """
+
+    name: ClassVar[str] = "ga"
+    description: ClassVar[str] = "genetic algorithm of one objective (pymoo)"
+    source: ClassVar[str] = "Deb and Agrawal (1995), Complex Systems 9(2)"
+    settings: ClassVar[Mapping[str, Setting]] = {
+        "population": Setting(40, "individuals, and rows per batch", low=4, high=100_000),
+        "crossover": Setting(0.9, "probability that two parents are crossed", 0.0, 1.0),
+        "crossover_eta": Setting(15.0, "how close children stay to their parents", 0.0, 1000.0),
+        "mutation": Setting(0.9, "probability that a child is mutated", 0.0, 1.0),
+        "mutation_eta": Setting(20.0, "how little a mutated parameter moves", 0.0, 1000.0),
+        "restart_within": RESTART_WITHIN,
+    }
+    many_objective: ClassVar[bool] = False
+
+    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+        from bridgegen.search._pymoo import Generations
+
+        self._values = resolve(GA, n_var, n_obj, seed, settings)
+        self._search = Generations(self._build, n_var, n_obj, seed)
+
+    def _build(self) -> Any:
+        from pymoo.algorithms.soo.nonconvex import ga
+        from pymoo.operators.crossover.sbx import SBX
+        from pymoo.operators.mutation.pm import PM
+
+        values = self._values
+        return ga.GA(
+            pop_size=values["population"],
+            crossover=SBX(prob=values["crossover"], eta=values["crossover_eta"]),
+            mutation=PM(prob=values["mutation"], eta=values["mutation_eta"]),
+        )
+
+    def ask(self) -> Float:
+        """Return the next generation, one row each."""
+        return self._search.ask()
+
+    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+        """Select who lives on.
+
+        Raises:
+            ValueError: U is not what was last asked.
+        """
+        self._search.tell(U, F, ok)
+        self._search.restart_if_within(self._values["restart_within"])
