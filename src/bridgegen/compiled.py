@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numba
 import numba.extending
@@ -106,8 +106,7 @@ def _compile(function: Callable[..., Any], **options: bool | str) -> Callable[..
             return resolve([plain(a) for a in given], {k: plain(a) for k, a in named.items()})
 
         compiled.get_call_template = resolve_alike
-    function = compiled
-    return function
+    return cast(Callable[..., Any], compiled)
 
 
 def _borrowed(_: Any, array: Any) -> Any:

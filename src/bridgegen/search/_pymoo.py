@@ -37,10 +37,16 @@ class Generations:
         n_var: searched parameters.
         n_obj: objectives.
         seed: of all that it draws.
+        restart_within: begin afresh once half of the population is so close to the best row, in
+            each parameter. A population that has converged would ask for one row for ever; what it
+            found is in the store, and another start may find another kind of critical scenario.
     """
 
-    def __init__(self, build: Callable[[], Any], n_var: int, n_obj: int, seed: int) -> None:
+    def __init__(
+        self, build: Callable[[], Any], n_var: int, n_obj: int, seed: int, restart_within: float
+    ) -> None:
         self._build, self._n_var, self._n_obj, self._seed = build, n_var, n_obj, seed
+        self._restart_within = restart_within
         self._penalty = Penalty(n_obj)
         self._asked: Any = None
         self.starts = 0
@@ -86,13 +92,6 @@ class Generations:
                 one.F = self._penalty.value
         self.algorithm.tell(infills=self._asked)
         self._asked = None
-
-    def restart_if_within(self, distance: float) -> None:
-        """Begin afresh once half of the population is so close to the best, in each parameter.
-
-        A population that has converged would ask for one row for ever. What it found is in the
-        store, and another start may find another kind of critical scenario.
-        """
         best, own = self.algorithm.opt[0].get("X"), self.algorithm.pop.get("X")
-        if np.median(np.abs(own - best).max(axis=1)) < distance:
+        if np.median(np.abs(own - best).max(axis=1)) < self._restart_within:
             self.restart()

@@ -38,7 +38,8 @@ class ES:
         from bridgegen.search._pymoo import Generations
 
         self._values = resolve(ES, n_var, n_obj, seed, settings)
-        self._search = Generations(self._build, n_var, n_obj, seed)
+        within = self._values["restart_within"]
+        self._search = Generations(self._build, n_var, n_obj, seed, within)
 
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import es
@@ -58,4 +59,3 @@ class ES:
             ValueError: U is not what was last asked.
         """
         self._search.tell(U, F, ok)
-        self._search.restart_if_within(self._values["restart_within"])

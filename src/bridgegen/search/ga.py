@@ -35,7 +35,8 @@ class GA:
         from bridgegen.search._pymoo import Generations
 
         self._values = resolve(GA, n_var, n_obj, seed, settings)
-        self._search = Generations(self._build, n_var, n_obj, seed)
+        within = self._values["restart_within"]
+        self._search = Generations(self._build, n_var, n_obj, seed, within)
 
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import ga
@@ -60,4 +61,3 @@ class GA:
             ValueError: U is not what was last asked.
         """
         self._search.tell(U, F, ok)
-        self._search.restart_if_within(self._values["restart_within"])

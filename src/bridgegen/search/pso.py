@@ -53,7 +53,8 @@ class PSO:
         from bridgegen.search._pymoo import Generations
 
         self._values = resolve(PSO, n_var, n_obj, seed, settings)
-        self._swarm = Generations(self._build, n_var, n_obj, seed)
+        within = self._values["restart_within"]
+        self._swarm = Generations(self._build, n_var, n_obj, seed, within)
 
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import pso
@@ -81,4 +82,3 @@ class PSO:
             ValueError: U is not what was last asked.
         """
         self._swarm.tell(U, F, ok)
-        self._swarm.restart_if_within(self._values["restart_within"])
