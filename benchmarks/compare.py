@@ -17,7 +17,7 @@ from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
-from bridgegen.search import get
+from bridgegen.search import Problem, get
 from bridgegen.store import Store
 from bridgegen.store.summary import Summary, summarise
 
@@ -34,7 +34,7 @@ def one(pipeline: Pipeline, algorithm: str, seed: int, budget: int) -> Summary:
             n_var=space.n_var, n_obj=n_obj,
         ) as store,
     ):  # fmt: skip
-        method = get(algorithm)(space.n_var, n_obj, seed)
+        method = get(algorithm)(Problem(space.variables, pipeline.metrics, n_obj), seed)
         run_loop(method, space.decode, pipeline.evaluate, store, budget)
         rows = store.read()
         d_min, v_d = (rows.metrics[:, store.metrics.index(name)] for name in ("d_min", "v_d"))

@@ -32,7 +32,7 @@ from bridgegen.openx.opendrive.read import read as read_map
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
-from bridgegen.search import get, names
+from bridgegen.search import Problem, Results, get, names
 
 SCENARIO = "crossroads-s4"
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
@@ -222,7 +222,7 @@ def algorithms() -> list[Row]:
     """Time ask and tell of a batch of 40 beside the simulator."""
     rows = []
     for name in names():
-        algorithm = get(name)(10, 1, 0)
+        algorithm = get(name)(Problem.unnamed(10), 0)
         tell = algorithm.tell
         times = []
         for _ in range(25):
@@ -230,8 +230,8 @@ def algorithms() -> list[Row]:
             U = algorithm.ask()
             asked = time.perf_counter() - start
             F = ((U - 0.3) ** 2).sum(axis=1, keepdims=True)
-            ok = np.ones(len(U), dtype=bool)
-            times.append(asked + seconds(lambda U=U, F=F, ok=ok, tell=tell: tell(U, F, ok)))
+            told = Results.of_F(F)
+            times.append(asked + seconds(lambda U=U, told=told, tell=tell: tell(U, told)))
         rows.append((f"{name}, a batch of 40, ms", f"{1e3 * float(np.median(times)):.2f}", "≤ 5"))
     return rows
 

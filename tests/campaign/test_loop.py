@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from bridgegen.campaign.loop import PATIENCE, Progress, Reason, run_loop
 from bridgegen.errors import InputError, StorageError
-from bridgegen.search import get
+from bridgegen.search import Problem, Results, get
 from bridgegen.store import Store
 
 RESULT = ("id", "batch", "U", "X", "metrics", "F", "status", "critical")
@@ -23,13 +24,15 @@ class Scripted:
 
     def __init__(self, *batches):
         self.batches = [np.array(batch, float).reshape(len(batch), -1) for batch in batches]
-        self.told = []
+        self.told, self.results = [], []
 
     def ask(self):
         return self.batches.pop(0) if self.batches else np.empty((0, 1))
 
-    def tell(self, U, F, ok):
-        self.told.append((U[:, 0].tolist(), F[:, 0].tolist(), ok.tolist()))
+    def tell(self, U, results):
+        F, ok = results.F[:, 0].tolist(), results.ok.tolist()
+        self.told.append((U[:, 0].tolist(), F, ok))
+        self.results.append(results)
 
 
 class Simulator:
@@ -194,7 +197,7 @@ def test_stop_ends_between_batches(open_store):
 
 @pytest.mark.parametrize("where", ["simulate", "on_batch", "tell", "ask"])
 def test_ctrl_c_keeps_finished_batches(where, open_store):
-    search, simulate, calls = get("random")(1, 1, 0), Simulator(), []
+    search, simulate, calls = get("random")(Problem.unnamed(1), 0), Simulator(), []
 
     def interrupt_third(work):
         def interrupting(*args):
@@ -216,9 +219,9 @@ def test_ctrl_c_keeps_finished_batches(where, open_store):
     result = run_loop(search, lambda U: U, simulate, store, 200, on_batch)
     assert result.reason is Reason.INTERRUPTED
     assert result.evaluations == len(store) == (120 if where in ("on_batch", "tell") else 80)
-    run_loop(get("random")(1, 1, 0), lambda U: U, Simulator(), store, 200)
+    run_loop(get("random")(Problem.unnamed(1), 0), lambda U: U, Simulator(), store, 200)
     whole = open_store("whole")
-    run_loop(get("random")(1, 1, 0), lambda U: U, Simulator(), whole, 200)
+    run_loop(get("random")(Problem.unnamed(1), 0), lambda U: U, Simulator(), whole, 200)
     same(store.read(), whole.read())
 
 
@@ -227,10 +230,10 @@ def test_ctrl_c_keeps_finished_batches(where, open_store):
 def test_a_larger_budget_goes_on_as_if_it_had_always_been(name, first, open_store):
     """Even from the middle of a batch."""
     whole, parts, simulate = open_store("whole", 2), open_store("parts", 2), Simulator()
-    go(whole, get(name)(2, 1, 5), 200)
-    go(parts, get(name)(2, 1, 5), first, simulate=simulate)
+    go(whole, get(name)(Problem.unnamed(2), 5), 200)
+    go(parts, get(name)(Problem.unnamed(2), 5), first, simulate=simulate)
     assert (len(parts), parts.finished) == (first, "budget")
-    result = go(parts, get(name)(2, 1, 5), 200, simulate=simulate)
+    result = go(parts, get(name)(Problem.unnamed(2), 5), 200, simulate=simulate)
     assert (result.evaluations, result.simulated) == (200, 200 - first)
     assert len(simulate.seen) == 200
     a, b = whole.read(), parts.read()
@@ -240,7 +243,7 @@ def test_a_larger_budget_goes_on_as_if_it_had_always_been(name, first, open_stor
 
 def test_a_finished_run_needs_no_replay(open_store):
     store = open_store()
-    go(store, get("random")(1, 1, 0), 60)
+    go(store, get("random")(Problem.unnamed(1), 0), 60)
     result = go(store, Scripted([0.5]), 60)  # not even the right algorithm is asked
     assert (result.reason, result.batches, result.simulated) == (Reason.BUDGET, 0, 0)
     assert go(store, Scripted([0.5]), 30).evaluations == 60
@@ -248,10 +251,17 @@ def test_a_finished_run_needs_no_replay(open_store):
 
 def test_a_run_killed_before_it_was_marked_is_finished(open_store):
     store, stop = open_store(), iter([False, True])
-    run_loop(get("random")(1, 1, 0), lambda U: U, Simulator(), store, 41, stop=lambda: next(stop))
+    run_loop(
+        get("random")(Problem.unnamed(1), 0),
+        lambda U: U,
+        Simulator(),
+        store,
+        41,
+        stop=lambda: next(stop),
+    )
     store.append(np.array([[0.5]]), np.array([[0.5]]), Simulator()(np.array([[0.5]])), 1.0)
     assert store.finished is None
-    assert go(store, get("random")(1, 1, 0), 41).simulated == 0
+    assert go(store, get("random")(Problem.unnamed(1), 0), 41).simulated == 0
     assert store.finished == "budget"
 
 
@@ -267,29 +277,53 @@ def test_replay_tells_what_was_told(open_store):
     assert repr(second.told[2]) == "([0.05, 0.2], [nan, 0.09], [False, True])"
     assert [(p.evaluations, p.replayed) for p in said] == [(2, True), (3, True), (4, False)]
     assert said[0].result.critical.tolist() == [True, False]
+    for live, replayed in zip(first.results, second.results, strict=False):
+        for one in fields(Results):
+            assert getattr(live, one.name).tobytes() == getattr(replayed, one.name).tobytes()
+
+
+def test_all_that_is_known_of_a_row_is_told(open_store):
+    class Caused(Simulator):
+        def __call__(self, X):
+            result = super().__call__(X)
+            return SimpleNamespace(**vars(result), cause=np.where(result.critical, 2, 0))
+
+    search = Scripted([0.5, 0.05, 0.7], [0.7, 0.5])
+    go(open_store(), search, 10, simulate=Caused())
+    first, second = search.results
+    assert first.critical.tolist() == [True, False, False]
+    np.testing.assert_allclose(first.metrics[:, 0], [0.0, np.nan, 0.08], atol=1e-15)
+    assert first.cause.tolist() == [2, 0, 0]
+    assert second.critical.tolist() == [False, True]
+    np.testing.assert_allclose(second.metrics[:, 0], [0.08, 0.0], atol=1e-15)
+    assert second.cause.tolist() == [0, 2]
 
 
 def test_time_goes_on_where_it_stopped(open_store):
     store = open_store()
-    run_loop(get("random")(1, 1, 0), lambda U: U, Simulator(), store, 40)
+    run_loop(get("random")(Problem.unnamed(1), 0), lambda U: U, Simulator(), store, 40)
     with store._connection as connection:
         connection.execute("UPDATE evaluations SET seconds = 1000.0")
-    result = run_loop(get("random")(1, 1, 0), lambda U: U, Simulator(), store, 80)
+    result = run_loop(get("random")(Problem.unnamed(1), 0), lambda U: U, Simulator(), store, 80)
     assert 1000.0 <= store.read(79).seconds[0] <= result.seconds < 1060.0
 
 
 @pytest.mark.parametrize(
     ("algorithm", "decoder", "detail"),
     [
-        (get("random")(1, 1, 1), lambda U: U, r"evaluation 0: U\[0\] is 0\.\d+, recorded 0\."),
-        (get("pso")(1, 1, 0), lambda U: U, r"evaluation 0: U\[0\]"),
-        (get("random")(1, 1, 0), lambda U: U + 1e-15, r"evaluation 0: X\[0\]"),
+        (
+            get("random")(Problem.unnamed(1), 1),
+            lambda U: U,
+            r"evaluation 0: U\[0\] is 0\.\d+, recorded 0\.",
+        ),
+        (get("pso")(Problem.unnamed(1), 0), lambda U: U, r"evaluation 0: U\[0\]"),
+        (get("random")(Problem.unnamed(1), 0), lambda U: U + 1e-15, r"evaluation 0: X\[0\]"),
         (Scripted(), lambda U: U, r"the search ends after 0 evaluations \(exhausted\)"),
     ],
 )
 def test_what_cannot_be_repeated_is_not_gone_on_with(algorithm, decoder, detail, open_store):
     store, simulate = open_store(), Simulator()
-    run_loop(get("random")(1, 1, 0), lambda U: U, Simulator(), store, 80)
+    run_loop(get("random")(Problem.unnamed(1), 0), lambda U: U, Simulator(), store, 80)
     with pytest.raises(StorageError, match=f"the 80 recorded evaluations bit for bit; {detail}"):
         run_loop(algorithm, decoder, simulate, store, 120)
     assert simulate.seen == []
@@ -303,7 +337,7 @@ import os, sys, time
 from types import SimpleNamespace
 import numpy as np
 from bridgegen.campaign.loop import run_loop
-from bridgegen.search import get
+from bridgegen.search import Problem, get
 from bridgegen.store import Store
 
 folder, log, name = sys.argv[1:]
@@ -323,7 +357,7 @@ if os.path.exists(folder + "/run.sqlite"):
 else:
     store = Store.create(folder, {}, ["a", "b", "c"], ["m"], n_var=3, n_obj=1)
 with store:
-    run_loop(get(name)(3, 1, 9), lambda U: np.round(U, 3), evaluate, store, 1500)
+    run_loop(get(name)(Problem.unnamed(3), 9), lambda U: np.round(U, 3), evaluate, store, 1500)
 """
 
 

@@ -12,6 +12,7 @@ from bridgegen.errors import InputError
 from bridgegen.odd import binned
 from bridgegen.odd import coverage as module
 from bridgegen.odd.coverage import Ways, coverage, coverage_map
+from bridgegen.search import Problem
 from bridgegen.search.pairwise import Pairwise
 
 
@@ -191,7 +192,7 @@ def test_pairs_are_told_whatever_the_strength(build, make_parameter):
 
 def test_a_covering_array_covers_all_pairs(build, make_parameter):
     space = build(make_parameter(f"p{k}") for k in range(8)).space()
-    search = Pairwise(8, 1, 0)
+    search = Pairwise(Problem.unnamed(8), 0)
     U = np.concatenate([search.ask() for _ in range(3)])
     found = coverage(space, space.decode(U), none(U))
     pairs = found.ways[1]

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from bridgegen.errors import InputError
-from bridgegen.search import get
+from bridgegen.search import Problem, get
 from bridgegen.search.algorithm import Penalty, resolve
 
 
@@ -44,7 +44,7 @@ def test_penalty_is_finite_and_worse_than_anything_told(F, ok):
 
 def test_all_problems_at_once():
     with pytest.raises(InputError) as error:
-        get("pso")(0, 2, -1, w=float("nan"), c1="much", population=True)
+        get("pso")(Problem.unnamed(0, 2), -1, w=float("nan"), c1="much", population=True)
     assert error.value.problems == (
         "pso: n_var ≥ 1 must hold, got 0: there is nothing to search",
         "pso: n_obj = 1 (it searches a single objective) must hold, got 2",
@@ -56,5 +56,5 @@ def test_all_problems_at_once():
 
 
 def test_an_integer_will_do_for_a_number():
-    assert resolve(get("pso"), 1, 1, 0, {"c1": 2})["c1"] == 2.0
-    assert type(resolve(get("pso"), 1, 1, 0, {"c1": 2})["c1"]) is float
+    assert resolve(get("pso"), Problem.unnamed(1), 0, {"c1": 2})["c1"] == 2.0
+    assert type(resolve(get("pso"), Problem.unnamed(1), 0, {"c1": 2})["c1"]) is float

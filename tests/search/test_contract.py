@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bridgegen.arrays import Float
 from bridgegen.campaign.loop import Reason, run_loop
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.search import ALGORITHMS, Algorithm
+from bridgegen.search import ALGORITHMS, Algorithm, Problem, Results
 from bridgegen.search.algorithm import resolve
 from bridgegen.store import Store
 
@@ -28,7 +28,7 @@ def sphere(U: Float, n_obj: int = 1) -> Float:
 
 
 def n_obj_of(algorithm: Kind) -> int:
-    return 2 if algorithm.many_objective else 1
+    return 1 if algorithm.objectives == "one" else 2
 
 
 def drive(search: Algorithm, n_batches: int, n_obj: int, ok: float = 1.0) -> Float:
@@ -40,7 +40,7 @@ def drive(search: Algorithm, n_batches: int, n_obj: int, ok: float = 1.0) -> Flo
         asked.append(U.copy())
         good = dice.random(len(U)) < ok
         F = np.where(good[:, None], sphere(U, n_obj), np.nan)
-        search.tell(U, F, good)
+        search.tell(U, Results.of_F(F, good))
     return np.concatenate(asked)
 
 
@@ -63,7 +63,12 @@ def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed
         store = Store.create(folder, {}, names, ["m"], n_var=n_var, n_obj=1)
     with store:
         result = run_loop(
-            algorithm(n_var, 1, seed), lambda U: U, evaluate, store, budget, stop=stop
+            algorithm(Problem(tuple(names), ("m",)), seed),
+            lambda U: U,
+            evaluate,
+            store,
+            budget,
+            stop=stop,
         )
         rows = store.read()
     return result, rows
@@ -74,7 +79,7 @@ def test_it_describes_itself(algorithm: Kind):
     assert algorithm.name == algorithm.name.lower()
     assert len(algorithm.description) > 10
     assert len(algorithm.source) > 10
-    assert isinstance(algorithm.many_objective, bool)
+    assert algorithm.objectives in ("one", "many", "any")
     for name, setting in algorithm.settings.items():
         assert name.isidentifier()
         assert len(setting.text) > 5
@@ -87,7 +92,7 @@ def test_it_describes_itself(algorithm: Kind):
 @pytest.mark.parametrize("ok", [1.0, 0.5, 0.0])
 def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: float):
     n_obj = n_obj_of(algorithm)
-    search = algorithm(n_var, n_obj, 0)
+    search = algorithm(Problem.unnamed(n_var, n_obj), 0)
     U = drive(search, 12, n_obj, ok)
     assert in_cube(U, n_var)
     assert len(U) >= 12 or (algorithm.name in DESIGNS and len(search.ask()) == 0)
@@ -102,30 +107,32 @@ def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: f
 @settings(max_examples=15, deadline=None)
 def test_any_finite_objective_and_any_failures(algorithm: Kind, seed, n_var, scale, data):
     n_obj = n_obj_of(algorithm)
-    search = algorithm(n_var, n_obj, seed)
+    search = algorithm(Problem.unnamed(n_var, n_obj), seed)
     for _ in range(4):
         U = search.ask()
         assert in_cube(U, n_var)
         bits = data.draw(st.integers(0, 2 ** len(U) - 1))
         ok = np.array([bits >> k & 1 for k in range(len(U))], dtype=bool)
         F = np.where(ok[:, None], sphere(U, n_obj) * scale, [[np.inf] * n_obj])
-        search.tell(U, F, ok)
+        search.tell(U, Results.of_F(F, ok))
 
 
 def test_one_seed_one_result_whatever_others_draw(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
     np.random.seed(1)  # noqa: NPY002  (the global generator is the point)
-    first = drive(algorithm(5, n_obj, 7), 8, n_obj, 0.8)
+    first = drive(algorithm(Problem.unnamed(5, n_obj), 7), 8, n_obj, 0.8)
     np.random.seed(2)  # noqa: NPY002
-    second = drive(algorithm(5, n_obj, 7), 8, n_obj, 0.8)
+    second = drive(algorithm(Problem.unnamed(5, n_obj), 7), 8, n_obj, 0.8)
     assert first.tobytes() == second.tobytes()
-    assert first.tobytes() != drive(algorithm(5, n_obj, 8), 8, n_obj, 0.8).tobytes()
+    assert (
+        first.tobytes() != drive(algorithm(Problem.unnamed(5, n_obj), 8), 8, n_obj, 0.8).tobytes()
+    )
 
 
 def test_two_searches_do_not_disturb_each_other(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    alone = drive(algorithm(3, n_obj, 5), 6, n_obj)
-    a, b = algorithm(3, n_obj, 5), algorithm(3, n_obj, 6)
+    alone = drive(algorithm(Problem.unnamed(3, n_obj), 5), 6, n_obj)
+    a, b = algorithm(Problem.unnamed(3, n_obj), 5), algorithm(Problem.unnamed(3, n_obj), 6)
     beside = []
     for _ in range(6):
         beside.append(drive(a, 1, n_obj))
@@ -137,7 +144,7 @@ def test_the_global_generator_is_left_alone(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
     np.random.seed(4)  # noqa: NPY002
     before = np.random.get_state()[1].tobytes()  # noqa: NPY002
-    drive(algorithm(5, n_obj, 7), 4, n_obj, 0.5)
+    drive(algorithm(Problem.unnamed(5, n_obj), 7), 4, n_obj, 0.5)
     assert np.random.get_state()[1].tobytes() == before  # noqa: NPY002
 
 
@@ -145,19 +152,19 @@ def test_it_says_nothing(algorithm: Kind, capfd):
     n_obj = n_obj_of(algorithm)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        drive(algorithm(5, n_obj, 7), 4, n_obj, 0.5)
+        drive(algorithm(Problem.unnamed(5, n_obj), 7), 4, n_obj, 0.5)
     assert capfd.readouterr() == ("", "")
 
 
 def test_told_arrays_are_not_changed(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    search = algorithm(3, n_obj, 0)
+    search = algorithm(Problem.unnamed(3, n_obj), 0)
     for _ in range(3):
         U = search.ask()
         F, ok = sphere(U, n_obj), np.arange(len(U)) % 2 == 0
         F[~ok] = np.nan
         copies = U.copy(), F.copy(), ok.copy()
-        search.tell(U, F, ok)
+        search.tell(U, Results.of_F(F, ok))
         for array, copy in zip((U, F, ok), copies, strict=True):
             np.testing.assert_array_equal(array, copy)
 
@@ -172,19 +179,19 @@ def test_rows_may_be_changed_by_who_asked(algorithm: Kind):
             kept = U.copy()
             asked.append(kept.tobytes())
             U[:] = 0.5
-            search.tell(kept, sphere(kept, n_obj), np.ones(len(U), bool))
+            search.tell(kept, Results.of_F(sphere(kept, n_obj)))
         return asked
 
-    untouched = drive(algorithm(3, n_obj, 2), 4, n_obj)
-    assert b"".join(vandal(algorithm(3, n_obj, 2))) == untouched.tobytes()
+    untouched = drive(algorithm(Problem.unnamed(3, n_obj), 2), 4, n_obj)
+    assert b"".join(vandal(algorithm(Problem.unnamed(3, n_obj), 2))) == untouched.tobytes()
 
 
 def test_constant_objective(algorithm: Kind):
-    search = algorithm(3, 1, 0)
+    search = algorithm(Problem.unnamed(3), 0)
     for _ in range(10):
         U = search.ask()
         assert in_cube(U, 3)
-        search.tell(U, np.zeros((len(U), 1)), np.ones(len(U), bool))
+        search.tell(U, Results.of_F(np.zeros((len(U), 1))))
 
 
 @pytest.mark.parametrize("budget", [1, 39, 40, 137])
@@ -218,37 +225,41 @@ def test_resumed_anywhere_the_result_is_the_same(algorithm: Kind, stops: list[in
 
 def test_wrong_arguments_are_named(algorithm: Kind):
     with pytest.raises(InputError, match="n_var ≥ 1 must hold, got 0"):
-        algorithm(0, 1, 0)
+        algorithm(Problem.unnamed(0), 0)
     with pytest.raises(InputError, match="n_obj"):
-        algorithm(3, 0 if algorithm.many_objective else 2, 0)
+        algorithm(Problem.unnamed(3, 2 if algorithm.objectives == "one" else 0), 0)
     with pytest.raises(InputError, match="seed ≥ 0 must hold, got -1"):
-        algorithm(3, 1, -1)
+        algorithm(Problem.unnamed(3), -1)
     some = next(iter(algorithm.settings))
     with pytest.raises(UnknownNameError, match=f"did you mean '{some}'"):
-        algorithm(3, 1, 0, **{some + "s": 1})
+        algorithm(Problem.unnamed(3), 0, **{some + "s": 1})
 
 
 def test_every_setting_is_checked_and_does_something(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    usual = drive(algorithm(3, n_obj, 0), 6, n_obj)
+    usual = drive(algorithm(Problem.unnamed(3, n_obj), 0), 6, n_obj)
     for name, setting in algorithm.settings.items():
         with pytest.raises(InputError, match=name):
-            algorithm(3, n_obj, 0, **{name: None})
+            algorithm(Problem.unnamed(3, n_obj), 0, **{name: None})
         if isinstance(setting.default, bool):
             other: object = not setting.default
         elif isinstance(setting.default, int | float):
             assert setting.low is not None, "numbers need a range"
             assert setting.high is not None, "numbers need a range"
             with pytest.raises(InputError, match=f"{name} must be in"):
-                algorithm(3, n_obj, 0, **{name: type(setting.default)(setting.high * 2 + 1)})
+                algorithm(
+                    Problem.unnamed(3, n_obj),
+                    0,
+                    **{name: type(setting.default)(setting.high * 2 + 1)},
+                )
             other = type(setting.default)((setting.default + min(setting.high, 100)) / 2)
             assert other != setting.default
         else:
             continue
-        changed = drive(algorithm(3, n_obj, 0, **{name: other}), 6, n_obj)
+        changed = drive(algorithm(Problem.unnamed(3, n_obj), 0, **{name: other}), 6, n_obj)
         assert changed.tobytes() != usual.tobytes(), f"{name} changes nothing"
 
 
 def test_defaults_are_what_is_resolved(algorithm: Kind):
-    values = resolve(algorithm, 3, 1, 0, {})
+    values = resolve(algorithm, Problem.unnamed(3), 0, {})
     assert values == {name: setting.default for name, setting in algorithm.settings.items()}

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 
 from bridgegen.arrays import Float
-from bridgegen.search import Algorithm
+from bridgegen.search import Algorithm, Problem
 from bridgegen.search.grid import Grid
 from bridgegen.search.pairwise import Pairwise
 from bridgegen.search.random import Random
@@ -37,22 +37,22 @@ def levels_of(U: Float, levels: int) -> np.ndarray:
 @pytest.mark.parametrize("n_var", [2, 5, 10])
 def test_sobol_is_more_even_than_random(n_var: int):
     n = 400
-    sobol = np.concatenate(list(islice(_batches(Sobol(n_var, 1, 3)), n // 40)))
-    random = np.concatenate(list(islice(_batches(Random(n_var, 1, 3)), n // 40)))
+    sobol = np.concatenate(list(islice(_batches(Sobol(Problem.unnamed(n_var), 3)), n // 40)))
+    random = np.concatenate(list(islice(_batches(Random(Problem.unnamed(n_var), 3)), n // 40)))
     assert qmc.discrepancy(sobol) < 0.6 * qmc.discrepancy(random)
 
 
 def test_sobol_fills_every_elementary_interval():
     """A (0, 1)-sequence in each column: 2^k rows have one in each of 2^k equal intervals."""
-    U = Sobol(6, 1, 8, population=64).ask()
+    U = Sobol(Problem.unnamed(6), 8, population=64).ask()
     for column in U.T:
         assert sorted(np.floor(column * 64)) == list(range(64))
 
 
 @pytest.mark.parametrize("population", [1, 2, 7, 120])
 def test_batches_are_stretches_of_one_sobol_sequence(population: int):
-    whole = Sobol(3, 1, 5, population=840).ask()
-    parts = Sobol(3, 1, 5, population=population)
+    whole = Sobol(Problem.unnamed(3), 5, population=840).ask()
+    parts = Sobol(Problem.unnamed(3), 5, population=population)
     np.testing.assert_array_equal(
         np.concatenate([parts.ask() for _ in range(840 // population)]), whole
     )
@@ -60,19 +60,19 @@ def test_batches_are_stretches_of_one_sobol_sequence(population: int):
 
 @given(st.integers(2, 6), st.integers(1, 4), st.integers(0, 2**40))
 def test_the_grid_is_enumerated_once(levels: int, n_var: int, seed: int):
-    found = levels_of(rows(Grid(n_var, 1, seed, levels=levels)), levels)
+    found = levels_of(rows(Grid(Problem.unnamed(n_var), seed, levels=levels)), levels)
     assert sorted(map(tuple, found)) == list(product(range(levels), repeat=n_var))
 
 
 def test_the_whole_of_a_large_grid():
-    found = levels_of(rows(Grid(10, 1, 0)), 3)
+    found = levels_of(rows(Grid(Problem.unnamed(10), 0)), 3)
     assert len(found) == 3**10
     assert len(np.unique(found @ 3 ** np.arange(10))) == 3**10
 
 
 @pytest.mark.parametrize(("n_var", "levels"), [(10, 3), (30, 5), (200, 1000)])
 def test_the_start_of_a_grid_is_spread_over_all_of_it(n_var: int, levels: int):
-    search = Grid(n_var, 1, 1, levels=levels)
+    search = Grid(Problem.unnamed(n_var), 1, levels=levels)
     U = np.concatenate([search.ask() for _ in range(25)])
     assert len(np.unique(U, axis=0)) == 1000
     # Means of 1000 uniform values: six standard errors, in a grid's spread √(1 − 1/levels²)/√12.
@@ -85,7 +85,7 @@ def test_the_start_of_a_grid_is_spread_over_all_of_it(n_var: int, levels: int):
 @pytest.mark.parametrize(("n_var", "levels"), [(1, 4), (2, 3), (3, 2), (4, 5), (10, 5), (13, 3)])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_every_pair_of_levels_occurs(n_var: int, levels: int, seed: int):
-    found = levels_of(rows(Pairwise(n_var, 1, seed, levels=levels)), levels)
+    found = levels_of(rows(Pairwise(Problem.unnamed(n_var), seed, levels=levels)), levels)
     for column in found.T:
         assert set(column) == set(range(levels))
     for a, b in combinations(found.T, 2):
@@ -94,10 +94,10 @@ def test_every_pair_of_levels_occurs(n_var: int, levels: int, seed: int):
 
 def test_a_covering_array_is_small():
     """At least levels² rows are needed; the greedy array takes about twice that."""
-    assert 25 <= len(rows(Pairwise(10, 1, 0))) <= 60
+    assert 25 <= len(rows(Pairwise(Problem.unnamed(10), 0))) <= 60
 
 
 def test_the_start_of_a_covering_array_covers_most():
-    found = levels_of(Pairwise(10, 1, 0).ask(), 5)
+    found = levels_of(Pairwise(Problem.unnamed(10), 0).ask(), 5)
     pairs = sum(len(set(zip(a, b, strict=True))) for a, b in combinations(found.T, 2))
     assert pairs > 0.9 * 45 * 25

@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.search import get
+from bridgegen.search import Problem, Results, get
 
 
 def best_of(name: str, seed: int, budget: int = 2000, **settings: float) -> float:
     """The best value of a bowl in eight dimensions, its bottom not in the middle."""
-    search, best, told = get(name)(8, 1, seed, **settings), np.inf, 0
+    search, best, told = get(name)(Problem.unnamed(8), seed, **settings), np.inf, 0
     while told < budget:
         U = search.ask()
         F = ((U - np.linspace(0.1, 0.8, 8)) ** 2).sum(axis=1, keepdims=True)
-        search.tell(U, F, np.ones(len(U), dtype=bool))
+        search.tell(U, Results.of_F(F))
         best, told = min(best, F.min()), told + len(U)
     return best
 
@@ -28,11 +28,11 @@ def test_it_goes_downhill(name: str):
 
 @pytest.mark.parametrize("name", ["ga", "es"])
 def test_it_begins_afresh_when_it_has_converged(name: str):
-    search, generations, starts = get(name)(2, 1, 0), 0, set()
+    search, generations, starts = get(name)(Problem.unnamed(2), 0), 0, set()
     while generations < 400:
         U = search.ask()
         F = ((U - 0.4) ** 2).sum(axis=1, keepdims=True)
-        search.tell(U, F, np.ones(len(U), dtype=bool))
+        search.tell(U, Results.of_F(F))
         generations += 1
         starts.add(search._search.starts)
     assert len(starts) > 1
@@ -40,9 +40,9 @@ def test_it_begins_afresh_when_it_has_converged(name: str):
 
 @pytest.mark.parametrize(("children", "parents"), [(4, 0.5), (5, 0.5), (7, 0.01), (40, 0.15)])
 def test_any_share_of_parents(children: int, parents: float):
-    search = get("es")(3, 1, 0, children=children, parents=parents)
+    search = get("es")(Problem.unnamed(3), 0, children=children, parents=parents)
     first = min(max(2, math.ceil(children * parents)), children // 2)
     for generation in range(5):
         U = search.ask()
         assert len(U) == (children if generation else first)
-        search.tell(U, U.sum(axis=1, keepdims=True), np.ones(len(U), dtype=bool))
+        search.tell(U, Results.of_F(U.sum(axis=1, keepdims=True)))

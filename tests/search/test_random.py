@@ -1,22 +1,23 @@
 import numpy as np
 
+from bridgegen.search import Problem
 from bridgegen.search.random import Random
 
 
 def test_the_stream_is_pcg64():
     """The baseline can be redrawn by anybody, without BridgeGen."""
     stream = np.random.Generator(np.random.PCG64(11))
-    search = Random(3, 1, 11)
+    search = Random(Problem.unnamed(3), 11)
     assert (search.ask() == stream.random((40, 3))).all()
     assert (search.ask() == stream.random((40, 3))).all()
 
 
 def test_rows_are_uniform():
-    U = np.concatenate([Random(2, 1, seed).ask() for seed in range(100)])
+    U = np.concatenate([Random(Problem.unnamed(2), seed).ask() for seed in range(100)])
     counts = np.histogram2d(*U.T, bins=4, range=[[0, 1], [0, 1]])[0]
     # χ² with 15 degrees of freedom is below 37.7 with probability 0.999.
     assert ((counts - 250) ** 2 / 250).sum() < 37.7
 
 
 def test_population_is_the_batch():
-    assert Random(2, 1, 0, population=7).ask().shape == (7, 2)
+    assert Random(Problem.unnamed(2), 0, population=7).ask().shape == (7, 2)

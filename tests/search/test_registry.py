@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 import pytest
 
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.search import ALGORITHMS, get, names
+from bridgegen.search import ALGORITHMS, Problem, get, names
 from bridgegen.search.random import Random
 
 
@@ -17,7 +17,7 @@ class Wrong:
     name = "wrong"
 
 
-NOT_A_CLASS = Lazy(1, 1, 0)
+NOT_A_CLASS = Lazy(Problem.unnamed(1), 0)
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_a_package_adds_its_own(installed):
     [
         ("gone", "no_such_module_here:Thing", "cannot be loaded: ModuleNotFoundError"),
         ("gone", f"{__name__}:Nothing", "cannot be loaded: AttributeError"),
-        ("wrong", f"{__name__}:Wrong", "lacks description, source, settings, many_objective, ask"),
+        ("wrong", f"{__name__}:Wrong", "lacks description, source, settings, objectives, ask"),
         ("lazy", f"{__name__}:NOT_A_CLASS", "is not a class"),
         ("idle", f"{__name__}:Lazy", "calls itself 'lazy'"),
         ("random", f"{__name__}:Lazy", "declared more than once: bridgegen, "),

@@ -22,7 +22,7 @@ from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
-from bridgegen.search.algorithm import Value, resolve
+from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.store import Store, refuse_used
 from bridgegen.store.summary import summarise
 
@@ -119,7 +119,7 @@ def run_search(
     space = logical.space(axes, fixed)
     if space.n_var == 0:
         refuse_standstill(logical)
-    values = resolve(method, space.n_var, 1, seed, settings or {})
+    values = resolve(method, Problem(space.variables), seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
     if cause is not None and not causes:
@@ -266,7 +266,8 @@ def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> R
     """Search up to the budget, then hand over and report."""
     space, chosen = pipeline.space, pipeline.objective
     method = toolkit.get(settings.algorithm)
-    algorithm = method(space.n_var, chosen.n_obj, settings.seed, **settings.algorithm_settings)
+    problem = Problem(space.variables, pipeline.metrics, chosen.n_obj)
+    algorithm = method(problem, settings.seed, **settings.algorithm_settings)
     watch.stage("search")
     result = run_loop(
         algorithm, space.decode, pipeline.evaluate, store, settings.budget, watch.batch

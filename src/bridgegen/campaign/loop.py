@@ -9,9 +9,10 @@ from hashlib import blake2b
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.arrays import Float, Int, as_float
+from bridgegen.cause import Cause
 from bridgegen.errors import InputError, StorageError
-from bridgegen.search import Algorithm
+from bridgegen.search import Algorithm, Results
 from bridgegen.store import Evaluated, Rows, Store
 
 PATIENCE = 100
@@ -130,6 +131,44 @@ def run_loop(
     )
 
 
+class _Told:
+    """What every row came to, by id; the same bits live and in a replay."""
+
+    def __init__(self, n_obj: int, n_metrics: int) -> None:
+        self._n_obj, self._n_metrics = n_obj, n_metrics
+        self._F, self._metrics = array("d"), array("d")
+        self._ok, self._critical, self._cause = array("b"), array("b"), array("b")
+
+    def add(self, result: Evaluated) -> None:
+        """Keep the results of the next rows."""
+        # SQLite keeps neither the sign of zero nor the bits of NaN.
+        F = np.asarray(result.F, np.float64) + 0.0
+        metrics = np.asarray(result.metrics, np.float64) + 0.0
+        metrics = np.where(np.isnan(metrics), np.nan, metrics)
+        ok = (np.asarray(result.status) == 0) & np.isfinite(F).all(axis=1)
+        critical = np.asarray(result.critical, np.bool_) & ok
+        found = getattr(result, "cause", None)
+        cause = np.full(len(F), Cause.NONE) if found is None else np.asarray(found)
+        for kept, values in (
+            (self._F, F),
+            (self._metrics, metrics),
+            (self._ok, ok),
+            (self._critical, critical),
+            (self._cause, cause.astype(np.int8)),
+        ):
+            kept.frombytes(values.tobytes())
+
+    def results(self, ids: Int) -> Results:
+        """Return those of some rows."""
+        return Results(
+            F=np.frombuffer(self._F).reshape(-1, self._n_obj)[ids],
+            ok=np.frombuffer(self._ok, np.bool_)[ids],
+            critical=np.frombuffer(self._critical, np.bool_)[ids],
+            metrics=np.frombuffer(self._metrics).reshape(-1, self._n_metrics)[ids],
+            cause=np.frombuffer(self._cause, np.int8)[ids],
+        )
+
+
 class _Session:
     """One call of the loop: which rows are known, and how far it is."""
 
@@ -149,7 +188,7 @@ class _Session:
         self._began: float | None = None
         # id of every row of X met so far, by a 16-byte digest: some 200 MB for a million rows.
         self._known: dict[bytes, int] = {}
-        self._F, self._ok = array("d"), array("b")  # of every row, by id
+        self._told = _Told(store.n_obj, len(store.metrics))
         self._idle = 0
 
     @property
@@ -172,14 +211,14 @@ class _Session:
         old = fresh[: max(0, self._recorded - done)]
         for rows, take in ((old, self._replay), (fresh[len(old) :], self._simulate)):
             if rows:
-                self._remember(take(U[rows], X[rows], int(ids[rows[0]])))
+                self._told.add(take(U[rows], X[rows], int(ids[rows[0]])))
         self.batches += 1
         self.repeated += int(np.count_nonzero(ids >= 0)) - len(fresh)
         if len(self._known) >= self._budget:
             # The budget may have cut this batch short, and nobody will ask again.
             return Reason.BUDGET
 
-        self._algorithm.tell(U, *self._results(ids))
+        self._algorithm.tell(U, self._told.results(ids))
         self._idle = 0 if fresh else self._idle + 1
         return self._nothing_new(Reason.CONVERGED) if self._idle >= PATIENCE else None
 
@@ -227,17 +266,6 @@ class _Session:
         self._store.append(U, X, result, self.seconds)
         self._report(start + len(U), result, replayed=False)
         return result
-
-    def _remember(self, result: Evaluated) -> None:
-        # No −0.0 here either: what is told live and what is told in a replay are the same bits.
-        F = np.asarray(result.F, np.float64) + 0.0
-        ok = (np.asarray(result.status) == 0) & np.isfinite(F).all(axis=1)
-        self._F.frombytes(F.tobytes())
-        self._ok.frombytes(ok.tobytes())
-
-    def _results(self, ids: Int) -> tuple[Float, Bool]:
-        F = np.frombuffer(self._F).reshape(-1, self._store.n_obj)[ids]
-        return F, np.frombuffer(self._ok, np.bool_)[ids]
 
     def _report(self, evaluations: int, result: Evaluated, *, replayed: bool) -> None:
         if self._on_batch:

@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 from pymoo.config import Config
-from pymoo.core.problem import Problem
+from pymoo.core.problem import Problem as PymooProblem
 from pymoo.core.termination import NoTermination
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Penalty
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Penalty, Problem, Results
 
 
-def unit_cube(n_var: int, n_obj: int) -> Problem:
+def unit_cube(problem: Problem) -> PymooProblem:
     """Return pymoo's description of the search space; it is never evaluated by pymoo."""
-    return Problem(n_var=n_var, n_obj=n_obj, xl=0.0, xu=1.0)
+    return PymooProblem(n_var=problem.n_var, n_obj=problem.n_obj, xl=0.0, xu=1.0)
 
 
 @contextmanager
@@ -34,8 +34,7 @@ class Generations:
 
     Args:
         build: makes pymoo's algorithm, not yet set up.
-        n_var: searched parameters.
-        n_obj: objectives.
+        problem: what is searched.
         seed: of all that it draws.
         restart_within: begin afresh once half of the population is so close to the best row, in
             each parameter. A population that has converged would ask for one row for ever; what it
@@ -43,11 +42,11 @@ class Generations:
     """
 
     def __init__(
-        self, build: Callable[[], Any], n_var: int, n_obj: int, seed: int, restart_within: float
+        self, build: Callable[[], Any], problem: Problem, seed: int, restart_within: float
     ) -> None:
-        self._build, self._n_var, self._n_obj, self._seed = build, n_var, n_obj, seed
+        self._build, self._problem, self._seed = build, problem, seed
         self._restart_within = restart_within
-        self._penalty = Penalty(n_obj)
+        self._penalty = Penalty(problem.n_obj)
         self._asked: Any = None
         self.starts = 0
         self.restart()
@@ -58,7 +57,7 @@ class Generations:
             self.algorithm = self._build()
             # The budget is the campaign's; pymoo's own criteria would end the search early.
             self.algorithm.setup(
-                unit_cube(self._n_var, self._n_obj),
+                unit_cube(self._problem),
                 termination=NoTermination(),
                 seed=[self._seed, self.starts],
             )
@@ -74,7 +73,7 @@ class Generations:
         self._asked.set("X", U)
         return U
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Take the results of the rows that were asked.
 
         Raises:
@@ -82,7 +81,7 @@ class Generations:
         """
         if self._asked is None or not np.array_equal(U, self._asked.get("X")):
             raise ValueError("U must be the rows that were last asked")
-        finite, failed = self._penalty.apply(F, ok)
+        finite, failed = self._penalty.apply(results.F, results.ok)
         self._asked.set("F", finite, "failed", failed)
         living = self.algorithm.pop if self.algorithm.is_initialized else ()
         # Who failed carries the penalty of that time; worse finite rows may have been told since,

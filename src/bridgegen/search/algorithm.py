@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float
+from bridgegen.cause import Cause
 from bridgegen.errors import InputError, UnknownNameError
 
 Value = bool | int | float | str
@@ -39,6 +41,69 @@ RESTART_WITHIN = Setting(
 """The setting of an algorithm whose population converges."""
 
 
+@dataclass(frozen=True)
+class Problem:
+    """What is searched.
+
+    Attributes:
+        parameters: the searched ones' names, one per column of U.
+        metrics: the names of those that are recorded, one per column of ``Results.metrics``.
+        n_obj: objectives, all minimised.
+    """
+
+    parameters: tuple[str, ...]
+    metrics: tuple[str, ...] = ()
+    n_obj: int = 1
+
+    @property
+    def n_var(self) -> int:
+        """Searched parameters."""
+        return len(self.parameters)
+
+    @classmethod
+    def unnamed(cls, n_var: int, n_obj: int = 1) -> Self:
+        """Return a problem of no scenario: parameters x0, x1 …, no metrics."""
+        return cls(tuple(f"x{i}" for i in range(n_var)), (), n_obj)
+
+
+@dataclass(frozen=True)
+class Results:
+    """What n rows came to.
+
+    Attributes:
+        F: ``(n, n_obj)`` float64, smaller is more critical; anything, NaN included, in rows that
+            are not ok.
+        ok: ``(n,)`` bool, False where the simulation failed.
+        critical: ``(n,)`` bool, by the scenario's thresholds.
+        metrics: ``(n, len(problem.metrics))`` float64, in the metrics' units; NaN in rows that are
+            not ok; +inf where the metric says so (a time to a collision that never comes).
+        cause: ``(n,)`` int8, a `Cause` each; NONE where not critical, or not sought.
+    """
+
+    F: Float
+    ok: Bool
+    critical: Bool
+    metrics: Float
+    cause: npt.NDArray[np.int8]
+
+    @classmethod
+    def of_F(cls, F: Float, ok: Bool | None = None) -> Self:
+        """Return results of no scenario: objectives, nothing critical, no metrics.
+
+        Args:
+            F: ``(n, n_obj)``.
+            ok: ``(n,)``; all by default.
+        """
+        n = len(F)
+        good = np.ones(n, dtype=bool) if ok is None else ok
+        nothing = np.zeros(n, dtype=bool), np.empty((n, 0)), np.full(n, Cause.NONE, np.int8)
+        return cls(F, good, *nothing)
+
+
+Arity = Literal["one", "many", "any"]
+"""How many columns of F an algorithm takes: exactly one; one or more; or it takes no notice."""
+
+
 class Algorithm(Protocol):
     """A search algorithm over the unit cube; every objective is minimised.
 
@@ -51,21 +116,21 @@ class Algorithm(Protocol):
         description: one line for ``bridgegen list algorithms``.
         source: where the method is published.
         settings: its hyper-parameters by name; the constructor takes them as keywords.
-        many_objective: whether it takes more than one objective.
+        objectives: how many it takes: "one", "many" (a campaign gives it a column of F for each
+            term of the scenario's objective, if not told otherwise), or "any" (it takes no notice).
     """
 
     name: ClassVar[str]
     description: ClassVar[str]
     source: ClassVar[str]
     settings: ClassVar[Mapping[str, Setting]]
-    many_objective: ClassVar[bool]
+    objectives: ClassVar[Arity]
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         """Set up the search.
 
         Args:
-            n_var: searched parameters, ≥ 1.
-            n_obj: objectives, ≥ 1; exactly 1 unless ``many_objective``.
+            problem: at least one parameter; as many objectives as it takes.
             seed: ≥ 0.
             **settings: a subset of ``settings``; the others keep their defaults.
 
@@ -82,19 +147,17 @@ class Algorithm(Protocol):
         """
         ...
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Take the results of the last ``ask``.
 
         Args:
             U: ``(n, n_var)`` float64, the rows that were asked.
-            F: ``(n, n_obj)`` float64, smaller is more critical; anything, NaN included, in rows
-                that are not ok.
-            ok: ``(n,)`` bool, False where the simulation failed.
+            results: of these rows; not to be changed.
         """
 
 
 def resolve(
-    algorithm: type[Algorithm], n_var: int, n_obj: int, seed: int, given: Mapping[str, Value]
+    algorithm: type[Algorithm], problem: Problem, seed: int, given: Mapping[str, Value]
 ) -> dict[str, Any]:
     """Check a constructor's arguments and return every setting's value, given or default.
 
@@ -107,25 +170,26 @@ def resolve(
         if key not in algorithm.settings:
             raise UnknownNameError(f"setting of {name}", key, algorithm.settings)
     problems = []
-    if n_var < 1:
-        problems.append(f"{name}: n_var ≥ 1 must hold, got {n_var}: there is nothing to search")
-    if n_obj < 1 or (n_obj > 1 and not algorithm.many_objective):
-        rule = "≥ 1" if algorithm.many_objective else "= 1 (it searches a single objective)"
-        problems.append(f"{name}: n_obj {rule} must hold, got {n_obj}")
+    if problem.n_var < 1:
+        problems.append(f"{name}: n_var ≥ 1 must hold, got 0: there is nothing to search")
+    single = algorithm.objectives == "one"
+    if problem.n_obj < 1 or (problem.n_obj > 1 and single):
+        rule = "= 1 (it searches a single objective)" if single else "≥ 1"
+        problems.append(f"{name}: n_obj {rule} must hold, got {problem.n_obj}")
     if seed < 0:
         problems.append(f"{name}: seed ≥ 0 must hold, got {seed}")
     values = {key: setting.default for key, setting in algorithm.settings.items()}
     for key, value in given.items():
-        problem = _problem(algorithm.settings[key], value)
-        if problem:
-            problems.append(f"{name}: {key} must be {problem}, got {value!r}")
-        values[key] = float(value) if isinstance(values[key], float) and not problem else value
+        wanted = _wanted(algorithm.settings[key], value)
+        if wanted:
+            problems.append(f"{name}: {key} must be {wanted}, got {value!r}")
+        values[key] = float(value) if isinstance(values[key], float) and not wanted else value
     if problems:
         raise InputError(*problems)
     return values
 
 
-def _problem(setting: Setting, value: Value) -> str | None:
+def _wanted(setting: Setting, value: Value) -> str | None:
     """Return what ``value`` must be, where it is not."""
     kind = type(setting.default)
     fits = type(value) is kind or (kind is float and type(value) is int)

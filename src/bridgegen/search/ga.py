@@ -3,8 +3,16 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import RESTART_WITHIN, Setting, Value, resolve
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import (
+    RESTART_WITHIN,
+    Arity,
+    Problem,
+    Results,
+    Setting,
+    Value,
+    resolve,
+)
 
 
 class GA:
@@ -29,14 +37,14 @@ class GA:
         "mutation_eta": Setting(20.0, "how little a mutated parameter moves", 0.0, 1000.0),
         "restart_within": RESTART_WITHIN,
     }
-    many_objective: ClassVar[bool] = False
+    objectives: ClassVar[Arity] = "one"
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         from bridgegen.search._pymoo import Generations
 
-        self._values = resolve(GA, n_var, n_obj, seed, settings)
+        self._values = resolve(GA, problem, seed, settings)
         within = self._values["restart_within"]
-        self._search = Generations(self._build, n_var, n_obj, seed, within)
+        self._search = Generations(self._build, problem, seed, within)
 
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import ga
@@ -54,10 +62,10 @@ class GA:
         """Return the next generation, one row each."""
         return self._search.ask()
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Select who lives on.
 
         Raises:
             ValueError: U is not what was last asked.
         """
-        self._search.tell(U, F, ok)
+        self._search.tell(U, results)

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Setting, Value, resolve
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 BATCH = 40
 """Rows that are asked for at a time; the results do not depend on it."""
@@ -33,13 +33,16 @@ class Grid:
     settings: ClassVar[Mapping[str, Setting]] = {
         "levels": Setting(3, "values per parameter, at the centres of equal bins", 2, 1000),
     }
-    many_objective: ClassVar[bool] = True
+    objectives: ClassVar[Arity] = "any"
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
-        self._levels: int = resolve(Grid, n_var, n_obj, seed, settings)["levels"]
-        self._n_var, self._key = n_var, str(seed).encode()
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
+        self._levels: int = resolve(Grid, problem, seed, settings)["levels"]
+        self._n_var, self._key = problem.n_var, str(seed).encode()
         # Python's integers: 30 parameters of 1000 levels are 10^90 points.
-        self._sizes = self._levels ** (n_var // 2), self._levels ** (n_var - n_var // 2)
+        self._sizes = (
+            self._levels ** (self._n_var // 2),
+            self._levels ** (self._n_var - self._n_var // 2),
+        )
         self._next = 0
 
     def ask(self) -> Float:
@@ -49,7 +52,7 @@ class Grid:
         self._next = last
         return (np.array(levels, np.float64).reshape(-1, self._n_var) + 0.5) / self._levels
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Take no notice: the grid is fixed by its levels, its order by the seed."""
 
     def _point(self, index: int) -> list[int]:

@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Setting, Value, resolve
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 BATCH = 40
 """Rows that are asked for at a time; the results do not depend on it."""
@@ -31,20 +31,20 @@ class Pairwise:
     settings: ClassVar[Mapping[str, Setting]] = {
         "levels": Setting(5, "values per parameter, at the centres of equal bins", 2, 100),
     }
-    many_objective: ClassVar[bool] = True
+    objectives: ClassVar[Arity] = "any"
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
-        self._levels: int = resolve(Pairwise, n_var, n_obj, seed, settings)["levels"]
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
+        self._levels: int = resolve(Pairwise, problem, seed, settings)["levels"]
         rng = np.random.Generator(np.random.PCG64(seed))
-        self._columns = rng.permutation(n_var)
-        self._names = rng.permuted(np.tile(np.arange(self._levels), (n_var, 1)), axis=1)
+        self._columns = rng.permutation(problem.n_var)
+        self._names = rng.permuted(np.tile(np.arange(self._levels), (problem.n_var, 1)), axis=1)
         self._array: Any
-        if n_var == 1:
+        if problem.n_var == 1:
             self._array = ([level] for level in range(self._levels))
         else:
             from allpairspy import AllPairs
 
-            self._array = AllPairs([range(self._levels)] * n_var)
+            self._array = AllPairs([range(self._levels)] * problem.n_var)
 
     def ask(self) -> Float:
         """Return the next rows of the array, none after the last."""
@@ -53,5 +53,5 @@ class Pairwise:
         U: Float = (renamed + 0.5) / self._levels
         return U
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Take no notice: the array is fixed by its levels and the seed."""

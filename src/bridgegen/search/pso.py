@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Setting, Value, resolve
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 
 class PSO:
@@ -47,14 +47,14 @@ class PSO:
             1.0,
         ),
     }
-    many_objective: ClassVar[bool] = False
+    objectives: ClassVar[Arity] = "one"
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         from bridgegen.search._pymoo import Generations
 
-        self._values = resolve(PSO, n_var, n_obj, seed, settings)
+        self._values = resolve(PSO, problem, seed, settings)
         within = self._values["restart_within"]
-        self._swarm = Generations(self._build, n_var, n_obj, seed, within)
+        self._swarm = Generations(self._build, problem, seed, within)
 
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import pso
@@ -75,10 +75,10 @@ class PSO:
         """Return where the particles are, one row each."""
         return self._swarm.ask()
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Move the particles' and the swarm's best rows, and from them the next velocities.
 
         Raises:
             ValueError: U is not what was last asked.
         """
-        self._swarm.tell(U, F, ok)
+        self._swarm.tell(U, results)

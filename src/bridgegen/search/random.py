@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Setting, Value, resolve
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 
 class Random:
@@ -21,11 +21,11 @@ class Random:
     settings: ClassVar[Mapping[str, Setting]] = {
         "population": Setting(40, "rows per batch", low=1, high=1_000_000),
     }
-    many_objective: ClassVar[bool] = True
+    objectives: ClassVar[Arity] = "any"
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
-        values = resolve(Random, n_var, n_obj, seed, settings)
-        self._shape = (values["population"], n_var)
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
+        values = resolve(Random, problem, seed, settings)
+        self._shape = (values["population"], problem.n_var)
         # The bit generator is named: NumPy may change what default_rng returns.
         self._rng = np.random.Generator(np.random.PCG64(seed))
 
@@ -33,5 +33,5 @@ class Random:
         """Return the next batch of rows."""
         return self._rng.random(self._shape)
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Take no notice: that is what makes it the baseline."""

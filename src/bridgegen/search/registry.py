@@ -48,7 +48,7 @@ def get(name: str) -> type[Algorithm]:
         found = added[0].load()
     except Exception as error:  # whatever a stranger's module raises while it is imported
         raise InputError(f"{place} cannot be loaded: {type(error).__name__}: {error}") from error
-    parts = ("name", "description", "source", "settings", "many_objective", "ask", "tell")
+    parts = ("name", "description", "source", "settings", "objectives", "ask", "tell")
     missing = [part for part in parts if not hasattr(found, part)]
     if missing or not isinstance(found, type):
         lack = f"lacks {', '.join(missing)}" if missing else "is not a class"

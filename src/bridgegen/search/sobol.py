@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Setting, Value, resolve
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 
 class Sobol:
@@ -24,14 +24,14 @@ class Sobol:
     settings: ClassVar[Mapping[str, Setting]] = {
         "population": Setting(40, "rows per batch", low=1, high=1_000_000),
     }
-    many_objective: ClassVar[bool] = True
+    objectives: ClassVar[Arity] = "any"
 
-    def __init__(self, n_var: int, n_obj: int, seed: int, **settings: Value) -> None:
-        self._population = resolve(Sobol, n_var, n_obj, seed, settings)["population"]
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
+        self._population = resolve(Sobol, problem, seed, settings)["population"]
         from scipy.stats import qmc  # takes a second to import
 
         rng = np.random.Generator(np.random.PCG64(seed))
-        self._sequence = qmc.Sobol(n_var, scramble=True, rng=rng)
+        self._sequence = qmc.Sobol(problem.n_var, scramble=True, rng=rng)
 
     def ask(self) -> Float:
         """Return the next stretch of the sequence."""
@@ -39,5 +39,5 @@ class Sobol:
         parts = self._sequence.random(1), self._sequence.random(self._population - 1)
         return np.concatenate(parts)
 
-    def tell(self, U: Float, F: Float, ok: Bool) -> None:
+    def tell(self, U: Float, results: Results) -> None:
         """Take no notice: the sequence is fixed by the seed."""
