@@ -106,6 +106,7 @@ class Pipeline:
         also: Sequence[str] = (),
         seek_causes: bool = False,
         cause: Cause | None = None,
+        threads: int | None = None,
     ) -> None:
         """Prepare a scenario.
 
@@ -121,6 +122,7 @@ class Pipeline:
             also: the names of metrics to record besides, by default.
             seek_causes: whether to find the cause of each critical scenario.
             cause: of harm; a critical scenario of another one does not count.
+            threads: to evaluate with, one for each core by default; no result depends on it.
 
         Raises:
             UnknownNameError: no such driver or metric.
@@ -148,7 +150,7 @@ class Pipeline:
         self._roads: Network | None = None
         if not {*self.source.static_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
-        self._threads = ThreadPoolExecutor(os.cpu_count() or 1, "rollout")
+        self._threads = ThreadPoolExecutor(threads or os.cpu_count() or 1, "rollout")
 
     def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
         """Set the objective: the given one, or the scenario's, sampled where it says so.

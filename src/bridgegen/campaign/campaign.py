@@ -67,6 +67,8 @@ def run_search(
     metrics: Sequence[str] = (),
     causes: bool = True,
     cause: str | None = None,
+    deliver: bool = True,
+    threads: int | None = None,
     watch: Watch | None = None,
 ) -> Run:
     """Search a logical scenario for its critical concrete ones, and hand them over.
@@ -98,6 +100,8 @@ def run_search(
         causes: whether to find the cause of each critical scenario, by replaying it.
         cause: "perception", "planning", "control" or "unavoidable": a critical scenario of another
             cause does not count.
+        deliver: whether to write the critical scenarios and the report; ``resume`` does it later.
+        threads: to evaluate with, one for each core by default; the results do not depend on it.
         watch: told how it is getting on.
 
     Returns:
@@ -134,6 +138,7 @@ def run_search(
         also=metrics,
         seek_causes=causes,
         cause=None if cause is None else Cause.named(cause),
+        threads=threads,
     )
     watch.stage("compile")
     pipeline.warm_up()
@@ -169,10 +174,17 @@ def run_search(
         folder, made_with.to_dict(), space.names, pipeline.metrics,
         n_var=space.n_var, n_obj=chosen.n_obj,
     ) as store:  # fmt: skip
-        return _go(pipeline, store, made_with, watch)
+        return _go(pipeline, store, made_with, watch, deliver)
 
 
-def resume(folder: Path | str, *, ego: str | None = None, watch: Watch | None = None) -> Run:
+def resume(
+    folder: Path | str,
+    *,
+    ego: str | None = None,
+    deliver: bool = True,
+    threads: int | None = None,
+    watch: Watch | None = None,
+) -> Run:
     """Go on with a run that was interrupted or killed; a finished one gets its files again.
 
     The result is that of an undisturbed run, to the last bit.
@@ -181,6 +193,8 @@ def resume(folder: Path | str, *, ego: str | None = None, watch: Watch | None = 
         folder: of the run.
         ego: where a driver of your own drives, that same driver: what a folder names is never
             imported by itself.
+        deliver: as for ``run_search``.
+        threads: likewise.
         watch: told how it is getting on.
 
     Raises:
@@ -203,11 +217,12 @@ def resume(folder: Path | str, *, ego: str | None = None, watch: Watch | None = 
             metrics=store.metrics,
             seek_causes=settings.causes,
             cause=Cause.named(settings.cause) if settings.cause else None,
+            threads=threads,
         )
         watch.stage("compile")
         pipeline.warm_up()
         pipeline.choose_objective(Objective.from_dict(settings.objective))
-        return _go(pipeline, store, settings, watch)
+        return _go(pipeline, store, settings, watch, deliver)
 
 
 def _ego(settings: Settings) -> str | None:
@@ -262,8 +277,8 @@ def _placed(
     return on_map(scenario, roads), roads
 
 
-def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> Run:
-    """Search up to the budget, then hand over and report."""
+def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch, deliver: bool) -> Run:
+    """Search up to the budget, then hand over and report if that is wanted."""
     space, chosen = pipeline.space, pipeline.objective
     method = toolkit.get(settings.algorithm)
     problem = Problem(space.variables, pipeline.metrics, chosen.n_obj)
@@ -274,6 +289,8 @@ def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> R
     )
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
+    if not deliver:
+        return Run(store.folder)
     try:
         _finish(pipeline, store, settings, watch)
     except KeyboardInterrupt:
