@@ -39,12 +39,23 @@ class Generations:
         restart_within: begin afresh once half of the population is so close to the best row, in
             each parameter. A population that has converged would ask for one row for ever; what it
             found is in the store, and another start may find another kind of critical scenario.
+            Many objectives: so close to one row of the front, that is, when that has shrunk to a
+            point; one that is spread goes on being filled.
+        scaled: it measures distances between objectives, so each is scaled to [0, 1] over all who
+            live and their children. Who dominates whom stays the same.
     """
 
     def __init__(
-        self, build: Callable[[], Any], problem: Problem, seed: int, restart_within: float
+        self,
+        build: Callable[[], Any],
+        problem: Problem,
+        seed: int,
+        restart_within: float,
+        *,
+        scaled: bool = False,
     ) -> None:
         self._build, self._problem, self._seed = build, problem, seed
+        self._scaled = scaled
         self._restart_within = restart_within
         self._penalty = Penalty(problem.n_obj)
         self._asked: Any = None
@@ -82,15 +93,28 @@ class Generations:
         if self._asked is None or not np.array_equal(U, self._asked.get("X")):
             raise ValueError("U must be the rows that were last asked")
         finite, failed = self._penalty.apply(results.F, results.ok)
-        self._asked.set("F", finite, "failed", failed)
+        self._asked.set("F", finite, "failed", failed, "told", finite)
         living = self.algorithm.pop if self.algorithm.is_initialized else ()
         # Who failed carries the penalty of that time; worse finite rows may have been told since,
         # and any of them must count as better.
         for one in living:
             if one.get("failed"):
                 one.F = self._penalty.value
+                one.set("told", one.F)
+        if self._scaled:
+            _scale([*living, *self._asked])
         self.algorithm.tell(infills=self._asked)
         self._asked = None
         best, own = self.algorithm.opt[0].get("X"), self.algorithm.pop.get("X")
         if np.median(np.abs(own - best).max(axis=1)) < self._restart_within:
             self.restart()
+
+
+def _scale(individuals: list[Any]) -> None:
+    """Set F to what was told, each objective scaled to [0, 1] over all of them."""
+    told = 0.5 * np.array([one.get("told") for one in individuals])  # twice the range fits float64
+    low, span = told.min(axis=0), np.ptp(told, axis=0)
+    for one, values in zip(
+        individuals, (told - low) / np.where(span > 0.0, span, 1.0), strict=True
+    ):
+        one.F = values

@@ -4,13 +4,17 @@ from typing import TYPE_CHECKING
 
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.search.algorithm import Algorithm
+from bridgegen.search.cma_es import CMAES
 from bridgegen.search.es import ES
 from bridgegen.search.ga import GA
 from bridgegen.search.grid import Grid
+from bridgegen.search.mopso import MOPSO
+from bridgegen.search.nsga2 import NSGA2
 from bridgegen.search.pairwise import Pairwise
 from bridgegen.search.pso import PSO
 from bridgegen.search.random import Random
 from bridgegen.search.sobol import Sobol
+from bridgegen.search.spea2 import SPEA2
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -18,7 +22,8 @@ if TYPE_CHECKING:
 GROUP = "bridgegen.algorithms"
 
 ALGORITHMS: dict[str, type[Algorithm]] = {
-    cls.name: cls for cls in (Random, Sobol, Grid, Pairwise, PSO, GA, ES)
+    cls.name: cls
+    for cls in (Random, Sobol, Grid, Pairwise, PSO, GA, ES, CMAES, NSGA2, SPEA2, MOPSO)
 }
 
 
