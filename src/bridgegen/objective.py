@@ -121,7 +121,8 @@ class Objective:
         """Return the objective, its weights and scale taken from a random sample where asked to.
 
         Args:
-            terms: metric and weight; the weight is None with entropy weights.
+            terms: metric and weight; the weight is None with entropy weights, and has no part in
+                many objectives.
             weights: "fixed", or "entropy" of the sample.
             scale: "raw" or "standardised" by the sample.
             objectives: "one" weighted sum, or "many", one per term (weights are then not used).
@@ -140,7 +141,7 @@ class Objective:
             get(name)
         _choice("way of weighting", weights, ("fixed", "entropy"))
         wrong = [n for n, w in terms if (w is None) == (weights == "fixed")]
-        if wrong:
+        if wrong and objectives == "one":
             rule = "need a weight for" if weights == "fixed" else "leave no place for a weight of"
             raise InputError(*(f"{weights} weights {rule} {name}" for name in wrong))
         resolved = tuple(1.0 if w is None or objectives == "many" else float(w) for _, w in terms)

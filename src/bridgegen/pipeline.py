@@ -18,7 +18,7 @@ from bridgegen import metrics as measures
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause, Counterfactual, causes, require
 from bridgegen.errors import InputError
-from bridgegen.objective import CLASSIFYING, Objective, Thresholds, needs_sample
+from bridgegen.objective import CLASSIFYING, Objective, Objectives, Thresholds, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
@@ -152,18 +152,25 @@ class Pipeline:
             self._roads = self.simulator.roads([nominal.roads])
         self._threads = ThreadPoolExecutor(threads or os.cpu_count() or 1, "rollout")
 
-    def choose_objective(self, objective: Objective | None = None, *, seed: int = 0) -> Objective:
+    def choose_objective(
+        self,
+        objective: Objective | None = None,
+        *,
+        objectives: Objectives = "one",
+        seed: int = 0,
+    ) -> Objective:
         """Set the objective: the given one, or the scenario's, sampled where it says so.
 
         Args:
             objective: as an earlier run recorded it.
+            objectives: "one", the terms' weighted sum, or "many", one for each term.
             seed: of the random sample that entropy weights and scales are taken from. Its
                 scenarios are not part of the search and not charged to its budget.
         """
         if objective is None:
             spec = self.scenario.objective
             sample = None
-            if needs_sample(spec.weights, spec.scale):
+            if needs_sample(spec.weights, spec.scale, objectives):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
                 parts = self._in_chunks(self._measure, self.space.decode(U))
@@ -173,6 +180,7 @@ class Pipeline:
                 [(term.metric, term.weight) for term in spec.terms],
                 weights=spec.weights,
                 scale=spec.scale,
+                objectives=objectives,
                 thresholds=Thresholds(
                     limits.n_collision_above, limits.d_min_below, limits.v_d_at_least
                 ),

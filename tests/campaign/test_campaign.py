@@ -16,6 +16,7 @@ from bridgegen.campaign import handover
 from bridgegen.campaign.handover import most_critical
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.metrics import METRICS
 from bridgegen.openx.convert import import_file
 from bridgegen.store import Store
 
@@ -179,12 +180,60 @@ def test_most_critical_are_distinct_critical_and_in_order():
             assert np.sqrt(((U[a] - U[b]) ** 2).mean()) >= min(handover.DISTINCT)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"algorithm": "pso"}, "pso: n_obj = 1 (it searches a single objective) must hold, got 2"),
+        ({"objective": {"d_min": 1.0}}, "weights have no part in many objectives, got d_min=1"),
+        ({"weights": "entropy"}, "weights have no part in many objectives, got --weights entropy"),
+    ],
+)
+def test_many_objectives_are_refused_where_they_make_no_sense(arguments, message, tmp_path):
+    arguments = {"algorithm": "random", "objectives": "many"} | arguments
+    with pytest.raises(InputError) as error:
+        bg.run_search("crossroads-s4", budget=40, out=tmp_path / "run", **arguments)
+    assert message in str(error.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_of_many_objectives_the_non_dominated_come_first():
+    rng = np.random.default_rng(4)
+    U, F = rng.random((200, 3)), rng.normal(size=(200, 2)) * [1.0, 50.0]
+    kept = most_critical(U, F, np.ones(200, dtype=bool), 200)
+    dominated = ((F[:, None] >= F).all(axis=2) & (F[:, None] > F).any(axis=2)).any(axis=1)
+    n_front = int((~dominated).sum())
+    assert 0 < n_front < 20
+    assert not dominated[kept[:n_front]].any()
+    assert dominated[kept[n_front:]].all()
+    again = most_critical(U, F * [100.0, 0.01], np.ones(200, dtype=bool), 200)
+    assert again.tolist() == kept.tolist()  # the units of the objectives do not count
+
+
 def test_near_copies_do_not_crowd_out_what_is_different():
     copies = np.full((50, 3), 0.9) + np.linspace(0.0, 0.2, 50)[:, None] * [0.2, 0.2, 0.2]
     U = np.vstack([copies, [[0.1, 0.1, 0.1]]])
     F = np.r_[np.full(50, -5.0), -1.0][:, None]
     kept = most_critical(U, F, np.ones(51, dtype=bool), 2)
     assert kept.tolist() == [0, 50]
+
+
+def test_many_objectives_are_recorded_handed_over_and_reported(tmp_path):
+    run = bg.run_search(
+        "crossroads-s2",
+        algorithm="random",
+        objectives="many",
+        budget=60,
+        out=tmp_path / "a",
+        keep=2,
+    )
+    table = run.frame()
+    ok = table[table.status == 0]
+    np.testing.assert_array_equal(ok.f0, np.minimum(ok.d_min, METRICS["d_min"].cap))
+    np.testing.assert_allclose(ok.f1, -3.6 * ok.v_d)
+    assert len(run.scenarios) == 2
+    assert "F of d_min" in run.report.read_text("utf-8")
+    assert "--objectives many" in run.settings.command(tmp_path / "b")
+    assert bg.resume(run.folder).frame().equals(table)
 
 
 def test_the_recorded_command_makes_the_same_run(tmp_path, monkeypatch):
@@ -344,6 +393,7 @@ def test_the_results_are_a_data_frame(tmp_path):
         ({"objective": {"d_mim": 1.0}}, "did you mean 'd_min'"),
         ({"axes": ["wether"]}, "weather"),
         ({"weights": "entropie"}, "entropy"),
+        ({"objectives": "more"}, "number of objectives 'more'"),
     ],
 )
 def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):

@@ -13,8 +13,8 @@ from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
 from bridgegen.ego import STORYBOARD, is_spec
-from bridgegen.errors import InputError, Interrupted, StorageError
-from bridgegen.objective import Objective
+from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
+from bridgegen.objective import Objective, Objectives
 from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
@@ -64,6 +64,7 @@ def run_search(
     objective: dict[str, float | None] | None = None,
     weights: str | None = None,
     scale: str | None = None,
+    objectives: str | None = None,
     metrics: Sequence[str] = (),
     causes: bool = True,
     cause: str | None = None,
@@ -96,6 +97,8 @@ def run_search(
             scenario's.
         weights: "fixed", or "entropy" of a random sample, instead of the scenario's way.
         scale: "raw", or "standardised" by a random sample, instead of the scenario's.
+        objectives: "one", the terms' weighted sum, or "many", one for each term; what the
+            algorithm is made for, by default.
         metrics: names of those to record besides the objective's and the paper's.
         causes: whether to find the cause of each critical scenario, by replaying it.
         cause: "perception", "planning", "control" or "unavoidable": a critical scenario of another
@@ -117,13 +120,16 @@ def run_search(
     budget = catalogue.budget if budget is None else budget
     seed = catalogue.seed if seed is None else seed
     _check_numbers(budget, seed, keep)
-    logical = replace(catalogue, objective=_choose(catalogue.objective, objective, weights, scale))
     method = toolkit.get(algorithm)
+    columns = _columns(method, objectives)
+    spec = _choose(catalogue.objective, objective, weights, scale, columns)
+    logical = replace(catalogue, objective=spec)
     logical, roads = _placed(logical, road_map, junction)
     space = logical.space(axes, fixed)
     if space.n_var == 0:
         refuse_standstill(logical)
-    values = resolve(method, Problem(space.variables), seed, settings or {})
+    n_obj = 1 if columns == "one" else len(spec.terms)
+    values = resolve(method, Problem(space.variables, n_obj=n_obj), seed, settings or {})
     folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
     refuse_used(folder)
     if cause is not None and not causes:
@@ -142,7 +148,7 @@ def run_search(
     )
     watch.stage("compile")
     pipeline.warm_up()
-    chosen = pipeline.choose_objective(seed=seed)
+    chosen = pipeline.choose_objective(objectives=columns, seed=seed)
     made_with = Settings(
         scenario=str(Path(scenario).resolve()) if is_file(scenario) else str(scenario),
         distribution=str(Path(distribution).resolve()) if distribution is not None else None,
@@ -167,6 +173,7 @@ def run_search(
             "objective": objective,
             "weights": weights,
             "scale": scale,
+            "objectives": objectives,
             "metrics": list(metrics),
         },
     )
@@ -320,13 +327,31 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
     write_report(store.folder / REPORT, data)
 
 
+def _columns(method: type[toolkit.Algorithm], objectives: str | None) -> Objectives:
+    """Return how many objectives are searched: what the user says, or the algorithm is for."""
+    if objectives is None:
+        return "many" if method.objectives == "many" else "one"
+    if objectives not in ("one", "many"):
+        raise UnknownNameError("number of objectives", objectives, ("one", "many"))
+    return objectives  # type: ignore[return-value]
+
+
 def _choose(
     spec: ObjectiveSpec,
     metrics: Mapping[str, float | None] | None,
     weights: str | None,
     scale: str | None,
+    columns: Objectives,
 ) -> ObjectiveSpec:
     """Return the scenario's objective with what the user wants instead."""
+    if columns == "many":
+        given = [f"{name}={w:g}" for name, w in (metrics or {}).items() if w is not None]
+        given += [f"--weights {weights}"] if weights else []
+        if given:
+            raise InputError(
+                f"weights have no part in many objectives, got {', '.join(given)}; "
+                "leave them out, or search their sum: --objectives one"
+            )
     way = weights or ("fixed" if metrics and None not in metrics.values() else spec.weights)
     terms = spec.terms
     if metrics is not None:

@@ -51,12 +51,13 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
 
     Args:
         U: ``(N, n_var)`` unit-cube rows.
-        F: ``(N, n_obj)``, minimised; several objectives are compared by their sum.
+        F: ``(N, n_obj)``, minimised. With many objectives, those that no other dominates come
+            first; then counts the sum of objectives, each scaled to [0, 1] over the critical rows.
         critical: ``(N,)``, only these are kept.
         keep: how many at most.
     """
     order = np.flatnonzero(critical)
-    order = order[np.argsort(F[order].sum(axis=1), kind="stable")]
+    order = order[_by_merit(F[order])]
     kept: list[int] = []
     for distance in DISTINCT:
         near = np.zeros(len(order), dtype=bool)
@@ -68,6 +69,24 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
             kept.append(best)
             rest = rest[_apart(U[rest], U[best]) >= distance]
     return order[np.isin(order, kept)]
+
+
+def _by_merit(F: Float) -> Int:
+    """Return the rows of F, best first."""
+    low, span = F.min(axis=0, initial=np.inf), np.ptp(F, axis=0) if len(F) else 1.0
+    total = ((F - low) / np.where(span > 0.0, span, 1.0)).sum(axis=1)
+    merit = np.lexsort((*F.T[::-1], total))  # by F where rounding leaves the sums equal
+    if F.shape[1] == 1:
+        return merit
+    # Who has the least sum is dominated by nobody; without those it dominates, so has the next.
+    front, left = [], merit
+    while len(left):
+        best = F[left[0]]
+        front.append(left[0])
+        left = left[1:]
+        left = left[~((best <= F[left]).all(axis=1) & (best < F[left]).any(axis=1))]
+    first = np.array(front, dtype=np.int64)
+    return np.concatenate([first, merit[~np.isin(merit, first)]])
 
 
 def _apart(U: Float, u: Float) -> Float:

@@ -39,8 +39,8 @@ class Settings:
         cause: the only one that counts, or None.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
         chosen: what the user chose of the objective instead of the scenario's: metrics with
-            weights, way of weighting, scale; None each where nothing; and the metrics to be
-            recorded besides.
+            weights, way of weighting, scale, one or many; None each where nothing; and the metrics
+            to be recorded besides.
     """
 
     scenario: str
@@ -107,8 +107,8 @@ class Settings:
         if self.chosen["objective"]:
             terms = self.chosen["objective"].items()
             words += ["--objective", ",".join(m if w is None else f"{m}={w!r}" for m, w in terms)]
-        for option in ("weights", "scale"):
-            if self.chosen[option]:
+        for option in ("weights", "scale", "objectives"):
+            if self.chosen.get(option):  # runs of the first versions do not have them all
                 words += [f"--{option}", self.chosen[option]]
         if also := self.chosen.get("metrics"):  # not in runs of the first versions
             words += ["--metrics", ",".join(also)]

@@ -86,6 +86,13 @@ def search(
         str | None, typer.Option(help="fixed, or entropy (from a random sample).")
     ] = None,
     scale: Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")] = None,
+    objectives: Annotated[
+        str | None,
+        typer.Option(
+            help="one: the metrics' weighted sum; many: each metric by itself.",
+            show_default="what the algorithm is made for",
+        ),
+    ] = None,
     metrics: Annotated[
         str | None,
         typer.Option(help="Record these as well, e.g. pet,drac; see 'bridgegen list metrics'."),
@@ -133,6 +140,7 @@ def search(
             objective=terms,
             weights=weights,
             scale=scale,
+            objectives=objectives,
             metrics=_names(metrics),
             causes=causes,
             cause=cause,

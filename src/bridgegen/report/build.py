@@ -61,10 +61,12 @@ def build_report(
         version: of BridgeGen.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
-    weights = ", ".join(
-        f"{name} {weight:.4g}"
-        for name, weight in zip(pipeline.objective.names, pipeline.objective.weights, strict=True)
-    )
+    terms = pipeline.objective.names
+    if pipeline.objective.objectives == "one":
+        weighted = zip(terms, pipeline.objective.weights, strict=True)
+        wanted = {"weights of the objective": ", ".join(f"{n} {w:.4g}" for n, w in weighted)}
+    else:
+        wanted = {"objectives": ", ".join(terms)}
     head = RunSummary(
         scenario=scenario.name,
         title=scenario.title,
@@ -91,7 +93,7 @@ def build_report(
         command=command,
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
-            "weights of the objective": weights,
+            **wanted,
             "simulated": f"{pipeline.simulator.duration:g} s at {pipeline.simulator.time_step:g} s",
         },
     )
@@ -135,10 +137,10 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
                measures.get(name).description)
         for j, name in enumerate(pipeline.metrics)
     )  # fmt: skip
-    n_obj = rows.F.shape[1]
+    one = pipeline.objective.objectives == "one"
+    names = ("F",) if one else tuple(f"F of {name}" for name in pipeline.objective.names)
     objectives = tuple(
-        Column("F" if n_obj == 1 else f"F{j + 1}", "1", np.ascontiguousarray(rows.F[:, j]))
-        for j in range(n_obj)
+        Column(name, "1", np.ascontiguousarray(rows.F[:, j])) for j, name in enumerate(names)
     )
     cause = rows.cause if rows.cause.any() else None
     return Evaluations(
