@@ -1,6 +1,7 @@
 """What every search algorithm must do; a new one passes by being registered."""
 
 import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,9 +40,14 @@ def drive(search: Algorithm, n_batches: int, n_obj: int, ok: float = 1.0) -> Flo
         U = search.ask()
         asked.append(U.copy())
         good = dice.random(len(U)) < ok
-        F = np.where(good[:, None], sphere(U, n_obj), np.nan)
-        search.tell(U, Results.of_F(F, good))
+        search.tell(U, results_of(U, good, n_obj))
     return np.concatenate(asked)
+
+
+def results_of(U: Float, ok: np.ndarray, n_obj: int) -> Results:
+    F = sphere(U, n_obj)
+    critical = ok & (F[:, 0] < 0.1)
+    return replace(Results.of_F(np.where(ok[:, None], F, np.nan), ok), critical=critical)
 
 
 def in_cube(U: Float, n_var: int) -> bool:
@@ -237,7 +243,7 @@ def test_wrong_arguments_are_named(algorithm: Kind):
 
 def test_every_setting_is_checked_and_does_something(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    usual = drive(algorithm(Problem.unnamed(3, n_obj), 0), 6, n_obj)
+    usual = drive(algorithm(Problem.unnamed(3, n_obj), 0), 8, n_obj)
     for name, setting in algorithm.settings.items():
         with pytest.raises(InputError, match=name):
             algorithm(Problem.unnamed(3, n_obj), 0, **{name: None})
@@ -257,7 +263,7 @@ def test_every_setting_is_checked_and_does_something(algorithm: Kind):
             assert other != setting.default
         else:
             continue
-        changed = drive(algorithm(Problem.unnamed(3, n_obj), 0, **{name: other}), 6, n_obj)
+        changed = drive(algorithm(Problem.unnamed(3, n_obj), 0, **{name: other}), 8, n_obj)
         assert changed.tobytes() != usual.tobytes(), f"{name} changes nothing"
 
 

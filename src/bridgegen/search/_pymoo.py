@@ -1,6 +1,6 @@
 """What the algorithms built on pymoo share. Imported only when one of them is built."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,10 +12,13 @@ from pymoo.core.termination import NoTermination
 from bridgegen.arrays import Float
 from bridgegen.search.algorithm import Penalty, Problem, Results
 
+Box = tuple[Float, Float]
+"""The lowest and the highest value of each parameter."""
 
-def unit_cube(problem: Problem) -> PymooProblem:
-    """Return pymoo's description of the search space; it is never evaluated by pymoo."""
-    return PymooProblem(n_var=problem.n_var, n_obj=problem.n_obj, xl=0.0, xu=1.0)
+
+def pymoos(problem: Problem, box: Box) -> PymooProblem:
+    """Return pymoo's description of what is searched; it is never evaluated by pymoo."""
+    return PymooProblem(n_var=problem.n_var, n_obj=problem.n_obj, xl=box[0], xu=box[1])
 
 
 @contextmanager
@@ -35,7 +38,7 @@ class Generations:
     Args:
         build: makes pymoo's algorithm, not yet set up.
         problem: what is searched.
-        seed: of all that it draws.
+        seed: of all that it draws; several numbers make one.
         restart_within: begin afresh once half of the population is so close to the best row, in
             each parameter. A population that has converged would ask for one row for ever; what it
             found is in the store, and another start may find another kind of critical scenario.
@@ -43,19 +46,22 @@ class Generations:
             point; one that is spread goes on being filled.
         scaled: it measures distances between objectives, so each is scaled to [0, 1] over all who
             live and their children. Who dominates whom stays the same.
+        box: where it searches; the whole cube by default.
     """
 
     def __init__(
         self,
         build: Callable[[], Any],
         problem: Problem,
-        seed: int,
+        seed: int | Sequence[int],
         restart_within: float,
         *,
         scaled: bool = False,
+        box: Box | None = None,
     ) -> None:
-        self._build, self._problem, self._seed = build, problem, seed
-        self._scaled = scaled
+        self._build, self._problem, self._scaled = build, problem, scaled
+        self._seed = [seed] if isinstance(seed, int) else list(seed)
+        self._box = box or (np.zeros(problem.n_var), np.ones(problem.n_var))
         self._restart_within = restart_within
         self._penalty = Penalty(problem.n_obj)
         self._asked: Any = None
@@ -68,9 +74,9 @@ class Generations:
             self.algorithm = self._build()
             # The budget is the campaign's; pymoo's own criteria would end the search early.
             self.algorithm.setup(
-                unit_cube(self._problem),
+                pymoos(self._problem, self._box),
                 termination=NoTermination(),
-                seed=[self._seed, self.starts],
+                seed=[*self._seed, self.starts],
             )
         self.starts += 1
 
@@ -80,7 +86,7 @@ class Generations:
         if self._asked is None or len(self._asked) == 0:  # every child is a known row
             self.restart()
             self._asked = self.algorithm.ask()
-        U: Float = np.clip(self._asked.get("X").astype(np.float64), 0.0, 1.0)
+        U: Float = np.clip(self._asked.get("X").astype(np.float64), *self._box)
         self._asked.set("X", U)
         return U
 

@@ -1,8 +1,8 @@
 """What every search algorithm is: ask for rows of the unit cube, tell their objectives."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol, Self
+from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ from bridgegen.cause import Cause
 from bridgegen.errors import InputError, UnknownNameError
 
 Value = bool | int | float | str
+
+JSON = None | bool | int | float | str | Sequence["JSON"] | Mapping[str, "JSON"]
+"""What a run can keep; no NaN and no inf."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,8 @@ class Algorithm(Protocol):
     An algorithm draws random numbers only from its own generator, so that one seed gives one
     sequence of rows, bit for bit; the campaign's resume replays a run on that promise.
 
+    It may have another method, ``notes``, see `TakesNotes`.
+
     Attributes:
         name: what the user calls it.
         description: one line for ``bridgegen list algorithms``.
@@ -154,6 +159,22 @@ class Algorithm(Protocol):
             U: ``(n, n_var)`` float64, the rows that were asked.
             results: of these rows; not to be changed.
         """
+
+
+@runtime_checkable
+class TakesNotes(Protocol):
+    """An algorithm that learns something which is worth keeping with the run."""
+
+    def notes(self) -> Mapping[str, JSON]:
+        """Return what it has learnt so far, by title.
+
+        The campaign records it when the search ends, is interrupted or stopped; ``Run.notes`` has
+        it, and the report shows it. Where a value is a list of mappings with the same keys, it is
+        shown as a table. A mapping called "box" holds, for some parameters, the lowest and highest
+        value in the unit cube; the report adds the parameters' own values, where no constraint
+        couples them.
+        """
+        ...
 
 
 def resolve(

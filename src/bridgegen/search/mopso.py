@@ -17,6 +17,7 @@ from bridgegen.search.algorithm import (
     resolve,
 )
 from bridgegen.search.dominance import crowding, non_dominated, thin
+from bridgegen.search.space_filling import latin_hypercube
 
 TURNED = -0.001
 """What is left of a particle's velocity at a face of the cube."""
@@ -68,10 +69,8 @@ class MOPSO:
         self._restart()
 
     def _restart(self) -> None:
-        rng, shape = self._rng, (self._size, self._n_var)
-        strata = rng.permuted(np.tile(np.arange(self._size), (self._n_var, 1)), axis=1).T
-        self._x: Float = (strata + rng.random(shape)) / self._size
-        self._v = np.zeros(shape)
+        self._x = latin_hypercube(self._rng, self._size, self._n_var)
+        self._v = np.zeros_like(self._x)
         self._started = False
 
     def ask(self) -> Float:

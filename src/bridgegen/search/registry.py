@@ -10,6 +10,7 @@ from bridgegen.search.ga import GA
 from bridgegen.search.grid import Grid
 from bridgegen.search.mopso import MOPSO
 from bridgegen.search.nsga2 import NSGA2
+from bridgegen.search.nsga2_dt import NSGA2DT
 from bridgegen.search.pairwise import Pairwise
 from bridgegen.search.pso import PSO
 from bridgegen.search.random import Random
@@ -23,7 +24,7 @@ GROUP = "bridgegen.algorithms"
 
 ALGORITHMS: dict[str, type[Algorithm]] = {
     cls.name: cls
-    for cls in (Random, Sobol, Grid, Pairwise, PSO, GA, ES, CMAES, NSGA2, SPEA2, MOPSO)
+    for cls in (Random, Sobol, Grid, Pairwise, PSO, GA, ES, CMAES, NSGA2, SPEA2, MOPSO, NSGA2DT)
 }
 
 
