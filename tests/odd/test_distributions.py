@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from bridgegen.errors import InputError
-from bridgegen.odd.distributions import TAIL, Discrete, Histogram, LogNormal, Normal
+from bridgegen.odd.distributions import (
+    TAIL,
+    Discrete,
+    Histogram,
+    LogNormal,
+    Normal,
+    shares_within,
+)
 
 # Ours, and the same distribution as scipy knows it.
 CONTINUOUS = {
@@ -122,3 +129,17 @@ def test_what_is_no_distribution_is_refused(message):
     with pytest.raises(InputError) as caught:
         BAD[message]()
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("name", EVERY)
+@given(ends=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), off=st.floats(-0.5, 0.5))
+def test_shares_within_a_range_are_those_of_its_values(name, ends, off):
+    ours, _ = EVERY[name]
+    low, high = sorted(ours.low + end * (ours.high - ours.low) + off for end in ends)
+    first, last = map(float, shares_within(ours, low, high))
+    shares = np.concatenate([np.linspace(0.0, 1.0, 500), np.linspace(first, last, 50)])
+    value, bits = ours.value(shares), 1e-9  # of the special functions
+    between = (first <= shares) & (shares < last)
+    assert ((low - bits <= value) & (value <= high + bits))[between].all()
+    outside = (shares < first) | (shares > last)
+    assert not ((low + bits < value) & (value < high - bits))[outside].any()

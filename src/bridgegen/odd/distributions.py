@@ -6,7 +6,7 @@ evenly, and any other algorithm goes from the rare through the usual to the rare
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -50,6 +50,29 @@ class Distribution(Protocol):
         Args:
             value: ``(N,)`` in [low, high].
         """
+
+
+def shares_within(distribution: Distribution, low: float, high: float) -> tuple[Float, Float]:
+    """Return the first and the last share of a distribution's values in [low, high].
+
+    The last is at most the first where there is none of any probability.
+    """
+
+    def first(holds: Callable[[float], bool]) -> float:
+        """Return the first share at which the value is so: it is from there on."""
+        below, above = 0.0, 1.0
+        if holds(float(distribution.value(np.array([below]))[0])):
+            return below
+        while below < (middle := below + (above - below) / 2) < above:
+            if holds(float(distribution.value(np.array([middle]))[0])):
+                above = middle
+            else:
+                below = middle
+        return above
+
+    last = first(lambda value: value > high) if distribution.high > high else 1.0
+    begin = first(lambda value: value >= low) if distribution.high >= low else 1.0
+    return np.array(begin), np.array(last)
 
 
 @dataclass(frozen=True)

@@ -144,6 +144,29 @@ class Parameter:
         share = np.divide(below, width, out=np.full(len(value), 0.5), where=width > 0.0)
         return np.asarray(np.clip(share, 0.0, 1.0))
 
+    def shares(
+        self, low: float, high: float, lo: Float | float, hi: Float | float
+    ) -> tuple[Float, Float]:
+        """Return the shares of the interval that is left to it at which values lie in a range.
+
+        Args:
+            low: smallest value, inclusive.
+            high: largest value, inclusive.
+            lo: smallest value that is left to it, one or ``(N,)``.
+            hi: largest value, likewise.
+
+        Returns:
+            The first and the last share, one or ``(N,)`` each, in [0, 1]; the last is at most the
+            first where no value, or but one of infinitely many, lies in the range.
+        """
+        below, above, width = np.asarray(low - lo), np.asarray(high - lo), np.asarray(hi - lo)
+        if self.kind == "integer":
+            below, above, width = np.ceil(below), np.floor(above) + 1.0, width + 1.0
+        safe = np.where(width > 0.0, width, 1.0)
+        first = np.where(width > 0.0, below / safe, np.where(below <= 0.0, 0.0, 1.0))
+        last = np.where(width > 0.0, above / safe, np.where(above >= 0.0, 1.0, 0.0))
+        return np.clip(first, 0.0, 1.0), np.clip(last, 0.0, 1.0)
+
     def _naming_problems(self) -> list[str]:
         return [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
 

@@ -45,6 +45,10 @@ class SearchSpace:
             its high is not searched.
         names: every parameter, then every derived quantity, in declared order: the columns of X.
         units: the unit of each of ``names``.
+        order: all of ``names``, each after those that it follows from or that limit it.
+        bounds: per parameter, what limits it.
+        derived: the derived quantities by name.
+        defaults: where each parameter stands while it is not searched.
 
     Args:
         scenario: where the parameters and constraints come from.
@@ -78,13 +82,13 @@ class SearchSpace:
             for p in parameters.values()
             if p.axis in self.axes and p.name not in fixed and p.low < p.high
         )
-        self._defaults = {p.name: p.default for p in parameters.values()} | fixed
+        self.defaults = {p.name: p.default for p in parameters.values()} | fixed
         self._columns = {name: number for number, name in enumerate(self.names)}
-        self._derived = {one.name: one for one in scenario.derived}
-        self._bounds: dict[str, tuple[Bound, ...]] = {
+        self.derived = {one.name: one for one in scenario.derived}
+        self.bounds: dict[str, tuple[Bound, ...]] = {
             name: tuple(b for b in scenario.bounds if b.target == name) for name in parameters
         }
-        self._order = order(self.names, scenario.bounds, scenario.derived)
+        self.order = order(self.names, scenario.bounds, scenario.derived)
         self._decode(probes(self.n_var))
 
     @property
@@ -153,7 +157,7 @@ class SearchSpace:
         table = self._table(rows)
         cube = np.empty((len(rows), self.n_var))
         for number, name in enumerate(self.variables):
-            lo, hi = self._interval(name, table)
+            lo, hi = self.interval(name, table)
             cube[:, number] = self.scenario.parameters[name].share(table[name], lo, hi)
         back = self._decode(cube)
         wrong = np.argwhere(np.abs(rows - back) > slack(back)).tolist()
@@ -187,14 +191,14 @@ class SearchSpace:
         for name in values:
             self.index(name)
         table: dict[str, Float | float] = {}
-        for name in self._order:
+        for name in self.order:
             if name in values:
                 table[name] = float(values[name])
-            elif name in self._derived:
-                table[name] = float(self._derived[name].value.evaluate(table))
+            elif name in self.derived:
+                table[name] = float(self.derived[name].value.evaluate(table))
             else:
-                lo, hi = self._interval(name, table)
-                table[name] = float(np.clip(self._defaults[name], lo, hi))
+                lo, hi = self.interval(name, table)
+                table[name] = float(np.clip(self.defaults[name], lo, hi))
         row = np.array([table[name] for name in self.names], dtype=np.float64)
         broken = self.violations(row[None, :])
         if broken:
@@ -224,36 +228,44 @@ class SearchSpace:
         # What formulas read; a parameter that never moves stays one number in it.
         table: dict[str, Float | float] = {}
         result = np.empty((len(self.names), len(cube)))
-        for name in self._order:
+        for name in self.order:
             out = result[self._columns[name]]
-            if name in self._derived:
-                out[:] = self._derived[name].value.evaluate(table)
-                one = self._derived[name]
+            if name in self.derived:
+                out[:] = self.derived[name].value.evaluate(table)
+                one = self.derived[name]
                 problem = f"'{one}'{at(one.place)} has no value"
                 self._refuse(problem, one.names, table, ~np.isfinite(out))
                 table[name] = out
                 continue
-            if name not in shares and not self._bounds[name]:
-                out[:] = table[name] = self._defaults[name]
+            if name not in shares and not self.bounds[name]:
+                out[:] = table[name] = self.defaults[name]
                 continue
-            lo, hi = self._interval(name, table)
+            lo, hi = self.interval(name, table)
             if name in shares:
                 out[:] = self.scenario.parameters[name].at(shares[name], lo, hi)
             else:
-                out[:] = np.clip(self._defaults[name], lo, hi)
+                out[:] = np.clip(self.defaults[name], lo, hi)
             table[name] = out
         return np.ascontiguousarray(result.T)
 
-    def _interval(
+    def interval(
         self, name: str, table: Mapping[str, Float | float]
     ) -> tuple[Float | float, Float | float]:
-        """Return the lowest and the highest value that the columns before it leave ``name``."""
+        """Return the lowest and the highest value that the columns before it leave a parameter.
+
+        Args:
+            name: the parameter.
+            table: those that come before it in ``order``, by name: a number or ``(N,)`` each.
+
+        Raises:
+            ScenarioError: they leave it no value in some row.
+        """
         parameter = self.scenario.parameters[name]
-        if not self._bounds[name]:
+        if not self.bounds[name]:
             return parameter.low, parameter.high
         lo: Float | float = parameter.low
         hi: Float | float = parameter.high
-        for bound in self._bounds[name]:
+        for bound in self.bounds[name]:
             if bound.lo is not None:
                 lo = np.maximum(lo, bound.lo.evaluate(table))
             if bound.hi is not None:
@@ -263,9 +275,9 @@ class SearchSpace:
             empty = ~np.atleast_1d(lo <= hi)
         else:
             empty = ~np.atleast_1d(lo <= hi + slack(hi))  # true for NaN, too
-        rules = " and ".join(f"'{bound}'{at(bound.place)}" for bound in self._bounds[name])
+        rules = " and ".join(f"'{bound}'{at(bound.place)}" for bound in self.bounds[name])
         label = f"{name} [{parameter.unit}], {parameter.low:g} to {parameter.high:g}"
-        names = frozenset().union(*(bound.names for bound in self._bounds[name]))
+        names = frozenset().union(*(bound.names for bound in self.bounds[name]))
         self._refuse(f"{rules} leaves no value to {label},", names, table, empty)
         # Where limits cross, by less than the tolerance, the upper one holds; inside the range.
         return lo, np.clip(hi, parameter.low, parameter.high)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
-from bridgegen.odd.distributions import Discrete, Distribution, Uniform
+from bridgegen.odd.distributions import Discrete, Distribution, Uniform, shares_within
 from bridgegen.odd.expression import lookup, parse
 from bridgegen.odd.parameters import Axis, Derived, Parameter, nearest
 from bridgegen.openx.openscenario import distributions as dst
@@ -45,6 +45,14 @@ class FileParameter(Parameter):
         if self.distribution is None:
             return super().share(value, lo, hi)
         return self.distribution.share(value)
+
+    def shares(
+        self, low: float, high: float, lo: Float | float, hi: Float | float
+    ) -> tuple[Float, Float]:
+        """See `Parameter`."""
+        if self.distribution is None:
+            return super().shares(low, high, lo, hi)
+        return shares_within(self.distribution, low, high)
 
     def _naming_problems(self) -> list[str]:
         return []
