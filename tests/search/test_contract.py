@@ -46,7 +46,8 @@ def drive(search: Algorithm, n_batches: int, n_obj: int, ok: float = 1.0) -> Flo
 
 def results_of(U: Float, ok: np.ndarray, n_obj: int) -> Results:
     F = sphere(U, n_obj)
-    critical = ok & (F[:, 0] < 0.1)
+    # Two of three rows in a ball: no decision tree can tell them apart.
+    critical = ok & (F[:, 0] < 0.2) & (np.floor(U[:, 0] * 1e6) % 3 > 0)
     return replace(Results.of_F(np.where(ok[:, None], F, np.nan), ok), critical=critical)
 
 
