@@ -419,3 +419,21 @@ def test_a_number_out_of_range_is_one_clear_error(tmp_path, arguments, message):
     with pytest.raises(InputError, match=message):
         bg.run_search("crossroads-s4", out=tmp_path / "run", **arguments)
     assert not (tmp_path / "run").exists()
+
+
+def test_what_an_algorithm_learnt_is_kept_and_shown(tmp_path):
+    small = {"initial": 20, "population": 10, "generations": 1, "min_rows": 5}
+    run = bg.run_search(
+        "crossroads-s2", algorithm="nsga2-dt", budget=60, seed=1, settings=small, keep=0,
+        causes=False, out=tmp_path / "run",
+    )  # fmt: skip
+    trees, boxes = run.notes["decision trees"], run.notes["critical boxes"]
+    assert trees[0]["evaluations"] == 20
+    assert len([one for one in boxes if one["tree"] == 1]) == trees[0]["critical leaves"] > 0
+    sample = run.frame()[:20]
+    first = boxes[0]
+    assert first["critical"] / first["rows"] >= 0.5
+    assert first["critical"] <= sample["critical"].sum()
+    page = run.report.read_text()
+    assert '"title":"critical boxes","columns":["tree","box","rows","critical"]' in page
+    assert bg.run_search("crossroads-s2", budget=40, keep=0, out=tmp_path / "pso").notes == {}

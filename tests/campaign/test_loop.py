@@ -398,3 +398,74 @@ def test_killed_at_any_moment(name, tmp_path):
     # What was lost: at most the batch that each kill broke off.
     assert len(logged(log)) <= 1500 + 40 * kills
     assert len(logged(tmp_path / "log")) == 1500
+
+
+class Diarist(Scripted):
+    """Takes notes of how often it was told what."""
+
+    def notes(self):
+        return {"told": [told for _, _, told in self.told]}
+
+
+def test_notes_are_kept_when_the_search_ends(open_store):
+    with open_store() as store:
+        run_loop(Diarist([0.2, 0.05], [0.3]), decode, Simulator(), store, 9)
+        assert store.notes == {"told": [[True, False], [True]]}
+    with open_store() as store:
+        assert store.notes == {"told": [[True, False], [True]]}
+
+
+def test_notes_are_of_the_last_batch_too_as_far_as_the_budget_goes(open_store):
+    with open_store() as store:
+        diarist = Diarist([0.2, 0.3], [0.4, 0.5, 0.2])
+        result = run_loop(diarist, decode, Simulator(), store, 3)
+        assert (result.reason, result.evaluations) == (Reason.BUDGET, 3)
+        # 0.5 has no place in the budget; 0.2 is known.
+        assert store.notes == {"told": [[True, True], [True, False, True]]}
+    last = diarist.results[-1]
+    assert np.isnan(last.metrics[1]).all()
+    assert not np.isnan(last.metrics[[0, 2]]).any()
+    assert not last.critical[1]
+
+
+def test_notes_are_kept_when_it_is_stopped_and_stay_until_it_is_further(open_store):
+    batches = [[0.2], [0.3], [0.4]]
+    with open_store() as store:
+        left = iter([False, False, True])
+        run_loop(Diarist(*batches), decode, Simulator(), store, 9, stop=lambda: next(left))
+        assert len(store.notes["told"]) == 2
+    with open_store() as store:  # stopped while it repeats what is recorded
+        left = iter([False, True])
+        run_loop(Diarist(*batches), decode, Simulator(), store, 9, stop=lambda: next(left))
+        assert len(store.notes["told"]) == 2
+    with open_store() as store:
+        run_loop(Diarist(*batches), decode, Simulator(), store, 9)
+        assert len(store.notes["told"]) == 3
+    with open_store() as store:  # finished: nothing is asked, nothing is forgotten
+        run_loop(Diarist(*batches), decode, Simulator(), store, 3)
+        assert len(store.notes["told"]) == 3
+
+
+def test_notes_are_kept_on_ctrl_c(open_store):
+    def interrupted(X):
+        if X[0, 0] == 0.3:
+            raise KeyboardInterrupt
+        return Simulator()(X)
+
+    with open_store() as store:
+        result = run_loop(Diarist([0.2], [0.3]), decode, interrupted, store, 9)
+        assert result.reason is Reason.INTERRUPTED
+        assert store.notes == {"told": [[True]]}
+
+
+@pytest.mark.parametrize("notes", [{"x": float("nan")}, {"x": np.zeros(2)}])
+def test_notes_must_be_json(open_store, notes):
+    class Wrong(Scripted):
+        def notes(self):
+            return notes
+
+    with open_store() as store, pytest.raises(InputError, match="notes must be JSON"):
+        run_loop(Wrong([0.2]), decode, Simulator(), store, 9)
+    with open_store() as store:
+        assert len(store) == 1
+        assert store.notes == {}

@@ -47,11 +47,11 @@ def test_the_first_sample_fills_the_space():
 def test_it_searches_where_the_tree_found_harm():
     search = dt(initial=200)
     batches = drive(search, in_corner, 13)
-    trees = search.notes()["trees"]
+    trees, boxes = search.notes()["decision trees"], search.notes()["critical boxes"]
     first = trees[0]
     assert first["evaluations"] == 200
     assert first["critical leaves"] == 1
-    (box,) = first["boxes"]
+    (box,) = [one for one in boxes if one["tree"] == 1]
     # The tree's edges lie between rows of the sample, near the truth.
     assert set(box["box"]) == {"speed", "gap"}
     assert box["box"]["speed"] == [pytest.approx(0.7, abs=0.02), 1.0]
@@ -88,7 +88,7 @@ def test_no_harm_or_nothing_else_the_whole_cube_is_searched(is_critical):
     U = np.concatenate(drive(search, is_critical, 8))
     assert (U.min(axis=0) < 0.1).all()
     assert (U.max(axis=0) > 0.9).all()
-    tree = search.notes()["trees"][0]
+    tree = search.notes()["decision trees"][0]
     assert tree["leaves"] == 1
     assert tree["critical leaves"] == int(is_critical(U)[0])
 
@@ -101,7 +101,7 @@ def test_the_surest_box_comes_first():
 
     search = dt(initial=250)
     batches = drive(search, two, 8)
-    boxes = search.notes()["trees"][0]["boxes"]
+    boxes = [one for one in search.notes()["critical boxes"] if one["tree"] == 1]
     estimates = [(box["critical"] + 1) / (box["rows"] + 2) for box in boxes]
     assert len(boxes) == 2
     assert estimates == sorted(estimates, reverse=True)
@@ -112,7 +112,7 @@ def test_the_surest_box_comes_first():
 def test_a_leaf_with_too_few_rows_or_too_little_harm_is_no_box():
     few = dt(initial=200, min_rows=150)
     drive(few, in_corner, 2)
-    assert few.notes()["trees"][0]["critical leaves"] == 0
+    assert few.notes()["decision trees"][0]["critical leaves"] == 0
 
     def striped(U: Float) -> Bool:  # a third of what lies in it, too fine for any leaf
         return in_corner(U) & (np.floor(U[:, 2] * 1e6) % 3 == 0)
@@ -120,15 +120,15 @@ def test_a_leaf_with_too_few_rows_or_too_little_harm_is_no_box():
     strict, lenient = dt(initial=400, min_rows=40), dt(initial=400, min_rows=40, share=0.2)
     for search in (strict, lenient):
         drive(search, striped, 2)
-    assert strict.notes()["trees"][0]["critical leaves"] == 0
-    assert lenient.notes()["trees"][0]["critical leaves"] > 0
+    assert strict.notes()["decision trees"][0]["critical leaves"] == 0
+    assert lenient.notes()["decision trees"][0]["critical leaves"] > 0
 
 
 def test_who_failed_is_neither():
     """Failed rows are in no leaf, and no box is looked for where all fail."""
     search = dt(initial=200)
     drive(search, in_corner, 3, fails=lambda U: U[:, 2] > 0.5)
-    assert search.notes()["trees"][0]["evaluations"] == pytest.approx(100, abs=1)
+    assert search.notes()["decision trees"][0]["evaluations"] == pytest.approx(100, abs=1)
 
 
 def test_it_finds_much_more_than_chance():
@@ -150,7 +150,7 @@ def test_its_notes_are_json_and_bounded():
         return np.floor(U[:, 2] * 1e6) % 2 == 0
 
     drive(search, noise, 1)
-    (tree,) = search.notes()["trees"]
+    (tree,) = search.notes()["decision trees"]
     assert tree["critical leaves"] > 100
-    assert len(tree["boxes"]) == 100
+    assert len(search.notes()["critical boxes"]) == 100
     json.dumps(search.notes(), allow_nan=False)

@@ -322,7 +322,7 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
         kept=[(one.name, one.evaluation, one.files) for one in kept],
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
         command=settings.command(store.folder), finished=store.finished is not None,
-        version=store.version,
+        version=store.version, notes=store.notes,
     )  # fmt: skip
     write_report(store.folder / REPORT, data)
 

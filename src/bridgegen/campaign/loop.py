@@ -12,7 +12,7 @@ import numpy as np
 from bridgegen.arrays import Float, Int, as_float
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, StorageError
-from bridgegen.search import Algorithm, Results
+from bridgegen.search import Algorithm, Results, TakesNotes
 from bridgegen.store import Evaluated, Rows, Store
 
 PATIENCE = 100
@@ -89,7 +89,8 @@ def run_loop(
 
     A row whose decoded X is known, to the last bit, is not evaluated again: the algorithm is
     told the recorded result, and the budget is not charged. A batch that the budget cuts short is
-    recorded as far as it goes; the algorithm, which is not needed any more, is not told.
+    recorded as far as it goes; the algorithm, which is not needed any more, is not told, unless
+    it takes notes: then the rows without a place in the budget are told as failed.
 
     A store that holds evaluations is gone on with: a fresh algorithm asks again, is told what is
     recorded, and must ask for exactly those rows. So a run that was killed, or ended with a
@@ -121,6 +122,7 @@ def run_loop(
             store.finish(reason)
     except KeyboardInterrupt:
         reason = Reason.INTERRUPTED
+    session.keep_notes()
     return LoopResult(
         reason,
         evaluations=len(store),
@@ -159,12 +161,17 @@ class _Told:
             kept.frombytes(values.tobytes())
 
     def results(self, ids: Int) -> Results:
-        """Return those of some rows."""
+        """Return those of some rows; the id −1 is of a row that was not evaluated."""
+        there = ids >= 0
         return Results(
             F=np.frombuffer(self._F).reshape(-1, self._n_obj)[ids],
-            ok=np.frombuffer(self._ok, np.bool_)[ids],
-            critical=np.frombuffer(self._critical, np.bool_)[ids],
-            metrics=np.frombuffer(self._metrics).reshape(-1, self._n_metrics)[ids],
+            ok=np.frombuffer(self._ok, np.bool_)[ids] & there,
+            critical=np.frombuffer(self._critical, np.bool_)[ids] & there,
+            metrics=np.where(
+                there[:, np.newaxis],
+                np.frombuffer(self._metrics).reshape(-1, self._n_metrics)[ids],
+                np.nan,
+            ),
             cause=np.frombuffer(self._cause, np.int8)[ids],
         )
 
@@ -216,11 +223,22 @@ class _Session:
         self.repeated += int(np.count_nonzero(ids >= 0)) - len(fresh)
         if len(self._known) >= self._budget:
             # The budget may have cut this batch short, and nobody will ask again.
+            if isinstance(self._algorithm, TakesNotes):
+                self._algorithm.tell(U, self._told.results(ids))
             return Reason.BUDGET
 
         self._algorithm.tell(U, self._told.results(ids))
         self._idle = 0 if fresh else self._idle + 1
         return self._nothing_new(Reason.CONVERGED) if self._idle >= PATIENCE else None
+
+    def keep_notes(self) -> None:
+        """Record what the algorithm has learnt, once it is as far as the store is."""
+        if (
+            isinstance(self._algorithm, TakesNotes)
+            and self.batches
+            and len(self._known) >= self._recorded
+        ):
+            self._store.keep_notes(self._algorithm.notes())
 
     def _ask(self) -> Float:
         name, n_var = self._algorithm.name, self._store.columns.n_var

@@ -27,6 +27,8 @@ class Run:
         finished: whether it has ended.
         failures: why evaluations failed, and how many for each reason.
         summary: its figures.
+        notes: what the algorithm learnt, by title; nothing where it takes no notes. nsga2-dt: its
+            trees' critical boxes.
     """
 
     def __init__(self, folder: Path | str) -> None:
@@ -39,6 +41,7 @@ class Run:
         with Store.open(self.folder) as store:
             self.settings = Settings.from_dict(store.settings, self.folder)
             self.finished = store.finished is not None
+            self.notes = store.notes
             rows = store.read()
             self.failures = _in_words(rows, store.failures())
             self.summary = summarise(

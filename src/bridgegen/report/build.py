@@ -1,7 +1,8 @@
 """From a run's rows to the report's data: the kept scenarios are rolled out again for playback."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from bridgegen.report.data import (
     ReportData,
     RunSummary,
 )
+from bridgegen.report.notes import tables
 from bridgegen.report.painter import paint
 from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.simulation.outcomes import with_outcomes
@@ -44,6 +46,7 @@ def build_report(
     command: str,
     finished: bool,
     version: str,
+    notes: Mapping[str, Any],
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -59,6 +62,7 @@ def build_report(
         command: the command line that makes the run again.
         finished: whether the budget is spent.
         version: of BridgeGen.
+        notes: what the algorithm wants kept with the run.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
     terms = pipeline.objective.names
@@ -102,6 +106,7 @@ def build_report(
         _evaluations(pipeline, rows),
         _playbacks(pipeline, rows, kept),
         _coverage(pipeline, rows),
+        tables(notes, pipeline.space),
     )
 
 

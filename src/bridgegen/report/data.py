@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.odd.coverage import CoverageMap
+from bridgegen.report.notes import NoteTable
 from bridgegen.report.picture import Picture
 
 AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median", "stripe"})
@@ -285,12 +286,14 @@ class ReportData:
         evaluations: every row.
         kept: the scenarios that were handed over, most critical first; may be empty.
         coverage: which bins and pairs of bins were evaluated, if it is to be shown.
+        notes: what the algorithm learnt.
     """
 
     summary: RunSummary
     evaluations: Evaluations
     kept: tuple[Playback, ...] = ()
     coverage: CoverageMap | None = None
+    notes: tuple[NoteTable, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

@@ -191,6 +191,7 @@ const showPicture = (() => {
 function start() {
   readPalette();
   fillSummary();
+  fillNotes(data.notes);
   $("coverage").hidden = !data.coverage?.parameters.length;
   if (!$("coverage").hidden) new Coverage(data.coverage);
   const hook = { data, state: () => null, charts: 0, chartsDrawn: 0, drawCharts };

@@ -14,12 +14,13 @@ from bridgegen.report.data import ReportData
 from bridgegen.report.payload import to_json
 
 SCRIPTS = (
-    "common.js", "page.js", "causes.js", "geometry.js", "view.js", "scene.js", "curves.js",
-    "picture.js", "player.js", "parallel.js", "charts.js", "coverage.js", "coverage_pairs.js",
+    "common.js", "page.js", "causes.js", "notes.js", "geometry.js", "view.js", "scene.js",
+    "curves.js", "picture.js", "player.js", "parallel.js", "charts.js", "coverage.js",
+    "coverage_pairs.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
 
-STYLES = ("page.css", "picture.css", "coverage.css", "causes.css")
+STYLES = ("page.css", "picture.css", "coverage.css", "causes.css", "notes.css")
 
 
 def write_report(path: Path, data: ReportData) -> None:

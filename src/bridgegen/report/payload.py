@@ -78,6 +78,10 @@ def payload(data: ReportData) -> dict[str, Any]:
         "roads": roads,
         "kept": kept,
         "coverage": coverage_payload(data.coverage) if data.coverage else None,
+        "notes": [
+            {"title": t.title, "columns": t.columns, "rows": t.rows, "left_out": t.left_out}
+            for t in data.notes
+        ],
         "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
     }
 

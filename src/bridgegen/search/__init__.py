@@ -4,7 +4,7 @@
 own through the entry-point group ``bridgegen.algorithms``.
 """
 
-from bridgegen.search.algorithm import Algorithm, Problem, Results, Setting
+from bridgegen.search.algorithm import Algorithm, Problem, Results, Setting, TakesNotes
 from bridgegen.search.registry import ALGORITHMS, get, names
 
-__all__ = ["ALGORITHMS", "Algorithm", "Problem", "Results", "Setting", "get", "names"]
+__all__ = ["ALGORITHMS", "Algorithm", "Problem", "Results", "Setting", "TakesNotes", "get", "names"]

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Generator, Mapping
 from functools import partial
+from hashlib import blake2b
 from typing import Any, ClassVar
 
 import numpy as np
@@ -72,6 +73,7 @@ class NSGA2DT:
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._known = _Known(problem)
         self._trees: list[JSON] = []
+        self._critical: list[JSON] = []
         self._rounds = self._search()
         self._next = next(self._rounds)
 
@@ -88,8 +90,8 @@ class NSGA2DT:
         self._next = self._rounds.send(results)
 
     def notes(self) -> Mapping[str, JSON]:
-        """Return the trees: how many evaluations each was fitted to, its leaves, its boxes."""
-        return {"trees": list(self._trees)}
+        """Return each tree's size and the boxes that it found critical, the surest first."""
+        return {"decision trees": list(self._trees), "critical boxes": list(self._critical)}
 
     def _search(self) -> Rounds:
         from bridgegen.search._pymoo import Generations
@@ -113,18 +115,22 @@ class NSGA2DT:
             leaf for leaf in leaves if leaf.rows >= least and leaf.share >= self._values["share"]
         ]
         critical.sort(key=lambda leaf: -(leaf.critical + 1) / (leaf.rows + 2))
+        number = len(self._trees) + 1
         self._trees.append(
             {
+                "tree": number,
                 "evaluations": len(known.U),
                 "leaves": len(leaves),
                 "critical leaves": len(critical),
-                "boxes": [self._box(leaf) for leaf in critical[:BOXES_KEPT]],
             }
         )
+        self._critical += [
+            {"tree": number, **self._described(leaf)} for leaf in critical[:BOXES_KEPT]
+        ]
         return critical or [Leaf(low, high, len(known.U), int(known.critical.sum()))]
 
-    def _box(self, leaf: Leaf) -> JSON:
-        """Return a leaf as JSON: where it is narrower than the cube, and what is in it."""
+    def _described(self, leaf: Leaf) -> dict[str, JSON]:
+        """Return a leaf: where it is narrower than the cube, and what is in it."""
         edges = zip(self._problem.parameters, leaf.low.tolist(), leaf.high.tolist(), strict=True)
         box: JSON = {name: [low, high] for name, low, high in edges if low > 0.0 or high < 1.0}
         return {"box": box, "rows": leaf.rows, "critical": leaf.critical}
@@ -163,19 +169,37 @@ class _Known:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.U, self.F = np.empty((0, problem.n_var)), np.empty((0, problem.n_obj))
-        self.critical: Bool = np.zeros(0, np.bool_)
+        self._parts = [
+            (np.empty((0, problem.n_var)), np.empty((0, problem.n_obj)), np.zeros(0, np.bool_))
+        ]
         self._rows: set[bytes] = set()
 
     def add(self, U: Float, results: Results) -> None:
         """Take in rows that are new and have a result."""
-        good = np.flatnonzero(results.ok & np.isfinite(results.F).all(axis=1))
-        before, fresh = len(self._rows), []
-        for k in good.tolist():
-            self._rows.add(U[k].tobytes())
-            if len(self._rows) > before:
+        good = results.ok & np.isfinite(results.F).all(axis=1)
+        fresh = []
+        for k in np.flatnonzero(good).tolist():
+            row = blake2b(U[k].tobytes(), digest_size=16).digest()
+            if row not in self._rows:
+                self._rows.add(row)
                 fresh.append(k)
-                before += 1
-        self.U = np.concatenate([self.U, U[fresh]])
-        self.F = np.concatenate([self.F, results.F[fresh]])
-        self.critical = np.concatenate([self.critical, results.critical[fresh]])
+        self._parts.append((U[fresh], results.F[fresh], results.critical[fresh]))
+
+    @property
+    def U(self) -> Float:
+        return self._joined[0]
+
+    @property
+    def F(self) -> Float:
+        return self._joined[1]
+
+    @property
+    def critical(self) -> Bool:
+        return self._joined[2]
+
+    @property
+    def _joined(self) -> tuple[Float, Float, Bool]:
+        if len(self._parts) > 1:  # seldom: once for a tree and once for a box
+            U, F, critical = zip(*self._parts, strict=True)
+            self._parts = [(np.concatenate(U), np.concatenate(F), np.concatenate(critical))]
+        return self._parts[0]

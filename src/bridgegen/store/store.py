@@ -42,8 +42,8 @@ class Store:
     column per parameter, metric and objective (f0, f1 …), status, critical, cause. NaN is NULL,
     and so is the cause of what is not critical. SQLite keeps no sign of zero: −0.0 comes back as
     0.0; every other float64 comes back bit for bit.
-    Table ``run``: key and value (JSON). Table ``failures``, where there is something to say: id,
-    message.
+    Table ``run``: key and value (JSON); what the algorithm learnt is under "notes".
+    Table ``failures``, where there is something to say: id, message.
 
     Made by :meth:`create` or :meth:`open`; a context manager.
 
@@ -67,6 +67,7 @@ class Store:
         self._connection = connection
         self._lock = lock
         self._finished: str | None = run.get("finished")
+        self._notes: dict[str, Any] = run.get("notes", {})
 
     @classmethod
     def create(
@@ -221,6 +222,26 @@ class Store:
                 "INSERT OR REPLACE INTO run VALUES ('finished', ?)", (json.dumps(reason),)
             )
         self._finished = reason
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """What the algorithm wants kept with the run; nothing by default."""
+        return self._notes
+
+    def keep_notes(self, notes: Mapping[str, Any]) -> None:
+        """Record what the algorithm wants kept with the run, in place of what was there.
+
+        Raises:
+            InputError: it is not JSON, or holds NaN or inf.
+            StorageError: the disk is full or fails; every evaluation is kept.
+        """
+        try:
+            text = json.dumps(notes, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"an algorithm's notes must be JSON: {error}") from None
+        with self._writing("every evaluation is kept"):
+            self._connection.execute("INSERT OR REPLACE INTO run VALUES ('notes', ?)", (text,))
+        self._notes = json.loads(text)
 
     @contextmanager
     def _writing(self, kept: str) -> Iterator[None]:

@@ -1,0 +1,107 @@
+"""What the search algorithm learnt, as tables for people."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bridgegen.odd.space import SearchSpace
+
+MOST = 200
+"""Rows of a table that the page holds, the last ones."""
+
+
+@dataclass(frozen=True)
+class NoteTable:
+    """A table of text.
+
+    Attributes:
+        title: what it is about.
+        columns: headings.
+        rows: as many texts as columns, each.
+        left_out: rows before these that are not shown.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    left_out: int = 0
+
+
+def tables(notes: Mapping[str, Any], space: SearchSpace) -> tuple[NoteTable, ...]:
+    """Return an algorithm's notes as tables: a list of mappings is one; single values are one.
+
+    Args:
+        notes: see `bridgegen.search.algorithm.TakesNotes`.
+        space: what was searched; boxes of its unit cube are told in its units where they can be.
+    """
+    found = [
+        NoteTable(title, *_cells(value, space))
+        for title, value in notes.items()
+        if _is_table(value)
+    ]
+    single = {title: value for title, value in notes.items() if not _is_table(value)}
+    if single:
+        rows = tuple((title, _text(value)) for title, value in single.items())
+        found.insert(0, NoteTable("In short", ("", "value"), rows))
+    return tuple(found)
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, list) and len(value) > 0 and all(isinstance(v, dict) for v in value)
+
+
+def _cells(
+    records: Sequence[Mapping[str, Any]], space: SearchSpace
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...], int]:
+    columns = tuple(dict.fromkeys(key for one in records for key in one))
+    rows = tuple(
+        tuple(
+            box_in_words(one[key], space) if key == "box" else _text(one.get(key, ""))
+            for key in columns
+        )
+        for one in records[-MOST:]
+    )
+    return columns, rows, max(0, len(records) - MOST)
+
+
+def box_in_words(box: Mapping[str, Sequence[float]], space: SearchSpace) -> str:
+    """Return a box of the unit cube as a rule.
+
+    A parameter that no constraint limits is told in its own unit; another one as shares of the
+    interval that the constraints leave to it.
+    """
+    if not box:
+        return "anywhere"
+    return "; ".join(_side(name, low, high, space) for name, (low, high) in box.items())
+
+
+def _side(name: str, low: float, high: float, space: SearchSpace) -> str:
+    parameter = space.scenario.parameters[name]
+    if space.bounds[name]:
+        edges = [f"{100 * share:.1f}" for share in (low, high)]
+        unit = " % of what is left to it"
+    else:
+        values = parameter.at(np.array([low, high]), parameter.low, parameter.high)
+        edges = [f"{value:.4g}" for value in values.tolist()]
+        unit = "" if parameter.unit in ("1", "count") else f" {parameter.unit}"
+    if low <= 0.0:
+        return f"{name} ≤ {edges[1]}{unit}"
+    if high >= 1.0:
+        return f"{name} ≥ {edges[0]}{unit}"
+    return f"{name} {edges[0]} … {edges[1]}{unit}"
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(map(_text, value))
+    if isinstance(value, dict):
+        return "; ".join(f"{key}: {_text(one)}" for key, one in value.items())
+    return str(value)
