@@ -1,4 +1,7 @@
-"""The loop of a campaign: ask → decode → evaluate → record → tell. Resume is its replay."""
+"""The loop of a campaign: ask → decode → evaluate → record → tell.
+
+Resume is its replay, from the start or from the state that the algorithm was saved in.
+"""
 
 import time
 from array import array
@@ -12,8 +15,8 @@ import numpy as np
 from bridgegen.arrays import Float, Int, as_float
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, StorageError
-from bridgegen.search import Algorithm, Results, TakesNotes
-from bridgegen.store import Evaluated, Rows, Store
+from bridgegen.search import Algorithm, Restorable, Results, TakesNotes
+from bridgegen.store import Checkpoint, Evaluated, Rows, Store
 
 PATIENCE = 100
 """Batches in a row without a new row, after which a search has nothing left to say."""
@@ -96,6 +99,10 @@ def run_loop(
     recorded, and must ask for exactly those rows. So a run that was killed, or ended with a
     smaller budget, becomes the run that it would have been undisturbed.
 
+    An algorithm that is `Restorable` is saved after each batch. It is gone on with from there, and
+    asks again only for what was recorded since: at most the batch that was recorded, but not yet
+    told, when the run was killed.
+
     Args:
         algorithm: new, made with the run's seed and settings.
         decode: ``(n, n_var)`` unit-cube rows → X ``(n, len(store.parameters))``; each row's
@@ -103,7 +110,8 @@ def run_loop(
         evaluate: X → metrics, F, critical and status of its rows; NaN and ±inf are recorded.
         store: open for writing.
         budget: evaluations in the store at the end.
-        on_batch: called after each batch that brought evaluations, recorded or replayed.
+        on_batch: called after each batch that brought evaluations, recorded or replayed; those that
+            a restored algorithm knows come a few thousand at a time.
         stop: asked before each batch; True ends the loop.
 
     Returns:
@@ -116,6 +124,8 @@ def run_loop(
     session = _Session(algorithm, decode, evaluate, store, budget, on_batch)
     reason: Reason | None = Reason.BUDGET if n_before >= budget else None
     try:
+        if reason is None:
+            session.restore()
         while reason is None:
             reason = Reason.STOPPED if stop is not None and stop() else session.batch()
         if reason.final and store.finished != reason:
@@ -204,6 +214,26 @@ class _Session:
         running = 0.0 if self._began is None else time.perf_counter() - self._began
         return self._seconds_before + running
 
+    def restore(self) -> None:
+        """Bring the algorithm to where it was saved, if it was; the other rows are replayed."""
+        algorithm, saved = self._algorithm, self._store.checkpoint()
+        if saved is None or not isinstance(algorithm, Restorable):
+            return
+        for rows in self._store.rows(0, saved.evaluations):
+            X = as_float("X", self._decode(rows.U), rows.X.shape) + 0.0
+            self._compare("X", X, rows.X, int(rows.id[0]))
+            self._identify(X)
+            self._told.add(rows)
+            self._report(int(rows.id[-1]) + 1, rows, replayed=True)
+        self._idle = saved.idle
+        try:
+            algorithm.restore(saved.state)
+        except ValueError as error:
+            raise StorageError(
+                f"{self._store.folder}: the saved state of the search cannot be gone on with: "
+                f"{error}; its results can still be read"
+            ) from error
+
     def batch(self) -> Reason | None:
         """Go through one batch; return why it was the last one, if it was."""
         done = len(self._known)
@@ -229,6 +259,8 @@ class _Session:
 
         self._algorithm.tell(U, self._told.results(ids))
         self._idle = 0 if fresh else self._idle + 1
+        if len(self._known) >= self._recorded:
+            self._save()
         return self._nothing_new(Reason.CONVERGED) if self._idle >= PATIENCE else None
 
     def keep_notes(self) -> None:
@@ -239,6 +271,10 @@ class _Session:
             and len(self._known) >= self._recorded
         ):
             self._store.keep_notes(self._algorithm.notes())
+
+    def _save(self) -> None:
+        if isinstance(self._algorithm, Restorable):
+            self._store.save(Checkpoint(len(self._known), self._idle, self._algorithm.state()))
 
     def _ask(self) -> Float:
         name, n_var = self._algorithm.name, self._store.columns.n_var
@@ -268,14 +304,18 @@ class _Session:
     def _replay(self, U: Float, X: Float, start: int) -> Rows:
         """Return what is recorded for rows that must be those asked at the time."""
         rows = self._store.read(start, start + len(U))
-        for name, now, then in (("U", U, rows.U), ("X", X, rows.X)):
-            differ = np.argwhere(now != then)
-            if len(differ):
-                k, j = (int(i) for i in differ[0])
-                detail = f"{name}[{j}] is {float(now[k, j])}, recorded {float(then[k, j])}"
-                raise self._other(f"evaluation {start + k}: {detail}")
+        self._compare("U", U, rows.U, start)
+        self._compare("X", X, rows.X, start)
         self._report(start + len(U), rows, replayed=True)
         return rows
+
+    def _compare(self, name: str, now: Float, then: Float, start: int) -> None:
+        """Refuse to go on where rows are not those that were recorded."""
+        differ = np.argwhere(now != then)
+        if len(differ):
+            k, j = (int(i) for i in differ[0])
+            detail = f"{name}[{j}] is {float(now[k, j])}, recorded {float(then[k, j])}"
+            raise self._other(f"evaluation {start + k}: {detail}")
 
     def _simulate(self, U: Float, X: Float, start: int) -> Evaluated:
         """Evaluate new rows and record them."""

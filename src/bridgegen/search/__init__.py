@@ -4,7 +4,17 @@
 own through the entry-point group ``bridgegen.algorithms``.
 """
 
-from bridgegen.search.algorithm import Algorithm, Problem, Results, Setting, TakesNotes
+from bridgegen.search.algorithm import Algorithm, Problem, Restorable, Results, Setting, TakesNotes
 from bridgegen.search.registry import ALGORITHMS, get, names
 
-__all__ = ["ALGORITHMS", "Algorithm", "Problem", "Results", "Setting", "TakesNotes", "get", "names"]
+__all__ = [
+    "ALGORITHMS",
+    "Algorithm",
+    "Problem",
+    "Restorable",
+    "Results",
+    "Setting",
+    "TakesNotes",
+    "get",
+    "names",
+]

@@ -114,7 +114,8 @@ class Algorithm(Protocol):
     An algorithm draws random numbers only from its own generator, so that one seed gives one
     sequence of rows, bit for bit; the campaign's resume replays a run on that promise.
 
-    It may have another method, ``notes``, see `TakesNotes`.
+    It may have other methods: ``notes``, see `TakesNotes`; ``state`` and ``restore``, see
+    `Restorable`.
 
     Attributes:
         name: what the user calls it.
@@ -175,6 +176,28 @@ class TakesNotes(Protocol):
         couples them.
         """
         ...
+
+
+@runtime_checkable
+class Restorable(Protocol):
+    """An algorithm for which replaying a long run would take too long: it can be saved."""
+
+    def state(self) -> bytes:
+        """Return all that the next rows depend on, as it is between ``tell`` and ``ask``.
+
+        The campaign saves it with the batch; only the newest is kept.
+        """
+        ...
+
+    def restore(self, state: bytes) -> None:
+        """Become what the algorithm was that returned ``state``, made with the same arguments.
+
+        Args:
+            state: perhaps damaged, or not written by BridgeGen at all: nothing in it is run.
+
+        Raises:
+            ValueError: it is no state of such an algorithm.
+        """
 
 
 def resolve(

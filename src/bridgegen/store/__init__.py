@@ -3,8 +3,9 @@
 ``Store.create`` starts a run's folder, ``Store.open`` reads it or goes on with it.
 """
 
+from bridgegen.store.checkpoint import Checkpoint
 from bridgegen.store.rows import Evaluated, Rows
 from bridgegen.store.run_file import refuse_used
 from bridgegen.store.store import Store
 
-__all__ = ["Evaluated", "Rows", "Store", "refuse_used"]
+__all__ = ["Checkpoint", "Evaluated", "Rows", "Store", "refuse_used"]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from bridgegen.arrays import Float
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, StorageError
+from bridgegen.store.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from bridgegen.store.rows import Evaluated, Rows, quoted
 from bridgegen.store.run_file import (
     FILE,
@@ -44,6 +45,7 @@ class Store:
     0.0; every other float64 comes back bit for bit.
     Table ``run``: key and value (JSON); what the algorithm learnt is under "notes".
     Table ``failures``, where there is something to say: id, message.
+    Table ``checkpoint``, where the algorithm can be saved: its state after its newest batch.
 
     Made by :meth:`create` or :meth:`open`; a context manager.
 
@@ -242,6 +244,30 @@ class Store:
         with self._writing("every evaluation is kept"):
             self._connection.execute("INSERT OR REPLACE INTO run VALUES ('notes', ?)", (text,))
         self._notes = json.loads(text)
+
+    def save(self, checkpoint: Checkpoint) -> None:
+        """Keep the state of the search, in the place of the one before.
+
+        Raises:
+            StorageError: the disk is full or fails; every evaluation is kept.
+        """
+        with self._writing("every evaluation is kept"):
+            write_checkpoint(self._connection, checkpoint)
+
+    def checkpoint(self) -> Checkpoint | None:
+        """Return the state of the search that was saved last; None if none was.
+
+        Raises:
+            StorageError: it is damaged.
+        """
+        try:
+            with self._reading():
+                found = read_checkpoint(self._connection)
+        except InputError as error:
+            raise self._damaged(str(error)) from error
+        if found and found.evaluations > len(self):
+            raise self._damaged("the saved state of the search is ahead of the evaluations")
+        return found
 
     @contextmanager
     def _writing(self, kept: str) -> Iterator[None]:
