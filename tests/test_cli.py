@@ -69,6 +69,31 @@ def test_search_prints_the_run_s_figures(cli, tmp_path):
     assert str(tmp_path / "r" / "report.html") in out
 
 
+def test_compare_prints_tables_and_words(cli, tmp_path):
+    words = (
+        "compare",
+        "crossroads-s4",
+        "--algorithms",
+        "random, pso",
+        "--seeds",
+        2,
+        "--budget",
+        60,
+    )
+    words += ("--set", "pso.population=20", "--jobs", 1, "--out", tmp_path / "c")
+    code, out, err = cli(*words)
+    assert code == 0, err
+    for label in ("R_critic", "quartiles", "A12", "T_critic", "to 50th", "distinct", "hypervolume"):
+        assert label in out
+    assert "pso" in out
+    assert str(tmp_path / "c" / "compare.html") in out
+    assert cli(*words)[1].splitlines()[:-1] == out.splitlines()[:-1]  # but for the wall time
+    refused(
+        cli(*words[:-1], tmp_path / "d", "--set", "w=3"), "--set must read ALGORITHM.NAME=VALUE"
+    )
+    refused(cli(*words, "--ego", "reference"), "made otherwise", "ego was null")
+
+
 def test_simulate_prints_what_the_store_holds(cli, finished):
     path = finished.scenarios[0]
     code, out, _ = cli("simulate", path, "--json")

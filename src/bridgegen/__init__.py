@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, resume, run_search
+    from bridgegen.comparison import Comparison, compare
     from bridgegen.odd.reader import load
     from bridgegen.simulate import simulate_file
 
-__all__ = ["Run", "load", "resume", "run_search", "simulate_file"]
+__all__ = ["Comparison", "Run", "compare", "load", "resume", "run_search", "simulate_file"]
 
 _HOMES = {
+    "Comparison": "bridgegen.comparison",
+    "compare": "bridgegen.comparison",
     "Run": "bridgegen.campaign",
     "load": "bridgegen.odd.reader",
     "resume": "bridgegen.campaign",

@@ -72,17 +72,27 @@ class StorageError(BridgeGenError):
 
 
 class Interrupted(BridgeGenError):
-    """Ctrl-C ended a search.
+    """Ctrl-C ended a search, or a comparison.
 
     Args:
         folder: the run's; holds what was done.
         evaluations: how many that is.
         budget: how many it was to be.
+        what: they are, if not evaluations.
+        command: that goes on, if not ``bridgegen resume``.
     """
 
-    def __init__(self, folder: Path, evaluations: int, budget: int) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        evaluations: int,
+        budget: int,
+        *,
+        what: str = "evaluations",
+        command: str | None = None,
+    ) -> None:
         super().__init__(
-            f"stopped after {evaluations} of {budget} evaluations; "
-            f"go on with 'bridgegen resume {folder}'"
+            f"stopped after {evaluations} of {budget} {what}; "
+            f"go on with '{command or f'bridgegen resume {folder}'}'"
         )
         self.folder, self.evaluations, self.budget = folder, evaluations, budget

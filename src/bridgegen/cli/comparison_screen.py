@@ -1,0 +1,178 @@
+"""What a person sees in the terminal of a comparison: one progress bar, then its tables."""
+
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from bridgegen.comparison import Comparison, Watch
+    from bridgegen.comparison.plan import Plan
+
+_STAGES = {"read": "reading the runs", "draw": "drawing"}
+
+
+class ComparisonScreen:
+    """A comparison's live progress on stderr: evaluations of all runs, runs that have ended."""
+
+    def __init__(self) -> None:
+        self._console = Console(stderr=True)
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=14),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[facts]}"),
+            TimeRemainingColumn(compact=True),
+            console=self._console,
+            transient=True,
+        )
+        self._task = self._progress.add_task("starting", total=None, facts="")
+        self._runs = self._ended = self._budget = self._total = self._failed = 0
+        self._evaluations: dict[str, int] = {}
+        self._before = 0
+        self._told = False
+        self._began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        """Since it was made [s]."""
+        return time.perf_counter() - self._began
+
+    @property
+    def watch(self) -> "Watch":
+        """The callbacks for a comparison."""
+        from bridgegen.comparison import Watch
+
+        return Watch(
+            compile=self._compile, batch=self._batch, ended=self._end, begun=self._begin,
+            stage=lambda stage: self._progress.update(
+                self._task, description=_STAGES[stage], facts=""
+            ),
+        )  # fmt: skip
+
+    def _begin(self, plan: "Plan", ended: int, made: int) -> None:
+        self._runs, self._ended, self._before = len(plan.cells), ended, made
+        self._budget = plan.budget
+        self._total = made + (self._runs - ended) * plan.budget
+        self._show()
+
+    def _compile(self) -> None:
+        from bridgegen.compiled import is_compiled
+
+        if not is_compiled() and not self._told:
+            self._told = True
+            self._console.print(
+                "First run: compiling the simulator, which takes a minute or two; later runs start "
+                "at once."
+            )
+
+    def _batch(self, name: str, evaluations: int) -> None:
+        self._evaluations[name] = evaluations
+        self._show()
+
+    def _end(self, name: str, failure: str | None) -> None:
+        self._ended += 1
+        if failure is not None:
+            self._failed += 1
+            self._console.print(f"{name} failed: {failure}", markup=False, highlight=False)
+        self._total -= self._budget - self._evaluations.get(name, 0)
+        self._show()
+
+    def _show(self) -> None:
+        made = self._before + sum(self._evaluations.values())
+        facts = f"{self._ended} of {self._runs} runs"
+        if self._failed:
+            facts += f", {self._failed} failed"
+        self._progress.update(
+            self._task, description="", total=self._total, completed=made, facts=facts
+        )
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._progress.stop()
+
+
+def print_comparison(comparison: "Comparison", seconds: float) -> None:
+    """Print, for each scenario, what was found and two tables; then where the files are."""
+    from bridgegen.comparison import words
+
+    plan = comparison.plan
+    console = Console(markup=False, emoji=False, highlight=False)
+    if not sys.stdout.isatty():
+        console.width = 120
+    for scenario in plan.scenarios:
+        console.print(f"\n{scenario}, {plan.budget} evaluations a run, medians over the runs")
+        if scenario in comparison.measured:
+            console.print(_criticality(comparison, scenario))
+            console.print(_variety(comparison, scenario))
+        for sentence in words.sentences(comparison, scenario):
+            console.print(sentence)
+    for cell, why in comparison.gaps.items():
+        console.print(f"missing: {cell.name}: {why}")
+    print()
+    for name, path in (("page", comparison.page), ("tables", Path(comparison.folder) / "*.csv")):
+        print(f"{name:<10}{path}")
+    print(f"{'runs':<10}{Path(comparison.folder) / 'runs'}  (bridgegen resume, coverage, …)")
+    print(f"{'wall time':<10}{seconds:.1f} s")
+
+
+def _criticality(comparison: "Comparison", scenario: str) -> Table:
+    """Return the table of how often and how soon, with the tests of R_critic."""
+    from bridgegen.comparison import words
+
+    early = [one for one in comparison.measures if one.name.startswith("to_")]
+    table = _table(
+        "algorithm", "runs", "R_critic", "quartiles", "p", "A12", "T_critic",
+        *(one.title for one in early),
+    )  # fmt: skip
+    kinds = {one.name: one for one in comparison.measures}
+    for name in comparison.plan.algorithms:
+        share, relative = (comparison.line(scenario, name, one) for one in ("r_critic", "t_critic"))
+        table.add_row(
+            name,
+            str(share.runs),
+            words.median(share, kinds["r_critic"]),
+            words.span(share, kinds["r_critic"]),
+            words.p_value(share.p_holm),
+            words.number(share.a12, 2),
+            words.median(relative, kinds["t_critic"]),
+            *(words.median(comparison.line(scenario, name, one.name), one) for one in early),
+        )
+    return table
+
+
+def _variety(comparison: "Comparison", scenario: str) -> Table:
+    """Return the table of what was found besides, and how long it took."""
+    from bridgegen.comparison import words
+
+    told = {
+        "distinct", "critical_bins", "critical_pairs", "hypervolume", "gd", "spread", "seconds",
+    }  # fmt: skip
+    shown = [one for one in comparison.measures if one.name in told]
+    table = _table("algorithm", *(one.title for one in shown))
+    for name in comparison.plan.algorithms:
+        lines = (comparison.line(scenario, name, one.name) for one in shown)
+        table.add_row(
+            name, *(words.median(line, one) for line, one in zip(lines, shown, strict=True))
+        )
+    return table
+
+
+def _table(*head: str) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in head:
+        table.add_column(name, justify="left" if name == "algorithm" else "right")
+    return table

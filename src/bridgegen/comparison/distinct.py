@@ -1,0 +1,77 @@
+"""How many of a run's critical scenarios are different ones."""
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.odd.space import SearchSpace
+
+APART = 0.1
+"""Two scenarios are different if their searched parameters differ by this share of their ranges or
+more, in root mean square; two random ones differ by 0.41."""
+
+LIMIT = 10_000
+"""No more than so many different scenarios of a run are counted: it bounds the time."""
+
+_CHUNK = 256
+
+
+def normalised(space: SearchSpace, X: Float) -> Float:
+    """Return the searched parameters as shares of their declared ranges.
+
+    Args:
+        space: what was searched.
+        X: ``(N, len(space.names))``.
+
+    Returns:
+        ``(N, space.n_var)`` float64 in [0, 1], but for rounding.
+    """
+    chosen = [space.scenario.parameters[name] for name in space.variables]
+    low = np.array([one.low for one in chosen])
+    span = np.array([one.high for one in chosen]) - low
+    columns = [space.index(name) for name in space.variables]
+    shares: Float = (X[:, columns] - low) / span
+    return shares
+
+
+def distinct(points: Float, apart: float = APART, limit: int = LIMIT) -> Bool:
+    """Return which points are new: at least ``apart`` from every new one before them.
+
+    A greedy net, in the order of the points. What is new are points that lie apart from one
+    another, and every point is closer than ``apart`` to one of them; so another order may find
+    a few more or fewer. Clusters by single linkage would not depend on the order, but a search
+    that fills the space evenly would be one cluster, and count as having found one scenario.
+
+    Args:
+        points: ``(N, d)`` float64, shares of the parameters' ranges.
+        apart: the root mean square of the d differences.
+        limit: that many new ones at most.
+
+    Returns:
+        ``(N,)`` bool; after the limit has been reached, False.
+    """
+    from scipy.spatial.distance import cdist
+
+    new = np.zeros(len(points), np.bool_)
+    if not points.size:
+        new[: min(len(points), 1)] = True
+        return new
+    least = apart * np.sqrt(points.shape[1])
+    centres = np.empty((min(len(points), limit), points.shape[1]))
+    count = 0
+    for start in range(0, len(points), _CHUNK):
+        chunk = points[start : start + _CHUNK]
+        free = np.ones(len(chunk), np.bool_)
+        if count:
+            free = cdist(chunk, centres[:count]).min(axis=1) >= least
+        open_ones = np.flatnonzero(free)
+        among = cdist(chunk[open_ones], chunk[open_ones]) < least
+        covered = np.zeros(len(open_ones), np.bool_)
+        for k, at in enumerate(open_ones.tolist()):
+            if covered[k]:
+                continue
+            if count == limit:
+                return new
+            new[start + at], centres[count] = True, chunk[at]
+            count += 1
+            covered |= among[k]
+    return new

@@ -1,0 +1,168 @@
+"""What is measured of a run, and which way is better."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.comparison.fronts import Scale, front, generational_distance, hypervolume, spread
+from bridgegen.comparison.plan import Cell
+from bridgegen.comparison.record import Record
+from bridgegen.comparison.statistics import quartiles
+
+SHARE = 0.05
+"""T_critic waits for this share of the budget to be critical: 50 of 1000."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number of each run.
+
+    Attributes:
+        name: in files.
+        title: in tables.
+        text: what it is, one line.
+        larger: whether larger is better; else smaller is.
+        timed: whether it is made of seconds, and so is not the same the next time.
+        digits: after the decimal point, where people read it.
+    """
+
+    name: str
+    title: str
+    text: str
+    larger: bool
+    timed: bool = False
+    digits: int = 0
+
+
+def waited_for(budget: int) -> int:
+    """Return k: T_critic is about the k-th critical scenario."""
+    return max(1, ceil(SHARE * budget - 1e-9))
+
+
+def counts(budget: int) -> tuple[int, ...]:
+    """Return which critical scenarios are waited for: the first, 10th and 50th, and the k-th."""
+    return tuple(sorted({1, 10, 50, waited_for(budget)}))
+
+
+def measures(budget: int) -> tuple[Measure, ...]:
+    """Return all measures of a comparison with this budget, those of time last."""
+    k = waited_for(budget)
+    best = "divided by the best method's median"
+    return (
+        Measure("r_critic", "R_critic", "critical share of the evaluations made", True, digits=3),
+        Measure(
+            "t_critic", "T_critic", f"evaluations until critical scenario {k}, {best}", False,
+            digits=2,
+        ),
+        *(
+            Measure(f"to_{n}", f"to {ordinal(n)}", f"evaluations until the {ordinal(n)} critical "
+                    "scenario", False)
+            for n in counts(budget)
+        ),
+        Measure("distinct", "distinct", "different critical scenarios", True),
+        Measure("critical_bins", "bins", "bins of parameters that hold a critical scenario", True),
+        Measure(
+            "critical_pairs", "pairs", "pairs of two parameters' bins that hold a critical "
+            "scenario", True,
+        ),
+        Measure(
+            "hypervolume", "hypervolume", "share of the objective box that is dominated", True,
+            digits=4,
+        ),
+        Measure(
+            "gd", "GD", "generational distance: mean distance of the front from the front of all "
+            "runs", False, digits=4,
+        ),
+        Measure("spread", "spread Δ", "unevenness of the front, Deb's Δ", False, digits=3),
+        Measure(
+            "t_critic_seconds", "T_critic, s", f"seconds until critical scenario {k}, {best}",
+            False, timed=True, digits=2,
+        ),
+        Measure(
+            f"seconds_to_{k}", f"s to {ordinal(k)}", f"seconds until the {ordinal(k)} critical "
+            "scenario", False, timed=True, digits=2,
+        ),
+        Measure("seconds", "seconds", "seconds of search", False, timed=True, digits=2),
+    )  # fmt: skip
+
+
+def ordinal(n: int) -> str:
+    """Return 1 as "1st", 50 as "50th"."""
+    endings = {1: "st", 2: "nd", 3: "rd"}
+    return f"{n}{'th' if n % 100 in (11, 12, 13) else endings.get(n % 10, 'th')}"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One scenario's runs in figures.
+
+    Attributes:
+        values: by run and by measure's name; NaN where it is not defined, +inf where what is
+            waited for never came.
+        curves: by run ``(c,)`` float64, the hypervolume by each point of the run's curve.
+        scale: of the objectives, the same for all these runs.
+        reference: ``(k, m)`` float64, the front of all runs together, as objectives in [0, 1].
+    """
+
+    values: Mapping[Cell, Mapping[str, float]]
+    curves: Mapping[Cell, Float]
+    scale: Scale
+    reference: Float
+
+
+def measure(records: Mapping[Cell, Record], budget: int) -> Measured:
+    """Measure the runs of one scenario, at least one."""
+    m = len(next(iter(records.values())).terms)
+    ranges = [(one.low, one.high) for one in records.values()]
+    known = [(low, high) for low, high in ranges if low is not None and high is not None]
+    scale = Scale.pooled(known, m)
+    final = {cell: scale.objectives(one.fronts[-1]) for cell, one in records.items()}
+    reference = front(np.concatenate(list(final.values())))
+    curves = {cell: _curve(one, scale) for cell, one in records.items()}
+    k = waited_for(budget)
+    reached = {cell: one.reached[k] for cell, one in records.items()}
+    seconds = {cell: one.seconds_reached[k] for cell, one in records.items()}
+    relative, relative_seconds = _by_the_best(reached), _by_the_best(seconds)
+    values = {
+        cell: {
+            "r_critic": one.critical / one.evaluations if one.evaluations else float("nan"),
+            "t_critic": relative[cell],
+            **{f"to_{n}": count for n, count in one.reached.items()},
+            "distinct": float(one.distinct),
+            "critical_bins": float(one.critical_bins),
+            "critical_pairs": float(one.critical_pairs),
+            "hypervolume": float(curves[cell][-1]),
+            "gd": generational_distance(final[cell], reference),
+            "spread": spread(final[cell], reference),
+            "t_critic_seconds": relative_seconds[cell],
+            f"seconds_to_{k}": seconds[cell],
+            "seconds": one.seconds,
+        }
+        for cell, one in records.items()
+    }
+    return Measured(values, curves, scale, reference)
+
+
+def _curve(record: Record, scale: Scale) -> Float:
+    """Return the hypervolume by each point; a front that has not changed is not measured again."""
+    volumes, last = [], None
+    for one in record.fronts:
+        if last is None or one is not last:
+            volume = hypervolume(scale.objectives(one))
+        last = one
+        volumes.append(volume)
+    return np.array(volumes)
+
+
+def _by_the_best(reached: Mapping[Cell, float]) -> dict[Cell, float]:
+    """Divide by the least median that an algorithm has; NaN where all of them are +inf."""
+    algorithms: dict[str, list[float]] = {}
+    for cell, count in reached.items():
+        algorithms.setdefault(cell.algorithm, []).append(count)
+    best = min(quartiles(np.array(counts)).median for counts in algorithms.values())
+    if not 0.0 < best < float("inf"):
+        return dict.fromkeys(reached, float("nan"))
+    return {cell: count / best for cell, count in reached.items()}

@@ -1,0 +1,271 @@
+"""The grid of runs of a comparison: scenarios × algorithms × seeds, and what makes it one."""
+
+import hashlib
+import json
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from bridgegen import search as toolkit
+from bridgegen.campaign.scenarios import is_file, load
+from bridgegen.comparison.distinct import APART
+from bridgegen.disk import write_whole
+from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.search.algorithm import Problem, Value, resolve
+
+FILE = "compare.json"
+"""In a comparison's folder: what all of its runs were made with."""
+
+RUNS = "runs"
+"""In a comparison's folder: the folders of its runs."""
+
+MAX_SEEDS = 1000
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run of the grid.
+
+    Attributes:
+        scenario: the logical scenario's name.
+        algorithm: that searches it.
+        seed: of the run.
+    """
+
+    scenario: str
+    algorithm: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Of the run's folder, and of the run where people read of it."""
+        return f"{self.scenario}-{self.algorithm}-{self.seed}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is compared.
+
+    Attributes:
+        out: the comparison's folder.
+        scenarios: as the user names each, by the name that it has itself.
+        fingerprints: digests of what they say, by name.
+        algorithms: the settings that the user gives each, by its name; in the user's order.
+        seeds: runs of each algorithm in each scenario; their seeds are 0, 1, 2 …
+        budget: evaluations of each run.
+        baseline: the algorithm that the others are tested against.
+        apart: from which distance two critical scenarios are different ones.
+        options: the other arguments of ``run_search``, the same in all runs.
+    """
+
+    out: Path
+    scenarios: Mapping[str, str]
+    fingerprints: Mapping[str, str]
+    algorithms: Mapping[str, Mapping[str, Value]]
+    seeds: int
+    budget: int
+    baseline: str
+    apart: float
+    options: Mapping[str, Any]
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Every run, in the order of running: seed by seed, so that what is done is comparable."""
+        return tuple(
+            Cell(scenario, algorithm, seed)
+            for seed in range(self.seeds)
+            for scenario in self.scenarios
+            for algorithm in self.algorithms
+        )
+
+    @property
+    def cells_in_order(self) -> tuple[Cell, ...]:
+        """Every run, in the order of telling: by scenario, algorithm and seed."""
+        scenarios, algorithms = list(self.scenarios), list(self.algorithms)
+
+        def place(cell: Cell) -> tuple[int, int, int]:
+            return scenarios.index(cell.scenario), algorithms.index(cell.algorithm), cell.seed
+
+        return tuple(sorted(self.cells, key=place))
+
+    def folder(self, cell: Cell) -> Path:
+        """Return the folder of a run."""
+        return self.out / RUNS / cell.name
+
+    def arguments(self, cell: Cell) -> dict[str, Any]:
+        """Return the arguments of ``run_search`` that make a run, but for its folder."""
+        return {
+            **self.options,
+            "scenario": self.scenarios[cell.scenario],
+            "algorithm": cell.algorithm,
+            "settings": dict(self.algorithms[cell.algorithm]),
+            "budget": self.budget,
+            "seed": cell.seed,
+        }
+
+    def command(self) -> str:
+        """Return the command line that begins this comparison, or goes on with it."""
+        words = ["bridgegen", "compare", *self.scenarios.values()]
+        words += ["--algorithms", ",".join(self.algorithms)]
+        words += ["--seeds", str(self.seeds), "--budget", str(self.budget)]
+        if self.baseline != next(iter(self.algorithms)):
+            words += ["--baseline", self.baseline]
+        for name, settings in self.algorithms.items():
+            for key, value in settings.items():
+                words += ["--set", f"{name}.{key}={json.dumps(value)}"]
+        words += _as_words(self.options)
+        if self.apart != APART:
+            words += ["--distinct", repr(self.apart)]
+        return shlex.join([*words, "--out", str(self.out)])
+
+    def identity(self) -> dict[str, Any]:
+        """Return what may not differ between the runs of one folder, as JSON's types."""
+        given = {name: value for name, value in self.options.items() if name != "road_map"}
+        road_map = self.options.get("road_map")
+        same = {
+            "version": version("bridgegen"),
+            "budget": self.budget,
+            **given,
+            "map": None if road_map is None else _digest(Path(road_map)),
+        }
+        same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
+        for name, settings in self.algorithms.items():
+            known = {key: one.default for key, one in toolkit.get(name).settings.items()}
+            same[f"settings of {name}"] = {**known, **settings}
+        plain: dict[str, Any] = json.loads(json.dumps(same))
+        return plain
+
+
+def make_plan(
+    scenarios: Sequence[str | Path],
+    algorithms: Sequence[str],
+    *,
+    settings: Mapping[str, Mapping[str, Value]],
+    seeds: int,
+    budget: int,
+    baseline: str | None,
+    apart: float,
+    out: Path | None,
+    options: Mapping[str, Any],
+) -> Plan:
+    """Return a plan, its names and numbers checked.
+
+    Raises:
+        InputError: what is named twice, not at all, or out of range; a scenario that breaks a rule.
+        UnknownNameError: no such scenario, algorithm or setting.
+    """
+    problems = _twice("scenario", [str(one) for one in scenarios]) + _twice("algorithm", algorithms)
+    problems += [
+        f"{low} <= {name} <= {high} must hold, got {value}"
+        for name, value, low, high in (("seeds", seeds, 1, MAX_SEEDS), ("budget", budget, 1, 10**7))
+        if not low <= value <= high
+    ]
+    if not 0.0 < apart <= 1.0:
+        problems.append(f"0 < distinct <= 1 must hold, got {apart:g}")
+    if options.get("distribution") and len(scenarios) > 1:
+        problems.append("a distribution belongs to one scenario file; compare that one alone")
+    if problems:
+        raise InputError(*problems)
+    for name in algorithms:
+        resolve(toolkit.get(name), Problem.unnamed(1), 0, settings.get(name, {}))
+    for name in [*settings, *([baseline] if baseline else [])]:
+        if name not in algorithms:
+            raise UnknownNameError("algorithm of this comparison", name, algorithms)
+    loaded = [(str(one), load(one, options.get("distribution"))) for one in scenarios]
+    if problems := _twice("scenario called", [one.name for _, one in loaded]):
+        raise InputError(*problems)
+    return Plan(
+        out=out or Path("comparisons") / "-".join(one.name for _, one in loaded),
+        scenarios={
+            one.name: str(Path(given).resolve()) if is_file(given) else given
+            for given, one in loaded
+        },
+        fingerprints={one.name: one.fingerprint for _, one in loaded},
+        algorithms={name: dict(settings.get(name, {})) for name in algorithms},
+        seeds=seeds,
+        budget=budget,
+        baseline=baseline or algorithms[0],
+        apart=apart,
+        options=options,
+    )
+
+
+def begin(plan: Plan) -> None:
+    """Make a comparison's folder, or find that it holds this comparison already.
+
+    More scenarios, algorithms and seeds may be asked for than before: the grid grows.
+
+    Raises:
+        StorageError: the folder holds something else, or runs that were made otherwise.
+    """
+    file, mine = plan.out / FILE, plan.identity()
+    try:
+        before = json.loads(file.read_text("utf-8")) if file.exists() else None
+        if before is None and plan.out.exists() and any(plan.out.iterdir()):
+            raise StorageError(
+                f"{plan.out}: is not empty and holds no comparison, so it is left alone; "
+                "choose another --out"
+            )
+        plan.out.joinpath(RUNS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{plan.out}: cannot be used: {error.strerror}") from None
+    except ValueError as error:
+        raise StorageError(f"{file}: the file is damaged: {error}") from None
+    before = before or {}
+    differ = [name for name in mine if name in before and before[name] != mine[name]]
+    if differ:
+        told = ", ".join(_difference(name, before[name], mine[name]) for name in differ)
+        raise StorageError(
+            f"{plan.out}: holds a comparison that was made otherwise, and runs of both cannot be "
+            f"compared: {told}; choose another --out"
+        )
+    text = json.dumps({**before, **mine}, indent=1)
+    write_whole(file, [text.encode()])
+
+
+def _difference(name: str, before: Any, now: Any) -> str:
+    if name.startswith("scenario "):
+        return f"{name} is not what it was"
+    if name == "map":
+        return "the map is not the same"
+    if isinstance(before, dict) and isinstance(now, dict):
+        keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
+        before, now = ({key: one.get(key) for key in keys} for one in (before, now))
+    return f"{name} was {json.dumps(before)}, is {json.dumps(now)}"
+
+
+def _twice(what: str, names: Iterable[str]) -> list[str]:
+    names = list(names)
+    if not names:
+        return [f"a comparison needs at least one {what}"]
+    again = {name for name in names if names.count(name) > 1}
+    return [f"{what} {name} must be named once" for name in sorted(again)]
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _as_words(options: Mapping[str, Any]) -> list[str]:
+    """Return options of ``run_search`` as the command line has them."""
+    words: list[str] = []
+    for name, value in options.items():
+        if value is None or value is False or value in ({}, [], ()):
+            continue
+        if name == "fixed":
+            words += [word for key, one in value.items() for word in ("--fix", f"{key}={one!r}")]
+        elif name == "objective":
+            terms = (key if one is None else f"{key}={one!r}" for key, one in value.items())
+            words += ["--objective", ",".join(terms)]
+        elif value is True:
+            words.append(f"--{name}")
+        else:
+            option = {"road_map": "map", "time_limit": "time-limit"}.get(name, name)
+            words += [f"--{option}", ",".join(value) if isinstance(value, tuple) else str(value)]
+    return words

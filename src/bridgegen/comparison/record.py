@@ -1,0 +1,181 @@
+"""What a comparison needs of one run: little, however long the run was."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.campaign.campaign import searched
+from bridgegen.campaign.settings import Settings
+from bridgegen.comparison.distinct import distinct, normalised
+from bridgegen.comparison.fronts import front
+from bridgegen.objective import Objective, positivised
+from bridgegen.odd.coverage import coverage
+from bridgegen.odd.space import SearchSpace
+from bridgegen.store import Store
+from bridgegen.store.rows import Rows
+
+POINTS = 50
+"""Of a curve over the evaluations."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A run that has ended.
+
+    Attributes:
+        terms: the metrics of the scenario's objective.
+        command: the command line that makes the same run, into the folder ``replay``.
+        ended: why it ended: "budget", "exhausted" or "converged".
+        evaluations: all that it made.
+        failed: of these, those whose simulation failed.
+        critical: critical ones.
+        reached: by k, the evaluations until the k-th critical one; +inf where it never came.
+        seconds: [s] that it took.
+        seconds_reached: [s] by k, likewise.
+        distinct: how many different critical scenarios it found.
+        critical_bins: bins of parameters that hold a critical scenario.
+        critical_pairs: pairs of bins of two parameters that do.
+        found: ``(c,)`` int64, critical scenarios by the c points of its curve.
+        fronts: c arrays ``(n, m)`` of positivised terms, larger is more critical: what was not
+            dominated by then.
+        low: ``(m,)`` the least critical value of each term; None where every simulation failed.
+        high: ``(m,)`` the most critical one; likewise.
+    """
+
+    terms: tuple[str, ...]
+    command: str
+    ended: str
+    evaluations: int
+    failed: int
+    critical: int
+    reached: Mapping[int, float]
+    seconds: float
+    seconds_reached: Mapping[int, float]
+    distinct: int
+    critical_bins: int
+    critical_pairs: int
+    found: Int
+    fronts: tuple[Float, ...]
+    low: Float | None
+    high: Float | None
+
+
+def points(budget: int) -> Int:
+    """Return the evaluations after which a curve has a point, ascending; the last is the budget."""
+    return np.unique(np.ceil(budget * np.arange(1, POINTS + 1) / POINTS).astype(np.int64))
+
+
+def space_of(folder: Path) -> SearchSpace:
+    """Return the search space of a run, the same for all runs of a scenario.
+
+    Raises:
+        StorageError: not a run, or its scenario or map is not what it was.
+        InputError: the scenario or the map is missing.
+    """
+    with Store.open(folder) as store:
+        return searched(Settings.from_dict(store.settings, folder), folder)[0]
+
+
+def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart: float) -> Record:
+    """Read a run that has ended.
+
+    Args:
+        folder: of the run.
+        space: what it searched.
+        budget: evaluations that it might have made.
+        ks: which critical scenarios to wait for.
+        apart: from which distance two critical scenarios are different ones.
+
+    Raises:
+        StorageError: not a run, or damaged.
+    """
+    with Store.open(folder) as store:
+        settings = Settings.from_dict(store.settings, folder)
+        terms = Objective.from_dict(settings.objective).names
+        reader = _Reader(terms, store.metrics, points(budget))
+        for rows in store.rows():
+            reader.take(rows)
+        seconds, ended = store.seconds, store.finished or "not yet"
+    critical = (
+        np.concatenate(reader.critical) if reader.critical else np.empty((0, len(space.names)))
+    )
+    n = len(critical)
+    bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
+    hits = reader.hits
+    return Record(
+        terms=terms,
+        command=settings.command(Path("replay") / folder.name),
+        ended=ended,
+        evaluations=reader.count,
+        failed=reader.failed,
+        critical=n,
+        reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
+        seconds=seconds,
+        seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
+        distinct=int(distinct(normalised(space, critical), apart).sum()),
+        critical_bins=bins[0].critical,
+        critical_pairs=bins[1].critical if len(bins) > 1 else 0,
+        found=np.array(reader.found, np.int64),
+        fronts=tuple(reader.fronts),
+        low=reader.low,
+        high=reader.high,
+    )
+
+
+class _Reader:
+    """Goes through a run, chunk by chunk; memory does not grow but with what is critical."""
+
+    def __init__(self, terms: Sequence[str], metrics: Sequence[str], points: Int) -> None:
+        self._terms, self._metrics, self._points = terms, metrics, points
+        self.count = self.failed = 0
+        self.hits: list[tuple[int, float]] = []
+        self.critical: list[Float] = []
+        self._front = np.empty((0, len(terms)))
+        self.low: Float | None = None
+        self.high: Float | None = None
+        self._found: list[int] = []
+        self._fronts: list[Float] = []
+
+    @property
+    def found(self) -> list[int]:
+        """Critical scenarios by each point; after the end of the run they stay as many."""
+        return self._found + [len(self.hits)] * (len(self._points) - len(self._found))
+
+    @property
+    def fronts(self) -> list[Float]:
+        """The front by each point, likewise."""
+        return self._fronts + [self._front] * (len(self._points) - len(self._fronts))
+
+    def take(self, rows: Rows) -> None:
+        """Take the rows that come next."""
+        x = positivised(rows.metrics, self._metrics, self._terms)
+        ok: Bool = (rows.status == 0) & np.isfinite(x).all(axis=1)
+        self.failed += int(np.count_nonzero(rows.status != 0))
+        at = np.flatnonzero(rows.critical)
+        numbers = (self.count + at + 1).tolist()
+        before = len(self.hits)
+        self.hits += zip(numbers, rows.seconds[at].tolist(), strict=True)
+        self.critical.append(rows.X[at])
+        if ok.any():
+            low, high = x[ok].min(axis=0), x[ok].max(axis=0)
+            self.low = low if self.low is None else np.minimum(self.low, low)
+            self.high = high if self.high is None else np.maximum(self.high, high)
+        start, end = 0, self.count + len(rows)
+        for point in self._points[len(self._found) :].tolist():
+            stop = min(point, end) - self.count
+            self._see(x[start:stop][ok[start:stop]])
+            start = stop
+            if point > end:
+                break
+            self._found.append(before + int(np.searchsorted(at, stop)))
+            self._fronts.append(self._front)
+        self.count = end
+
+    def _see(self, x: Float) -> None:
+        if len(x):
+            seen = -front(-np.concatenate([self._front, x]))
+            if not np.array_equal(seen, self._front):
+                self._front = seen

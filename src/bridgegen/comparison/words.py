@@ -1,0 +1,138 @@
+"""A comparison in words and in short numbers, for people."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from math import isinf, isnan
+
+from bridgegen.comparison.measures import Measure
+from bridgegen.comparison.result import Comparison
+from bridgegen.comparison.statistics import effect
+from bridgegen.comparison.table import Line
+
+SURE = 0.05
+"""A corrected p below this is called a difference."""
+
+TOLD = {
+    "r_critic": "The largest share of critical scenarios, R_critic, is that of",
+    "distinct": "The largest number of different critical scenarios is that of",
+    "hypervolume": "The largest hypervolume, many bad outcomes at once, is that of",
+}
+"""How the sentence about a measure begins; of each, larger is better."""
+
+
+def number(value: float, digits: int) -> str:
+    """Return a value, "–" where it is not defined, "never" where it is +inf."""
+    if isnan(value):
+        return "–"
+    return "never" if isinf(value) else f"{value:,.{digits}f}"
+
+
+def median(line: Line, one: Measure) -> str:
+    """Return a line's median."""
+    return number(line.quartiles.median, one.digits)
+
+
+def span(line: Line, one: Measure) -> str:
+    """Return a line's quartiles."""
+    q = line.quartiles
+    if isnan(q.low) or isinf(q.low):
+        return ""
+    return f"{number(q.low, one.digits)} to {number(q.high, one.digits)}"
+
+
+def p_value(p: float) -> str:
+    """Return a p value as papers print it."""
+    if isnan(p):
+        return "–"
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+def verdict(line: Line) -> str:
+    """Return whether runs are "better" or "worse" than the baseline's, or "" for neither."""
+    if isnan(line.p_holm) or line.p_holm >= SURE or line.a12 == 0.5:
+        return ""
+    return "better" if line.a12 > 0.5 else "worse"
+
+
+def sentences(comparison: Comparison, scenario: str) -> list[str]:
+    """Return what was found in one scenario: who finds most, how sure that is, and what is odd."""
+    measures = {one.name: one for one in comparison.measures}
+    told = [_best(comparison, scenario, measures[name]) for name in TOLD]
+    return [text for text in (*told, *_short(comparison, scenario)) if text]
+
+
+def _best(comparison: Comparison, scenario: str, one: Measure) -> str:
+    lines = [
+        line for line in comparison.lines if (line.scenario, line.measure) == (scenario, one.name)
+    ]
+    known = [line for line in lines if line.runs]
+    if not known:
+        return ""
+    top = max(line.quartiles.median for line in known)
+    best = [line for line in known if line.quartiles.median == top]
+    names = _and(line.algorithm for line in best)
+    text = f"{TOLD[one.name]} {names} (median {median(best[0], one)}"
+    base = next((line for line in known if line.algorithm == comparison.plan.baseline), None)
+    if base is None or base in best:
+        text += ")."
+    else:
+        text += f"; {base.algorithm}: {median(base, one)})."
+    parts = []
+    for which in ("better", "worse"):
+        if chosen := [line for line in lines if verdict(line) == which]:
+            parts.append(f"{which} than {comparison.plan.baseline}: {_tested(chosen)}")
+    open_ones = [
+        line.algorithm
+        for line in lines
+        if not verdict(line) and line.algorithm != comparison.plan.baseline and line.runs
+    ]
+    if open_ones:
+        parts.append(f"no difference from {comparison.plan.baseline} shown: {_and(open_ones)}")
+    rest = "; ".join(parts)
+    return text + (f" {rest[0].upper()}{rest[1:]}." if rest else "")
+
+
+def _tested(lines: Iterable[Line]) -> str:
+    """Return algorithms with their tests; those whose tests read the same, together."""
+    groups: dict[str, list[str]] = {}
+    for line in lines:
+        test = f"p {_is(line.p_holm)}, A12 {line.a12:.2f}, {effect(line.a12)}"
+        groups.setdefault(test, []).append(line.algorithm)
+    return "; ".join(f"{_and(names)} ({test})" for test, names in groups.items())
+
+
+def _is(p: float) -> str:
+    return "< 0.001" if p < 0.001 else f"= {p:.3f}"
+
+
+def _short(comparison: Comparison, scenario: str) -> Iterable[str]:
+    """Tell of runs that failed, or that ended before their budget."""
+    budget = comparison.plan.budget
+    records = {c: one for c, one in comparison.records.items() if c.scenario == scenario}
+    ended = Counter(c.algorithm for c, one in records.items() if one.evaluations < budget)
+    for name, count in ended.items():
+        made = [one.evaluations for c, one in records.items() if c.algorithm == name]
+        few = f"{min(made):,}" if min(made) == max(made) else f"{min(made):,} to {max(made):,}"
+        yield (
+            f"{name} had no more to ask after {few} of {budget:,} evaluations in "
+            f"{count} of {len(made)} runs: its shares are of these, and what it had not found "
+            "by then counts as never found."
+        )
+    failed = Counter(c.algorithm for c, one in records.items() if one.failed)
+    if failed:
+        total = sum(one.failed for one in records.values())
+        yield (
+            f"{total:,} simulations failed, in runs of {_and(failed)}; they count as evaluations "
+            "that are not critical."
+        )
+    gaps = [cell for cell in comparison.gaps if cell.scenario == scenario]
+    if gaps:
+        which = _and(f"{cell.algorithm} with seed {cell.seed}" for cell in gaps)
+        yield f"Missing, since the run failed: {which}. The same command tries again."
+
+
+def _and(words: Iterable[str]) -> str:
+    given: Sequence[str] = list(words)
+    if len(given) < 2:
+        return "".join(given)
+    return f"{', '.join(given[:-1])} and {given[-1]}"

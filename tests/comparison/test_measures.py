@@ -1,0 +1,74 @@
+"""Hand-worked measures of made-up runs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bridgegen.comparison.measures import counts, measure, measures, ordinal, waited_for
+from bridgegen.comparison.plan import Cell
+from bridgegen.comparison.record import Record
+
+INF = math.inf
+
+
+def record(reached: float, front: list[list[float]], *, critical=60, evaluations=1000) -> Record:
+    x = np.array(front, np.float64).reshape(-1, 2)
+    return Record(
+        terms=("d_min", "v_d"), command="", ended="budget", evaluations=evaluations, failed=0,
+        critical=critical, reached={1: 2.0, 10: 20.0, 50: reached}, seconds=4.0,
+        seconds_reached={1: 0.1, 10: 0.2, 50: reached / 100.0}, distinct=5, critical_bins=7,
+        critical_pairs=9, found=np.array([1, critical]), fronts=(x[:0], x),
+        low=x.min(axis=0) if len(x) else None, high=x.max(axis=0) if len(x) else None,
+    )  # fmt: skip
+
+
+def test_by_hand():
+    """d_min of −10 to 0 and v_d of 0 to 8: the run at (−5, 8) and (0, 4) dominates 3/4."""
+    one, two = Cell("s", "pso", 0), Cell("s", "random", 0)
+    found = measure(
+        {one: record(200.0, [[-5.0, 8.0], [0.0, 4.0]]), two: record(INF, [[-10.0, 0.0]])}, 1000
+    )
+    best, other = found.values[one], found.values[two]
+    assert (best["r_critic"], best["to_50"], best["t_critic"]) == (0.06, 200.0, 1.0)
+    assert (other["to_50"], other["t_critic"]) == (INF, INF)
+    assert (best["t_critic_seconds"], best["seconds_to_50"]) == (1.0, 2.0)
+    assert best["hypervolume"] == pytest.approx(0.75)
+    assert found.curves[one].tolist() == pytest.approx([0.0, 0.75])
+    assert found.reference.tolist() == [[0.0, 0.5], [0.5, 0.0]]
+    assert best["gd"] == 0.0
+    assert other["hypervolume"] == 0.0
+    # From (1, 1) to (½, 0) as to (0, ½).
+    assert other["gd"] == pytest.approx(math.sqrt(1.25))
+    assert other["spread"] == 1.0
+
+
+def test_the_best_method_is_that_of_the_least_median():
+    cells = [Cell("s", name, seed) for name in ("a", "b") for seed in range(3)]
+    times = [100.0, 300.0, INF, 50.0, 400.0, 500.0]
+    records = {c: record(t, [[0.0, 0.0]]) for c, t in zip(cells, times, strict=True)}
+    values = measure(records, 1000).values
+    assert [values[c]["t_critic"] for c in cells] == pytest.approx([t / 300.0 for t in times])
+
+
+def test_where_nobody_gets_there_nobody_is_the_best():
+    values = measure({Cell("s", "a", 0): record(INF, [])}, 1000).values[Cell("s", "a", 0)]
+    assert math.isnan(values["t_critic"])
+    assert math.isnan(values["gd"])
+    assert (values["to_50"], values["hypervolume"]) == (INF, 0.0)
+
+
+def test_five_per_cent_of_the_budget():
+    assert [waited_for(budget) for budget in (1, 20, 21, 100, 1000, 10_000)] == [
+        1, 1, 2, 5, 50, 500,
+    ]  # fmt: skip
+    assert counts(1000) == (1, 10, 50)
+    assert counts(200) == (1, 10, 50)
+    assert counts(10_000) == (1, 10, 50, 500)
+    assert {"to_500", "seconds_to_500"} < {one.name for one in measures(10_000)}
+
+
+def test_ordinals():
+    assert [ordinal(n) for n in (1, 2, 3, 4, 10, 11, 12, 13, 21, 50, 111)] == [
+        "1st", "2nd", "3rd", "4th", "10th", "11th", "12th", "13th", "21st", "50th", "111th",
+    ]  # fmt: skip

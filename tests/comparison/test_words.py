@@ -1,0 +1,56 @@
+import math
+
+import numpy as np
+import pytest
+
+from bridgegen.comparison import words
+from bridgegen.comparison.measures import measures
+from bridgegen.comparison.plan import Cell
+from bridgegen.comparison.table import Line, summarise
+
+MEASURES = {one.name: one for one in measures(1000)}
+
+
+def line(p: float, a12: float, values=(1.0, 2.0, 3.0)) -> Line:
+    from bridgegen.comparison.statistics import quartiles
+
+    return Line("s", "pso", "to_50", 3, 0, quartiles(np.array(values)), p, p, a12)
+
+
+def test_numbers_as_people_read_them():
+    one = MEASURES["to_50"]
+    assert words.median(line(0.5, 0.5), one) == "2"
+    assert words.span(line(0.5, 0.5, (100.0, 200.0, 300.0)), one) == "150 to 250"
+    late = line(0.5, 0.5, (100.0, 200.0, math.inf))
+    assert (words.median(late, one), words.span(late, one)) == ("200", "150 to never")
+    never = line(0.5, 0.5, (math.inf, math.inf))
+    assert (words.median(never, one), words.span(never, one)) == ("never", "")
+    assert words.number(math.nan, 2) == "–"
+    assert words.number(12345.6, 0) == "12,346"
+    assert [words.p_value(p) for p in (0.0004, 0.02, math.nan)] == ["< 0.001", "0.020", "–"]
+
+
+@pytest.mark.parametrize(
+    ("p", "a12", "said"),
+    [(0.01, 0.9, "better"), (0.01, 0.1, "worse"), (0.05, 0.9, ""), (math.nan, 0.9, "")],
+)
+def test_a_verdict_needs_a_sure_test(p, a12, said):
+    assert words.verdict(line(p, a12)) == said
+
+
+def test_the_summary_tests_against_the_baseline_and_corrects_by_measure():
+    shares = {"a": [0.1, 0.2, 0.3, 0.4], "b": [0.5, 0.6, 0.7, 0.8], "c": [0.1, 0.2, 0.3, 0.4]}
+    values = {
+        Cell("s", name, seed): {"r_critic": share}
+        for name, row in shares.items()
+        for seed, share in enumerate(row)
+    }
+    lines = summarise(values, ["s"], ["a", "b", "c"], "a", [MEASURES["r_critic"]])
+    base, better, same = lines
+    assert math.isnan(base.p)
+    assert (better.a12, same.a12) == (1.0, 0.5)
+    assert better.p == pytest.approx(2 / 70)  # the two outermost of C(8, 4) orders
+    assert better.p_holm == pytest.approx(4 / 70)
+    assert same.p == same.p_holm == 1.0
+    with_gap = {cell: row for cell, row in values.items() if cell != Cell("s", "b", 3)}
+    assert summarise(with_gap, ["s"], ["a", "b", "c"], "a", [MEASURES["r_critic"]])[1].runs == 3

@@ -1,0 +1,31 @@
+"""Processes: one that dies costs its run and no other."""
+
+import os
+from pathlib import Path
+
+from bridgegen.comparison.runs import Task, Watcher, evaluations_of
+from bridgegen.comparison.workers import run_all
+
+
+class Bomb:
+    """Whoever unpickles it is gone."""
+
+    def __reduce__(self):
+        return os._exit, (7,)
+
+
+def task(folder: Path, name: str, **more: object) -> Task:
+    arguments = {"scenario": "crossroads-s4", "algorithm": "random", "budget": 40, "causes": False}
+    return Task(name, folder / name, {**arguments, **more})
+
+
+def test_a_process_that_dies_costs_one_run(tmp_path):
+    told: list[tuple[str, bool]] = []
+    watcher = Watcher(ended=lambda name, failure: told.append((name, failure is None)))
+    tasks = [task(tmp_path, "bomb", metrics=Bomb()), task(tmp_path, "0")]
+    failures = run_all(tasks, 2, watcher)
+    assert list(failures) == ["bomb"]
+    assert failures["bomb"] in (f"its process ended with status {n}" for n in (7, -9))
+    assert sorted(told) == [("0", True), ("bomb", False)]
+    assert evaluations_of(tmp_path / "0") == (40, True)
+    assert evaluations_of(tmp_path / "bomb") == (0, False)
