@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from bridgegen import ego as egos
 from bridgegen import metrics as measures
+from bridgegen.adversary import AdversarySource, Arena
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause, Counterfactual, causes, require
 from bridgegen.errors import InputError
@@ -22,7 +23,7 @@ from bridgegen.objective import CLASSIFYING, Objective, Objectives, Thresholds, 
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
-from bridgegen.openx.source import ConcreteScenario, Source, source_of
+from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
@@ -134,23 +135,37 @@ class Pipeline:
         if name is None and tuple(ideal):
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
         driver = egos.get(name, ideal, time_limit) if name else None
-        self.source = _source(scenario, driver, road_map)
+        self.source = _source(scenario, driver, road_map, space)
         self.cause, self.seeks_causes = cause, seek_causes or cause is not None
         nominal = self.concrete(space.row({}))
         simulator = EmbeddedSimulator(nominal.storyboard, scenario.name, driver=driver)
         self.simulator: Simulator[Network] = simulator
         self.driver = simulator.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
-            self.source = _source(scenario, self.driver, road_map)
+            self.source = _source(scenario, self.driver, road_map, space)
         if cause is not None:
             require(cause, self.driver)
         recorded = metrics_of(scenario, self.driver, also) if metrics is None else metrics
         self.metrics = tuple(recorded)
         _refuse_fixed(scenario, space, self.simulator.fixed)
         self._roads: Network | None = None
-        if not {*self.source.static_names} & {*space.variables}:
+        if not isinstance(self.source, AdversarySource) and not {*self.source.static_names} & {
+            *space.variables
+        }:
             self._roads = self.simulator.roads([nominal.roads])
         self._threads = ThreadPoolExecutor(threads or os.cpu_count() or 1, "rollout")
+
+    def arena(self) -> Arena:
+        """Return where an agent drives the adversary's participant in closed loop.
+
+        Raises:
+            InputError: there is no adversary, or the ego's driver cannot be asked instant by
+                instant.
+        """
+        if not isinstance(self.source, AdversarySource):
+            raise InputError(f"{self.scenario.place}: no adversary drives anybody")
+        assert isinstance(self.simulator, EmbeddedSimulator)
+        return Arena(self.source, self.simulator, self.space)
 
     def choose_objective(
         self,
@@ -270,6 +285,11 @@ class Pipeline:
         """Return the compiled road networks of some rows, and which row has which."""
         if self._roads is not None:
             return self._roads, np.zeros(len(X), dtype=np.int64)
+        if isinstance(self.source, AdversarySource):
+            values = [self.space.values(row) for row in X]
+            alone = [self.source.roads(one) for one in values]
+            courses = [self.source.courses(one) for one in values]
+            return self.simulator.roads(alone, courses), np.arange(len(X))
         names = self.source.static_names
         columns = [self.space.index(name) for name in names]
         static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
@@ -278,11 +298,17 @@ class Pipeline:
 
 
 def _source(
-    scenario: SearchedScenario, driver: egos.Driver | None, road_map: RoadMap | None
+    scenario: SearchedScenario,
+    driver: egos.Driver | None,
+    road_map: RoadMap | None,
+    space: SearchSpace,
 ) -> Source:
     if driver is None:
         return source_of(scenario, None, road_map)
-    return source_of(scenario, driver.name, road_map, egos.join(driver.ideal))
+    source = source_of(scenario, driver.name, road_map, egos.join(driver.ideal))
+    if isinstance(source, OntologySource) and source.constraints.adversary:
+        return AdversarySource(source, space.values(space.row({})))
+    return source
 
 
 def _refuse_fixed(scenario: SearchedScenario, space: SearchSpace, fixed: Mapping[str, str]) -> None:

@@ -15,6 +15,7 @@ from bridgegen.cause import Cause
 from bridgegen.ego import STORYBOARD, is_spec
 from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.objective import Objective, Objectives
+from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
@@ -68,6 +69,7 @@ def run_search(
     metrics: Sequence[str] = (),
     causes: bool = True,
     cause: str | None = None,
+    adversary: str | None = None,
     deliver: bool = True,
     threads: int | None = None,
     watch: Watch | None = None,
@@ -103,6 +105,8 @@ def run_search(
         causes: whether to find the cause of each critical scenario, by replaying it.
         cause: "perception", "planning", "control" or "unavoidable": a critical scenario of another
             cause does not count.
+        adversary: the participant that an adversary drives, see `bridgegen.odd.adversary`; with an
+            algorithm that is one, the first vehicle by default.
         deliver: whether to write the critical scenarios and the report; ``resume`` does it later.
         threads: to evaluate with, one for each core by default; the results do not depend on it.
         watch: told how it is getting on.
@@ -125,6 +129,10 @@ def run_search(
     spec = _choose(catalogue.objective, objective, weights, scale, columns)
     logical = replace(catalogue, objective=spec)
     logical, roads = _placed(logical, road_map, junction)
+    driven: str | None = None
+    if adversary is not None or getattr(method, "is_adversary", False):
+        logical = adversarial(logical, adversary)
+        driven = logical.adversary.participant if logical.adversary else None
     space = logical.space(axes, fixed)
     if space.n_var == 0:
         refuse_standstill(logical)
@@ -168,6 +176,7 @@ def run_search(
         keep=keep,
         causes=causes,
         cause=cause,
+        adversary=driven,
         objective=chosen.to_dict(),
         chosen={
             "objective": objective,
@@ -265,6 +274,8 @@ def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | N
     placed, roads = _placed(logical, settings.map, settings.junction)
     if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
         raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
+    if settings.adversary is not None:
+        placed = adversarial(placed, settings.adversary)
     return placed.space(settings.axes, settings.fixed), roads
 
 
@@ -288,7 +299,8 @@ def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch, deli
     """Search up to the budget, then hand over and report if that is wanted."""
     space, chosen = pipeline.space, pipeline.objective
     method = toolkit.get(settings.algorithm)
-    problem = Problem(space.variables, pipeline.metrics, chosen.n_obj)
+    arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
+    problem = Problem(space.variables, pipeline.metrics, chosen.n_obj, arena)
     algorithm = method(problem, settings.seed, **settings.algorithm_settings)
     watch.stage("search")
     result = run_loop(

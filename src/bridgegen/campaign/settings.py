@@ -10,7 +10,13 @@ from typing import Any, Self
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import StorageError
 
-SINCE: Mapping[str, Any] = {"distribution": None, "ideal": [], "causes": False, "cause": None}
+SINCE: Mapping[str, Any] = {
+    "distribution": None,
+    "ideal": [],
+    "causes": False,
+    "cause": None,
+    "adversary": None,
+}
 """What a run of an earlier version, which could not say it, was made with."""
 
 
@@ -37,6 +43,7 @@ class Settings:
         keep: how many scenarios are handed over.
         causes: whether the causes of critical scenarios are sought.
         cause: the only one that counts, or None.
+        adversary: the participant that an adversary drives, or None.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
         chosen: what the user chose of the objective instead of the scenario's: metrics with
             weights, way of weighting, scale, one or many; None each where nothing; and the metrics
@@ -61,6 +68,7 @@ class Settings:
     keep: int
     causes: bool
     cause: str | None
+    adversary: str | None
     objective: Mapping[str, Any]
     chosen: Mapping[str, Any]
 
@@ -98,6 +106,8 @@ class Settings:
             words.append("--no-causes")
         if self.cause:
             words += ["--cause", self.cause]
+        if self.adversary:
+            words += ["--adversary", self.adversary]
         if self.distribution:
             words += ["--distribution", self.distribution]
         for name, value in self.algorithm_settings.items():

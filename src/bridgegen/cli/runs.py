@@ -107,6 +107,13 @@ def search(
             show_default="any",
         ),
     ] = None,
+    adversary: Annotated[
+        str | None,
+        typer.Option(
+            help="A vehicle that an adversary drives instead of the scenario's events.",
+            show_default="none; with ppo-adversary the first",
+        ),
+    ] = None,
     road_map: Annotated[
         Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
     ] = None,
@@ -144,6 +151,7 @@ def search(
             metrics=_names(metrics),
             causes=causes,
             cause=cause,
+            adversary=adversary,
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)

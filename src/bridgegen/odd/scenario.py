@@ -3,12 +3,15 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.odd.space import SearchSpace
 from bridgegen.odd.story import EventSpec, Participant, Story
+
+if TYPE_CHECKING:
+    from bridgegen.odd.adversary import Adversary
 
 
 @dataclass(frozen=True)
@@ -154,6 +157,7 @@ class LogicalScenario(SearchedScenario):
         driver: who drives the ego unless the user says otherwise.
         effects: the user's functions that add to each scenario, as ``file.py:function`` or the
             name of an entry point.
+        adversary: who drives a participant, if `bridgegen.odd.adversary.adversarial` made it.
     """
 
     source: str
@@ -163,6 +167,7 @@ class LogicalScenario(SearchedScenario):
     story: Story
     driver: str
     effects: tuple[str, ...]
+    adversary: "Adversary | None" = field(default=None, repr=False, kw_only=True)
 
     @property
     def participants(self) -> tuple[Participant, ...]:

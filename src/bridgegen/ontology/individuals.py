@@ -7,10 +7,12 @@ static parameters, so one storyboard serves all road networks of a batch.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from bridgegen.arrays import Float
 from bridgegen.errors import OntologyError
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.ontology.builder import Builder
+from bridgegen.ontology.courses import add_course
 from bridgegen.ontology.effects import apply_effect
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.roads import add_road_network
@@ -29,6 +31,7 @@ def build(
     driver: str,
     ideal: str = "",
     site: Site | None = None,
+    courses: Mapping[str, Float] | None = None,
 ) -> Individuals:
     """Return the individuals of one concrete scenario.
 
@@ -40,6 +43,8 @@ def build(
         ideal: its stages that are ideal, separated by commas.
         site: the intersection of a map that was made elsewhere; by default a crossroads is
             generated from the static parameters.
+        courses: who is where when: ``(V, 4)`` time [s], x, y [m], heading [rad], by the name of
+            a participant; rounded.
 
     Raises:
         OntologyError: ``values`` lacks a parameter, or the site a leg that the scenario uses.
@@ -62,6 +67,8 @@ def build(
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
     for event in story.events:
         put(top, "has_event", add_event(builder, event, declared))
+    for who, course in (courses or {}).items():
+        put(top, "has_event", add_course(builder, who, course))
     for jam in story.jams:
         put(top, "has_event", add_jam(builder, jam, place))
     for works in story.works:

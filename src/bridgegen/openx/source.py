@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
+from bridgegen.arrays import Float
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.rules import speed_bounds
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
@@ -173,13 +174,29 @@ class OntologySource:
             return self._map.model
         return opendrive_from_owl(build_static(dict(values), self._scenario.roads))
 
-    def concrete(self, values: Mapping[str, float], road_file: str = "") -> ConcreteScenario:
-        """See `Source`."""
+    def concrete(
+        self,
+        values: Mapping[str, float],
+        road_file: str = "",
+        courses: Mapping[str, Float] | None = None,
+    ) -> ConcreteScenario:
+        """See `Source`.
+
+        Args:
+            values: of every parameter, by name.
+            road_file: what its OpenDRIVE file will be called.
+            courses: see `bridgegen.ontology.individuals.build`.
+        """
         site = self._map.site if self._map else None
         if site and road_file:
             site = replace(site, map_file=road_file)
         individuals = build(
-            self._scenario, values, driver=self._driver, ideal=self._ideal, site=site
+            self._scenario,
+            values,
+            driver=self._driver,
+            ideal=self._ideal,
+            site=site,
+            courses=courses,
         )
         return _OfOntology(individuals, road_file or f"{self._scenario.name}.xodr", self._map)
 

@@ -1,13 +1,13 @@
 """What every search algorithm is: ask for rows of the unit cube, tell their objectives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, UnknownNameError
 
@@ -44,6 +44,33 @@ RESTART_WITHIN = Setting(
 """The setting of an algorithm whose population converges."""
 
 
+class Arena(Protocol):
+    """Where an agent decides for a participant while the scenario runs.
+
+    Attributes:
+        n_decisions: of each scenario.
+        n_observed: numbers that it sees at each.
+        decisions: ``(n_decisions, 2)`` int64, the columns of U that it decides.
+    """
+
+    n_decisions: int
+    n_observed: int
+    decisions: Int
+
+    def play(self, U: Float, act: Callable[[Float, Bool], Float]) -> Float:
+        """Let an agent decide, and return the rows that came of it.
+
+        Args:
+            U: ``(N, n_var)``; the columns of decisions do not count.
+            act: ``(N, n_observed)`` observations and ``(N,)`` bool, whether a row still runs →
+                ``(N, 2)`` decisions in [0, 1].
+
+        Returns:
+            ``(N, n_var)``.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Problem:
     """What is searched.
@@ -52,11 +79,13 @@ class Problem:
         parameters: the searched ones' names, one per column of U.
         metrics: the names of those that are recorded, one per column of ``Results.metrics``.
         n_obj: objectives, all minimised.
+        arena: where an adversary drives in closed loop; None without one.
     """
 
     parameters: tuple[str, ...]
     metrics: tuple[str, ...] = ()
     n_obj: int = 1
+    arena: Arena | None = None
 
     @property
     def n_var(self) -> int:

@@ -5,7 +5,7 @@ from typing import Protocol, TypeVar
 
 import numpy.typing as npt
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Float, Int
 from bridgegen.ego import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.rollout import Rollout
@@ -44,8 +44,16 @@ class Simulator(Protocol[Roads]):
     def parameters(self) -> Mapping[str, float]:
         """The storyboard's numeric parameters with their declared values."""
 
-    def roads(self, models: Sequence[OpenDrive]) -> Roads:
+    def roads(
+        self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
+    ) -> Roads:
         """Make P road networks ready for this storyboard.
+
+        Args:
+            models: the road networks.
+            courses: who is where when on each of them, ``(V, 4)`` time [s], x, y [m], heading [rad]
+                by the name of an entity, instead of the timed trajectory that the file has the
+                entity follow; nobody by default.
 
         Raises:
             InputError: a position that is not on a road, or a route that no lane leads along.

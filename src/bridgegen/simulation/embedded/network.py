@@ -1,6 +1,6 @@
 """The roads of a compiled storyboard: P road networks, and the paths on them that are known."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from threading import Lock
 
@@ -14,6 +14,7 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Stretch
 from bridgegen.simulation.embedded._memory_kernels import Roads
 from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.embedded.trajectories import timetable
 from bridgegen.simulation.embedded.ways import UNKNOWN, Ways, padded, position
 
 NO_GROUND = Ground(np.empty((0, 4)), np.empty(0, np.int64))
@@ -35,9 +36,18 @@ class Network:
         scene: what a driver with stages knows of them.
     """
 
-    def __init__(self, program: Program, models: Sequence[OpenDrive]) -> None:
+    def __init__(
+        self,
+        program: Program,
+        models: Sequence[OpenDrive],
+        courses: Sequence[Mapping[str, Float]] = (),
+    ) -> None:
         self._program = program
-        self._ways = [Ways(program, model) for model in models]
+        told = courses or [{}] * len(models)
+        self._ways = [
+            Ways(program.on_course(course), model)
+            for model, course in zip(models, told, strict=True)
+        ]
         self._lock = Lock()
         self._points = np.zeros((len(models), len(program.points), 2))
         for p, model in enumerate(models):
@@ -55,6 +65,30 @@ class Network:
     def n_networks(self) -> int:
         """P."""
         return len(self._ways)
+
+    def amend(self, name: str, first: int, part: Float) -> None:
+        """Change a stretch of an entity's timed trajectory on each road network.
+
+        Args:
+            name: of the entity, which follows one.
+            first: the vertex that the stretch begins at.
+            part: ``(P, S + 1, 4)`` time [s], x, y [m], heading [rad] of its vertices.
+        """
+        m = self._program.trajectory_of(name)
+        with self._lock:
+            for p, (ways, course) in enumerate(zip(self._ways, part.tolist(), strict=True)):
+                corners = [(x, y, h) for _, x, y, h in course]
+                rows = timetable(corners, [t for t, *_ in course])
+                table = ways.timetables[m]
+                rows[:, 8:] += table[first, 8]
+                table[first : first + len(rows)] = rows
+                self.tables.timetables[p, m, : len(table)] = table
+
+    def zones(self, name: str) -> Float:
+        """Return where the ego's way meets the timed trajectory of an entity, ``(P, 5)``."""
+        path = self._program.trajectories[self._program.trajectory_of(name)]
+        zones: Float = self.tables.zones[:, path]
+        return zones
 
     def plan(self, wanted: Iterable[tuple[int, int, int]]) -> None:
         """Plan what rows have asked for.

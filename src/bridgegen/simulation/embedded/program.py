@@ -21,6 +21,7 @@ from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded._codes import (
     ANGLE,
     CLEARANCE,
+    FOLLOW,
     OFFROAD,
     PROBE,
     RELATIVE_ANGLE,
@@ -314,6 +315,28 @@ class Program:
             weathers[:, FRICTION_SCALE] = UNSAID
             changed = replace(changed, weathers=weathers)
         return changed
+
+    def trajectory_of(self, name: str) -> int:
+        """Return the number of the one trajectory that an event has an entity follow."""
+        mine = (self.actions[:, 0] == self.names.index(name)) & (self.actions[:, 1] == FOLLOW)
+        (number,) = self.actions[mine, 6].tolist()
+        return int(number)
+
+    def on_course(self, courses: Mapping[str, Float]) -> "Program":
+        """Return the program with other timed trajectories.
+
+        Args:
+            courses: ``(V, 4)`` time [s], x, y [m], heading [rad], by the name of an entity that
+                follows one such trajectory.
+        """
+        paths = list(self.paths)
+        for name, course in courses.items():
+            path = int(self.trajectories[self.trajectory_of(name)])
+            old = paths[path]
+            assert isinstance(old, AlongTrajectory)
+            points = tuple(WorldPoint(x, y, old.line, h) for _, x, y, h in course.tolist())
+            paths[path] = replace(old, points=points, times=tuple(course[:, 0].tolist()))
+        return replace(self, paths=tuple(paths)) if courses else self
 
     @cached_property
     def box(self) -> Float:

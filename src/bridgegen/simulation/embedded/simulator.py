@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Float, Int
 from bridgegen.ego import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -109,9 +109,11 @@ class EmbeddedSimulator:
         """See `Simulator`."""
         return self.program.parameters
 
-    def roads(self, models: Sequence[OpenDrive]) -> Network:
+    def roads(
+        self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
+    ) -> Network:
         """See `Simulator`: each entity's route, planned and sampled."""
-        return Network(self.program, models)
+        return Network(self.program, models, courses)
 
     def run(
         self,

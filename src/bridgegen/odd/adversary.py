@@ -1,0 +1,221 @@
+"""A participant that an adversary drives: what it decides is searched like any other parameter.
+
+Its events are taken from the scenario; instead, it changes its speed and moves within its lane as
+parameters of the extension axis say, one of each per decision. Whatever they are, they keep to the
+scenario's limits: the speeds that the scenario gives the participant (which road and weather
+bound), the rate at which it takes them up, what its body and the road's friction let it brake, and
+its lane.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.bodies import BODIES
+from bridgegen.odd.parameters import Axis, Parameter
+from bridgegen.odd.roads import Quantity
+from bridgegen.odd.rules import speeds_of
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
+from bridgegen.odd.story import EventSpec, Participant, SpeedChange, Story
+
+PERIOD = 0.5
+"""Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
+
+MARGIN = 0.1
+"""Metres that its body keeps to the edges of its lane."""
+
+GRIP = 0.85 * 9.81
+"""What tyres hold on a dry road [m/s²]; see `bridgegen.odd.rules`."""
+
+
+@dataclass(frozen=True)
+class Adversary:
+    """Who is driven by an adversary, and within what limits.
+
+    Attributes:
+        participant: its name.
+        speeds: [m/s] that the scenario gives it: the first is its speed at the start, the largest
+            its highest.
+        lane_width: [m] of the lane that it keeps to.
+        width: of its body [m].
+        rate: [m/s²] at which the scenario has it change its speed.
+        acceleration: of its body at most [m/s²].
+        braking: of its body at most [m/s²].
+        paces: the parameters that are its speeds as shares of the highest, one per decision.
+        offsets: the parameters that are its places in the lane, -1 at its right edge, 1 at its left
+            one, one per decision.
+    """
+
+    participant: str
+    speeds: tuple[Quantity, ...]
+    lane_width: Quantity
+    width: float
+    rate: Quantity
+    acceleration: float
+    braking: float
+    paces: tuple[str, ...]
+    offsets: tuple[str, ...]
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """The parameters by decision: pace and place of the first, then of the second."""
+        pairs = zip(self.paces, self.offsets, strict=True)
+        return tuple(name for pair in pairs for name in pair)
+
+    def first_speed(self, values: Mapping[str, float]) -> float:
+        """Return its speed at the start [m/s]."""
+        return _value(self.speeds[0], values)
+
+    def top_speed(self, values: Mapping[str, float]) -> float:
+        """Return its highest speed [m/s]."""
+        return max(_value(one, values) for one in self.speeds)
+
+    def limits(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Return by how much it accelerates and brakes at most [m/s²]."""
+        grip = GRIP * values.get("friction", 1.0)
+        rate = min(_value(self.rate, values), self.acceleration, grip)
+        return rate, min(self.braking, grip)
+
+    def room(self, values: Mapping[str, float]) -> float:
+        """Return how far it may be aside of its lane's centre [m]."""
+        return max(0.0, 0.5 * (_value(self.lane_width, values) - self.width) - MARGIN)
+
+
+def adversarial(scenario: SearchedScenario, participant: str | None = None) -> LogicalScenario:
+    """Return a scenario in which an adversary drives one of the participants.
+
+    Args:
+        scenario: of five layers.
+        participant: a vehicle or bicycle that keeps to lanes, not the ego; the first that the
+            scenario lets move by default.
+
+    Raises:
+        UnknownNameError: no such participant.
+        InputError: a scenario file; or a participant that is no such vehicle, or whose events
+            others wait for.
+    """
+    if not isinstance(scenario, LogicalScenario):
+        raise InputError(
+            f"{scenario.name}: an adversary drives participants of a scenario of five layers (a "
+            "YAML file), and this is an OpenSCENARIO file"
+        )
+    able = [one.name for one in scenario.participants if _can_be_driven(one, scenario.story)]
+    if participant is None:
+        if not able:
+            raise InputError(
+                f"{scenario.place}: an adversary needs a vehicle other than the ego that keeps to "
+                "lanes and may move"
+            )
+        participant = able[0]
+    names = [one.name for one in scenario.participants]
+    if participant not in names:
+        raise UnknownNameError("participant", participant, names)
+    if participant not in able:
+        raise InputError(
+            f"{scenario.place}: an adversary drives a vehicle other than the ego that keeps to "
+            f"lanes and may move, got '{participant}'; it can drive: {', '.join(able) or 'nobody'}"
+        )
+    who = scenario.participant(participant)
+    own = [event for event in scenario.events if event.participant == participant]
+    rest = tuple(event for event in scenario.events if event.participant != participant)
+    _refuse_awaited(scenario, own, rest)
+    adversary = _adversary(scenario, who, own)
+    story = replace(scenario.story, events=rest)
+    left = replace(scenario, story=story)
+    limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
+    needed = {quantity for quantity in limits if isinstance(quantity, str)}
+    idle = _quantities(own) - _quantities(rest) - needed - _elsewhere(left)
+    known = sorted(idle & left.parameters.keys())
+    left = left.measured({name: left.parameters[name].default for name in known})
+    return replace(
+        left,
+        parameters=left.parameters | {one.name: one for one in _controls(adversary)},
+        axes=tuple(axis for axis in Axis if axis in {*left.axes, Axis.EXTENSION}),
+        adversary=adversary,
+    )
+
+
+def _can_be_driven(one: Participant, story: Story) -> bool:
+    on_lanes = one.kind in ("vehicle", "bicycle") and not one.path
+    return on_lanes and one.name != "ego" and any(speed != 0.0 for speed in speeds_of(one, story))
+
+
+def _adversary(scenario: LogicalScenario, who: Participant, own: Iterable[EventSpec]) -> Adversary:
+    body = BODIES[who.type]
+    changes = [a.change for event in own for a in event.actions if isinstance(a, SpeedChange)]
+    rates = [one.rate for one in changes if one.rate is not None]
+    numbers = [f"{k:02d}" for k in range(1, ceil(scenario.duration / PERIOD) + 1)]
+    return Adversary(
+        participant=who.name,
+        speeds=tuple(speeds_of(who, scenario.story)),
+        lane_width=scenario.roads.knobs["lane_width"],
+        width=body.width,
+        rate=rates[0] if rates else body.max_acceleration,
+        acceleration=body.max_acceleration,
+        braking=body.max_deceleration,
+        paces=tuple(f"{who.name}_pace_{number}" for number in numbers),
+        offsets=tuple(f"{who.name}_offset_{number}" for number in numbers),
+    )
+
+
+def _controls(adversary: Adversary) -> Iterable[Parameter]:
+    who = adversary.participant
+    for k, (pace, offset) in enumerate(zip(adversary.paces, adversary.offsets, strict=True)):
+        when = f"from {k * PERIOD:g} s to {(k + 1) * PERIOD:g} s"
+        yield Parameter(
+            pace, Axis.EXTENSION, "1", 0.0, 1.0, 1.0,
+            description=f"Speed that the adversary has {who} make for {when}; 1: its highest.",
+            source="The speeds that the scenario gives it.",
+        )  # fmt: skip
+        yield Parameter(
+            offset, Axis.EXTENSION, "1", -1.0, 1.0, 0.0,
+            description=f"Where in its lane the adversary steers {who} {when}; 1: leftmost.",
+            source="The lane's width, less its body's.",
+        )  # fmt: skip
+
+
+def _refuse_awaited(
+    scenario: LogicalScenario, own: Iterable[EventSpec], rest: Iterable[EventSpec]
+) -> None:
+    names = {event.name for event in own}
+    problems = [
+        f"{scenario.place}: event '{event.name}' waits for '{condition.event}', which an adversary "
+        f"that drives '{next(iter(own)).participant}' takes away"
+        for event in rest
+        for group in event.when
+        for condition in group
+        if condition.event in names
+    ]
+    if problems:
+        raise InputError(*problems)
+
+
+def _quantities(events: Iterable[EventSpec]) -> set[str]:
+    """Return the parameters that events read."""
+    found: set[Quantity | None] = set()
+    for event in events:
+        found |= {condition.value for group in event.when for condition in group}
+        for action in event.actions:
+            found |= {getattr(action, "speed", None)}
+            if (change := getattr(action, "change", None)) is not None:
+                found |= {change.rate, change.time, change.distance}
+    return {one for one in found if isinstance(one, str)}
+
+
+def _elsewhere(scenario: LogicalScenario) -> set[str]:
+    """Return the parameters that anything but events reads."""
+    found: set[Quantity] = set(scenario.roads.knobs.values())
+    for one in scenario.participants:
+        found.add(one.speed)
+        for point in (one.start, one.end, *one.path):
+            if point is not None:
+                found |= {point.distance, point.offset}
+    names = {one for one in found if isinstance(one, str)}
+    return names.union(
+        *(bound.names for bound in scenario.bounds), *(one.names for one in scenario.derived)
+    )
+
+
+def _value(quantity: Quantity, values: Mapping[str, float]) -> float:
+    return float(values[quantity]) if isinstance(quantity, str) else float(quantity)
