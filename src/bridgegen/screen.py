@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from bridgegen.campaign import Run, Watch
     from bridgegen.campaign.driver_contract import Check
     from bridgegen.campaign.loop import Progress as LoopProgress
+    from bridgegen.campaign.regions import RunRegions
     from bridgegen.campaign.settings import Settings
     from bridgegen.metrics.measure import Measured
     from bridgegen.odd.coverage import Coverage, ParameterBins
     from bridgegen.odd.scenario import ParameterLine
+    from bridgegen.regions import Evidence
     from bridgegen.simulate import FileResult
 
 _STAGES = {
@@ -66,13 +68,8 @@ class Screen:
         return Watch(stage=self._stage, batch=self._batch)
 
     def _stage(self, stage: str) -> None:
-        from bridgegen.compiled import is_compiled
-
-        if stage == "compile" and not is_compiled():
-            self._console.print(
-                "First run: compiling the simulator, which takes a minute or two; later runs start "
-                "at once."
-            )
+        if stage == "compile":
+            _say_compiling(self._console)
         self._progress.update(self._task, description=_STAGES[stage])
 
     def _batch(self, progress: "LoopProgress") -> None:
@@ -99,6 +96,53 @@ class Screen:
         trace: TracebackType | None,
     ) -> None:
         self._progress.stop()
+
+
+class Bar:
+    """A bar on stderr of something that is counted.
+
+    Args:
+        what: is done.
+    """
+
+    def __init__(self, what: str) -> None:
+        self._console, self._what = Console(stderr=True), what
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=14),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(compact=True),
+            console=self._console,
+            transient=True,
+        )
+        self._task = self._progress.add_task("starting", total=None)
+
+    def stage(self, stage: str) -> None:
+        """Take down what begins."""
+        if stage == "compile":
+            _say_compiling(self._console)
+        self._progress.update(self._task, description=_STAGES.get(stage) or self._what)
+
+    def progress(self, done: int, total: int) -> None:
+        """Take down how many are done, and how many there are."""
+        self._progress.update(self._task, description=self._what, completed=done, total=total)
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+
+def _say_compiling(console: Console) -> None:
+    from bridgegen.compiled import is_compiled
+
+    if not is_compiled():
+        console.print(
+            "First run: compiling the simulator, which takes a minute or two; later runs start "
+            "at once."
+        )
 
 
 def print_summary(run: "Run", seconds: float) -> None:
@@ -242,6 +286,87 @@ def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_jso
         low, high = one.edges[[0, -1]] + ((0.5, -0.5) if one.integer else (0.0, 0.0))
         print(f"{one.name:<{width}}  {one.axis}, {low:g} to {high:g} {one.unit}")
         print(f"    {_cells(one)}")
+
+
+def print_regions(run: "RunRegions", *, as_json: bool) -> None:
+    """Print a run's regions: what holds, then what does not, then what that comes to."""
+    facts, found = run.record, run.found
+    if as_json:
+        print(json.dumps(facts, indent=2))
+        return
+    confirmed = len(found.confirmed)
+    by = f" by {facts['cause']}" if facts["cause"] else ""
+    print(
+        f"{run.folder}: {facts['scenario']}, ego {facts['ego']}, {facts['algorithm']}, "
+        f"{facts['evaluations']} evaluations{'' if facts['finished'] else ' so far'}, "
+        f"{found.critical} critical{by}\n"
+    )
+    least = _percent(facts["at_least"])
+    asked = f"at least {least} of all scenarios are critical, with 95 % confidence"
+    if confirmed:
+        print(f"Regions where {asked}:\n")
+        _print_regions(run, 0, confirmed)
+    else:
+        print(f"No region is confirmed where {asked}.")
+    if others := len(found.regions) - confirmed:
+        print("\nNot confirmed:\n")
+        _print_regions(run, confirmed, confirmed + others)
+    if found.regions:
+        print(
+            "\nfresh: random scenarios of the region, simulated for this table: the share that "
+            "counts, with\nits 95 % interval. run: those that the search chose there, a biased "
+            "share. space: how many\nof all random scenarios lie in the region."
+        )
+    else:
+        print("No part of its parameters' ranges stands out in a decision tree of the evaluations.")
+    if confirmed:
+        print(
+            f"\nThe confirmed {'region holds' if confirmed == 1 else 'regions hold'} "
+            f"{found.critical_held} of the run's {found.critical} critical scenarios, and "
+            f"{_percent(found.space_share)} of all random scenarios."
+        )
+    files = ", ".join(map(str, run.files))
+    print(f"{found.simulations} fresh scenarios, seed {facts['seed']}: {files}")
+    if run.unstated:
+        print(
+            f"{len(run.unstated)} of the regions cannot be stated as classes: the ontology does "
+            "not carry a parameter that they name."
+        )
+
+
+def _print_regions(run: "RunRegions", start: int, stop: int) -> None:
+    from bridgegen.regions.words import ANYWHERE, conditions
+
+    failed = any(one.fresh.failed for one in run.found.regions[start:stop])
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
+    for name in ("#", "region", "fresh", "run", "space", *(["failed"] if failed else [])):
+        table.add_column(name, overflow="fold")
+    for number, one in enumerate(run.found.regions[start:stop], start=start + 1):
+        rule = "\nand ".join(conditions(one.box, run.space)) or ANYWHERE
+        note = "\n(narrowed to others)" if one.narrowed else ""
+        table.add_row(
+            str(number),
+            rule + note,
+            _shares(one.fresh),
+            _shares(one.search),
+            _percent(one.space_share),
+            *([str(one.fresh.failed)] if failed else []),
+        )
+    Console(markup=False, emoji=False, highlight=False).print(table)
+
+
+def _shares(one: "Evidence") -> str:
+    if one.share is None:
+        return "none"
+    low, high = map(_percent, one.interval)
+    low = low.removesuffix(" %")
+    return f"{_percent(one.share)}\n{low} to {high}\n{one.critical} of {one.rows}"
+
+
+def _percent(share: float) -> str:
+    from bridgegen.regions.words import percent
+
+    return percent(share)
 
 
 def _cells(one: "ParameterBins") -> str:

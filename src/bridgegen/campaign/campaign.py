@@ -221,24 +221,54 @@ def resume(
     watch = watch or Watch()
     with Store.open(folder, write=True) as store:
         settings = Settings.from_dict(store.settings, store.folder)
-        _check_driver(settings, ego, store.folder)
-        space, roads = searched(settings, Path(folder))
-        pipeline = Pipeline(
-            space.scenario,
-            space,
-            ego=_ego(settings),
-            ideal=settings.ideal,
-            time_limit=settings.time_limit,
-            road_map=roads,
-            metrics=store.metrics,
-            seek_causes=settings.causes,
-            cause=Cause.named(settings.cause) if settings.cause else None,
-            threads=threads,
-        )
+        pipeline = pipeline_of(settings, store.metrics, store.folder, ego=ego, threads=threads)
         watch.stage("compile")
         pipeline.warm_up()
-        pipeline.choose_objective(Objective.from_dict(settings.objective))
         return _go(pipeline, store, settings, watch, deliver)
+
+
+def pipeline_of(
+    settings: Settings,
+    metrics: Sequence[str],
+    folder: Path,
+    *,
+    ego: str | None = None,
+    command: str = "resume",
+    causes: bool | None = None,
+    threads: int | None = None,
+) -> Pipeline:
+    """Return the pipeline that a run was made with, its objective included.
+
+    Args:
+        settings: of the run.
+        metrics: that it records.
+        folder: of the run.
+        ego: where a driver of the user's drives, that same driver.
+        command: who asks, for messages.
+        causes: whether to find causes, as the run did by default; where only one counts, they are
+            found all the same.
+        threads: to evaluate with, one for each core by default.
+
+    Raises:
+        StorageError: the scenario or the map is not what it was.
+        InputError: the scenario or the map is missing; or the ego is another, or must be named.
+    """
+    _check_driver(settings, ego, folder, command)
+    space, roads = searched(settings, folder)
+    pipeline = Pipeline(
+        space.scenario,
+        space,
+        ego=_ego(settings),
+        ideal=settings.ideal,
+        time_limit=settings.time_limit,
+        road_map=roads,
+        metrics=metrics,
+        seek_causes=settings.causes if causes is None else causes,
+        cause=Cause.named(settings.cause) if settings.cause else None,
+        threads=threads,
+    )
+    pipeline.choose_objective(Objective.from_dict(settings.objective))
+    return pipeline
 
 
 def _ego(settings: Settings) -> str | None:
@@ -246,12 +276,12 @@ def _ego(settings: Settings) -> str | None:
     return None if settings.ego == STORYBOARD.name else settings.ego
 
 
-def _check_driver(settings: Settings, ego: str | None, folder: Path) -> None:
+def _check_driver(settings: Settings, ego: str | None, folder: Path, command: str) -> None:
     """Refuse another driver than the run's, and one of the user's that is not named again."""
     if ego is None and is_spec(settings.ego):
         raise InputError(
             f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
-            f"bridgegen resume {folder} --ego {settings.ego}"
+            f"bridgegen {command} {folder} --ego {settings.ego}"
         )
     if ego not in (None, settings.ego):
         raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")

@@ -207,6 +207,45 @@ def coverage(
 
 
 @app.command()
+def regions(
+    run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
+    samples: Annotated[
+        int, typer.Option(help="Fresh random scenarios to simulate in each region.")
+    ] = 300,
+    at_least: Annotated[
+        float,
+        typer.Option(
+            help="The share of critical scenarios that makes a region critical; the fresh ones "
+            "must show it with 95 % confidence."
+        ),
+    ] = 0.5,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
+    ] = None,
+    ego: Annotated[
+        str | None, typer.Option(help="The run's driver, where it is one of your own.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Find where scenarios are critical: readable rules, each verified by fresh scenarios."""
+    from bridgegen.campaign.regions import regions_of
+    from bridgegen.screen import Bar, print_regions
+
+    with Bar("simulating fresh scenarios") as bar:
+        found = regions_of(
+            run,
+            ego=ego,
+            samples=samples,
+            at_least=at_least,
+            seed=seed,
+            stage=bar.stage,
+            progress=bar.progress,
+        )
+    print_regions(found, as_json=as_json)
+
+
+@app.command()
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[

@@ -159,9 +159,11 @@ class Parameter:
             The first and the last share, one or ``(N,)`` each, in [0, 1]; the last is at most the
             first where no value, or but one of infinitely many, lies in the range.
         """
-        below, above, width = np.asarray(low - lo), np.asarray(high - lo), np.asarray(hi - lo)
+        more = 0.0
         if self.kind == "integer":
-            below, above, width = np.ceil(below), np.floor(above) + 1.0, width + 1.0
+            low, high, more = math.ceil(low), math.floor(high), 1.0
+        below, above = np.asarray(low - lo), np.asarray(high - lo + more)
+        width = np.asarray(hi - lo + more)
         safe = np.where(width > 0.0, width, 1.0)
         first = np.where(width > 0.0, below / safe, np.where(below <= 0.0, 0.0, 1.0))
         last = np.where(width > 0.0, above / safe, np.where(above >= 0.0, 1.0, 0.0))

@@ -21,7 +21,7 @@ from bridgegen.odd.space import SearchSpace
 MOST = 2**21
 """Rows that are proposed for one box, at most."""
 
-_LEAST = 2**15  # rows that are proposed at least: so many look for the largest chance
+_LEAST = 2**14  # rows that are proposed at least: so many look for the largest chance
 _AT_ONCE = 4096
 
 

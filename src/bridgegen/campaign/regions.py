@@ -1,0 +1,137 @@
+"""The critical regions of a run on disk, verified with its own scenario, ego and objective."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.campaign.campaign import pipeline_of
+from bridgegen.campaign.settings import Settings
+from bridgegen.disk import write_whole
+from bridgegen.errors import InputError
+from bridgegen.odd.space import SearchSpace
+from bridgegen.ontology.files import save
+from bridgegen.pipeline import Pipeline
+from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
+from bridgegen.regions.owl import carriers, classes, statable
+from bridgegen.regions.record import to_json
+from bridgegen.store import Store
+
+JSON_FILE, OWL_FILE = "regions.json", "regions.owl"
+MAX_SEED = 2**32 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class RunRegions:
+    """The critical regions of a run.
+
+    Attributes:
+        folder: the run's.
+        space: what was searched.
+        found: the regions.
+        record: how they were found and all that is known of them, as JSON's types.
+        files: those that were written.
+        unstated: confirmed regions that the ontology cannot state, for it does not carry a
+            parameter that they name.
+    """
+
+    folder: Path
+    space: SearchSpace
+    found: Found
+    record: Mapping[str, Any]
+    files: tuple[Path, ...]
+    unstated: tuple[Region, ...]
+
+
+def regions_of(
+    folder: Path | str,
+    *,
+    ego: str | None = None,
+    samples: int = SAMPLES,
+    at_least: float = AT_LEAST,
+    seed: int | None = None,
+    threads: int | None = None,
+    stage: Callable[[str], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> RunRegions:
+    """Find and verify the critical regions of a run, finished or not; write them beside it.
+
+    ``regions.json`` has all of them, ``regions.owl`` a class for each that is confirmed.
+
+    Args:
+        folder: of the run.
+        ego: where a driver of your own drives, that same driver.
+        samples: fresh scenarios to simulate in each region.
+        at_least: the share of critical scenarios that makes a region critical.
+        seed: of the fresh scenarios; the run's by default.
+        threads: to simulate with, one for each core by default; the results do not depend on it.
+        stage: told what begins: "compile", "regions".
+        progress: told how many fresh scenarios are simulated, of how many.
+
+    Raises:
+        StorageError: not a run, its scenario or map is not what it was, or not writable.
+        InputError: a number out of range, no critical row, the scenario or the map is missing, or
+            the ego has to be named.
+    """
+    stage = stage or (lambda name: None)
+    if seed is not None and not 0 <= seed <= MAX_SEED:
+        raise InputError(f"0 <= seed <= {MAX_SEED} must hold, got {seed}")
+    with Store.open(folder) as store:
+        settings = Settings.from_dict(store.settings, store.folder)
+        rows = store.read()
+        metrics, finished, place = store.metrics, store.finished is not None, store.folder
+    pipeline = pipeline_of(
+        settings, metrics, place, ego=ego, command="regions", causes=False, threads=threads
+    )
+    space, ok = pipeline.space, rows.status == 0
+    check(space, rows.critical[ok], samples, at_least)
+    stage("compile")
+    pipeline.warm_up()
+    stage("regions")
+    seed = settings.seed if seed is None else seed
+    found = find_regions(
+        space, pipeline.evaluate, rows.X[ok], rows.critical[ok],
+        samples=samples, at_least=at_least, seed=seed, progress=progress,
+    )  # fmt: skip
+    driver = pipeline.driver.label
+    record = {
+        "run": str(place),
+        "scenario": space.scenario.name,
+        "ego": driver,
+        "cause": settings.cause,
+        "algorithm": settings.algorithm,
+        "evaluations": len(rows),
+        "finished": finished,
+        "samples": samples,
+        "at_least": at_least,
+        "seed": seed,
+        **to_json(found, space, driver),
+    }
+    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    write_whole(place / JSON_FILE, [text.encode()])
+    origin = f"{len(rows)} evaluations of {settings.algorithm} with seed {settings.seed}"
+    stated = _state(pipeline, found, place / OWL_FILE, origin)
+    return RunRegions(
+        place, space, found, record,
+        files=(place / JSON_FILE, *([place / OWL_FILE] if stated else [])),
+        unstated=tuple(one for one in found.confirmed if one not in stated),
+    )  # fmt: skip
+
+
+def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Region]:
+    """Write a class for each confirmed region that the ontology can state; return these regions."""
+    space = pipeline.space
+    # Any row would do; in this one no two parameters have the same value.
+    x = space.decode(np.random.default_rng(0).random((1, space.n_var)))[0]
+    individuals = pipeline.concrete(x).individuals if found.confirmed else None
+    carried = {} if individuals is None else carriers(individuals, space.values(x))
+    stated = [one for one in found.confirmed if individuals and statable(one, space, carried)]
+    if stated:
+        driver = pipeline.driver.label
+        save(classes(stated, space, carried, driver=driver, origin=origin), path)
+    else:
+        path.unlink(missing_ok=True)  # an earlier one would say what was not found now
+    return stated

@@ -1,0 +1,10 @@
+"""Critical regions of a search space: rules that hold, for they were tried on fresh scenarios.
+
+`find_regions` finds and verifies them; `words` says them, `owl` states them as ontology classes.
+"""
+
+from bridgegen.regions.box import Box
+from bridgegen.regions.evidence import Evidence
+from bridgegen.regions.find import Found, Region, find_regions
+
+__all__ = ["Box", "Evidence", "Found", "Region", "find_regions"]

@@ -1,0 +1,99 @@
+"""Boxes of the search space with edges that people can read."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.odd.space import SearchSpace
+from bridgegen.search.tree import Leaf
+
+# An edge moves by 1/20 of its box at most, and by 1/60 of its parameter's range.
+_STEPS_IN_BOX, _STEPS_IN_RANGE = 10, 30
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A range of each searched parameter, in its own unit; all edges count as inside.
+
+    Attributes:
+        low: ``(n_var,)`` float64.
+        high: ``(n_var,)`` float64.
+    """
+
+    low: Float
+    high: Float
+
+    def holds(self, X: Float) -> Bool:
+        """Return which rows of ``(N, n_var)`` lie in it, ``(N,)`` bool."""
+        inside: Bool = np.all((self.low <= X) & (self.high >= X), axis=1)
+        return inside
+
+    def narrows(self, outer: "Box") -> Bool:
+        """Return which parameters it leaves less than another box does, ``(n_var,)`` bool."""
+        less: Bool = (self.low > outer.low) | (self.high < outer.high)
+        return less
+
+
+def whole(space: SearchSpace) -> Box:
+    """Return the box of all rows: every searched parameter's declared range."""
+    parameters = [space.scenario.parameters[name] for name in space.variables]
+    return Box(
+        np.array([one.low for one in parameters]), np.array([one.high for one in parameters])
+    )
+
+
+def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
+    """Return a leaf with edges of few digits: what is printed is what is checked.
+
+    Args:
+        leaf: of a tree over the searched parameters.
+        space: of these.
+        outer: edges of this box stay as they are, and none goes beyond.
+    """
+    low, high = leaf.low.copy(), leaf.high.copy()
+    for k, name in enumerate(space.variables):
+        one = space.scenario.parameters[name]
+        if one.kind == "integer":
+            low[k], high[k] = math.ceil(leaf.low[k]), math.floor(leaf.high[k])
+            continue
+        step = min((high[k] - low[k]) / _STEPS_IN_BOX, (one.high - one.low) / _STEPS_IN_RANGE)
+        if not step > 0.0:
+            continue  # one value is all that it may be
+        digits = -math.floor(math.log10(step))
+        if low[k] > outer.low[k]:
+            low[k] = max(round(float(low[k]), digits) + 0.0, outer.low[k])  # no −0.0
+        if high[k] < outer.high[k]:
+            high[k] = min(round(float(high[k]), digits) + 0.0, outer.high[k])
+    return Box(low, high)
+
+
+def joined(leaves: Sequence[Leaf]) -> list[Leaf]:
+    """Return leaves with those made one that lie side by side and make up a box together."""
+    kept = list(leaves)
+    first = 0
+    while first < len(kept):
+        for second in range(first + 1, len(kept)):
+            both = _together(kept[first], kept[second])
+            if both is not None:
+                kept[first] = both
+                del kept[second]
+                first = -1  # the larger box may have neighbours among the earlier ones
+                break
+        first += 1
+    return kept
+
+
+def _together(one: Leaf, other: Leaf) -> Leaf | None:
+    """Return two leaves as one, if they differ in one column and touch there."""
+    (columns,) = np.nonzero((one.low != other.low) | (one.high != other.high))
+    if len(columns) != 1:
+        return None
+    column = int(columns[0])
+    lower, upper = sorted((one, other), key=lambda leaf: float(leaf.low[column]))
+    if np.nextafter(lower.high[column], np.inf) != upper.low[column]:
+        return None
+    rows, critical = one.rows + other.rows, one.critical + other.critical
+    return Leaf(lower.low, upper.high, rows, critical)

@@ -1,0 +1,205 @@
+import json
+import sqlite3
+import sys
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.regions import regions_of
+from bridgegen.cli import main
+from bridgegen.errors import InputError, StorageError
+from bridgegen.odd.within import in_box
+from bridgegen.ontology.files import load
+from bridgegen.ontology.vocabulary import LABEL
+from bridgegen.store import Store
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("runs") / "s3"
+    bg.run_search(
+        "crossroads-s3", algorithm="random", budget=400, seed=1, ego="route-follower", keep=0,
+        causes=False, deliver=False, out=place,
+    )  # fmt: skip
+    return place
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    return regions_of(folder, samples=100)
+
+
+@pytest.fixture
+def cli(monkeypatch, capsys):
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return run
+
+
+def copied(folder, place, **changes):
+    """The run elsewhere, with other settings or without some of its rows."""
+    place.mkdir()
+    (place / "run.sqlite").write_bytes((folder / "run.sqlite").read_bytes())
+    with sqlite3.connect(place / "run.sqlite") as connection:
+        for statement in changes.pop("sql", ()):
+            connection.execute(statement)
+        if changes:
+            sql = "SELECT value FROM run WHERE key = 'settings'"
+            settings = json.loads(connection.execute(sql).fetchone()[0])
+            connection.execute(
+                "UPDATE run SET value = ? WHERE key = 'settings'",
+                [json.dumps(settings | changes)],
+            )
+    return place
+
+
+def test_regions_hold_for_scenarios_found_by_trying(folder, found):
+    """Independent rows of the whole space, those outside a region thrown away."""
+    from bridgegen.campaign.campaign import pipeline_of
+    from bridgegen.campaign.settings import Settings
+
+    assert len(found.found.confirmed) >= 2
+    with Store.open(folder) as store:
+        settings = Settings.from_dict(store.settings, folder)
+        pipeline = pipeline_of(settings, store.metrics, folder, causes=False)
+    space = pipeline.space
+    X = space.decode(np.random.default_rng(99).random((2000, space.n_var)))
+    result = pipeline.evaluate(X)
+    for one in found.found.regions:
+        inside = in_box(space, X, one.box.low, one.box.high)
+        assert inside.mean() == pytest.approx(one.space_share, abs=0.03)
+        share = result.critical[inside].mean()
+        spread = np.sqrt(share * (1.0 - share) / inside.sum()) + 0.01
+        low, high = one.fresh.interval
+        assert low - 2.5 * spread < share < high + 2.5 * spread
+    anywhere = result.critical.mean()
+    assert all(one.fresh.share > anywhere + 0.1 for one in found.found.confirmed)
+
+
+def test_the_files_say_what_was_found(folder, found):
+    record = json.loads((folder / "regions.json").read_text("utf-8"))
+    assert record == json.loads(json.dumps(found.record))
+    assert (record["evaluations"], record["finished"], record["seed"]) == (400, True, 1)
+    with Store.open(folder) as store:
+        frame = store.frame()
+    assert record["critical"] == int(frame.critical.sum())
+    held = np.zeros(len(frame), bool)
+    for one in record["regions"]:
+        inside = np.ones(len(frame), bool)
+        for name, edges in one["box"].items():
+            inside &= frame[name].between(edges["low"], edges["high"])
+        counts = (int(inside.sum()), int((inside & frame.critical).sum()))
+        assert counts == (one["search"]["rows"], one["search"]["critical"])
+        assert [p for p in record["parameters"] if p["name"] in one["named"]]
+        held |= inside & one["confirmed"]
+    assert record["critical_held"] == int((held & frame.critical).sum())
+    owl = load(folder / "regions.owl")
+    labels = [quad.object.value for quad in owl.quads if quad.predicate == LABEL]
+    classes = sorted(label for label in labels if label.startswith("critical region"))
+    confirmed = range(1, len(found.found.confirmed) + 1)
+    assert classes == [f"critical region {k} of crossroads-s3" for k in confirmed]
+    assert found.files == (folder / "regions.json", folder / "regions.owl")
+
+
+def test_one_seed_gives_one_result_however_many_threads(folder, found, tmp_path):
+    place = copied(folder, tmp_path / "run")
+    again = regions_of(place, samples=100, seed=1, threads=1)
+    assert again.record | {"run": ""} == found.record | {"run": ""}
+    for name in ("regions.json", "regions.owl"):
+        mine, theirs = ((one / name).read_bytes() for one in (place, folder))
+        assert mine == theirs.replace(bytes(folder), bytes(place))
+    other = regions_of(place, samples=100, seed=2)
+    assert other.record["regions"] != found.record["regions"]
+
+
+def test_a_run_that_is_not_finished_has_regions_of_what_is_there(folder, tmp_path, cli):
+    sql = ["DELETE FROM run WHERE key = 'finished'", "DELETE FROM evaluations WHERE id >= 200"]
+    place = copied(folder, tmp_path / "run", sql=sql)
+    code, out, _ = cli("regions", place, "--samples", 50)
+    assert code == 0
+    assert "200 evaluations so far" in out
+    assert json.loads((place / "regions.json").read_text("utf-8"))["rows"] == 200
+
+
+def test_the_command_says_what_holds_and_what_does_not(folder, found, cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    code, out, err = cli("regions", folder, "--samples", 100)
+    assert (code, err.strip()) == (0, "")
+    assert "Regions where at least 50 % of all scenarios are critical" in out
+    table, _, rest = out.partition("Not confirmed:")
+    for one in found.found.confirmed:
+        assert f"{one.fresh.critical} of 100" in table
+        assert f"{one.search.critical} of {one.search.rows}" in table
+    refuted = [one for one in found.found.regions if not one.confirmed]
+    for one in refuted:
+        assert f"{one.fresh.critical} of 100" in rest
+    held = f"{found.found.critical_held} of the run's {found.found.critical} critical scenarios"
+    assert held in out
+    assert f"{len(found.found.regions) * 100} fresh scenarios, seed 1" in out
+    code, out, _ = cli("regions", folder, "--samples", 100, "--json")
+    assert (code, json.loads(out)) == (0, json.loads(json.dumps(found.record)))
+
+
+def test_nothing_that_holds_is_said_and_leaves_no_class(folder, tmp_path, cli):
+    place = copied(folder, tmp_path / "run")
+    (place / "regions.owl").write_text("of an earlier time", "utf-8")
+    code, out, _ = cli("regions", place, "--samples", 3)  # three rows confirm nothing
+    assert code == 0
+    assert "No region is confirmed where at least 50 %" in out
+    assert "Not confirmed:" in out
+    assert not (place / "regions.owl").exists()
+    assert json.loads((place / "regions.json").read_text("utf-8"))["critical_held"] == 0
+
+
+def test_every_mistake_is_one_clear_error(folder, tmp_path, cli):
+    def refused(*words):
+        code, _, err = cli("regions", *words)
+        assert (code, "Traceback" in err) == (2, False)
+        return err
+
+    assert "nowhere" in refused(tmp_path / "nowhere")
+    assert "1 <= samples" in refused(folder, "--samples", 0)
+    assert "0 < at_least < 1 must hold, got 2" in refused(folder, "--at-least", 2)
+    assert "0 <= seed" in refused(folder, "--seed", -1)
+    assert "the ego of this run must be route-follower, got fsm" in refused(folder, "--ego", "fsm")
+    calm = copied(folder, tmp_path / "calm", sql=["UPDATE evaluations SET critical = 0"])
+    assert "none of 400 evaluations is critical" in refused(calm)
+    empty = copied(folder, tmp_path / "empty", sql=["DELETE FROM evaluations"])
+    assert "none of 0 evaluations is critical" in refused(empty)
+    mine = copied(folder, tmp_path / "mine", ego="mine.py:Driver")
+    assert f"bridgegen regions {mine} --ego mine.py:Driver" in refused(mine)
+    other = copied(folder, tmp_path / "other", fingerprint="0" * 64)
+    assert "is not what it was" in refused(other)
+    assert not (calm / "regions.json").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_said(folder, tmp_path):
+    place = copied(folder, tmp_path / "run")
+    (place / "regions.json").mkdir()
+    with pytest.raises(StorageError, match=r"regions\.json: cannot be written"):
+        regions_of(place, samples=10)
+
+
+def test_where_one_cause_counts_it_counts_here_too(tmp_path):
+    """Harm that planning would have avoided: all other harm is as good as none."""
+    place = tmp_path / "run"
+    run = bg.run_search(
+        "crossroads-s2", algorithm="random", budget=150, seed=2, ego="route-follower", keep=0,
+        cause="planning", deliver=False, out=place,
+    )  # fmt: skip
+    counted = int(run.frame().critical.sum())
+    found = regions_of(place, samples=60, at_least=0.3)
+    assert found.record["cause"] == "planning"
+    assert found.found.critical == counted
+    assert found.found.confirmed
+
+
+def test_python_says_where_a_search_is_missing(tmp_path):
+    with pytest.raises((InputError, StorageError)):
+        regions_of(tmp_path)
