@@ -218,21 +218,55 @@ def decoder() -> list[Row]:
     return [("decoder at 1000 rows, rows/ms", f"{1.0 / fastest:,.0f}", "≥ 1,000")]
 
 
+LEARNERS = ("nsga2-dt", "map-elites")
+"""The algorithms that may take longer: they fit trees, or keep an archive."""
+
+
 def algorithms() -> list[Row]:
-    """Time ask and tell of a batch of 40 beside the simulator."""
+    """Time what an algorithm takes for 40 rows, over a search of 1000, beside the simulator."""
     rows = []
     for name in names():
-        algorithm = get(name)(Problem.unnamed(10), 0)
-        tell = algorithm.tell
-        times = []
-        for _ in range(25):
-            start = time.perf_counter()
-            U = algorithm.ask()
-            asked = time.perf_counter() - start
-            F = ((U - 0.3) ** 2).sum(axis=1, keepdims=True)
-            told = Results.of_F(F)
-            times.append(asked + seconds(lambda U=U, told=told, tell=tell: tell(U, told)))
-        rows.append((f"{name}, a batch of 40, ms", f"{1e3 * float(np.median(times)):.2f}", "≤ 5"))
+        target = "≤ 50" if name in LEARNERS else "≤ 5"
+        taken = best(lambda name=name: 40 * seconds_a_row(name))  # type: ignore[misc]
+        rows.append((f"{name}, for 40 rows, ms", f"{1e3 * taken:.2f}", target))
+    return rows
+
+
+def seconds_a_row(name: str) -> float:
+    """Return what asking and telling takes a row [s]; a tenth of the space is critical."""
+    method = get(name)
+    n_obj = 2 if method.objectives == "many" else 1
+    algorithm = method(Problem(tuple(f"x{i}" for i in range(10)), ("d_min", "v_d"), n_obj), 0)
+    asked, taken = 0, 0.0
+    while asked < 1000:
+        start = time.perf_counter()
+        U = algorithm.ask()
+        taken += time.perf_counter() - start
+        if not len(U):
+            break
+        F = np.stack([((U - c) ** 2).sum(axis=1) for c in (0.3, 0.5)], axis=1)
+        n = len(U)
+        results = Results(
+            F[:, :n_obj], np.ones(n, bool), F[:, 0] < 0.85, F.copy(), np.zeros(n, np.int8)
+        )
+        taken += seconds(lambda U=U, results=results: algorithm.tell(U, results))  # type: ignore[misc]
+        asked += n
+    return taken / asked
+
+
+def million() -> list[Row]:
+    """Time a million evaluations of nothing, through the loop and into the store."""
+    rows = []
+    for name in ("random", "pso"):
+        script = Path(__file__).with_name("million.py")
+        done = subprocess.run(
+            [sys.executable, str(script), name], stdout=subprocess.PIPE, check=True, text=True
+        )
+        wall, peak = done.stdout.split()
+        rows += [
+            (f"1,000,000 evaluations of {name}, peak memory, MiB", peak, "≤ 2,048"),
+            ("  s, without the simulator", wall, ""),
+        ]
     return rows
 
 
@@ -266,7 +300,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     part.__name__: part
     for part in (
         hot_paths, own_drivers, many_actors, senses, decoder, algorithms, files, town, one_file,
-        processes,
+        processes, million,
     )
 }  # fmt: skip
 

@@ -55,24 +55,25 @@ def in_cube(U: Float, n_var: int) -> bool:
     return U.dtype == np.float64 and U.shape[1] == n_var and bool(((U >= 0) & (U <= 1)).all())
 
 
-def evaluate(X: Float) -> SimpleNamespace:
-    F = sphere(X)
+def evaluate(X: Float, n_obj: int = 1) -> SimpleNamespace:
+    F, m = sphere(X, n_obj), sphere(X)
     status = np.where(X[:, 0] > 0.9, 1, 0)  # a tenth of the cube cannot be simulated
     F[status == 1] = np.nan
-    return SimpleNamespace(messages={}, metrics=F, F=F, critical=F[:, 0] < 0.1, status=status)
+    m[status == 1] = np.nan
+    return SimpleNamespace(messages={}, metrics=m, F=F, critical=m[:, 0] < 0.1, status=status)
 
 
 def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed: int = 3):
-    names = [f"p{i}" for i in range(n_var)]
+    names, n_obj = [f"p{i}" for i in range(n_var)], n_obj_of(algorithm)
     if folder.exists():
         store = Store.open(folder, write=True)
     else:
-        store = Store.create(folder, {}, names, ["m"], n_var=n_var, n_obj=1)
+        store = Store.create(folder, {}, names, ["m"], n_var=n_var, n_obj=n_obj)
     with store:
         result = run_loop(
-            algorithm(Problem(tuple(names), ("m",)), seed),
+            algorithm(Problem(tuple(names), ("m",), n_obj), seed),
             lambda U: U,
-            evaluate,
+            lambda X: evaluate(X, n_obj),
             store,
             budget,
             stop=stop,
@@ -211,6 +212,32 @@ def test_the_budget_is_exact(algorithm: Kind, budget: int, tmp_path):
         assert len(rows) == budget
     assert len(np.unique(rows.X, axis=0)) == len(rows)
     assert in_cube(rows.U, 4)
+
+
+def test_no_known_row_is_simulated_twice(algorithm: Kind, tmp_path):
+    """Integer parameters: many rows of the cube are one scenario, which is run once."""
+    n_obj, seen, told = n_obj_of(algorithm), [], {}
+
+    def simulate(X: Float) -> SimpleNamespace:
+        seen.extend(map(bytes, X))
+        return evaluate(X, n_obj)
+
+    class Told(algorithm):  # type: ignore[misc,valid-type]
+        def tell(self, U: Float, results: Results) -> None:
+            for k, x in enumerate(np.round(6 * U) / 6):
+                once = results.F[k].tobytes(), bool(results.ok[k]), bool(results.critical[k])
+                assert told.setdefault(x.tobytes(), once) == once
+                assert results.ok[k] == (x[0] <= 0.9)
+            super().tell(U, results)
+
+    search = Told(Problem(("p", "q", "r"), ("m",), n_obj), 3)
+    with Store.create(tmp_path / "run", {}, ["p", "q", "r"], ["m"], n_var=3, n_obj=n_obj) as store:
+        result = run_loop(search, lambda U: np.round(6 * U) / 6, simulate, store, 120)
+        assert store.read().X.tobytes() == b"".join(seen)
+    assert len(set(seen)) == len(seen) == result.evaluations <= 120
+    if algorithm.name not in DESIGNS:
+        assert result.evaluations == 120 or result.reason is Reason.CONVERGED
+        assert result.repeated > 0
 
 
 @pytest.mark.parametrize("stops", [[1], [2, 3], [1, 1, 1, 1]])

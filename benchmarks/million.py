@@ -1,0 +1,54 @@
+"""A million evaluations through the campaign's loop: how long, and how much memory.
+
+    .venv/bin/python benchmarks/million.py random|pso [EVALUATIONS]
+
+The evaluation is trivial, the loop and the store are the real ones: ten parameters, the paper's
+number of metrics. Prints seconds and the peak of memory [MiB] of the process.
+"""
+
+import re
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.campaign.loop import run_loop
+from bridgegen.search import Problem, get
+from bridgegen.store import Store
+
+PARAMETERS = tuple(f"p{i}" for i in range(10))
+METRICS = tuple(f"m{i}" for i in range(11))
+
+
+def evaluate(X: Float) -> SimpleNamespace:
+    """Return a bowl; its inside is critical."""
+    F = ((X - 0.3) ** 2).sum(axis=1, keepdims=True)
+    metrics = np.repeat(F, len(METRICS), axis=1)
+    status = np.zeros(len(X), np.int8)
+    return SimpleNamespace(messages={}, metrics=metrics, F=F, critical=F[:, 0] < 0.5, status=status)
+
+
+def main() -> None:
+    name, budget = sys.argv[1], int((sys.argv[2:] or ["1000000"])[0])
+    algorithm = get(name)(Problem(PARAMETERS, METRICS), 0)
+    start = time.perf_counter()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Store.create(
+            Path(folder) / "run", {}, PARAMETERS, METRICS, n_var=len(PARAMETERS), n_obj=1
+        ) as store,
+    ):
+        result = run_loop(algorithm, lambda U: U, evaluate, store, budget)
+        if result.evaluations != budget:
+            sys.exit(f"{name} ended after {result.evaluations} evaluations: {result.reason}")
+    peak = re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())
+    assert peak is not None
+    print(f"{time.perf_counter() - start:.0f} {int(peak[1]) / 1024:.0f}")
+
+
+if __name__ == "__main__":
+    main()
