@@ -225,8 +225,11 @@ def test_no_known_row_is_simulated_twice(algorithm: Kind, tmp_path):
     class Told(algorithm):  # type: ignore[misc,valid-type]
         def tell(self, U: Float, results: Results) -> None:
             for k, x in enumerate(np.round(6 * U) / 6):
+                if bytes(x) not in seen:  # no place in the budget, which only note-takers hear of
+                    assert not results.ok[k]
+                    continue
                 once = results.F[k].tobytes(), bool(results.ok[k]), bool(results.critical[k])
-                assert told.setdefault(x.tobytes(), once) == once
+                assert told.setdefault(bytes(x), once) == once
                 assert results.ok[k] == (x[0] <= 0.9)
             super().tell(U, results)
 
