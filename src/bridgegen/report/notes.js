@@ -8,7 +8,7 @@ function fillNotes(tables) {
     const table = element("table", {}, element("caption", { class: "hidden" }, title), element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...body));
     const wide = element("div", { class: "wide", tabindex: "0", role: "group", "aria-label": `${title}, scrollable` }, table);
     const card = element("div", { class: "card note-table" }, element("h3", {}, title), wide);
-    if (left_out) card.append(element("p", { class: "muted" }, `${number(left_out)} before these are kept with the run.`));
+    if (left_out) card.append(element("p", { class: "muted" }, `${number(left_out)} more are kept with the run.`));
     $("notes").append(card);
   }
 }

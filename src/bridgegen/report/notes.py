@@ -9,7 +9,7 @@ import numpy as np
 from bridgegen.odd.space import SearchSpace
 
 MOST = 200
-"""Rows of a table that the page holds, the last ones."""
+"""Rows of a table that the page holds, the first ones."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class NoteTable:
         title: what it is about.
         columns: headings.
         rows: as many texts as columns, each.
-        left_out: rows before these that are not shown.
+        left_out: rows after these that are not shown.
     """
 
     title: str
@@ -61,7 +61,7 @@ def _cells(
             box_in_words(one[key], space) if key == "box" else _text(one.get(key, ""))
             for key in columns
         )
-        for one in records[-MOST:]
+        for one in records[:MOST]
     )
     return columns, rows, max(0, len(records) - MOST)
 

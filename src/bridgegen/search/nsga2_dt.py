@@ -90,7 +90,7 @@ class NSGA2DT:
         self._next = self._rounds.send(results)
 
     def notes(self) -> Mapping[str, JSON]:
-        """Return each tree's size and the boxes that it found critical, the surest first."""
+        """Return each tree's size, and the critical boxes: the last tree's and the surest first."""
         return {"decision trees": list(self._trees), "critical boxes": list(self._critical)}
 
     def _search(self) -> Rounds:
@@ -124,9 +124,10 @@ class NSGA2DT:
                 "critical leaves": len(critical),
             }
         )
-        self._critical += [
+        boxes: list[JSON] = [
             {"tree": number, **self._described(leaf)} for leaf in critical[:BOXES_KEPT]
         ]
+        self._critical = boxes + self._critical
         return critical or [Leaf(low, high, len(known.U), int(known.critical.sum()))]
 
     def _described(self, leaf: Leaf) -> dict[str, JSON]:

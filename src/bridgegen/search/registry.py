@@ -8,6 +8,7 @@ from bridgegen.search.cma_es import CMAES
 from bridgegen.search.es import ES
 from bridgegen.search.ga import GA
 from bridgegen.search.grid import Grid
+from bridgegen.search.map_elites import MAPElites
 from bridgegen.search.mopso import MOPSO
 from bridgegen.search.nsga2 import NSGA2
 from bridgegen.search.nsga2_dt import NSGA2DT
@@ -24,7 +25,21 @@ GROUP = "bridgegen.algorithms"
 
 ALGORITHMS: dict[str, type[Algorithm]] = {
     cls.name: cls
-    for cls in (Random, Sobol, Grid, Pairwise, PSO, GA, ES, CMAES, NSGA2, SPEA2, MOPSO, NSGA2DT)
+    for cls in (
+        Random,
+        Sobol,
+        Grid,
+        Pairwise,
+        PSO,
+        GA,
+        ES,
+        CMAES,
+        NSGA2,
+        SPEA2,
+        MOPSO,
+        NSGA2DT,
+        MAPElites,
+    )
 }
 
 
