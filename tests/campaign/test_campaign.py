@@ -431,9 +431,19 @@ def test_what_an_algorithm_learnt_is_kept_and_shown(tmp_path):
     assert trees[0]["evaluations"] == 20
     assert len([one for one in boxes if one["tree"] == 1]) == trees[0]["critical leaves"] > 0
     sample = run.frame()[:20]
-    first = boxes[0]
+    first = next(one for one in boxes if one["tree"] == 1)
+    assert boxes[0]["tree"] == len(trees) > 1
     assert first["critical"] / first["rows"] >= 0.5
     assert first["critical"] <= sample["critical"].sum()
     page = run.report.read_text()
     assert '"title":"critical boxes","columns":["tree","box","rows","critical"]' in page
     assert bg.run_search("crossroads-s2", budget=40, keep=0, out=tmp_path / "pso").notes == {}
+
+
+def test_what_an_algorithm_refuses_leaves_no_folder(tmp_path):
+    with pytest.raises(UnknownNameError, match="did you mean 'v_d'"):
+        bg.run_search(
+            "crossroads-s2", algorithm="map-elites", settings={"descriptors": "v_e"},
+            out=tmp_path / "run",
+        )  # fmt: skip
+    assert not (tmp_path / "run").exists()

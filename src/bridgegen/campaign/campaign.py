@@ -186,11 +186,12 @@ def run_search(
             "metrics": list(metrics),
         },
     )
+    searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
     with Store.create(
         folder, made_with.to_dict(), space.names, pipeline.metrics,
         n_var=space.n_var, n_obj=chosen.n_obj,
     ) as store:  # fmt: skip
-        return _go(pipeline, store, made_with, watch, deliver)
+        return _go(pipeline, searcher, store, made_with, watch, deliver)
 
 
 def resume(
@@ -224,7 +225,8 @@ def resume(
         pipeline = pipeline_of(settings, store.metrics, store.folder, ego=ego, threads=threads)
         watch.stage("compile")
         pipeline.warm_up()
-        return _go(pipeline, store, settings, watch, deliver)
+        searcher = _algorithm(pipeline, settings)
+        return _go(pipeline, searcher, store, settings, watch, deliver)
 
 
 def pipeline_of(
@@ -325,16 +327,27 @@ def _placed(
     return on_map(scenario, roads), roads
 
 
-def _go(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch, deliver: bool) -> Run:
-    """Search up to the budget, then hand over and report if that is wanted."""
-    space, chosen = pipeline.space, pipeline.objective
+def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
+    """Return the run's search algorithm, as it begins."""
     method = toolkit.get(settings.algorithm)
     arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
-    problem = Problem(space.variables, pipeline.metrics, chosen.n_obj, arena)
-    algorithm = method(problem, settings.seed, **settings.algorithm_settings)
+    names, n_obj = pipeline.space.variables, pipeline.objective.n_obj
+    problem = Problem(names, pipeline.metrics, n_obj, arena)
+    return method(problem, settings.seed, **settings.algorithm_settings)
+
+
+def _go(
+    pipeline: Pipeline,
+    algorithm: toolkit.Algorithm,
+    store: Store,
+    settings: Settings,
+    watch: Watch,
+    deliver: bool,
+) -> Run:
+    """Search up to the budget, then hand over and report if that is wanted."""
     watch.stage("search")
     result = run_loop(
-        algorithm, space.decode, pipeline.evaluate, store, settings.budget, watch.batch
+        algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, watch.batch
     )
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
