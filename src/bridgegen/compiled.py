@@ -2,7 +2,8 @@
 
 Numba keys its cache by the file of the compiled function alone, so a change in a kernel that it
 calls from another file would go unnoticed. Here the cache folder's name is a digest of the source
-of every private module, kernels and what they read: change one, and all are compiled again.
+of every private module beside a kernel, all that kernels read: change one, and all are compiled
+again.
 """
 
 import ctypes
@@ -32,7 +33,8 @@ def cache_folder() -> Path:
     serves for as long as the machine keeps it.
     """
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("_[!_]*.py")):
+    homes = {kernels.parent for kernels in Path(__file__).parent.rglob("_*_kernels.py")}
+    for source in sorted(one for home in homes for one in home.glob("_[!_]*.py")):
         digest.update(source.read_bytes())
     name = f"kernels-{digest.hexdigest()[:16]}"
     chosen = os.environ.get("NUMBA_CACHE_DIR")
