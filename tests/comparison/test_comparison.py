@@ -282,6 +282,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
         ({"settings": {"ga": {}}}, UnknownNameError, "of this comparison 'ga'"),
         ({"seeds": 0}, InputError, "1 <= seeds"),
         ({"budget": 0}, InputError, "1 <= budget"),
+        ({"jobs": 0}, InputError, "1 <= jobs must hold, got 0"),
         ({"apart": 0.0}, InputError, "0 < distinct <= 1"),
         ({"ego": "refrence"}, UnknownNameError, "did you mean 'reference'"),
         ({"road_map": "no.xodr"}, InputError, "no.xodr"),
@@ -290,6 +291,6 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
 )
 def test_mistakes_are_told_before_anything_is_run(tmp_path, arguments, error, told):
     with pytest.raises(error, match=re.escape(told)):
-        bg.compare("crossroads-s4", jobs=1, out=tmp_path / "c", **arguments)
+        bg.compare("crossroads-s4", **{"jobs": 1, "out": tmp_path / "c", **arguments})
     runs = tmp_path / "c" / "runs"
     assert not runs.exists() or not [*runs.rglob("run.sqlite")]

@@ -5,17 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.comparison.measures import counts, measure, measures, ordinal, waited_for
+from bridgegen.comparison.measures import counts, measure, measures, ordinal, others, waited_for
 from bridgegen.comparison.plan import Cell
 from bridgegen.comparison.record import Record
 
 INF = math.inf
 
 
-def record(reached: float, front: list[list[float]], *, critical=60, evaluations=1000) -> Record:
+def record(reached: float, front: list[list[float]], *, critical=60, searched=("a",)) -> Record:
     x = np.array(front, np.float64).reshape(-1, 2)
     return Record(
-        terms=("d_min", "v_d"), command="", ended="budget", evaluations=evaluations, failed=0,
+        terms=("d_min", "v_d"), parameters=searched, command="", ended="budget",
+        evaluations=1000, failed=0,
         critical=critical, reached={1: 2.0, 10: 20.0, 50: reached}, seconds=4.0,
         seconds_reached={1: 0.1, 10: 0.2, 50: reached / 100.0}, distinct=5, critical_bins=7,
         critical_pairs=9, found=np.array([1, critical]), fronts=(x[:0], x),
@@ -27,7 +28,9 @@ def test_by_hand():
     """d_min of −10 to 0 and v_d of 0 to 8: the run at (−5, 8) and (0, 4) dominates 3/4."""
     one, two = Cell("s", "pso", 0), Cell("s", "random", 0)
     found = measure(
-        {one: record(200.0, [[-5.0, 8.0], [0.0, 4.0]]), two: record(INF, [[-10.0, 0.0]])}, 1000
+        {one: record(200.0, [[-5.0, 8.0], [0.0, 4.0]]), two: record(INF, [[-10.0, 0.0]])},
+        1000,
+        "random",
     )
     best, other = found.values[one], found.values[two]
     assert (best["r_critic"], best["to_50"], best["t_critic"]) == (0.06, 200.0, 1.0)
@@ -47,15 +50,27 @@ def test_the_best_method_is_that_of_the_least_median():
     cells = [Cell("s", name, seed) for name in ("a", "b") for seed in range(3)]
     times = [100.0, 300.0, INF, 50.0, 400.0, 500.0]
     records = {c: record(t, [[0.0, 0.0]]) for c, t in zip(cells, times, strict=True)}
-    values = measure(records, 1000).values
+    values = measure(records, 1000, "a").values
     assert [values[c]["t_critic"] for c in cells] == pytest.approx([t / 300.0 for t in times])
 
 
 def test_where_nobody_gets_there_nobody_is_the_best():
-    values = measure({Cell("s", "a", 0): record(INF, [])}, 1000).values[Cell("s", "a", 0)]
+    values = measure({Cell("s", "a", 0): record(INF, [])}, 1000, "a").values[Cell("s", "a", 0)]
     assert math.isnan(values["t_critic"])
     assert math.isnan(values["gd"])
     assert (values["to_50"], values["hypervolume"]) == (INF, 0.0)
+
+
+def test_those_who_search_something_else_are_not_compared_by_parameters():
+    one, two = Cell("s", "random", 0), Cell("s", "ppo-adversary", 0)
+    records = {two: record(200.0, [[0.0, 1.0]], searched=("b",)), one: record(50.0, [[0.0, 1.0]])}
+    assert others(records, "random") == {"ppo-adversary"}
+    assert others({two: records[two]}, "random") == set()
+    values = measure(records, 1000, "random").values
+    names = ("distinct", "critical_bins", "critical_pairs")
+    assert [values[one][name] for name in names] == [5.0, 7.0, 9.0]
+    assert all(math.isnan(values[two][name]) for name in names)
+    assert values[two]["t_critic"] == 4.0
 
 
 def test_five_per_cent_of_the_budget():

@@ -1,4 +1,5 @@
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,3 +55,55 @@ def test_the_summary_tests_against_the_baseline_and_corrects_by_measure():
     assert same.p == same.p_holm == 1.0
     with_gap = {cell: row for cell, row in values.items() if cell != Cell("s", "b", 3)}
     assert summarise(with_gap, ["s"], ["a", "b", "c"], "a", [MEASURES["r_critic"]])[1].runs == 3
+
+
+def told(shares: dict[str, list[float]], critical: int = 1) -> list[str]:
+    """The sentences of made-up runs."""
+    values = {
+        Cell("s", name, seed): {"r_critic": share, "distinct": 5.0, "hypervolume": 0.5}
+        for name, row in shares.items()
+        for seed, share in enumerate(row)
+    }
+    kinds = [MEASURES[name] for name in words.TOLD]
+    plan = SimpleNamespace(algorithms=list(shares), baseline="a", budget=1000)
+    lines = summarise(values, ["s"], plan.algorithms, "a", kinds)
+
+    def line(scenario, algorithm, measure):
+        wanted = (scenario, algorithm, measure)
+        return next(x for x in lines if (x.scenario, x.algorithm, x.measure) == wanted)
+
+    records = dict.fromkeys(
+        values, SimpleNamespace(critical=critical, evaluations=1000, failed=0, parameters=())
+    )
+    made = SimpleNamespace(
+        plan=plan, measures=kinds, lines=lines, line=line, records=records, gaps={}
+    )
+    return words.sentences(made, "s")
+
+
+def test_sentences_name_the_best_and_how_sure_that_is():
+    seeds = np.arange(8) / 100.0
+    first, second, third = told(
+        {"a": [*(0.1 + seeds)], "b": [*(0.5 + seeds)], "c": [*(0.1 + seeds)]}
+    )
+    assert first == (
+        "The largest share of critical scenarios, R_critic, is that of b (median 0.535; a: 0.135). "
+        "Better than a: b (p < 0.001, A12 1.00, large); no difference from a shown: c."
+    )
+    assert second.startswith(
+        "The largest number of different critical scenarios is that of a, b and c"
+    )
+    assert third.endswith("No difference from a shown: b and c.")
+
+
+def test_too_few_runs_are_said_to_be_too_few():
+    """2 / C(6, 3) = 0.1, and twice that for two tests."""
+    sentences = told({"a": [0.1, 0.2, 0.3], "b": [0.5, 0.6, 0.7], "c": [0.5, 0.6, 0.7]})
+    assert "p would still be 0.20. Ask for more seeds." in sentences[-1]
+    assert not any("no difference" in one.lower() for one in sentences)
+
+
+def test_where_nothing_was_found_nobody_is_praised_for_it():
+    first, second, *_ = told({"a": [0.0], "b": [0.0]}, critical=0)
+    assert first == "No run found a critical scenario."
+    assert second.startswith("The largest hypervolume")

@@ -72,6 +72,13 @@ def compare(
     cause: Annotated[
         str | None, typer.Option(help="Count only this cause's.", show_default="any")
     ] = None,
+    adversary: Annotated[
+        str | None,
+        typer.Option(
+            help="A vehicle that an adversary drives, as for 'search', with every algorithm.",
+            show_default="none; with an algorithm that is one the first",
+        ),
+    ] = None,
     road_map: Annotated[
         Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
     ] = None,
@@ -114,6 +121,7 @@ def compare(
             metrics=_names(metrics),
             causes=causes,
             cause=cause,
+            adversary=adversary,
             watch=screen.watch,
         )
     print_comparison(result, screen.seconds)

@@ -14,7 +14,7 @@ from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.runs import Task, Watcher, evaluations_of
 from bridgegen.comparison.table import summarise, write_tables
 from bridgegen.comparison.workers import run_all
-from bridgegen.errors import Interrupted, StorageError
+from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.odd.space import SearchSpace
 from bridgegen.search.algorithm import Value
 from bridgegen.store.sqlite import Lock
@@ -38,7 +38,7 @@ class Watch(Watcher):
 def compare(
     scenarios: str | Path | Sequence[str | Path],
     *,
-    algorithms: Sequence[str] = ("random", "pso"),
+    algorithms: str | Sequence[str] = ("random", "pso"),
     settings: Mapping[str, Mapping[str, Value]] | None = None,
     seeds: int = 10,
     budget: int = 1000,
@@ -61,6 +61,7 @@ def compare(
     metrics: Sequence[str] = (),
     causes: bool = False,
     cause: str | None = None,
+    adversary: str | None = None,
     watch: Watch | None = None,
 ) -> Comparison:
     """Run algorithms on scenarios with several seeds, and say which is better at what.
@@ -72,7 +73,7 @@ def compare(
 
     Args:
         scenarios: one or several, each as for ``run_search``.
-        algorithms: names of ``bridgegen list algorithms``.
+        algorithms: one or several names of ``bridgegen list algorithms``.
         settings: of algorithms by their names, where they are not to be their defaults.
         seeds: runs of each algorithm in each scenario, with the seeds 0, 1, 2 …
         budget: evaluations of each run.
@@ -96,6 +97,7 @@ def compare(
         metrics: to record besides.
         causes: whether to find the cause of each critical scenario; takes longer.
         cause: the only one that counts.
+        adversary: the participant that an adversary drives, with every algorithm.
         watch: told how it is getting on.
 
     Returns:
@@ -107,9 +109,11 @@ def compare(
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
     watch = watch or Watch()
+    if jobs is not None and jobs < 1:
+        raise InputError(f"1 <= jobs must hold, got {jobs}")
     plan = make_plan(
         [scenarios] if isinstance(scenarios, str | Path) else scenarios,
-        algorithms,
+        [algorithms] if isinstance(algorithms, str) else algorithms,
         settings=settings or {},
         seeds=seeds,
         budget=budget,
@@ -132,6 +136,7 @@ def compare(
             "metrics": tuple(metrics),
             "causes": causes or cause is not None,
             "cause": cause,
+            "adversary": adversary,
         },
     )
     begin(plan)
@@ -184,20 +189,21 @@ def _conclude(plan: Plan, failures: Mapping[Cell, str], watch: Watch) -> Compari
     """Read the runs, measure and test them, and write it all."""
     watch.stage("read")
     gaps, records = dict(failures), {}
-    spaces: dict[str, SearchSpace] = {}
+    spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
     for cell in plan.cells:
         if cell in gaps:
             continue
         folder = plan.folder(cell)
         try:
-            if cell.scenario not in spaces:
-                spaces[cell.scenario] = space_of(folder)
-            space = spaces[cell.scenario]
+            kind = (cell.scenario, cell.algorithm)
+            if kind not in spaces:
+                spaces[kind] = space_of(folder)
+            space = spaces[kind]
             records[cell] = read(folder, space, plan.budget, counts(plan.budget), plan.apart)
         except StorageError as error:
             gaps[cell] = str(error)
     measured = {
-        scenario: measure(of_it, plan.budget)
+        scenario: measure(of_it, plan.budget, plan.baseline)
         for scenario in plan.scenarios
         if (of_it := {c: one for c, one in records.items() if c.scenario == scenario})
     }

@@ -87,7 +87,13 @@ def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme)
 
 
 def curves(
-    samples: Mapping[str, Float], points: Sequence[int], baseline: str, label: str, theme: Theme
+    samples: Mapping[str, Float],
+    points: Sequence[int],
+    baseline: str,
+    label: str,
+    theme: Theme,
+    *,
+    from_zero: bool = True,
 ) -> bytes:
     """Draw the median over runs, and the band between the quartiles, by evaluations; a PNG.
 
@@ -97,6 +103,8 @@ def curves(
         baseline: drawn in ink.
         label: of the vertical axis.
         theme: what to draw in.
+        from_zero: whether the vertical axis begins at 0; else where the curves are after a tenth of
+            the evaluations, so that ends that differ little can be told apart.
     """
     names = [name for name in samples if len(samples[name])]
     figure, axes = _figure(3.1 + 0.2 * -(-len(names) // 4), theme)
@@ -111,7 +119,8 @@ def curves(
         axes.fill_between(x, low, high, color=colour, alpha=0.16, linewidth=0)
         axes.plot(x, median, color=colour, linestyle=style, linewidth=2, label=name)
     axes.set_xlim(0, points[-1])
-    axes.set_ylim(bottom=0)
+    early = [float(quartiles(samples[name][:, len(points) // 10]).low) for name in names]
+    axes.set_ylim(bottom=0 if from_zero or not early else np.floor(20 * min(early)) / 20)
     axes.set_xlabel("evaluations")
     axes.set_ylabel(label)
     axes.grid(color=theme.grid, linewidth=0.8)

@@ -113,8 +113,22 @@ class Measured:
     reference: Float
 
 
-def measure(records: Mapping[Cell, Record], budget: int) -> Measured:
-    """Measure the runs of one scenario, at least one."""
+def others(records: Mapping[Cell, Record], baseline: str) -> set[str]:
+    """Return the algorithms that did not search the same parameters as the baseline.
+
+    Where the baseline has no run, the first algorithm that has one stands for it.
+    """
+    usual = next(iter(records.values())).parameters
+    usual = next((r.parameters for cell, r in records.items() if cell.algorithm == baseline), usual)
+    return {cell.algorithm for cell, one in records.items() if one.parameters != usual}
+
+
+def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measured:
+    """Measure the runs of one scenario, at least one.
+
+    Bins and differences of parameters are not defined (NaN) for algorithms that search others than
+    the baseline does: an adversary, say.
+    """
     m = len(next(iter(records.values())).terms)
     ranges = [(one.low, one.high) for one in records.values()]
     known = [(low, high) for low, high in ranges if low is not None and high is not None]
@@ -126,14 +140,14 @@ def measure(records: Mapping[Cell, Record], budget: int) -> Measured:
     reached = {cell: one.reached[k] for cell, one in records.items()}
     seconds = {cell: one.seconds_reached[k] for cell, one in records.items()}
     relative, relative_seconds = _by_the_best(reached), _by_the_best(seconds)
+    strange = others(records, baseline)
     values = {
         cell: {
             "r_critic": one.critical / one.evaluations if one.evaluations else float("nan"),
             "t_critic": relative[cell],
             **{f"to_{n}": count for n, count in one.reached.items()},
-            "distinct": float(one.distinct),
-            "critical_bins": float(one.critical_bins),
-            "critical_pairs": float(one.critical_pairs),
+            **dict.fromkeys(("distinct", "critical_bins", "critical_pairs"), float("nan")),
+            **(_in_parameters(one) if cell.algorithm not in strange else {}),
             "hypervolume": float(curves[cell][-1]),
             "gd": generational_distance(final[cell], reference),
             "spread": spread(final[cell], reference),
@@ -144,6 +158,14 @@ def measure(records: Mapping[Cell, Record], budget: int) -> Measured:
         for cell, one in records.items()
     }
     return Measured(values, curves, scale, reference)
+
+
+def _in_parameters(one: Record) -> dict[str, float]:
+    return {
+        "distinct": float(one.distinct),
+        "critical_bins": float(one.critical_bins),
+        "critical_pairs": float(one.critical_pairs),
+    }
 
 
 def _curve(record: Record, scale: Scale) -> Float:

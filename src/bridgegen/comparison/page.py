@@ -136,7 +136,7 @@ def _median(line: Line, one: Measure, is_best: bool) -> str:
     parts.append(f"<small>{escape(words.span(line, one))}</small>")
     if not np.isnan(line.p_holm):
         parts.append(f"<small>p {escape(words.p_value(line.p_holm))}, A12 {line.a12:.2f}</small>")
-    if line.never:
+    if 0 < line.never < line.runs:
         parts.append(f"<small>never in {line.never} of {line.runs}</small>")
     return f"<td{' class=best' if is_best else ''}>{''.join(parts)}</td>"
 
@@ -162,10 +162,8 @@ def _figures(comparison: Comparison, scenario: str) -> str:
     band = "Median over the runs, and the band between the quartiles"
     drawn = []
     for theme in (figures.LIGHT, figures.DARK):
-        critical, volume = (
-            figures.curves(samples, at, plan.baseline, label, theme)
-            for samples, label in ((found, "critical scenarios"), (volumes, "hypervolume"))
-        )
+        critical = figures.curves(found, at, plan.baseline, "critical scenarios", theme)
+        volume = figures.curves(volumes, at, plan.baseline, "hypervolume", theme, from_zero=False)
         drawn.append((figures.boxes(shares, plan.baseline, "R_critic", theme), critical, volume))
     captions = (
         "R_critic: the critical share of each run (points), quartiles and median.",

@@ -96,9 +96,19 @@ class Plan:
         return self.out / RUNS / cell.name
 
     def arguments(self, cell: Cell) -> dict[str, Any]:
-        """Return the arguments of ``run_search`` that make a run, but for its folder."""
+        """Return the arguments of ``run_search`` that make a run, but for its folder.
+
+        Weights are for the algorithms that search one sum; who searches many objectives is not
+        given any, unless the user asks for many of all algorithms.
+        """
+        options = dict(self.options)
+        of_many = toolkit.get(cell.algorithm).objectives == "many"
+        if of_many and options.get("objectives") is None:
+            options["weights"] = None
+            if options.get("objective"):
+                options["objective"] = dict.fromkeys(options["objective"])
         return {
-            **self.options,
+            **options,
             "scenario": self.scenarios[cell.scenario],
             "algorithm": cell.algorithm,
             "settings": dict(self.algorithms[cell.algorithm]),

@@ -27,6 +27,7 @@ class Record:
 
     Attributes:
         terms: the metrics of the scenario's objective.
+        parameters: what it searched.
         command: the command line that makes the same run, into the folder ``replay``.
         ended: why it ended: "budget", "exhausted" or "converged".
         evaluations: all that it made.
@@ -46,6 +47,7 @@ class Record:
     """
 
     terms: tuple[str, ...]
+    parameters: tuple[str, ...]
     command: str
     ended: str
     evaluations: int
@@ -107,6 +109,7 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
     hits = reader.hits
     return Record(
         terms=terms,
+        parameters=space.variables,
         command=settings.command(Path("replay") / folder.name),
         ended=ended,
         evaluations=reader.count,

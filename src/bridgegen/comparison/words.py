@@ -4,9 +4,11 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from math import isinf, isnan
 
-from bridgegen.comparison.measures import Measure
+import numpy as np
+
+from bridgegen.comparison.measures import Measure, others
 from bridgegen.comparison.result import Comparison
-from bridgegen.comparison.statistics import effect
+from bridgegen.comparison.statistics import effect, mann_whitney
 from bridgegen.comparison.table import Line
 
 SURE = 0.05
@@ -57,11 +59,39 @@ def verdict(line: Line) -> str:
 def sentences(comparison: Comparison, scenario: str) -> list[str]:
     """Return what was found in one scenario: who finds most, how sure that is, and what is odd."""
     measures = {one.name: one for one in comparison.measures}
-    told = [_best(comparison, scenario, measures[name]) for name in TOLD]
-    return [text for text in (*told, *_short(comparison, scenario)) if text]
+    few = _too_few(comparison, scenario)
+    found = any(one.critical for c, one in comparison.records.items() if c.scenario == scenario)
+    names = list(TOLD) if found else ["hypervolume"]
+    told = [] if found else ["No run found a critical scenario."]
+    told += [_best(comparison, scenario, measures[name], is_open=not few) for name in names]
+    return [text for text in (*told, few, *_short(comparison, scenario)) if text]
 
 
-def _best(comparison: Comparison, scenario: str, one: Measure) -> str:
+def _too_few(comparison: Comparison, scenario: str) -> str:
+    """Say where so few runs could not be told from luck, even if they differed entirely."""
+    plan = comparison.plan
+    runs = {
+        name: comparison.line(scenario, name, "r_critic").runs
+        for name in plan.algorithms
+        if comparison.line(scenario, name, "r_critic").runs
+    }
+    others = [n for name, n in runs.items() if name != plan.baseline]
+    if not others or plan.baseline not in runs:
+        return ""
+    n, m = runs[plan.baseline], max(others)
+    least = mann_whitney(np.arange(float(n)), np.arange(float(n), float(n + m))) * len(others)
+    if least < SURE:
+        return ""
+    against = f" by {len(others)} tests" if len(others) > 1 else ""
+    return (
+        f"So few runs cannot show a difference from {plan.baseline}{against}: were each run of an "
+        f"algorithm better than each of {plan.baseline}, p would still be {min(least, 1.0):.2f}. "
+        "Ask for more seeds."
+    )
+
+
+def _best(comparison: Comparison, scenario: str, one: Measure, *, is_open: bool) -> str:
+    """Return which algorithm's median is the largest, and which differ from the baseline."""
     lines = [
         line for line in comparison.lines if (line.scenario, line.measure) == (scenario, one.name)
     ]
@@ -86,7 +116,7 @@ def _best(comparison: Comparison, scenario: str, one: Measure) -> str:
         for line in lines
         if not verdict(line) and line.algorithm != comparison.plan.baseline and line.runs
     ]
-    if open_ones:
+    if open_ones and is_open:
         parts.append(f"no difference from {comparison.plan.baseline} shown: {_and(open_ones)}")
     rest = "; ".join(parts)
     return text + (f" {rest[0].upper()}{rest[1:]}." if rest else "")
@@ -117,6 +147,12 @@ def _short(comparison: Comparison, scenario: str) -> Iterable[str]:
             f"{name} had no more to ask after {few} of {budget:,} evaluations in "
             f"{count} of {len(made)} runs: its shares are of these, and what it had not found "
             "by then counts as never found."
+        )
+    if strange := others(records, comparison.plan.baseline) if records else set():
+        names = [name for name in comparison.plan.algorithms if name in strange]
+        yield (
+            f"{_and(names)} searched other parameters than {comparison.plan.baseline}: different "
+            "scenarios and bins are not counted, for they could not be compared."
         )
     failed = Counter(c.algorithm for c, one in records.items() if one.failed)
     if failed:

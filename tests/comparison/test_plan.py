@@ -1,0 +1,77 @@
+"""A plan's command line is the plan; and what its runs are made with."""
+
+import shlex
+import sys
+
+import pytest
+
+import bridgegen as bg
+from bridgegen.cli import main
+from bridgegen.comparison.plan import Cell, make_plan
+from bridgegen.errors import InputError
+
+
+@pytest.fixture
+def plans(monkeypatch):
+    """The plans that comparisons begin with; none is carried out."""
+    found = []
+
+    def keep(plan):
+        found.append(plan)
+        raise InputError("not today")
+
+    monkeypatch.setattr("bridgegen.comparison.comparison.begin", keep)
+    return found
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"algorithms": ["random", "pso", "nsga2"], "baseline": "pso", "seeds": 3, "budget": 77},
+        {"settings": {"pso": {"w": 0.5, "population": 20, "mutate_best": False}}, "apart": 0.25},
+        {"objective": {"d_min": 0.25, "ttc": 1.0}, "scale": "standardised", "metrics": ["pet"]},
+        {"objective": {"d_min": None, "ttc": None}, "weights": "entropy", "cause": "planning"},
+        {"ego": "my driver.py:It's", "ideal": ["control", "perception"], "time_limit": 2.5},
+        {"axes": ["static", "weather"], "fixed": {"fog_density": 1e-3}, "causes": True},
+        {"objectives": "many", "road_map": "town.xodr", "junction": "965", "adversary": "bv"},
+    ],
+)
+def test_its_command_is_the_plan(plans, monkeypatch, tmp_path, options):
+    with pytest.raises(InputError, match="not today"):
+        bg.compare(["crossroads-s4", "cut-in"], out=tmp_path / "c", **options)
+    monkeypatch.setattr(sys, "argv", shlex.split(plans[0].command()))
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2
+    assert len(plans) == 2
+    assert plans[0] == plans[1]
+
+
+def plan(**options):
+    given = {"settings": {}, "seeds": 2, "budget": 9, "baseline": None, "apart": 0.1, "out": None}
+    return make_plan(["crossroads-s4", "crossroads-s1"], ["pso", "nsga2"], **given, options=options)
+
+
+def test_the_grid_in_the_order_of_running_and_of_telling():
+    names = ["pso", "nsga2"]
+    scenarios = ["crossroads-s4", "crossroads-s1"]
+    made = plan()
+    assert list(made.cells) == [Cell(s, a, k) for k in range(2) for s in scenarios for a in names]
+    assert list(made.cells_in_order) == [
+        Cell(s, a, k) for s in scenarios for a in names for k in range(2)
+    ]
+    assert str(made.out) == "comparisons/crossroads-s4-crossroads-s1"
+    assert made.folder(made.cells[0]).name == "crossroads-s4-pso-0"
+    assert made.baseline == "pso"
+
+
+def test_weights_are_for_those_who_search_a_sum():
+    one, many = Cell("crossroads-s4", "pso", 0), Cell("crossroads-s4", "nsga2", 0)
+    made = plan(objective={"d_min": 0.5, "v_d": 1.0}, weights="fixed", objectives=None)
+    assert made.arguments(one)["objective"] == {"d_min": 0.5, "v_d": 1.0}
+    assert made.arguments(one)["weights"] == "fixed"
+    assert made.arguments(many)["objective"] == {"d_min": None, "v_d": None}
+    assert made.arguments(many)["weights"] is None
+    asked = plan(objective={"d_min": 0.5, "v_d": 1.0}, weights="fixed", objectives="many")
+    assert asked.arguments(many)["weights"] == "fixed"  # and so it is refused
