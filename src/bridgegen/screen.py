@@ -318,7 +318,10 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
             "share. space: how many\nof all random scenarios lie in the region."
         )
     else:
-        print("No part of its parameters' ranges stands out in a decision tree of the evaluations.")
+        print(
+            "No part of the parameters' ranges stands out in a decision tree of the evaluations: too "
+            "few are\ncritical, or nowhere enough of them."
+        )
     if confirmed:
         print(
             f"\nThe confirmed {'region holds' if confirmed == 1 else 'regions hold'} "
@@ -329,8 +332,8 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
     print(f"{found.simulations} fresh scenarios, seed {facts['seed']}: {files}")
     if run.unstated:
         print(
-            f"{len(run.unstated)} of the regions cannot be stated as classes: the ontology does "
-            "not carry a parameter that they name."
+            f"{len(run.unstated)} of them cannot be stated as classes: the ontology cannot say this "
+            "scenario, or has no value of a parameter that the rule names."
         )
 
 

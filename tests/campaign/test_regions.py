@@ -14,6 +14,8 @@ from bridgegen.ontology.files import load
 from bridgegen.ontology.vocabulary import LABEL
 from bridgegen.store import Store
 
+from .braking import limits, stochastic, write_pair
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -198,6 +200,40 @@ def test_where_one_cause_counts_it_counts_here_too(tmp_path):
     assert found.record["cause"] == "planning"
     assert found.found.critical == counted
     assert found.found.confirmed
+
+
+def test_of_a_scenario_file_s_choices_the_values_are_said(tmp_path, cli):
+    """A lead vehicle brakes: the harder, the later it may begin and still do harm."""
+    body = stochastic(
+        ("Gap", f"<UniformDistribution>{limits(5.2, 60)}</UniformDistribution>"),
+        ("BrakeTime", f"<UniformDistribution>{limits(1, 14)}</UniformDistribution>"),
+        ("Deceleration", '<ProbabilityDistributionSet><Element value="0.5" weight="1"/>'
+         '<Element value="3" weight="3"/><Element value="8" weight="1"/>'
+         "</ProbabilityDistributionSet>"),
+    )  # fmt: skip
+    scenario, ranges = write_pair(tmp_path, body)
+    place = tmp_path / "run"
+    bg.run_search(
+        scenario, distribution=ranges, algorithm="random", budget=500, keep=0, deliver=False,
+        out=place,
+    )  # fmt: skip
+    code, out, _ = cli("regions", place)
+    assert code == 0
+    record = json.loads((place / "regions.json").read_text("utf-8"))
+    edges = {
+        edge
+        for one in record["regions"]
+        if "Deceleration" in one["named"]
+        for edge in one["box"]["Deceleration"].values()
+    }
+    assert edges
+    assert edges <= {0.5, 3.0, 8.0}
+    confirmed = [one for one in record["regions"] if one["confirmed"]]
+    # Harm needs time to brake: the scenario ends after 12 s.
+    assert all(one["box"]["BrakeTime"]["high"] < 12.0 for one in confirmed)
+    assert record["critical_held"] > 0.8 * record["critical"]
+    assert f"{len(confirmed)} of them cannot be stated as classes" in out
+    assert not (place / "regions.owl").exists()
 
 
 def test_python_says_where_a_search_is_missing(tmp_path):

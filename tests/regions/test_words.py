@@ -33,6 +33,8 @@ def test_rules_read_as_people_say_them():
         "bv_speed in 1.2 .. 2 m/s"
     )
     assert rule(OUTER, EVERY) == ANYWHERE
+    assert rule(box(lanes_per_direction=(1, 1)), EVERY) == "lanes_per_direction = 1"
+    assert rule(box(lanes_per_direction=(1, 2)), EVERY) == "lanes_per_direction ≤ 2"
 
 
 def test_a_sentence_says_what_is_known():

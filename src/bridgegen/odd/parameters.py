@@ -169,6 +169,15 @@ class Parameter:
         last = np.where(width > 0.0, above / safe, np.where(above >= 0.0, 1.0, 0.0))
         return np.clip(first, 0.0, 1.0), np.clip(last, 0.0, 1.0)
 
+    def ends(self, low: float, high: float) -> tuple[float, float] | None:
+        """Return its lowest and its highest value in a range; None where it may take any there.
+
+        The range holds a value of it at least.
+        """
+        if self.kind == "integer":
+            return float(math.ceil(low)), float(math.floor(high))
+        return None
+
     def _naming_problems(self) -> list[str]:
         return [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
 

@@ -56,8 +56,8 @@ def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
     low, high = leaf.low.copy(), leaf.high.copy()
     for k, name in enumerate(space.variables):
         one = space.scenario.parameters[name]
-        if one.kind == "integer":
-            low[k], high[k] = math.ceil(leaf.low[k]), math.floor(leaf.high[k])
+        if ends := one.ends(float(low[k]), float(high[k])):
+            low[k], high[k] = ends
             continue
         step = min((high[k] - low[k]) / _STEPS_IN_BOX, (one.high - one.low) / _STEPS_IN_RANGE)
         if not step > 0.0:

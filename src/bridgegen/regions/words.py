@@ -14,16 +14,13 @@ def conditions(box: Box, space: SearchSpace) -> list[str]:
     The numbers are the box's own, to the last bit.
     """
     outer = whole(space)
-    return [
-        _condition(
-            name,
-            _unit(space, name),
-            float(box.low[k]) if box.low[k] > outer.low[k] else None,
-            float(box.high[k]) if box.high[k] < outer.high[k] else None,
-        )
-        for k, name in enumerate(space.variables)
-        if box.narrows(outer)[k]
-    ]
+    found = []
+    for k in box.narrows(outer).nonzero()[0].tolist():
+        low, high = float(box.low[k]), float(box.high[k])
+        name = space.variables[k]
+        text = _range(low, high, low > float(outer.low[k]), high < float(outer.high[k]))
+        found.append(f"{name} {text}{_unit(space, name)}")
+    return found
 
 
 def rule(box: Box, space: SearchSpace) -> str:
@@ -65,14 +62,13 @@ def number(value: float) -> str:
     return repr(value).removesuffix(".0")
 
 
-def _condition(name: str, unit: str, low: float | None, high: float | None) -> str:
-    """Return the condition on one parameter; None leaves a side as wide as it is."""
-    if low is not None and low == high:
-        return f"{name} = {number(low)}{unit}"
-    if low is not None and high is not None:
-        return f"{name} in {number(low)} .. {number(high)}{unit}"
-    sign, edge = ("≥", low) if low is not None else ("≤", high)
-    return f"{name} {sign} {number(edge)}{unit}" if edge is not None else name
+def _range(low: float, high: float, low_counts: bool, high_counts: bool) -> str:
+    """Return a range as read; an end that does not count excludes nothing."""
+    if low == high:
+        return f"= {number(low)}"
+    if low_counts and high_counts:
+        return f"in {number(low)} .. {number(high)}"
+    return f"≥ {number(low)}" if low_counts else f"≤ {number(high)}"
 
 
 def _unit(space: SearchSpace, name: str) -> str:

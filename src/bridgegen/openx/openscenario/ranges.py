@@ -54,6 +54,13 @@ class FileParameter(Parameter):
             return super().shares(low, high, lo, hi)
         return shares_within(self.distribution, low, high)
 
+    def ends(self, low: float, high: float) -> tuple[float, float] | None:
+        """See `Parameter`."""
+        if not isinstance(self.distribution, Discrete):
+            return super().ends(low, high)
+        inside = [value for value in self.distribution.values if low <= value <= high]
+        return min(inside), max(inside)
+
     def _naming_problems(self) -> list[str]:
         return []
 
