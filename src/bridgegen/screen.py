@@ -319,8 +319,8 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
         )
     else:
         print(
-            "No part of the parameters' ranges stands out in a decision tree of the evaluations: too "
-            "few are\ncritical, or nowhere enough of them."
+            "No part of the parameters' ranges stands out in a decision tree of the evaluations:\n"
+            "too few are critical, or nowhere enough of them."
         )
     if confirmed:
         print(
@@ -332,8 +332,8 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
     print(f"{found.simulations} fresh scenarios, seed {facts['seed']}: {files}")
     if run.unstated:
         print(
-            f"{len(run.unstated)} of them cannot be stated as classes: the ontology cannot say this "
-            "scenario, or has no value of a parameter that the rule names."
+            f"{len(run.unstated)} of them cannot be stated as classes: the ontology cannot say "
+            "this scenario, or has no value of a parameter that the rule names."
         )
 
 
