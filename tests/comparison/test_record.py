@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.comparison.fronts import front
@@ -25,6 +25,7 @@ def rows_of(n: int, seed: int) -> Rows:
     )  # fmt: skip
 
 
+@settings(max_examples=30)
 @given(st.integers(0, 90), st.integers(1, 120), st.integers(1, 40), st.integers(0, 5))
 def test_chunks_do_not_matter(n, budget, chunk, seed):
     rows = rows_of(n, seed)

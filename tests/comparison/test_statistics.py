@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import mannwhitneyu
 
@@ -33,6 +33,7 @@ def test_a12_takes_what_never_came_as_the_worst_of_what_should_be_small():
     assert better([NAN, 2.0], [1.0]) == 1.0
 
 
+@settings(max_examples=30)
 @given(values, values)
 def test_a12_is_the_u_statistic_over_the_pairs(x, y):
     ranks = np.unique(np.array([*x, *y]), return_inverse=True)[1]
@@ -40,6 +41,7 @@ def test_a12_is_the_u_statistic_over_the_pairs(x, y):
     assert better(x, y) == pytest.approx(u / (len(x) * len(y)))
 
 
+@settings(max_examples=30)
 @given(values, values)
 def test_a12_changes_sides_with_the_samples_and_with_what_is_better(x, y):
     assert better(x, y) == pytest.approx(1.0 - better(y, x))
@@ -64,6 +66,7 @@ def test_holm_by_hand():
     assert holm([]) == []
 
 
+@settings(max_examples=30)
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8), st.randoms())
 def test_holm_keeps_the_order_and_never_makes_surer(p, random):
     corrected = holm(p)
@@ -85,6 +88,7 @@ def test_mann_whitney_by_hand_and_by_scipy():
     assert math.isnan(mann_whitney(np.array([NAN]), np.array([1.0])))
 
 
+@settings(max_examples=30)
 @given(values, values)
 def test_mann_whitney_knows_only_ranks(x, y):
     p = mann_whitney(np.array(x), np.array(y))
@@ -93,6 +97,7 @@ def test_mann_whitney_knows_only_ranks(x, y):
     assert 0.0 <= p <= 1.0
 
 
+@settings(max_examples=30)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=12))
 def test_quartiles_are_numpy_s_where_all_is_finite(x):
     q = quartiles(np.array([*x, NAN]))
