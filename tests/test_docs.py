@@ -93,3 +93,48 @@ def test_every_metric_and_column_is_described():
     told = {row[0].strip("| `"): tuple(row[1:]) for row in rows if len(row) == 3}
     assert {m.name: (m.unit, m.sense) for m in METRICS.values()}.items() <= told.items()
     assert [name for name in (*COLUMNS, *MORE) if f"`{name}`" not in text] == []
+
+
+def test_every_algorithm_is_listed_as_it_describes_itself():
+    from bridgegen.search import ALGORITHMS
+
+    text = (DOCS / "algorithms.md").read_text("utf-8")
+    table = text[text.index("| name |") : text.index("`bridgegen compare`")]
+    rows = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in table.splitlines()]
+    told = {row[0].strip("`"): (row[1], row[3]) for row in rows if row[0].startswith("`")}
+    assert told == {name: (one.description, one.source) for name, one in ALGORITHMS.items()}
+
+
+def test_the_algorithm_of_the_documentation_is_found_and_searches(tmp_path, monkeypatch):
+    """As if a package had declared it; it finds more than chance, and can be resumed."""
+    from importlib.metadata import EntryPoint, EntryPoints
+
+    import bridgegen as bg
+    from bridgegen.errors import InputError
+    from bridgegen.store import Store
+
+    monkeypatch.syspath_prepend(str(DOCS / "examples"))
+    point = EntryPoint("neighbours", "my_algorithm:Neighbours", "bridgegen.algorithms")
+
+    def entry_points(**which: str) -> EntryPoints:
+        ours = which.get("group") == "bridgegen.algorithms"
+        return EntryPoints([point]) if ours else EntryPoints()
+
+    monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
+    chosen = {"seed": 1, "deliver": False, "causes": False, "ego": "route-follower"}
+    whole, chance = (
+        bg.run_search("crossroads-s1", algorithm=name, budget=160, out=tmp_path / name, **chosen)
+        for name in ("neighbours", "random")
+    )
+    assert whole.summary.critical > 2 * chance.summary.critical
+    assert len(whole.notes["the most critical objectives"]) == 20
+    again = bg.run_search(
+        "crossroads-s1", algorithm="neighbours", budget=160, out=tmp_path / "again", **chosen
+    )
+    rows = []
+    for run in (whole, again):
+        with Store.open(run.folder) as store:
+            rows.append(store.read())
+    assert rows[0].U.tobytes() == rows[1].U.tobytes()
+    with pytest.raises(InputError, match=r"step must be in 0 \.\. 1, got 7"):
+        bg.run_search("crossroads-s1", algorithm="neighbours", settings={"step": 7}, out=tmp_path)
