@@ -231,7 +231,7 @@ def test_of_a_scenario_file_s_choices_the_values_are_said(tmp_path, cli):
     confirmed = [one for one in record["regions"] if one["confirmed"]]
     assert confirmed[0]["box"]["BrakeTime"]["high"] < 12.0  # when the scenario ends
     assert record["critical_held"] > 0.8 * record["critical"]
-    assert f"{len(confirmed)} of them cannot be stated as classes" in out
+    assert f"{len(confirmed)} of the confirmed regions cannot be stated as classes" in out
     assert not (place / "regions.owl").exists()
 
 
