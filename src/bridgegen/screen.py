@@ -332,8 +332,8 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
     print(f"{found.simulations} fresh scenarios, seed {facts['seed']}: {files}")
     if run.unstated:
         print(
-            f"{len(run.unstated)} of the confirmed regions cannot be stated as classes: the ontology cannot say "
-            "this scenario, or has no value of a parameter that the rule names."
+            f"{len(run.unstated)} of the confirmed regions cannot be stated as classes: the "
+            "ontology cannot say this\nscenario, or has no value of a parameter that the rule names."
         )
 
 

@@ -83,10 +83,28 @@ def test_a_box_that_random_search_never_meets_is_filled_all_the_same():
     assert speeds * 0.13 * 0.01 < drawn.share < speeds * 0.303 / 61.0 * 1.5
 
 
+def test_rows_kept_by_too_small_a_largest_chance_are_tried_again(monkeypatch):
+    """The last rows that are proposed are a hundred times as likely as all before them."""
+    proposed = []
+
+    def narrowed(space, U, low, high):
+        proposed.append(space.decode(U))
+        return U, 1.0, np.full(len(U), 1.0 if len(proposed) == 4 else 0.01)
+
+    monkeypatch.setattr("bridgegen.odd.within._narrowed", narrowed)
+    low, high = box(SPACE, {})
+    drawn = draw_within(SPACE, low, high, 1000, np.random.default_rng(0))
+    assert len(drawn.X) == 1000
+    chunk = {row.tobytes(): k for k, X in enumerate(proposed) for row in X}
+    came = np.bincount([chunk[row.tobytes()] for row in drawn.X], minlength=4)
+    assert came[:3].sum() == pytest.approx(3 * 4096 * 0.01, abs=40)
+    assert came[3] == 1000 - came[:3].sum()
+
+
 def test_a_whole_space_takes_every_row():
     low, high = box(SPACE, {})
     drawn = draw_within(SPACE, low, high, 100, np.random.default_rng(3))
-    U = np.random.default_rng(3).random((4096, SPACE.n_var))
+    U = np.random.default_rng(3).random((4096, SPACE.n_var))  # the first that are proposed
     assert drawn.share == 1.0
     assert np.array_equal(drawn.X, SPACE.decode(U)[:100])
 

@@ -42,7 +42,8 @@ def region(**edges):
 
 def stated(*regions):
     carried = carriers(individuals(row(0)), SPACE.values(row(0)))
-    return classes(regions, SPACE, carried, driver="route-follower", origin="a test")
+    numbered = dict(enumerate(regions, start=1))
+    return classes(numbered, SPACE, carried, driver="route-follower", origin="a test")
 
 
 class Asserted:

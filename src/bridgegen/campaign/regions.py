@@ -128,10 +128,14 @@ def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Re
     x = space.decode(np.random.default_rng(0).random((1, space.n_var)))[0]
     individuals = pipeline.concrete(x).individuals if found.confirmed else None
     carried = {} if individuals is None else carriers(individuals, space.values(x))
-    stated = [one for one in found.confirmed if individuals and statable(one, space, carried)]
+    stated = {
+        number: one
+        for number, one in enumerate(found.confirmed, start=1)
+        if individuals is not None and statable(one, space, carried)
+    }
     if stated:
         driver = pipeline.driver.label
         save(classes(stated, space, carried, driver=driver, origin=origin), path)
     else:
         path.unlink(missing_ok=True)  # an earlier one would say what was not found now
-    return stated
+    return list(stated.values())

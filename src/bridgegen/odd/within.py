@@ -81,23 +81,22 @@ def draw_within(
     kept = np.empty((0, space.n_var))
     lottery, chance = np.empty(0), np.empty(0)
     proposed, total, largest = 0, 0.0, 0.0
-    X = np.empty((0, len(space.names)))
-    while proposed < most and (len(X) < n or proposed < _LEAST):
+    while True:
         V, certain, chances = _narrowed(space, random.random((_AT_ONCE, space.n_var)), low, high)
         proposed += len(V)
         total += certain * float(chances.sum())
-        if not certain > 0.0:
-            break
         kept = np.concatenate([kept, V])
-        chance = np.concatenate([chance, chances])
+        chance = np.concatenate([chance, chances if certain > 0.0 else 0.0 * chances])
         lottery = np.concatenate([lottery, random.random(_AT_ONCE)])
         largest = max(largest, float(chances.max()))
-        won = lottery * largest < chance
+        won = lottery * largest < chance  # the earlier ones, too: the largest may have grown
         kept, chance, lottery = kept[won], chance[won], lottery[won]
-        if len(kept) >= n or proposed >= most:
+        last = proposed >= most or not certain > 0.0
+        if last or (len(kept) >= n and proposed >= _LEAST):
             X = space.decode(kept)
             X = X[in_box(space, X, low, high)]  # rounding may leave it by a bit
-    return Drawn(X[:n], total / max(proposed, 1))
+            if last or len(X) >= n:
+                return Drawn(X[:n], total / proposed)
 
 
 def _narrowed(space: SearchSpace, U: Float, low: Float, high: Float) -> tuple[Float, float, Float]:

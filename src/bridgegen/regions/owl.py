@@ -129,7 +129,7 @@ def statable(region: Region, space: SearchSpace, carried: Mapping[str, Carrier])
 
 
 def classes(
-    regions: Sequence[Region],
+    regions: Mapping[int, Region],
     space: SearchSpace,
     carried: Mapping[str, Carrier],
     *,
@@ -139,7 +139,7 @@ def classes(
     """Return the statements that define a class for each region.
 
     Args:
-        regions: those to state; `statable` each.
+        regions: those to state by their number; `statable` each.
         space: what was searched.
         carried: what carries its parameters.
         driver: the ego's, for whom the regions are critical.
@@ -147,7 +147,7 @@ def classes(
     """
     writer = _Writer(space, carried)
     digest = hashlib.sha256(repr([space.scenario.name, driver]).encode())
-    for one in regions:
+    for one in regions.values():
         digest.update(one.box.low.tobytes() + one.box.high.tobytes())
     # Regions of two runs may be loaded together: each run's have a name of their own.
     name = quote(space.scenario.name, safe="")
@@ -163,7 +163,7 @@ def classes(
         writer.put(node, TYPE, ox.NamedNode(OWL + "AnnotationProperty"))
         writer.put(node, LABEL, ox.Literal(term.replace("_", " ")))
         writer.put(node, COMMENT, ox.Literal(text))
-    for number, region in enumerate(regions, start=1):
+    for number, region in regions.items():
         writer.region(ox.NamedNode(f"{header.value}#region_{number}"), number, region, driver)
     return Individuals(writer.quads)
 
