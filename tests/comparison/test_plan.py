@@ -7,8 +7,8 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.cli import main
-from bridgegen.comparison.plan import Cell, make_plan
-from bridgegen.errors import InputError
+from bridgegen.comparison.plan import Cell, begin, make_plan
+from bridgegen.errors import InputError, StorageError
 
 
 @pytest.fixture
@@ -48,9 +48,10 @@ def test_its_command_is_the_plan(plans, monkeypatch, tmp_path, options):
     assert plans[0] == plans[1]
 
 
-def plan(**options):
-    given = {"settings": {}, "seeds": 2, "budget": 9, "baseline": None, "apart": 0.1, "out": None}
-    return make_plan(["crossroads-s4", "crossroads-s1"], ["pso", "nsga2"], **given, options=options)
+def plan(budget=9, out=None, **options):
+    given = {"settings": {}, "seeds": 2, "baseline": None, "apart": 0.1}
+    names = ["crossroads-s4", "crossroads-s1"], ["pso", "nsga2"]
+    return make_plan(*names, **given, budget=budget, out=out, options=options)
 
 
 def test_the_grid_in_the_order_of_running_and_of_telling():
@@ -75,3 +76,20 @@ def test_weights_are_for_those_who_search_a_sum():
     assert made.arguments(many)["weights"] is None
     asked = plan(objective={"d_min": 0.5, "v_d": 1.0}, weights="fixed", objectives="many")
     assert asked.arguments(many)["weights"] == "fixed"  # and so it is refused
+
+
+def test_a_mistake_that_made_no_run_binds_nobody(tmp_path):
+    out = tmp_path / "c"
+    begin(plan(out=out, ego="refrence"))
+    made = plan(out=out, ego="reference")
+    begin(made)
+    folder = made.folder(made.cells[0])
+    folder.mkdir()
+    (folder / "run.sqlite").touch()
+    begin(made)
+    (out / "compare.json").write_text("[]", "utf-8")
+    with pytest.raises(StorageError, match="the file is damaged"):
+        begin(made)
+    (out / "compare.json").write_text('{"budget": 9, "ego": "reference"}', "utf-8")
+    with pytest.raises(StorageError, match='budget was 9, is 10, ego was "reference", is null'):
+        begin(plan(budget=10, out=out, ego=None))

@@ -15,6 +15,7 @@ from bridgegen.comparison.distinct import APART
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.search.algorithm import Problem, Value, resolve
+from bridgegen.store.run_file import FILE as RUN_FILE
 
 FILE = "compare.json"
 """In a comparison's folder: what all of its runs were made with."""
@@ -214,6 +215,8 @@ def begin(plan: Plan) -> None:
     file, mine = plan.out / FILE, plan.identity()
     try:
         before = json.loads(file.read_text("utf-8")) if file.exists() else None
+        if before is not None and not isinstance(before, dict):
+            raise ValueError("it must hold an object")
         if before is None and plan.out.exists() and any(plan.out.iterdir()):
             raise StorageError(
                 f"{plan.out}: is not empty and holds no comparison, so it is left alone; "
@@ -224,6 +227,8 @@ def begin(plan: Plan) -> None:
         raise StorageError(f"{plan.out}: cannot be used: {error.strerror}") from None
     except ValueError as error:
         raise StorageError(f"{file}: the file is damaged: {error}") from None
+    if not any(plan.out.glob(f"{RUNS}/*/{RUN_FILE}")):
+        before = None  # no run has been made: there is nothing to fit to
     before = before or {}
     differ = [name for name in mine if name in before and before[name] != mine[name]]
     if differ:
