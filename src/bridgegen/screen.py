@@ -333,7 +333,8 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
     if run.unstated:
         print(
             f"{len(run.unstated)} of the confirmed regions cannot be stated as classes: the "
-            "ontology cannot say this\nscenario, or has no value of a parameter that the rule names."
+            "ontology cannot say this\nscenario, or has no value of a parameter that the rule "
+            "names."
         )
 
 
