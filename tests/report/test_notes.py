@@ -50,6 +50,21 @@ def test_a_box_is_told_in_units_where_nothing_limits_the_parameter(space):
     assert box_in_words({}, space) == "anywhere"
 
 
+@pytest.mark.parametrize(
+    ("box", "told"),
+    [
+        ({"cloudiness": [0.5, 1.0]}, "cloudiness ≥ 50.0 % of what is left to it"),
+        ({"clouds": [0.5, 1.0]}, "clouds: 0.5, 1"),
+        ({"cloudiness": [0.5]}, "cloudiness: 0.5"),
+        ({"cloudiness": [20, 30]}, "cloudiness: 20, 30"),
+        ("none", "none"),
+    ],
+)
+def test_what_is_no_box_of_the_space_is_told_as_it_is(space, box, told):
+    (table,) = tables({"boxes": [{"box": box}]}, space)
+    assert table.rows == ((told,),)
+
+
 def test_the_page_holds_them(report, tmp_path):
     table = NoteTable("critical boxes", ("tree", "box"), (("1", "fog ≥ 61 <%>"),), 4)
     told = payload(replace(report, notes=(table,)))

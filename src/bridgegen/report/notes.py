@@ -57,13 +57,29 @@ def _cells(
 ) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...], int]:
     columns = tuple(dict.fromkeys(key for one in records for key in one))
     rows = tuple(
-        tuple(
-            box_in_words(one[key], space) if key == "box" else _text(one.get(key, ""))
-            for key in columns
-        )
-        for one in records[:MOST]
+        tuple(_cell(key, one.get(key, ""), space) for key in columns) for one in records[:MOST]
     )
     return columns, rows, max(0, len(records) - MOST)
+
+
+def _cell(key: str, value: Any, space: SearchSpace) -> str:
+    """Return a value as text; a box as a rule, if it is one of this space."""
+    if (
+        key == "box"
+        and isinstance(value, dict)
+        and all(_is_side(*one, space) for one in value.items())
+    ):
+        return box_in_words(value, space)
+    return _text(value)
+
+
+def _is_side(name: str, edges: Any, space: SearchSpace) -> bool:
+    return (
+        name in space.variables
+        and isinstance(edges, list)
+        and len(edges) == 2
+        and all(isinstance(edge, int | float) and 0.0 <= edge <= 1.0 for edge in edges)
+    )
 
 
 def box_in_words(box: Mapping[str, Sequence[float]], space: SearchSpace) -> str:
