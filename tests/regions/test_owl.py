@@ -234,4 +234,4 @@ def test_a_reasoner_tells_which_region_a_scenario_lies_in(tmp_path):
         found = reason(Individuals([*them.quads, *classes_read.quads]))
         assert found.problems == []
         (types,) = [kinds for iri, kinds in found.types.items() if iri.endswith("#scenario")]
-        assert types == (("region_1",) if inside else ("Scenario",))
+        assert ("region_1" in types) == inside
