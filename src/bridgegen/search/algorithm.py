@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
@@ -12,6 +13,9 @@ from bridgegen.cause import Cause
 from bridgegen.errors import InputError, UnknownNameError
 
 Value = bool | int | float | str
+
+EXTRAS = {"rl": ("torch", "stable_baselines3", "gymnasium")}
+"""The modules that come with an extra."""
 
 JSON = None | bool | int | float | str | Sequence["JSON"] | Mapping[str, "JSON"]
 """What a run can keep; no NaN and no inf."""
@@ -26,12 +30,14 @@ class Setting:
         text: what it does, one line.
         low: smallest value allowed, for numbers.
         high: largest value allowed, for numbers.
+        choices: the values allowed, for texts; empty where any is.
     """
 
     default: Value
     text: str
     low: float | None = None
     high: float | None = None
+    choices: tuple[str, ...] = ()
 
 
 RESTART_WITHIN = Setting(
@@ -143,8 +149,8 @@ class Algorithm(Protocol):
     An algorithm draws random numbers only from its own generator, so that one seed gives one
     sequence of rows, bit for bit; the campaign's resume replays a run on that promise.
 
-    It may have other methods: ``notes``, see `TakesNotes`; ``state`` and ``restore``, see
-    `Restorable`.
+    It may name an ``extra`` that must be installed, see `EXTRAS`, and it may have other methods:
+    ``notes``, see `TakesNotes`; ``state`` and ``restore``, see `Restorable`.
 
     Attributes:
         name: what the user calls it.
@@ -235,10 +241,11 @@ def resolve(
     """Check a constructor's arguments and return every setting's value, given or default.
 
     Raises:
-        InputError: the rules that are broken, all of them.
+        InputError: the rules that are broken, all of them; or its extra is not installed.
         UnknownNameError: no such setting.
     """
     name = algorithm.name
+    _require(name, getattr(algorithm, "extra", None))
     for key in given:
         if key not in algorithm.settings:
             raise UnknownNameError(f"setting of {name}", key, algorithm.settings)
@@ -262,6 +269,12 @@ def resolve(
     return values
 
 
+def _require(name: str, extra: str | None) -> None:
+    """Refuse an algorithm whose extra is not installed; imports nothing."""
+    if extra and not all(find_spec(module) for module in EXTRAS[extra]):
+        raise InputError(f"algorithm '{name}' needs the extra: pip install 'bridgegen[{extra}]'")
+
+
 def _wanted(setting: Setting, value: Value) -> str | None:
     """Return what ``value`` must be, where it is not."""
     kind = type(setting.default)
@@ -269,7 +282,8 @@ def _wanted(setting: Setting, value: Value) -> str | None:
     if not fits:
         return {bool: "true or false", int: "an integer", float: "a number", str: "a text"}[kind]
     if isinstance(value, str):
-        return None
+        fits = not setting.choices or value in setting.choices
+        return None if fits else f"one of {', '.join(setting.choices)}"
     low = -np.inf if setting.low is None else setting.low
     high = np.inf if setting.high is None else setting.high
     # Written so that NaN fails.

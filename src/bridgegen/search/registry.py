@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.search.algorithm import Algorithm
 from bridgegen.search.cma_es import CMAES
+from bridgegen.search.ddpg import DDPG
+from bridgegen.search.dqn import DQN
 from bridgegen.search.es import ES
 from bridgegen.search.ga import GA
 from bridgegen.search.grid import Grid
@@ -13,6 +15,7 @@ from bridgegen.search.mopso import MOPSO
 from bridgegen.search.nsga2 import NSGA2
 from bridgegen.search.nsga2_dt import NSGA2DT
 from bridgegen.search.pairwise import Pairwise
+from bridgegen.search.ppo import PPO
 from bridgegen.search.pso import PSO
 from bridgegen.search.random import Random
 from bridgegen.search.sobol import Sobol
@@ -39,6 +42,9 @@ ALGORITHMS: dict[str, type[Algorithm]] = {
         MOPSO,
         NSGA2DT,
         MAPElites,
+        DQN,
+        DDPG,
+        PPO,
     )
 }
 

@@ -1,0 +1,98 @@
+"""The generator as an agent: what it observes, how its actions become rows, what rewards it.
+
+Shared by the algorithms of deep reinforcement learning and by the public environments.
+"""
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import Problem
+
+Observation = npt.NDArray[np.float32]
+Encoding = Literal["step", "row"]
+ENCODINGS: tuple[Encoding, ...] = ("step", "row")
+
+LARGEST = 1000.0
+"""Magnitude of a metric, in its own unit, that is observed as ±1; more is no more."""
+
+
+class Observer:
+    """Turns rows and their metrics into observations: finite numbers in [−1, 1].
+
+    First the row, [0, 1] → [−1, 1]. Then each metric m as sign(m)·ln(1 + |m|)/ln(1 + LARGEST): fine
+    near 0, where collisions are, and coarse far away. A value less critical than its metric's cap,
+    +inf among them, counts as the cap; NaN, which a failed scenario has, as 0.
+
+    Args:
+        problem: names the parameters and the metrics; metrics that BridgeGen does not know have no
+            cap.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        from bridgegen.metrics import METRICS
+
+        known = [METRICS.get(name) for name in problem.metrics]
+        self._sign = np.array([1.0 if one is None else one.sign for one in known])
+        floor = [-np.inf if one is None else one.sign * one.cap for one in known]
+        self._floor = np.array(floor, dtype=np.float64)
+        self.size = problem.n_var + len(known)
+
+    def __call__(self, U: Float, metrics: Float) -> Observation:
+        """Return ``(n, size)`` float32.
+
+        Args:
+            U: ``(n, n_var)`` in [0, 1].
+            metrics: ``(n, len(problem.metrics))`` in the metrics' units.
+        """
+        value = self._sign * np.maximum(self._sign * metrics, self._floor)
+        small = np.sign(value) * np.log1p(np.abs(value)) / np.log1p(LARGEST)
+        small = np.clip(np.nan_to_num(small, nan=0.0), -1.0, 1.0)
+        return np.hstack([2.0 * U - 1.0, small]).astype(np.float32)
+
+
+class Reward:
+    """−F on a scale of its own, which the first results set: their median is 0, quartiles 1 apart.
+
+    Clipped to ±`LIMIT`; a failed scenario has −`LIMIT`. The scale stays as it is from then on, so
+    that a reward means the same throughout a run.
+    """
+
+    LIMIT = 5.0
+
+    def __init__(self) -> None:
+        self.scale = np.array([0.0, 0.0, 0.0])
+        """Whether it is set, centre, spread; changed in place."""
+
+    def __call__(self, F: Float, ok: Bool) -> npt.NDArray[np.float32]:
+        """Return ``(n,)`` float32, finite.
+
+        Args:
+            F: ``(n,)``, smaller is more critical; anything where not ok.
+            ok: ``(n,)``.
+        """
+        good = ok & np.isfinite(F)
+        if not self.scale[0] and good.any():
+            low, centre, high = np.quantile(F[good], (0.25, 0.5, 0.75), method="lower")
+            with np.errstate(over="ignore"):
+                self.scale[:] = 1.0, centre, high - low
+        _, centre, spread = self.scale
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            # Where all were equal, better is LIMIT and worse is −LIMIT; 0/0 is as good as before.
+            scaled = np.nan_to_num((centre - F) / spread, nan=0.0)
+        reward = np.clip(np.where(good, scaled, -self.LIMIT), -self.LIMIT, self.LIMIT)
+        return reward.astype(np.float32)
+
+
+def step_from(U: Float, move: Float) -> Float:
+    """Return the rows that are ``move`` away, reflected at the faces of the cube.
+
+    Args:
+        U: ``(n, n_var)`` in [0, 1].
+        move: ``(n, n_var)``, finite.
+    """
+    there = np.mod(U + move, 2.0)
+    rows: Float = np.clip(np.minimum(there, 2.0 - there), 0.0, 1.0)
+    return rows

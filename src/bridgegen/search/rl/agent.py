@@ -1,0 +1,136 @@
+"""What PPO, DDPG and DQN share: batches of episodes, and a state of plain arrays."""
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
+from bridgegen.search.observation import ENCODINGS, Observation
+from bridgegen.search.rl.walkers import Walkers
+from bridgegen.search.space_filling import latin_hypercube
+
+COMMON = {
+    "population": Setting(40, "environments side by side, and rows per batch", 2, 10_000),
+    "horizon": Setting(2, "steps of an episode", 1, 10_000),
+    "elite": Setting(40, "best rows so far, at one of which an episode begins", 1, 10_000),
+    "gamma": Setting(0.99, "discount of rewards to come", 0.0, 1.0),
+    "width": Setting(64, "units in each of the networks' two hidden layers", 1, 4096),
+}
+"""Settings that all have."""
+
+STEP = Setting(0.2, "size of a step, as a share of each parameter's range", 1e-4, 1.0)
+MEMORY = Setting(2000, "transitions that are remembered, the newest", 1, 1_000_000)
+ACTION = Setting("step", "what an action is: a step from the last row, or a row", choices=ENCODINGS)
+
+
+class Learner(Protocol):
+    """A model of Stable-Baselines3's, driven from outside."""
+
+    @property
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """All that its next actions depend on, to be read or changed in place."""
+        ...
+
+    def rows(self, U: Float, observation: Observation, batch: int) -> Float:
+        """Return the rows that the agents choose, ``(n, n_var)`` in [0, 1].
+
+        Args:
+            U: ``(n, n_var)``, where they are.
+            observation: ``(n, size)``, what they observe there.
+            batch: its number, 1 for the first.
+        """
+        ...
+
+    def learn(self, reward: npt.NDArray[np.float32], observation: Observation, batch: int) -> None:
+        """Learn what the rows came to, and what is observed there."""
+        ...
+
+
+class Agent(ABC):
+    """Deep reinforcement learning as a search: the generator of scenarios is the agent.
+
+    Observation: the last row and its metrics. Action: a row, or a step from the last one. Reward:
+    −F. A batch is one step of ``population`` environments. The first batch is a Latin hypercube;
+    see `Walkers` for episodes, `Observer` and `Reward` for what is observed and rewarded.
+
+    Every batch draws from generators seeded by the search's seed and its own number.
+    """
+
+    name: ClassVar[str]
+    description: ClassVar[str]
+    source: ClassVar[str]
+    settings: ClassVar[Mapping[str, Setting]]
+    objectives: ClassVar[Arity] = "one"
+    extra: ClassVar[str] = "rl"
+
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
+        self._values = resolve(type(self), problem, seed, settings)
+        values, self._problem, self._seed = self._values, problem, seed
+        from bridgegen.search.rl.models import own_generators
+
+        self._own = own_generators
+        self._walkers = Walkers(problem, values["population"], values["horizon"], values["elite"])
+        with self._own((seed, 0)):
+            self._learner = self._build(problem.n_var, self._walkers.size)
+        self._batch = np.zeros(1, np.int64)
+        self._arrays = {"batch": self._batch, **self._walkers.arrays, **self._learner.arrays}
+
+    @abstractmethod
+    def _build(self, n_var: int, n_obs: int) -> Learner:
+        """Return a new learner; what it draws is this search's own."""
+
+    def ask(self) -> Float:
+        """Return the rows that the agents choose; at first, rows that fill the space."""
+        batch, walkers = int(self._batch[0]), self._walkers
+        if batch == 0:
+            return latin_hypercube(self._rng(1), len(walkers.U), self._problem.n_var)
+        with self._own((self._seed, 2, batch)):
+            return self._learner.rows(walkers.U, walkers.observation, batch)
+
+    def tell(self, U: Float, results: Results) -> None:
+        """Reward the agents, and train them."""
+        batch = int(self._batch[0])
+        reward, observation = self._walkers.step(U, results, self._rng(3))
+        if batch:
+            with self._own((self._seed, 4, batch)):
+                self._learner.learn(reward, observation, batch)
+        self._batch += 1
+
+    def state(self) -> bytes:
+        """Return networks, optimisers, memory and walkers: a line of JSON, then plain arrays."""
+        return self._header() + b"".join(array.tobytes() for array in self._arrays.values())
+
+    def restore(self, state: bytes) -> None:
+        """Become what the algorithm was that returned ``state``.
+
+        Raises:
+            ValueError: it was made by another algorithm, with other settings or metrics, with
+                another version of what it runs on; or it is damaged.
+        """
+        header, arrays = self._header(), self._arrays.values()
+        if not state.startswith(header):
+            raise ValueError(f"it is no state of {self.name} with these settings and metrics")
+        if len(state) != len(header) + sum(array.nbytes for array in arrays):
+            raise ValueError("it is longer or shorter than it must be")
+        parts, at = [], len(header)
+        for array in arrays:
+            part = np.frombuffer(state, array.dtype, array.size, at).reshape(array.shape)
+            if part.dtype.kind == "f" and np.isnan(part).any():
+                raise ValueError("it holds NaN")
+            parts.append(part)
+            at += array.nbytes
+        for array, part in zip(arrays, parts, strict=True):
+            array[...] = part
+
+    def _header(self) -> bytes:
+        shapes = [[key, one.dtype.str, one.shape] for key, one in self._arrays.items()]
+        return json.dumps([self.name, self._values, shapes]).encode() + b"\n"
+
+    def _rng(self, purpose: int) -> np.random.Generator:
+        seed = (self._seed, purpose, int(self._batch[0]))
+        return np.random.Generator(np.random.PCG64(seed))
