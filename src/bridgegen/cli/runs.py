@@ -232,7 +232,7 @@ def regions(
     from bridgegen.campaign.regions import regions_of
     from bridgegen.screen import Bar, print_regions
 
-    with Bar("simulating fresh scenarios") as bar:
+    with Bar("simulating") as bar:
         found = regions_of(
             run,
             ego=ego,
