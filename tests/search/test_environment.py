@@ -182,4 +182,5 @@ def test_the_documented_agent_learns(pipeline):
     spec.loader.exec_module(my_agent)
     forty = ScenarioVectorEnv(pipeline, action="row", horizon=1000)
     shares = my_agent.cross_entropy(forty, 10)
-    assert np.mean(shares[-3:]) > 1.5 * np.mean(shares[:2])
+    assert shares[0] < 0.7  # random sampling has a half
+    assert np.mean(shares[-3:]) > 0.9

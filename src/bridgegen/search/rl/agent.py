@@ -17,13 +17,13 @@ from bridgegen.search.space_filling import latin_hypercube
 COMMON = {
     "population": Setting(40, "environments side by side, and rows per batch", 2, 10_000),
     "horizon": Setting(2, "steps of an episode", 1, 10_000),
-    "elite": Setting(40, "best rows so far, at one of which an episode begins", 1, 10_000),
+    "elite": Setting(10, "best rows so far, at one of which an episode begins", 1, 10_000),
     "gamma": Setting(0.99, "discount of rewards to come", 0.0, 1.0),
     "width": Setting(64, "units in each of the networks' two hidden layers", 1, 4096),
 }
 """Settings that all have."""
 
-STEP = Setting(0.2, "size of a step, as a share of each parameter's range", 1e-4, 1.0)
+STEP = Setting(0.1, "size of a step, as a share of each parameter's range", 1e-4, 1.0)
 MEMORY = Setting(2000, "transitions that are remembered, the newest", 1, 1_000_000)
 ACTION = Setting("step", "what an action is: a step from the last row, or a row", choices=ENCODINGS)
 
