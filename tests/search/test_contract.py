@@ -27,6 +27,7 @@ SMALL = {
     },
     "ddpg": {"epochs": 2, "width": 8, "memory": 200},
     "ppo": {"epochs": 4, "width": 8, "lr_actor": 0.03},
+    "ppo-adversary": {"epochs": 2, "width": 8, "lr_actor": 0.03, "minibatch": 16},
 }
 """Other defaults: networks that are trained in no time, settings that show in six batches."""
 
@@ -46,6 +47,37 @@ def small(algorithm: Kind) -> Any:
 
 
 pytestmark = pytest.mark.parametrize("algorithm", [small(one) for one in ALGORITHMS.values()])
+
+
+class Toy:
+    """An arena without a simulator: what an agent sees is a sum of what it has decided."""
+
+    n_observed = 3
+
+    def __init__(self, n_var: int):
+        own = 1 if n_var < 6 else 2  # of the last two thirds of the columns
+        self.n_decisions = max(1, 2 * n_var // 3 // own)
+        self.decisions = np.arange(n_var - own * self.n_decisions, n_var).reshape(-1, own)
+
+    def play(self, U: Float, act) -> Float:
+        U, running = U.copy(), np.ones(len(U), dtype=bool)
+        U[:, self.decisions.ravel()] = 0.5
+        for columns in self.decisions:
+            seen = np.column_stack([U.sum(axis=1), U[:, 0], np.ones(len(U))])
+            U[np.ix_(running, columns)] = act(seen, running)[running]
+            running &= U[:, columns[0]] < 0.9  # a tenth of them end early
+            if not running.any():
+                break
+        return U
+
+
+def problem(algorithm: Kind, n_var: int, n_obj: int = 1, names: list[str] | None = None) -> Problem:
+    made = Problem.unnamed(n_var, n_obj)
+    if names is not None:
+        made = Problem(tuple(names), ("m",), n_obj)
+    is_adversary = getattr(algorithm, "is_adversary", False)
+    return replace(made, arena=Toy(n_var)) if is_adversary and n_var else made
+
 
 DESIGNS = ("grid", "pairwise")
 """The algorithms that have a size of their own, and end with it."""
@@ -99,7 +131,7 @@ def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed
         store = Store.create(folder, {}, names, ["m"], n_var=n_var, n_obj=n_obj)
     with store:
         result = run_loop(
-            algorithm(Problem(tuple(names), ("m",), n_obj), seed),
+            algorithm(problem(algorithm, n_var, n_obj, names), seed),
             lambda U: U,
             lambda X: evaluate(X, n_obj),
             store,
@@ -128,7 +160,7 @@ def test_it_describes_itself(algorithm: Kind):
 @pytest.mark.parametrize("ok", [1.0, 0.5, 0.0])
 def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: float):
     n_obj = n_obj_of(algorithm)
-    search = algorithm(Problem.unnamed(n_var, n_obj), 0)
+    search = algorithm(problem(algorithm, n_var, n_obj), 0)
     U = drive(search, 12, n_obj, ok)
     assert in_cube(U, n_var)
     assert len(U) >= 12 or (algorithm.name in DESIGNS and len(search.ask()) == 0)
@@ -143,7 +175,7 @@ def test_rows_stay_in_the_cube_whatever_fails(algorithm: Kind, n_var: int, ok: f
 @settings(max_examples=15, deadline=None)
 def test_any_finite_objective_and_any_failures(algorithm: Kind, seed, n_var, scale, data):
     n_obj = n_obj_of(algorithm)
-    search = algorithm(Problem.unnamed(n_var, n_obj), seed)
+    search = algorithm(problem(algorithm, n_var, n_obj), seed)
     for _ in range(4):
         U = search.ask()
         assert in_cube(U, n_var)
@@ -156,19 +188,20 @@ def test_any_finite_objective_and_any_failures(algorithm: Kind, seed, n_var, sca
 def test_one_seed_one_result_whatever_others_draw(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
     np.random.seed(1)  # noqa: NPY002  (the global generator is the point)
-    first = drive(algorithm(Problem.unnamed(5, n_obj), 7), 8, n_obj, 0.8)
+    first = drive(algorithm(problem(algorithm, 5, n_obj), 7), 8, n_obj, 0.8)
     np.random.seed(2)  # noqa: NPY002
-    second = drive(algorithm(Problem.unnamed(5, n_obj), 7), 8, n_obj, 0.8)
+    second = drive(algorithm(problem(algorithm, 5, n_obj), 7), 8, n_obj, 0.8)
     assert first.tobytes() == second.tobytes()
     assert (
-        first.tobytes() != drive(algorithm(Problem.unnamed(5, n_obj), 8), 8, n_obj, 0.8).tobytes()
+        first.tobytes()
+        != drive(algorithm(problem(algorithm, 5, n_obj), 8), 8, n_obj, 0.8).tobytes()
     )
 
 
 def test_two_searches_do_not_disturb_each_other(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    alone = drive(algorithm(Problem.unnamed(3, n_obj), 5), 6, n_obj)
-    a, b = algorithm(Problem.unnamed(3, n_obj), 5), algorithm(Problem.unnamed(3, n_obj), 6)
+    alone = drive(algorithm(problem(algorithm, 3, n_obj), 5), 6, n_obj)
+    a, b = algorithm(problem(algorithm, 3, n_obj), 5), algorithm(problem(algorithm, 3, n_obj), 6)
     beside = []
     for _ in range(6):
         beside.append(drive(a, 1, n_obj))
@@ -180,7 +213,7 @@ def test_the_global_generator_is_left_alone(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
     np.random.seed(4)  # noqa: NPY002
     before = np.random.get_state()[1].tobytes()  # noqa: NPY002
-    drive(algorithm(Problem.unnamed(5, n_obj), 7), 4, n_obj, 0.5)
+    drive(algorithm(problem(algorithm, 5, n_obj), 7), 4, n_obj, 0.5)
     assert np.random.get_state()[1].tobytes() == before  # noqa: NPY002
 
 
@@ -188,13 +221,13 @@ def test_it_says_nothing(algorithm: Kind, capfd):
     n_obj = n_obj_of(algorithm)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        drive(algorithm(Problem.unnamed(5, n_obj), 7), 4, n_obj, 0.5)
+        drive(algorithm(problem(algorithm, 5, n_obj), 7), 4, n_obj, 0.5)
     assert capfd.readouterr() == ("", "")
 
 
 def test_told_arrays_are_not_changed(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    search = algorithm(Problem.unnamed(3, n_obj), 0)
+    search = algorithm(problem(algorithm, 3, n_obj), 0)
     for _ in range(3):
         U = search.ask()
         F, ok = sphere(U, n_obj), np.arange(len(U)) % 2 == 0
@@ -215,15 +248,15 @@ def test_rows_may_be_changed_by_who_asked(algorithm: Kind):
             kept = U.copy()
             asked.append(kept.tobytes())
             U[:] = 0.5
-            search.tell(kept, Results.of_F(sphere(kept, n_obj)))
+            search.tell(kept, results_of(kept, np.ones(len(U), bool), n_obj))
         return asked
 
-    untouched = drive(algorithm(Problem.unnamed(3, n_obj), 2), 4, n_obj)
-    assert b"".join(vandal(algorithm(Problem.unnamed(3, n_obj), 2))) == untouched.tobytes()
+    untouched = drive(algorithm(problem(algorithm, 3, n_obj), 2), 4, n_obj)
+    assert b"".join(vandal(algorithm(problem(algorithm, 3, n_obj), 2))) == untouched.tobytes()
 
 
 def test_constant_objective(algorithm: Kind):
-    search = algorithm(Problem.unnamed(3), 0)
+    search = algorithm(problem(algorithm, 3), 0)
     for _ in range(10):
         U = search.ask()
         assert in_cube(U, 3)
@@ -261,7 +294,7 @@ def test_no_known_row_is_simulated_twice(algorithm: Kind, tmp_path):
                 assert results.ok[k] == (x[0] <= 0.9)
             super().tell(U, results)
 
-    search = Told(Problem(("p", "q", "r"), ("m",), n_obj), 3)
+    search = Told(problem(algorithm, 3, n_obj, ["p", "q", "r"]), 3)
     with Store.create(tmp_path / "run", {}, ["p", "q", "r"], ["m"], n_var=3, n_obj=n_obj) as store:
         result = run_loop(search, lambda U: np.round(6 * U) / 6, simulate, store, 120)
         assert store.read().X.tobytes() == b"".join(seen)
@@ -291,22 +324,22 @@ def test_resumed_anywhere_the_result_is_the_same(algorithm: Kind, stops: list[in
 
 def test_wrong_arguments_are_named(algorithm: Kind):
     with pytest.raises(InputError, match="n_var ≥ 1 must hold, got 0"):
-        algorithm(Problem.unnamed(0), 0)
+        algorithm(problem(algorithm, 0), 0)
     with pytest.raises(InputError, match="n_obj"):
-        algorithm(Problem.unnamed(3, 2 if algorithm.objectives == "one" else 0), 0)
+        algorithm(problem(algorithm, 3, 2 if algorithm.objectives == "one" else 0), 0)
     with pytest.raises(InputError, match="seed ≥ 0 must hold, got -1"):
-        algorithm(Problem.unnamed(3), -1)
+        algorithm(problem(algorithm, 3), -1)
     some = next(iter(algorithm.settings))
     with pytest.raises(UnknownNameError, match=f"did you mean '{some}'"):
-        algorithm(Problem.unnamed(3), 0, **{some + "s": 1})
+        algorithm(problem(algorithm, 3), 0, **{some + "s": 1})
 
 
 def test_every_setting_is_checked_and_does_something(algorithm: Kind):
     n_obj = n_obj_of(algorithm)
-    usual = drive(algorithm(Problem.unnamed(3, n_obj), 0), 8, n_obj)
+    usual = drive(algorithm(problem(algorithm, 3, n_obj), 0), 8, n_obj)
     for name, setting in algorithm.settings.items():
         with pytest.raises(InputError, match=name):
-            algorithm(Problem.unnamed(3, n_obj), 0, **{name: None})
+            algorithm(problem(algorithm, 3, n_obj), 0, **{name: None})
         if isinstance(setting.default, bool):
             other: object = not setting.default
         elif isinstance(setting.default, int | float):
@@ -314,7 +347,7 @@ def test_every_setting_is_checked_and_does_something(algorithm: Kind):
             assert setting.high is not None, "numbers need a range"
             with pytest.raises(InputError, match=f"{name} must be in"):
                 algorithm(
-                    Problem.unnamed(3, n_obj),
+                    problem(algorithm, 3, n_obj),
                     0,
                     **{name: type(setting.default)(setting.high * 2 + 1)},
                 )
@@ -323,10 +356,10 @@ def test_every_setting_is_checked_and_does_something(algorithm: Kind):
             assert other != setting.default
         else:
             continue
-        changed = drive(algorithm(Problem.unnamed(3, n_obj), 0, **{name: other}), 8, n_obj)
+        changed = drive(algorithm(problem(algorithm, 3, n_obj), 0, **{name: other}), 8, n_obj)
         assert changed.tobytes() != usual.tobytes(), f"{name} changes nothing"
 
 
 def test_defaults_are_what_is_resolved(algorithm: Kind):
-    values = resolve(algorithm, Problem.unnamed(3), 0, {})
+    values = resolve(algorithm, problem(algorithm, 3), 0, {})
     assert values == {name: setting.default for name, setting in algorithm.settings.items()}

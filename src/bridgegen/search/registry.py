@@ -16,6 +16,7 @@ from bridgegen.search.nsga2 import NSGA2
 from bridgegen.search.nsga2_dt import NSGA2DT
 from bridgegen.search.pairwise import Pairwise
 from bridgegen.search.ppo import PPO
+from bridgegen.search.ppo_adversary import PPOAdversary
 from bridgegen.search.pso import PSO
 from bridgegen.search.random import Random
 from bridgegen.search.sobol import Sobol
@@ -45,6 +46,7 @@ ALGORITHMS: dict[str, type[Algorithm]] = {
         DQN,
         DDPG,
         PPO,
+        PPOAdversary,
     )
 }
 

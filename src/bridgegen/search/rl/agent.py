@@ -1,6 +1,5 @@
-"""What PPO, DDPG and DQN share: batches of episodes, and a state of plain arrays."""
+"""What PPO, DDPG and DQN share: batches of episodes, each a step of every environment."""
 
-import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
@@ -11,6 +10,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Float
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 from bridgegen.search.observation import ENCODINGS, Observation
+from bridgegen.search.rl.saved import Saved
 from bridgegen.search.rl.walkers import Walkers
 from bridgegen.search.space_filling import latin_hypercube
 
@@ -51,7 +51,7 @@ class Learner(Protocol):
         ...
 
 
-class Agent(ABC):
+class Agent(Saved, ABC):
     """Deep reinforcement learning as a search: the generator of scenarios is the agent.
 
     Observation: the last row and its metrics. Action: a row, or a step from the last one. Reward:
@@ -100,36 +100,6 @@ class Agent(ABC):
             with self._own((self._seed, 4, batch)):
                 self._learner.learn(reward, observation, batch)
         self._batch += 1
-
-    def state(self) -> bytes:
-        """Return networks, optimisers, memory and walkers: a line of JSON, then plain arrays."""
-        return self._header() + b"".join(array.tobytes() for array in self._arrays.values())
-
-    def restore(self, state: bytes) -> None:
-        """Become what the algorithm was that returned ``state``.
-
-        Raises:
-            ValueError: it was made by another algorithm, with other settings or metrics, with
-                another version of what it runs on; or it is damaged.
-        """
-        header, arrays = self._header(), self._arrays.values()
-        if not state.startswith(header):
-            raise ValueError(f"it is no state of {self.name} with these settings and metrics")
-        if len(state) != len(header) + sum(array.nbytes for array in arrays):
-            raise ValueError("it is longer or shorter than it must be")
-        parts, at = [], len(header)
-        for array in arrays:
-            part = np.frombuffer(state, array.dtype, array.size, at).reshape(array.shape)
-            if part.dtype.kind == "f" and np.isnan(part).any():
-                raise ValueError("it holds NaN")
-            parts.append(part)
-            at += array.nbytes
-        for array, part in zip(arrays, parts, strict=True):
-            array[...] = part
-
-    def _header(self) -> bytes:
-        shapes = [[key, one.dtype.str, one.shape] for key, one in self._arrays.items()]
-        return json.dumps([self.name, self._values, shapes]).encode() + b"\n"
 
     def _rng(self, purpose: int) -> np.random.Generator:
         seed = (self._seed, purpose, int(self._batch[0]))

@@ -15,7 +15,7 @@ from bridgegen.search.observation import Observation, step_from
 from bridgegen.search.rl.models import Arrays, Spaces, arrays_of, silent
 
 
-class _Policy(ActorCriticPolicy):
+class Policy(ActorCriticPolicy):
     """Separate learning rates of actor, critic and standard deviations."""
 
     def __init__(self, *args: Any, rates: tuple[float, float, float], **given: Any) -> None:
@@ -33,9 +33,45 @@ class _Policy(ActorCriticPolicy):
         self.optimizer = self.optimizer_class(groups, **self.optimizer_kwargs)
 
 
-class _Model(PPO):
+class Model(PPO):
+    """PPO with the learning rates of its policy."""
+
     def _update_learning_rate(self, optimizers: Any) -> None:
         """Leave the policy's own learning rates alone."""
+
+
+def model_of(
+    values: Mapping[str, Any], n_obs: int, n_actions: int, *, n_steps: int, minibatch: int
+) -> Model:
+    """Return a model that learns from ``n_steps`` steps of every environment.
+
+    Args:
+        values: of the settings.
+        n_obs: numbers in an observation.
+        n_actions: numbers in an action.
+        n_steps: of each environment, between two trainings.
+        minibatch: steps between two updates.
+    """
+    width = values["width"]
+    model = Model(
+        Policy,
+        Spaces(values["population"], n_obs, spaces.Box(-1.0, 1.0, (n_actions,), np.float32)),
+        n_steps=n_steps,
+        batch_size=minibatch,
+        n_epochs=values["epochs"],
+        gamma=values["gamma"],
+        gae_lambda=values.get("gae", 0.95),
+        clip_range=values["clip"],
+        ent_coef=values["entropy"],
+        policy_kwargs={
+            "rates": (values["lr_actor"], values["lr_critic"], values["lr_std"]),
+            "log_std_init": float(np.log(values["std"])),
+            "net_arch": {"pi": [width, width], "vf": [width, width]},
+        },
+        device="cpu",
+    )
+    silent(model)
+    return model
 
 
 class PPOLearner:
@@ -48,25 +84,9 @@ class PPOLearner:
     """
 
     def __init__(self, values: Mapping[str, Any], n_var: int, n_obs: int) -> None:
-        n, width = values["population"], values["width"]
+        n = values["population"]
         self._step, self._encoding = values["step"], values["action"]
-        self._model = _Model(
-            _Policy,
-            Spaces(n, n_obs, spaces.Box(-1.0, 1.0, (n_var,), np.float32)),
-            n_steps=1,
-            batch_size=n,
-            n_epochs=values["epochs"],
-            gamma=values["gamma"],
-            clip_range=values["clip"],
-            ent_coef=values["entropy"],
-            policy_kwargs={
-                "rates": (values["lr_actor"], values["lr_critic"], values["lr_std"]),
-                "log_std_init": float(np.log(values["std"])),
-                "net_arch": {"pi": [width, width], "vf": [width, width]},
-            },
-            device="cpu",
-        )
-        silent(self._model)
+        self._model = model_of(values, n_obs, n_var, n_steps=1, minibatch=n)
         self._asked: tuple[Any, ...] = ()
         self.arrays: Arrays = arrays_of(self._model.policy, [self._model.policy.optimizer])
 
