@@ -25,7 +25,7 @@ SMALL = {
         **{"epochs": 4, "width": 8, "memory": 200},
         **{"gamma": 0.5, "lr_critic": 0.05, "explore": 2},
     },
-    "ddpg": {"epochs": 2, "width": 8, "memory": 200},
+    "ddpg": {"epochs": 1, "width": 8, "memory": 200, "noise": 1.0},
     "ppo": {"epochs": 4, "width": 8, "lr_actor": 0.03},
     "ppo-adversary": {"epochs": 2, "width": 8, "lr_actor": 0.03, "minibatch": 16},
 }
