@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 import bridgegen as bg
 from bridgegen.adversary import OBSERVED
+from bridgegen.campaign.coverage import coverage_of
 from bridgegen.campaign.handover import write_scenario
 from bridgegen.errors import InputError
 from bridgegen.odd.adversary import adversarial
@@ -152,6 +153,15 @@ def test_a_campaign_searches_its_decisions_and_goes_on(tmp_path):
     assert {"bv_pace_01", "bv_offset_40"} <= {*table.columns}
     assert "--adversary bv" in shlex.join(shlex.split(run.settings.command(tmp_path / "b")))
     assert bg.resume(run.folder).frame().equals(table)
+    # A course is no combination of forty speeds: the report leaves the decisions out.
+    assert "bv_pace_01" not in run.report.read_text("utf-8").replace("--adversary", "")
+    _, covered = coverage_of(run.folder, strength=2)
+    assert {one.name for one in covered.parameters} == {
+        *load("crossroads-s1").space().variables
+    } - {
+        "bv_trigger_time",
+        "bv_trigger_distance",
+    }
 
 
 def test_who_cannot_be_asked_instant_by_instant_is_named(tmp_path):

@@ -7,7 +7,7 @@ over like any other, as the trajectory that came of it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -148,7 +148,12 @@ class AdversarySource:
         assert inner.constraints.adversary is not None
         self.adversary: Adversary = inner.constraints.adversary
         self._inner = inner
-        self.constraints = inner.constraints
+        left = {
+            name: one
+            for name, one in inner.constraints.parameters.items()
+            if name not in self.adversary.controls
+        }
+        self.constraints = replace(inner.constraints, parameters=left)
         self.static_names, self.unused_names = inner.static_names, inner.unused_names
         parked = inner.concrete(nominal)
         # Only where lanes lead is asked of it; the ego's own driver need not be there for that.

@@ -236,8 +236,11 @@ class Pipeline:
         return Evaluation(metrics, F, counts, rollout.status, rollout.messages, cause)
 
     def facts(self, x: Float) -> dict[str, float]:
-        """Return the parameters of one row that its scenario depends on, by name."""
-        unused = self.source.unused_names
+        """Return the parameters of one row that its scenario depends on, by name.
+
+        Without an adversary's decisions: what came of them is the scenario's.
+        """
+        unused = {*self.source.unused_names, *self.space.decisions}
         return {name: one for name, one in self.space.values(x).items() if name not in unused}
 
     def concrete(self, x: Float, road_file: str = "") -> ConcreteScenario:

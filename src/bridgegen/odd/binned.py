@@ -18,7 +18,9 @@ class BinnedRows:
     """The bins of rows and of a fixed random sample, to be counted parameter by parameter.
 
     Attributes:
-        space: what was searched; parameters are numbered as in its ``variables``.
+        space: what was searched.
+        names: of the parameters, as they are numbered: all that are searched, but for an
+            adversary's decisions.
         edges: per parameter ``(n + 1,)`` float64 in its unit, ascending.
         sizes: per parameter n, its bins.
         n_rows: N.
@@ -44,12 +46,13 @@ class BinnedRows:
         if hit.shape != (len(X),):
             raise ValueError(f"critical must have shape ({len(X)},), got {hit.shape}")
         self.space = space
-        self.edges = [_edges(space, name, bins) for name in space.variables]
+        self.names = tuple(name for name in space.variables if name not in space.decisions)
+        self.edges = [_edges(space, name, bins) for name in self.names]
         self.sizes = [len(one) - 1 for one in self.edges]
         self.n_rows, self.n_critical = len(X), int(hit.sum())
         # Sorted into critical rows, other rows, sample: each is a stretch of columns.
         order = np.argsort(~hit, kind="stable")
-        seen = [_bin(space, X[order], self.edges), *_sampled(space, self.edges, sample)]
+        seen = [self._bin(X[order]), *self._sampled(sample)]
         self._where = np.concatenate(seen, axis=1)
         self._ends = (self.n_critical, self.n_rows, self._where.shape[1])
 
@@ -89,6 +92,22 @@ class BinnedRows:
             start = end
         return counts
 
+    def _bin(self, X: Float) -> npt.NDArray[np.int32]:
+        """Return ``(len(names), len(X))``, the bin of every parameter."""
+        where = np.empty((len(self.names), len(X)), np.int32)
+        for number, name in enumerate(self.names):
+            column = np.ascontiguousarray(X[:, self.space.index(name)])
+            # Inner edges only: what rounding puts beyond an end is in the last bin there.
+            where[number] = np.searchsorted(self.edges[number][1:-1], column, side="right")
+        return where
+
+    def _sampled(self, sample: int) -> Iterator[npt.NDArray[np.int32]]:
+        """Yield the bins of the sample, a chunk at a time."""
+        rng = np.random.Generator(np.random.PCG64(0))
+        for start in range(0, sample, _CHUNK):
+            U = rng.random((min(_CHUNK, sample - start), self.space.n_var))
+            yield self._bin(self.space.decode(U))
+
     def _codes(self, chosen: Sequence[int]) -> Int:
         """Return for every row and sample the number of its combination, in C order."""
         codes = np.zeros(self._where.shape[1], np.int64)
@@ -103,23 +122,3 @@ def _edges(space: SearchSpace, name: str, bins: int) -> Float:
     if one.kind == "integer":
         return np.arange(one.low, one.high + 2.0) - 0.5
     return np.linspace(one.low, one.high, bins + 1)
-
-
-def _bin(space: SearchSpace, X: Float, edges: list[Float]) -> npt.NDArray[np.int32]:
-    """Return ``(n_var, len(X))``, the bin of every searched parameter."""
-    where = np.empty((space.n_var, len(X)), np.int32)
-    for number, name in enumerate(space.variables):
-        column = np.ascontiguousarray(X[:, space.index(name)])
-        # Inner edges only: what rounding puts beyond an end is in the last bin there.
-        where[number] = np.searchsorted(edges[number][1:-1], column, side="right")
-    return where
-
-
-def _sampled(
-    space: SearchSpace, edges: list[Float], sample: int
-) -> Iterator[npt.NDArray[np.int32]]:
-    """Yield the bins of the sample, a chunk at a time."""
-    rng = np.random.Generator(np.random.PCG64(0))
-    for start in range(0, sample, _CHUNK):
-        U = rng.random((min(_CHUNK, sample - start), space.n_var))
-        yield _bin(space, space.decode(U), edges)

@@ -157,7 +157,7 @@ def coverage(
     """
     _check(bins, strength)
     rows = BinnedRows(space, X, critical, bins, sample)
-    ways = (_ways(rows, t) for t in range(1, min(strength, space.n_var) + 1))
+    ways = (_ways(rows, t) for t in range(1, min(strength, len(rows.names)) + 1))
     return Coverage(rows.n_rows, rows.n_critical, sample, _parameters(rows), tuple(ways))
 
 
@@ -186,9 +186,9 @@ def coverage_map(
     """
     _check(bins, strength)
     rows = BinnedRows(space, X, critical, bins, sample)
-    pairs = tuple(_pair(rows, i, j) for i, j in combinations(range(space.n_var), 2))
+    pairs = tuple(_pair(rows, i, j) for i, j in combinations(range(len(rows.names)), 2))
     ways = []
-    for t in range(1, min(strength, space.n_var) + 1):
+    for t in range(1, min(strength, len(rows.names)) + 1):
         ways.append(_ways(rows, t) if t != 2 else _sum([pair.ways for pair in pairs]))
     total = Coverage(rows.n_rows, rows.n_critical, sample, _parameters(rows), tuple(ways))
     return CoverageMap(total, pairs)
@@ -206,7 +206,7 @@ def _check(bins: int, strength: int) -> None:
 
 def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
     found = []
-    for number, name in enumerate(rows.space.variables):
+    for number, name in enumerate(rows.names):
         one = rows.space.scenario.parameters[name]
         critical, evaluated, met = rows.counts([number])
         found.append(
@@ -226,14 +226,14 @@ def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
 
 def _ways(rows: BinnedRows, t: int) -> Ways:
     total, found = 0, np.zeros(3, np.int64)
-    for chosen in combinations(range(rows.space.n_var), t):
+    for chosen in combinations(range(len(rows.names)), t):
         total += prod(rows.sizes[k] for k in chosen)
         found += rows.distinct(chosen)
     return Ways(t, total, int(found[2]), int(found[1]), int(found[0]))
 
 
 def _pair(rows: BinnedRows, i: int, j: int) -> PairBins:
-    first, second = rows.space.variables[i], rows.space.variables[j]
+    first, second = rows.names[i], rows.names[j]
     total = rows.sizes[i] * rows.sizes[j]
     if total > MAX_GRID:
         hit, seen, met = rows.distinct([i, j])

@@ -43,6 +43,8 @@ class SearchSpace:
         axes: the axes that are searched.
         variables: the searched parameters, in declared order: the columns of U. One whose low is
             its high is not searched.
+        decisions: those of the parameters that are an adversary's decisions, of which only the
+            course that comes of all of them means something.
         names: every parameter, then every derived quantity, in declared order: the columns of X.
         units: the unit of each of ``names``.
         order: all of ``names``, each after those that it follows from or that limit it.
@@ -82,6 +84,8 @@ class SearchSpace:
             for p in parameters.values()
             if p.axis in self.axes and p.name not in fixed and p.low < p.high
         )
+        adversary = getattr(scenario, "adversary", None)
+        self.decisions: frozenset[str] = frozenset(adversary.controls if adversary else ())
         self.defaults = {p.name: p.default for p in parameters.values()} | fixed
         self._columns = {name: number for number, name in enumerate(self.names)}
         self.derived = {one.name: one for one in scenario.derived}

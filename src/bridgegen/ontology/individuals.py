@@ -50,10 +50,12 @@ def build(
         OntologyError: ``values`` lacks a parameter, or the site a leg that the scenario uses.
         UnsupportedError: a participant of a type that has no class.
     """
+    # An adversary's decisions are in the course that came of them.
+    decisions = {*scenario.adversary.controls} if scenario.adversary else set()
     declared: dict[str, Parameter | Derived] = {
         name: parameter
         for name, parameter in (scenario.parameters | _derived(scenario)).items()
-        if site is None or parameter.axis != Axis.STATIC
+        if (site is None or parameter.axis != Axis.STATIC) and name not in decisions
     }
     missing = [name for name in declared if name not in values]
     if missing:

@@ -23,6 +23,8 @@ _RULES = {
 _UNSAID = frozenset({TYPE, bg("has_name"), bg("has_parameter"), bg("binds_property")})
 _DEEP = 8
 """Individuals within individuals; a circle in an edited file ends there."""
+_MOST_PLACES = 12
+"""Of a trajectory; of one with more, its two ends are said."""
 
 
 @dataclass
@@ -168,6 +170,8 @@ def _trajectory(speaker: _Speaker, node: Subject) -> str:
         return next((as_number(v) or 0.0 for v in found if isinstance(v, ox.Literal)), 0.0)
 
     places = [speaker.inner(one, "has_position") for one in sorted(vertices, key=index)]
+    if len(places) > _MOST_PLACES:
+        places = [places[0], f"{len(places) - 2} points between", places[-1]]
     return f"along {' → '.join(places) or '?'}"
 
 

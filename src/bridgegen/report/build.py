@@ -135,7 +135,7 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
             name in space.variables,
         )
         for i, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
-        if name not in pipeline.source.unused_names
+        if name not in {*pipeline.source.unused_names, *space.decisions}
     )
     metrics = tuple(
         Column(name, measures.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
@@ -156,7 +156,8 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
 def _coverage(pipeline: Pipeline, rows: Rows) -> CoverageMap:
     space, ok = pipeline.space, rows.status == 0
     X, critical = rows.X[ok], rows.critical[ok]
-    strength = 3 if comb(space.n_var, 3) * (len(X) + SAMPLE) <= TRIPLES else 2
+    n_var = len({*space.variables} - space.decisions)
+    strength = 3 if comb(n_var, 3) * (len(X) + SAMPLE) <= TRIPLES else 2
     try:
         return coverage_map(space, X, critical, strength=strength, sample=SAMPLE)
     except ScenarioError:

@@ -16,6 +16,7 @@ STATION, ASIDE, SPEED, SLIDE, TURN = range(5)
 
 REACH = 1.0  # s, in which it would be where it is told to be
 SLOPE = 0.15  # most of its speed that leads across the lane: it turns its nose by 9 degrees at most
+BEND = 0.15  # 1/m, of its way across the lane: a car turns tighter only to park
 SLIDE_RATE = 1.0  # m/s², of the speed across: comfortable lane keeping has half, evasion four times
 CURVATURE_COLUMN = 5
 
@@ -42,9 +43,12 @@ def steer(path, n, ds, state, speed, place, rate, braking, dt, first, steps, cou
         v, w = state[SPEED], state[SLIDE]
         faster = min(max(speed, v - braking * dt, 0.0), v + rate * dt)
         wanted = (place - state[ASIDE]) / REACH
-        most = SLOPE * faster
         slide = w + min(max(wanted - w, -SLIDE_RATE * dt), SLIDE_RATE * dt)
-        slide = min(max(slide, -most), most)
+        if faster > 1e-9:
+            turn = math.asin(min(max(slide / faster, -SLOPE), SLOPE))
+            most = BEND * 0.5 * (v + faster) * dt
+            state[TURN] += min(max(turn - state[TURN], -most), most)
+        slide = faster * math.sin(state[TURN])
         along = 0.5 * (math.sqrt(v * v - w * w) + math.sqrt(faster * faster - slide * slide)) * dt
         i, f = locate(n, ds, state[STATION])
         f = min(max(f, 0.0), 1.0)
@@ -54,8 +58,6 @@ def steer(path, n, ds, state, speed, place, rate, braking, dt, first, steps, cou
         state[STATION] += along / (1.0 - bend * state[ASIDE])
         state[ASIDE] += 0.5 * (w + slide) * dt
         state[SPEED], state[SLIDE] = faster, slide
-        if faster > 1e-9:
-            state[TURN] = math.asin(slide / faster)
         note(path, n, ds, state, k, k * dt, course)
 
 
