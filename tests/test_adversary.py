@@ -11,7 +11,7 @@ from bridgegen.adversary import OBSERVED
 from bridgegen.campaign.coverage import coverage_of
 from bridgegen.campaign.handover import write_scenario
 from bridgegen.errors import InputError
-from bridgegen.odd.adversary import adversarial
+from bridgegen.odd.adversary import MARGIN, adversarial
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
@@ -76,7 +76,8 @@ def test_its_motion_keeps_to_its_limits(speed, v, place, bend, rate, braking):
     assert (change <= rate + 0.05 * max(speed, v) + 1e-6).all()
     assert (change >= -braking - 0.05 * max(speed, v) - 1e-6).all()
     aside = state[1]
-    assert min(0.0, place) - 1e-9 <= aside <= max(0.0, place) + 1e-9
+    # Its nose takes a while to turn back: the margin that it keeps to the edges is for that.
+    assert min(0.0, place) - MARGIN <= aside <= max(0.0, place) + MARGIN
     # It goes where its nose points: no slipping sideways.
     going = np.hypot(np.diff(x), np.diff(y)) > 0.01
     course_h = np.unwrap(np.arctan2(np.diff(y), np.diff(x)))

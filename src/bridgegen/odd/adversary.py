@@ -23,7 +23,7 @@ PERIOD = 0.5
 """Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
 
 MARGIN = 0.1
-"""Metres that its body keeps to the edges of its lane."""
+"""Metres that its body keeps to the edges of its lane: it overshoots by a centimetre at times."""
 
 GRIP = 0.85 * 9.81
 """What tyres hold on a dry road [m/s²]; see `bridgegen.odd.rules`."""
@@ -126,11 +126,11 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
     needed = {quantity for quantity in limits if isinstance(quantity, str)}
     idle = _quantities(own) - _quantities(rest) - needed - _elsewhere(left)
-    known = sorted(idle & left.parameters.keys())
-    left = left.measured({name: left.parameters[name].default for name in known})
+    kept = {name: one for name, one in left.parameters.items() if name not in idle}
     return replace(
         left,
-        parameters=left.parameters | {one.name: one for one in _controls(adversary)},
+        parameters=kept | {one.name: one for one in _controls(adversary)},
+        bounds=tuple(bound for bound in left.bounds if bound.target not in idle),
         axes=tuple(axis for axis in Axis if axis in {*left.axes, Axis.EXTENSION}),
         adversary=adversary,
     )
