@@ -1,26 +1,13 @@
 """A genetic algorithm, pymoo's."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from bridgegen.arrays import Float
-from bridgegen.search.algorithm import (
-    RESTART_WITHIN,
-    Arity,
-    Problem,
-    Results,
-    Setting,
-    Value,
-    resolve,
-)
+from bridgegen.search.algorithm import Arity
+from bridgegen.search.genetic import Genetic
 
 
-class GA:
+class GA(Genetic):
     """A population that is selected by tournament, crossed, mutated, and thinned to the best.
-
-    Crossover is simulated binary, mutation polynomial (each parameter with probability 1/n of a
-    mutated child, or 1/2 where n is one or two); a child that is a known individual is not
-    evaluated again.
 
     Source: Deb and Agrawal (1995), "Simulated binary crossover for continuous search space";
     elitist survival of parents and children together, as pymoo has it.
@@ -29,43 +16,9 @@ class GA:
     name: ClassVar[str] = "ga"
     description: ClassVar[str] = "genetic algorithm of one objective (pymoo)"
     source: ClassVar[str] = "Deb and Agrawal (1995), Complex Systems 9(2)"
-    settings: ClassVar[Mapping[str, Setting]] = {
-        "population": Setting(40, "individuals, and rows per batch", low=4, high=100_000),
-        "crossover": Setting(0.9, "probability that two parents are crossed", 0.0, 1.0),
-        "crossover_eta": Setting(15.0, "how close children stay to their parents", 0.0, 1000.0),
-        "mutation": Setting(0.9, "probability that a child is mutated", 0.0, 1.0),
-        "mutation_eta": Setting(20.0, "how little a mutated parameter moves", 0.0, 1000.0),
-        "restart_within": RESTART_WITHIN,
-    }
     objectives: ClassVar[Arity] = "one"
 
-    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        from bridgegen.search._pymoo import Generations
-
-        self._values = resolve(GA, problem, seed, settings)
-        within = self._values["restart_within"]
-        self._search = Generations(self._build, problem, seed, within)
-
-    def _build(self) -> Any:
+    def _made_of(self, **parts: Any) -> Any:
         from pymoo.algorithms.soo.nonconvex import ga
-        from pymoo.operators.crossover.sbx import SBX
-        from pymoo.operators.mutation.pm import PM
 
-        values = self._values
-        return ga.GA(
-            pop_size=values["population"],
-            crossover=SBX(prob=values["crossover"], eta=values["crossover_eta"]),
-            mutation=PM(prob=values["mutation"], eta=values["mutation_eta"]),
-        )
-
-    def ask(self) -> Float:
-        """Return the next generation, one row each."""
-        return self._search.ask()
-
-    def tell(self, U: Float, results: Results) -> None:
-        """Select who lives on.
-
-        Raises:
-            ValueError: U is not what was last asked.
-        """
-        self._search.tell(U, results)
+        return ga.GA(**parts)
