@@ -72,6 +72,14 @@ class Arena:
         self.n_decisions, self.n_observed = len(names), len(OBSERVED)
         self.decisions: Int = np.vectorize(space.variables.index, otypes=[np.int64])(names)
 
+    def warm_up(self) -> None:
+        """Play once, so that the kernels are compiled before time counts."""
+
+        def wait(observation: Float, running: Bool) -> Float:
+            return np.zeros((len(observation), self.decisions.shape[1]))
+
+        self.play(np.full((1, self._space.n_var), 0.5), wait)
+
     def play(self, U: Float, act: Act) -> Float:
         """Let an agent decide, and return the rows that came of it.
 

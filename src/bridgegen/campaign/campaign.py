@@ -331,6 +331,8 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     """Return the run's search algorithm, as it begins."""
     method = toolkit.get(settings.algorithm)
     arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
+    if arena is not None:
+        arena.warm_up()
     names, n_obj = pipeline.space.variables, pipeline.objective.n_obj
     problem = Problem(names, pipeline.metrics, n_obj, arena)
     return method(problem, settings.seed, **settings.algorithm_settings)
