@@ -4,19 +4,11 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from bridgegen.arrays import Float
-from bridgegen.search.algorithm import (
-    RESTART_WITHIN,
-    Arity,
-    Problem,
-    Results,
-    Setting,
-    Value,
-    resolve,
-)
+from bridgegen.search.algorithm import RESTART_WITHIN, Arity, Setting
+from bridgegen.search.evolved import Evolved
 
 
-class ES:
+class ES(Evolved):
     """The best of each generation's children become the parents of the next; none lives longer.
 
     Each individual carries its own step sizes, one a parameter, which mutate before they are used
@@ -42,28 +34,9 @@ class ES:
     }
     objectives: ClassVar[Arity] = "one"
 
-    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        from bridgegen.search._pymoo import Generations
-
-        self._values = resolve(ES, problem, seed, settings)
-        within = self._values["restart_within"]
-        self._search = Generations(self._build, problem, seed, within)
-
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import es
 
         children = self._values["children"]
         parents = min(max(2, math.ceil(children * self._values["parents"])), children // 2)
         return es.ES(n_offsprings=children, pop_size=parents, gamma=self._values["gamma"])
-
-    def ask(self) -> Float:
-        """Return the next generation, one row each."""
-        return self._search.ask()
-
-    def tell(self, U: Float, results: Results) -> None:
-        """Select who lives on.
-
-        Raises:
-            ValueError: U is not what was last asked.
-        """
-        self._search.tell(U, results)

@@ -1,22 +1,14 @@
 """What the genetic algorithms of pymoo's share: how children are made."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from bridgegen.arrays import Float
-from bridgegen.search.algorithm import (
-    RESTART_WITHIN,
-    Arity,
-    Problem,
-    Results,
-    Setting,
-    Value,
-    resolve,
-)
+from bridgegen.search.algorithm import RESTART_WITHIN, Setting
+from bridgegen.search.evolved import Evolved
 
 
-class Genetic(ABC):
+class Genetic(Evolved):
     """A population whose parents are crossed and whose children are mutated.
 
     Crossover is simulated binary, mutation polynomial (each parameter with probability 1/n of a
@@ -26,10 +18,6 @@ class Genetic(ABC):
     Source: Deb and Agrawal (1995), "Simulated binary crossover for continuous search space".
     """
 
-    name: ClassVar[str]
-    description: ClassVar[str]
-    source: ClassVar[str]
-    objectives: ClassVar[Arity]
     settings: ClassVar[Mapping[str, Setting]] = {
         "population": Setting(40, "individuals, and rows per batch", low=4, high=100_000),
         "crossover": Setting(0.9, "probability that two parents are crossed", 0.0, 1.0),
@@ -38,15 +26,6 @@ class Genetic(ABC):
         "mutation_eta": Setting(20.0, "how little a mutated parameter moves", 0.0, 1000.0),
         "restart_within": RESTART_WITHIN,
     }
-    scaled: ClassVar[bool] = False
-    """Whether it measures distances between objectives, which then must be of one scale."""
-
-    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        from bridgegen.search._pymoo import Generations
-
-        self._values = resolve(type(self), problem, seed, settings)
-        within = self._values["restart_within"]
-        self._search = Generations(self._build, problem, seed, within, scaled=self.scaled)
 
     def _build(self) -> Any:
         from pymoo.operators.crossover.sbx import SBX
@@ -62,15 +41,3 @@ class Genetic(ABC):
     @abstractmethod
     def _made_of(self, **parts: Any) -> Any:
         """Return pymoo's algorithm, not yet set up, of a population's size and its operators."""
-
-    def ask(self) -> Float:
-        """Return the next generation, one row each."""
-        return self._search.ask()
-
-    def tell(self, U: Float, results: Results) -> None:
-        """Select who lives on.
-
-        Raises:
-            ValueError: U is not what was last asked.
-        """
-        self._search.tell(U, results)

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from bridgegen.arrays import Float
-from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
+from bridgegen.search.algorithm import Arity, Setting
+from bridgegen.search.evolved import Evolved
 
 
-class PSO:
+class PSO(Evolved):
     """A swarm of particles drawn to their own best row and to the swarm's.
 
     The inertia and the two pulls are constant, as in the paper; pymoo's adaptive variant would
@@ -49,13 +49,6 @@ class PSO:
     }
     objectives: ClassVar[Arity] = "one"
 
-    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        from bridgegen.search._pymoo import Generations
-
-        self._values = resolve(PSO, problem, seed, settings)
-        within = self._values["restart_within"]
-        self._swarm = Generations(self._build, problem, seed, within)
-
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import pso
 
@@ -70,15 +63,3 @@ class PSO:
             max_velocity_rate=values["max_velocity"],
             pertube_best=values["mutate_best"],
         )
-
-    def ask(self) -> Float:
-        """Return where the particles are, one row each."""
-        return self._swarm.ask()
-
-    def tell(self, U: Float, results: Results) -> None:
-        """Move the particles' and the swarm's best rows, and from them the next velocities.
-
-        Raises:
-            ValueError: U is not what was last asked.
-        """
-        self._swarm.tell(U, results)

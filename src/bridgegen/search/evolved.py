@@ -1,0 +1,46 @@
+"""What the algorithms built on pymoo's populations share: a generation is a batch."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from bridgegen.arrays import Float
+from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
+
+
+class Evolved(ABC):
+    """A population that changes from generation to generation; begun afresh when it has converged.
+
+    Attributes:
+        scaled: whether it measures distances between objectives, which then must be of one scale.
+    """
+
+    name: ClassVar[str]
+    description: ClassVar[str]
+    source: ClassVar[str]
+    settings: ClassVar[Mapping[str, Setting]]
+    objectives: ClassVar[Arity]
+    scaled: ClassVar[bool] = False
+
+    def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
+        from bridgegen.search._pymoo import Generations
+
+        self._values = resolve(type(self), problem, seed, settings)
+        within = self._values["restart_within"]
+        self._search = Generations(self._build, problem, seed, within, scaled=self.scaled)
+
+    @abstractmethod
+    def _build(self) -> Any:
+        """Return pymoo's algorithm, not yet set up."""
+
+    def ask(self) -> Float:
+        """Return the next generation, one row each."""
+        return self._search.ask()
+
+    def tell(self, U: Float, results: Results) -> None:
+        """Make of what the rows came to who lives on, or where to go next.
+
+        Raises:
+            ValueError: U is not what was last asked.
+        """
+        self._search.tell(U, results)
