@@ -149,9 +149,7 @@ class Pipeline:
         self.metrics = tuple(recorded)
         _refuse_fixed(scenario, space, self.simulator.fixed)
         self._roads: Network | None = None
-        if not isinstance(self.source, AdversarySource) and not {*self.source.static_names} & {
-            *space.variables
-        }:
+        if not {*self._road_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
         self._threads = ThreadPoolExecutor(threads or os.cpu_count() or 1, "rollout")
 
@@ -288,16 +286,19 @@ class Pipeline:
         """Return the compiled road networks of some rows, and which row has which."""
         if self._roads is not None:
             return self._roads, np.zeros(len(X), dtype=np.int64)
-        if isinstance(self.source, AdversarySource):
-            values = [self.space.values(row) for row in X]
-            alone = [self.source.roads(one) for one in values]
-            courses = [self.source.courses(one) for one in values]
-            return self.simulator.roads(alone, courses), np.arange(len(X))
-        names = self.source.static_names
+        source, names = self.source, self._road_names
         columns = [self.space.index(name) for name in names]
-        static, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
-        models = [self.source.roads(dict(zip(names, row.tolist(), strict=True))) for row in static]
-        return self.simulator.roads(models), rows.reshape(-1).astype(np.int64)
+        distinct, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
+        values = [dict(zip(names, row, strict=True)) for row in distinct.tolist()]
+        roads = self.simulator.roads(
+            [source.roads(one) for one in values], [source.courses(one) for one in values]
+        )
+        return roads, rows.reshape(-1).astype(np.int64)
+
+    @property
+    def _road_names(self) -> tuple[str, ...]:
+        """The parameters that a row's road network, and the courses on it, depend on."""
+        return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
 
 
 def _source(

@@ -70,7 +70,7 @@ def test_the_papers_run_is_too_short_to_start_afresh():
     for seed in range(5):
         pso = PSO(Problem.unnamed(10), seed)
         search(pso, sphere)
-        assert pso._swarm.starts == 1
+        assert pso._search.starts == 1
 
 
 def test_the_first_step_is_towards_the_best_row_only():
@@ -109,7 +109,7 @@ def test_a_failed_row_is_no_particles_best_for_long():
         F = np.full((40, 1), float(generation) * 1e6)
         F[0] = 0.0
         pso.tell(U, Results.of_F(F, ok))
-        best = pso._swarm.algorithm.pop.get("F")[:, 0]
+        best = pso._search.algorithm.pop.get("F")[:, 0]
         assert np.isfinite(best).all()
         assert best[0] == 0.0
         if generation == 1:

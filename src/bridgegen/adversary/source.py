@@ -33,6 +33,7 @@ class AdversarySource:
         }
         self.constraints = replace(inner.constraints, parameters=left)
         self.static_names, self.unused_names = inner.static_names, inner.unused_names
+        self.course_names = tuple(nominal)  # decisions, and what limits and places the participant
         parked = inner.concrete(nominal)
         # Only where lanes lead is asked of it; the ego's own driver need not be there for that.
         plain, name = DRIVERS["route-follower"], inner.constraints.name

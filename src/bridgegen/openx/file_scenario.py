@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
+from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.parameters import Axis
@@ -143,6 +144,7 @@ class FileSource:
     """
 
     static_names: tuple[str, ...] = ()
+    course_names: tuple[str, ...] = ()
     unused_names: tuple[str, ...] = ()
     junction = None
     constraints = None
@@ -169,6 +171,10 @@ class FileSource:
     def roads(self, values: Mapping[str, float]) -> OpenDrive:
         """See `Source`."""
         return self._scenario.roads.model
+
+    def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
+        """See `Source`: the file tells all rows the same."""
+        return {}
 
     def concrete(self, values: Mapping[str, float], road_file: str = "") -> "ConcreteFile":
         """See `Source`."""

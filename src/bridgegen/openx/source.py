@@ -56,6 +56,10 @@ class Source(Protocol):
         """The parameters that the road network depends on."""
 
     @property
+    def course_names(self) -> tuple[str, ...]:
+        """The parameters that ``courses`` depends on; none where nobody is told a course."""
+
+    @property
     def unused_names(self) -> tuple[str, ...]:
         """The parameters that nothing depends on: a map tells what they would."""
 
@@ -69,6 +73,13 @@ class Source(Protocol):
 
     def roads(self, values: Mapping[str, float]) -> OpenDrive:
         """Return the road network, of the values of ``static_names``."""
+
+    def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
+        """Return who is where when, by name, of those whom each row tells it, of such values.
+
+        Returns:
+            ``(V, 4)`` float64 each: time [s], x, y [m], heading [rad] of the reference point.
+        """
 
     def concrete(self, values: Mapping[str, float], road_file: str = "") -> ConcreteScenario:
         """Return one concrete scenario.
@@ -134,6 +145,8 @@ class OntologySource:
         ideal: the driver's stages that are ideal, separated by commas.
     """
 
+    course_names: tuple[str, ...] = ()
+
     def __init__(
         self,
         scenario: LogicalScenario,
@@ -173,6 +186,10 @@ class OntologySource:
         if self._map is not None:
             return self._map.model
         return opendrive_from_owl(build_static(dict(values), self._scenario.roads))
+
+    def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
+        """See `Source`: nobody is told one."""
+        return {}
 
     def concrete(
         self,
