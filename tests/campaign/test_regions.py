@@ -63,7 +63,7 @@ def copied(folder, place, **changes):
 
 def test_regions_hold_for_scenarios_found_by_trying(folder, found):
     """Independent rows of the whole space, those outside a region thrown away."""
-    from bridgegen.campaign.campaign import pipeline_of
+    from bridgegen.campaign.restored import pipeline_of
     from bridgegen.campaign.settings import Settings
 
     assert len(found.found.confirmed) >= 2

@@ -6,20 +6,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridgegen import search as toolkit
+from bridgegen.campaign.chosen import chosen_objective, columns_of
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
+from bridgegen.campaign.restored import pipeline_of, placed
 from bridgegen.campaign.run import REPORT, Run
 from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
-from bridgegen.ego import STORYBOARD, is_spec
-from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
-from bridgegen.objective import Objective, Objectives
+from bridgegen.errors import InputError, Interrupted
 from bridgegen.odd.adversary import adversarial
-from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
-from bridgegen.odd.space import SearchSpace
-from bridgegen.openx.opendrive.road_map import RoadMap, load_map
-from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.build import build_report
 from bridgegen.report.page import write_report
@@ -125,10 +121,10 @@ def run_search(
     seed = catalogue.seed if seed is None else seed
     _check_numbers(budget, seed, keep)
     method = toolkit.get(algorithm)
-    columns = _columns(method, objectives)
-    spec = _choose(catalogue.objective, objective, weights, scale, columns)
+    columns = columns_of(method, objectives)
+    spec = chosen_objective(catalogue.objective, objective, weights, scale, columns)
     logical = replace(catalogue, objective=spec)
-    logical, roads = _placed(logical, road_map, junction)
+    logical, roads = placed(logical, road_map, junction)
     driven: str | None = None
     if adversary is not None or getattr(method, "is_adversary", False):
         logical = adversarial(logical, adversary)
@@ -229,104 +225,6 @@ def resume(
         return _go(pipeline, searcher, store, settings, watch, deliver)
 
 
-def pipeline_of(
-    settings: Settings,
-    metrics: Sequence[str],
-    folder: Path,
-    *,
-    ego: str | None = None,
-    command: str = "resume",
-    causes: bool | None = None,
-    threads: int | None = None,
-) -> Pipeline:
-    """Return the pipeline that a run was made with, its objective included.
-
-    Args:
-        settings: of the run.
-        metrics: that it records.
-        folder: of the run.
-        ego: where a driver of the user's drives, that same driver.
-        command: who asks, for messages.
-        causes: whether to find causes, as the run did by default; where only one counts, they are
-            found all the same.
-        threads: to evaluate with, one for each core by default.
-
-    Raises:
-        StorageError: the scenario or the map is not what it was.
-        InputError: the scenario or the map is missing; or the ego is another, or must be named.
-    """
-    _check_driver(settings, ego, folder, command)
-    space, roads = searched(settings, folder)
-    pipeline = Pipeline(
-        space.scenario,
-        space,
-        ego=_ego(settings),
-        ideal=settings.ideal,
-        time_limit=settings.time_limit,
-        road_map=roads,
-        metrics=metrics,
-        seek_causes=settings.causes if causes is None else causes,
-        cause=Cause.named(settings.cause) if settings.cause else None,
-        threads=threads,
-    )
-    pipeline.choose_objective(Objective.from_dict(settings.objective))
-    return pipeline
-
-
-def _ego(settings: Settings) -> str | None:
-    """Return the driver to ask for; None where the file's own actions move the ego."""
-    return None if settings.ego == STORYBOARD.name else settings.ego
-
-
-def _check_driver(settings: Settings, ego: str | None, folder: Path, command: str) -> None:
-    """Refuse another driver than the run's, and one of the user's that is not named again."""
-    if ego is None and is_spec(settings.ego):
-        raise InputError(
-            f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
-            f"bridgegen {command} {folder} --ego {settings.ego}"
-        )
-    if ego not in (None, settings.ego):
-        raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")
-
-
-def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | None]:
-    """Return the search space that a run was made with, and its map if it has one.
-
-    Raises:
-        StorageError: the scenario or the map is not what it was.
-        InputError: the scenario or the map is missing.
-    """
-    logical = load(settings.scenario, settings.distribution)
-    if logical.fingerprint != settings.fingerprint:
-        what = " or its distribution" if settings.distribution else ""
-        raise StorageError(
-            f"{folder}: scenario {settings.scenario}{what} is not what it was when the run began; "
-            "its results can still be read"
-        )
-    placed, roads = _placed(logical, settings.map, settings.junction)
-    if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
-        raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
-    if settings.adversary is not None:
-        placed = adversarial(placed, settings.adversary)
-    return placed.space(settings.axes, settings.fixed), roads
-
-
-def _placed(
-    scenario: SearchedScenario, road_map: Path | str | None, junction: str | None
-) -> tuple[SearchedScenario, RoadMap | None]:
-    """Return a scenario as it is on a map, and the map; as it was, without one.
-
-    Raises:
-        InputError: a scenario that brings its own map, or a map that it cannot take place on.
-    """
-    if road_map is None:
-        return scenario, None
-    if not isinstance(scenario, LogicalScenario):
-        raise InputError(f"{scenario.name}: a scenario file names its map, it takes no other")
-    roads = load_map(Path(road_map), junction, scenario)
-    return on_map(scenario, roads), roads
-
-
 def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     """Return the run's search algorithm, as it begins."""
     method = toolkit.get(settings.algorithm)
@@ -382,40 +280,6 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
         version=store.version, notes=store.notes,
     )  # fmt: skip
     write_report(store.folder / REPORT, data)
-
-
-def _columns(method: type[toolkit.Algorithm], objectives: str | None) -> Objectives:
-    """Return how many objectives are searched: what the user says, or the algorithm is for."""
-    if objectives is None:
-        return "many" if method.objectives == "many" else "one"
-    if objectives not in ("one", "many"):
-        raise UnknownNameError("number of objectives", objectives, ("one", "many"))
-    return objectives  # type: ignore[return-value]
-
-
-def _choose(
-    spec: ObjectiveSpec,
-    metrics: Mapping[str, float | None] | None,
-    weights: str | None,
-    scale: str | None,
-    columns: Objectives,
-) -> ObjectiveSpec:
-    """Return the scenario's objective with what the user wants instead."""
-    if columns == "many":
-        given = [f"{name}={w:g}" for name, w in (metrics or {}).items() if w is not None]
-        given += [f"--weights {weights}"] if weights else []
-        if given:
-            raise InputError(
-                f"weights have no part in many objectives, got {', '.join(given)}; "
-                "leave them out, or search their sum: --objectives one"
-            )
-    way = weights or ("fixed" if metrics and None not in metrics.values() else spec.weights)
-    terms = spec.terms
-    if metrics is not None:
-        terms = tuple(Term(name, weight) for name, weight in metrics.items())
-    elif way == "entropy":
-        terms = tuple(Term(term.metric) for term in terms)
-    return replace(spec, terms=terms, weights=way, scale=scale or spec.scale)  # type: ignore[arg-type]
 
 
 def _check_numbers(budget: int, seed: int, keep: int) -> None:

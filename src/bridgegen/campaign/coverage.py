@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridgegen.campaign.campaign import searched
+from bridgegen.campaign.restored import searched
 from bridgegen.campaign.settings import Settings
 from bridgegen.odd.coverage import MAX_STRENGTH, Coverage, coverage
 from bridgegen.store import Store

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.campaign.campaign import pipeline_of
+from bridgegen.campaign.restored import pipeline_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.campaign.campaign import searched
+from bridgegen.campaign.restored import searched
 from bridgegen.campaign.settings import Settings
 from bridgegen.comparison.distinct import distinct, normalised
 from bridgegen.comparison.fronts import front

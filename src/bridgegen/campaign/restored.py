@@ -1,0 +1,116 @@
+"""What a run was made with, made again: its search space, its map, its pipeline."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from bridgegen.campaign.scenarios import load
+from bridgegen.campaign.settings import Settings
+from bridgegen.cause import Cause
+from bridgegen.ego import STORYBOARD, is_spec
+from bridgegen.errors import InputError, StorageError
+from bridgegen.objective import Objective
+from bridgegen.odd.adversary import adversarial
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
+from bridgegen.odd.space import SearchSpace
+from bridgegen.openx.opendrive.road_map import RoadMap, load_map
+from bridgegen.openx.source import on_map
+from bridgegen.pipeline import Pipeline
+
+
+def pipeline_of(
+    settings: Settings,
+    metrics: Sequence[str],
+    folder: Path,
+    *,
+    ego: str | None = None,
+    command: str = "resume",
+    causes: bool | None = None,
+    threads: int | None = None,
+) -> Pipeline:
+    """Return the pipeline that a run was made with, its objective included.
+
+    Args:
+        settings: of the run.
+        metrics: that it records.
+        folder: of the run.
+        ego: where a driver of the user's drives, that same driver.
+        command: who asks, for messages.
+        causes: whether to find causes, as the run did by default; where only one counts, they are
+            found all the same.
+        threads: to evaluate with, one for each core by default.
+
+    Raises:
+        StorageError: the scenario or the map is not what it was.
+        InputError: the scenario or the map is missing; or the ego is another, or must be named.
+    """
+    _check_driver(settings, ego, folder, command)
+    space, roads = searched(settings, folder)
+    pipeline = Pipeline(
+        space.scenario,
+        space,
+        ego=_ego(settings),
+        ideal=settings.ideal,
+        time_limit=settings.time_limit,
+        road_map=roads,
+        metrics=metrics,
+        seek_causes=settings.causes if causes is None else causes,
+        cause=Cause.named(settings.cause) if settings.cause else None,
+        threads=threads,
+    )
+    pipeline.choose_objective(Objective.from_dict(settings.objective))
+    return pipeline
+
+
+def _ego(settings: Settings) -> str | None:
+    """Return the driver to ask for; None where the file's own actions move the ego."""
+    return None if settings.ego == STORYBOARD.name else settings.ego
+
+
+def _check_driver(settings: Settings, ego: str | None, folder: Path, command: str) -> None:
+    """Refuse another driver than the run's, and one of the user's that is not named again."""
+    if ego is None and is_spec(settings.ego):
+        raise InputError(
+            f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
+            f"bridgegen {command} {folder} --ego {settings.ego}"
+        )
+    if ego not in (None, settings.ego):
+        raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")
+
+
+def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | None]:
+    """Return the search space that a run was made with, and its map if it has one.
+
+    Raises:
+        StorageError: the scenario or the map is not what it was.
+        InputError: the scenario or the map is missing.
+    """
+    logical = load(settings.scenario, settings.distribution)
+    if logical.fingerprint != settings.fingerprint:
+        what = " or its distribution" if settings.distribution else ""
+        raise StorageError(
+            f"{folder}: scenario {settings.scenario}{what} is not what it was when the run began; "
+            "its results can still be read"
+        )
+    there, roads = placed(logical, settings.map, settings.junction)
+    if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
+        raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
+    if settings.adversary is not None:
+        there = adversarial(there, settings.adversary)
+    return there.space(settings.axes, settings.fixed), roads
+
+
+def placed(
+    scenario: SearchedScenario, road_map: Path | str | None, junction: str | None
+) -> tuple[SearchedScenario, RoadMap | None]:
+    """Return a scenario as it is on a map, and the map; as it was, without one.
+
+    Raises:
+        InputError: a scenario that brings its own map, or a map that it cannot take place on.
+    """
+    if road_map is None:
+        return scenario, None
+    if not isinstance(scenario, LogicalScenario):
+        raise InputError(f"{scenario.name}: a scenario file names its map, it takes no other")
+    roads = load_map(Path(road_map), junction, scenario)
+    return on_map(scenario, roads), roads
