@@ -231,7 +231,7 @@ def algorithms() -> list[Row]:
         target = "≤ 50" if name in LEARNERS else "≤ 5"
         if hasattr(get(name), "restore"):
             target = ""  # it trains a network
-        taken = best(lambda name=name: 40 * seconds_a_row(name))  # type: ignore[misc]
+        taken = best(lambda name=name: 40 * seconds_a_row(name))
         rows.append((f"{name}, for 40 rows, ms", f"{1e3 * taken:.2f}", target))
     return rows
 
@@ -253,7 +253,7 @@ def seconds_a_row(name: str) -> float:
         results = Results(
             F[:, :n_obj], np.ones(n, bool), F[:, 0] < 0.85, F.copy(), np.zeros(n, np.int8)
         )
-        taken += seconds(lambda U=U, results=results: algorithm.tell(U, results))  # type: ignore[misc]
+        taken += seconds(lambda U=U, results=results: algorithm.tell(U, results))
         asked += n
     return taken / asked
 

@@ -1,7 +1,6 @@
 """The application that the commands are registered with, and how it is run."""
 
 import sys
-from typing import Annotated
 
 import typer
 
@@ -20,8 +19,6 @@ app.add_typer(listing, name="list")
 
 ontology = typer.Typer(help="The ontology itself.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(ontology, name="ontology")
-
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
 def main() -> None:

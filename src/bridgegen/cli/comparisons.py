@@ -5,10 +5,9 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.cli import options
 from bridgegen.cli.app import app
-from bridgegen.cli.runs import Ideal, TimeLimit, _names, _numbers, _settings, _terms
 from bridgegen.ego import split
-from bridgegen.errors import InputError
 
 
 @app.command()
@@ -40,49 +39,22 @@ def compare(
     jobs: Annotated[
         int | None, typer.Option(help="Runs at a time.", show_default="one on each core")
     ] = None,
-    distribution: Annotated[
-        Path | None,
-        typer.Option(help="How the parameters of an OpenSCENARIO file are distributed."),
-    ] = None,
-    ego: Annotated[
-        str | None,
-        typer.Option(help="Who drives, as for 'search'.", show_default="the scenario's choice"),
-    ] = None,
-    ideal: Ideal = None,
-    time_limit: TimeLimit = None,
-    axes: Annotated[
-        str | None, typer.Option(help="What to search, e.g. static,participants,weather.")
-    ] = None,
-    fix: Annotated[
-        list[str] | None, typer.Option(help="NAME=NUMBER; not searched; may be repeated.")
-    ] = None,
-    objective: Annotated[
-        str | None, typer.Option(help="Metrics, with weights or without, as for 'search'.")
-    ] = None,
-    weights: Annotated[str | None, typer.Option(help="fixed, or entropy.")] = None,
-    scale: Annotated[str | None, typer.Option(help="raw, or standardised.")] = None,
-    objectives: Annotated[
-        str | None,
-        typer.Option(help="one, or many.", show_default="what each algorithm is made for"),
-    ] = None,
-    metrics: Annotated[str | None, typer.Option(help="Record these as well.")] = None,
-    causes: Annotated[
-        bool, typer.Option(help="Find the cause of each critical scenario; takes longer.")
-    ] = False,
-    cause: Annotated[
-        str | None, typer.Option(help="Count only this cause's.", show_default="any")
-    ] = None,
-    adversary: Annotated[
-        str | None,
-        typer.Option(
-            help="A vehicle that an adversary drives, as for 'search', with every algorithm.",
-            show_default="none; with an algorithm that is one the first",
-        ),
-    ] = None,
-    road_map: Annotated[
-        Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
-    ] = None,
-    junction: Annotated[str | None, typer.Option(help="Which junction of the map.")] = None,
+    distribution: options.Distribution = None,
+    ego: options.Ego = None,
+    ideal: options.Ideal = None,
+    time_limit: options.TimeLimit = None,
+    axes: options.Axes = None,
+    fix: options.Fix = None,
+    objective: options.Objective = None,
+    weights: options.Weights = None,
+    scale: options.Scale = None,
+    objectives: options.Objectives = None,
+    metrics: options.Metrics = None,
+    causes: options.Causes = False,
+    cause: options.Cause = None,
+    adversary: options.Adversary = None,
+    road_map: options.RoadMap = None,
+    junction: options.Junction = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -93,13 +65,13 @@ def compare(
 ) -> None:
     """Compare algorithms over several seeds: table, tests, figures and a page."""
     from bridgegen import comparison
-    from bridgegen.cli.comparison_screen import ComparisonScreen, print_comparison
+    from bridgegen.screen.comparison import ComparisonScreen, print_comparison
 
     with ComparisonScreen() as screen:
         result = comparison.compare(
             scenarios,
-            algorithms=_names(algorithms),
-            settings=_by_algorithm(settings or []),
+            algorithms=options.read_names(algorithms),
+            settings=options.read_algorithm_settings(settings),
             seeds=seeds,
             budget=budget,
             baseline=baseline,
@@ -111,29 +83,17 @@ def compare(
             ideal=split(ideal or ""),
             time_limit=time_limit,
             axes=axes.split(",") if axes else None,
-            fixed=_numbers(fix or []),
+            fixed=options.read_numbers(fix),
             road_map=road_map,
             junction=junction,
-            objective=_terms(objective) if objective else None,
+            objective=options.read_terms(objective),
             weights=weights,
             scale=scale,
             objectives=objectives,
-            metrics=_names(metrics),
+            metrics=options.read_names(metrics),
             causes=causes,
             cause=cause,
             adversary=adversary,
             watch=screen.watch,
         )
     print_comparison(result, screen.seconds)
-
-
-def _by_algorithm(pairs: list[str]) -> dict[str, dict[str, bool | int | float | str]]:
-    """Read ``algorithm.name=value`` pairs."""
-    found: dict[str, dict[str, bool | int | float | str]] = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        algorithm, dot, setting = name.partition(".")
-        if not (equals and dot and algorithm and setting):
-            raise InputError(f"--set must read ALGORITHM.NAME=VALUE, got '{pair}'")
-        found.setdefault(algorithm, {}).update(_settings([f"{setting}={value}"]))
-    return found

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from bridgegen.cli.app import Json, app, ontology
+from bridgegen.cli import options
+from bridgegen.cli.app import app, ontology
 from bridgegen.errors import InputError
 
 
@@ -131,11 +132,11 @@ def ask(
     sparql: Annotated[
         Path | None, typer.Option(help="A file with a SPARQL SELECT of your own, instead.")
     ] = None,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Answer a question about a scenario's individuals."""
     from bridgegen.ontology.questions import ask_file
-    from bridgegen.screen import print_table
+    from bridgegen.screen.tables import print_table
 
     answer = ask_file(file, question, sparql)
     print_table(answer.columns, answer.rows, as_json=as_json)
@@ -157,18 +158,16 @@ def metrics(
     dt: Annotated[
         float | None, typer.Option(help="Resample the recording at this time step [s].")
     ] = None,
-    only: Annotated[
-        str | None,
-        typer.Option("--metrics", help="Only these, e.g. pet,drac.", show_default="all there are"),
-    ] = None,
-    as_json: Json = False,
+    only: options.OnlyMetrics = None,
+    as_json: options.Json = False,
 ) -> None:
     """Print the metrics of a recording that another simulator, or the road, made."""
     from bridgegen.metrics.measure import measure_recording
-    from bridgegen.screen import print_measured
+    from bridgegen.screen.files import print_measured
 
-    names = [name.strip() for name in only.split(",")] if only else None
-    measured = measure_recording(file, ego=ego, boxes=boxes, metrics=names, time_step=dt)
+    measured = measure_recording(
+        file, ego=ego, boxes=boxes, metrics=options.read_names(only) or None, time_step=dt
+    )
     for note in measured.notes:
         print(f"bridgegen: note: {file}: {note}", file=sys.stderr)
     print_measured(file, measured, as_json=as_json)

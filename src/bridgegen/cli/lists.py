@@ -5,24 +5,25 @@ from typing import Annotated
 
 import typer
 
-from bridgegen.cli.app import Json, listing
+from bridgegen.cli import options
+from bridgegen.cli.app import listing
 
 
 @listing.command("scenarios")
-def list_scenarios(as_json: Json = False) -> None:
+def list_scenarios(as_json: options.Json = False) -> None:
     """The logical scenarios that ship."""
     from bridgegen.odd.reader import load, names
-    from bridgegen.screen import print_table
+    from bridgegen.screen.tables import print_table
 
     rows = [(name, load(name).title) for name in names()]
     print_table(("scenario", "title"), rows, as_json=as_json)
 
 
 @listing.command("algorithms")
-def list_algorithms(as_json: Json = False) -> None:
+def list_algorithms(as_json: options.Json = False) -> None:
     """The search algorithms."""
     from bridgegen import search as toolkit
-    from bridgegen.screen import print_table
+    from bridgegen.screen.tables import print_table
 
     rows = []
     for one in (toolkit.get(name) for name in toolkit.names()):
@@ -32,21 +33,21 @@ def list_algorithms(as_json: Json = False) -> None:
 
 
 @listing.command("drivers")
-def list_drivers(as_json: Json = False) -> None:
+def list_drivers(as_json: options.Json = False) -> None:
     """The drivers that an ego can have."""
     from bridgegen.ego import DRIVERS
     from bridgegen.ego.drivers import join
-    from bridgegen.screen import print_table
+    from bridgegen.screen.tables import print_table
 
     rows = [(one.name, one.description, join(one.stages)) for one in DRIVERS.values()]
     print_table(("driver", "description", "can be ideal"), rows, as_json=as_json)
 
 
 @listing.command("metrics")
-def list_metrics(as_json: Json = False) -> None:
+def list_metrics(as_json: options.Json = False) -> None:
     """The criticality metrics."""
     from bridgegen.metrics import METRICS, TABLE_I
-    from bridgegen.screen import print_table
+    from bridgegen.screen.tables import print_table
 
     rows = [
         (
@@ -60,10 +61,10 @@ def list_metrics(as_json: Json = False) -> None:
 
 
 @listing.command("sight")
-def list_sight(as_json: Json = False) -> None:
+def list_sight(as_json: options.Json = False) -> None:
     """How far the reference driver's sensors detect a car and a pedestrian in each weather [m]."""
     from bridgegen.ego.sight import HEAD, table
-    from bridgegen.screen import print_table
+    from bridgegen.screen.tables import print_table
 
     print_table(HEAD, list(table()), as_json=as_json)
 
@@ -71,10 +72,10 @@ def list_sight(as_json: Json = False) -> None:
 @listing.command("parameters")
 def list_parameters(
     scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """The parameters of a scenario, with ranges and constraints."""
     from bridgegen.odd.reader import load
-    from bridgegen.screen import print_parameters
+    from bridgegen.screen.tables import print_parameters
 
     print_parameters(load(scenario).table(), as_json=as_json)

@@ -7,25 +7,9 @@ from typing import Annotated
 
 import typer
 
-from bridgegen.cli.app import Json, app
+from bridgegen.cli import options
+from bridgegen.cli.app import app
 from bridgegen.ego import split
-from bridgegen.errors import InputError
-
-TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        help="Seconds that a call of a driver of your own may take; of a compiled one, a scenario.",
-        show_default="10",
-    ),
-]
-Ideal = Annotated[
-    str | None,
-    typer.Option(
-        help="Stages of the driver that work without fault: perception, prediction, control, "
-        "separated by commas.",
-        show_default="none of them",
-    ),
-]
 
 
 @app.command()
@@ -34,13 +18,7 @@ def search(
         str,
         typer.Argument(help="A catalogue name, or the path of a YAML or an OpenSCENARIO file."),
     ],
-    distribution: Annotated[
-        Path | None,
-        typer.Option(
-            help="How the parameters of an OpenSCENARIO file are distributed: a file with a "
-            "ParameterValueDistribution."
-        ),
-    ] = None,
+    distribution: options.Distribution = None,
     algorithm: Annotated[str, typer.Option(help="See 'bridgegen list algorithms'.")] = "pso",
     settings: Annotated[
         list[str] | None,
@@ -58,97 +36,50 @@ def search(
             help="The same seed gives the same result.", show_default="0, or a distribution's"
         ),
     ] = None,
-    ego: Annotated[
-        str | None,
-        typer.Option(
-            help="Who drives: see 'bridgegen list drivers'; or your own: module:Class, "
-            "file.py:Class (or a compiled driver's function), file.fmu.",
-            show_default="the scenario's choice",
-        ),
-    ] = None,
-    ideal: Ideal = None,
-    time_limit: TimeLimit = None,
-    axes: Annotated[
-        str | None,
-        typer.Option(help="What to search, e.g. static,participants,weather."),
-    ] = None,
-    fix: Annotated[
-        list[str] | None,
-        typer.Option(help="Hold a parameter, e.g. --fix fog_density=80; may be repeated."),
-    ] = None,
-    objective: Annotated[
-        str | None,
-        typer.Option(
-            help="Metrics and weights, e.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy."
-        ),
-    ] = None,
-    weights: Annotated[
-        str | None, typer.Option(help="fixed, or entropy (from a random sample).")
-    ] = None,
-    scale: Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")] = None,
-    objectives: Annotated[
-        str | None,
-        typer.Option(
-            help="one: the metrics' weighted sum; many: each metric by itself.",
-            show_default="what the algorithm is made for",
-        ),
-    ] = None,
-    metrics: Annotated[
-        str | None,
-        typer.Option(help="Record these as well, e.g. pet,drac; see 'bridgegen list metrics'."),
-    ] = None,
-    causes: Annotated[
-        bool, typer.Option(help="Find the cause of each critical scenario, by replaying it.")
-    ] = True,
-    cause: Annotated[
-        str | None,
-        typer.Option(
-            help="Count only this cause's: perception, planning, control or unavoidable.",
-            show_default="any",
-        ),
-    ] = None,
-    adversary: Annotated[
-        str | None,
-        typer.Option(
-            help="A vehicle that an adversary drives instead of the scenario's events.",
-            show_default="none; with ppo-adversary the first",
-        ),
-    ] = None,
-    road_map: Annotated[
-        Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
-    ] = None,
-    junction: Annotated[str | None, typer.Option(help="Which junction of the map.")] = None,
+    ego: options.Ego = None,
+    ideal: options.Ideal = None,
+    time_limit: options.TimeLimit = None,
+    axes: options.Axes = None,
+    fix: options.Fix = None,
+    objective: options.Objective = None,
+    weights: options.Weights = None,
+    scale: options.Scale = None,
+    objectives: options.Objectives = None,
+    metrics: options.Metrics = None,
+    causes: options.Causes = True,
+    cause: options.Cause = None,
+    adversary: options.Adversary = None,
+    road_map: options.RoadMap = None,
+    junction: options.Junction = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
     out: Annotated[Path | None, typer.Option(help="The run's folder, new.")] = None,
 ) -> None:
     """Search a logical scenario for its critical concrete ones."""
     from bridgegen import campaign
-    from bridgegen.screen import Screen, print_summary
+    from bridgegen.screen.search import SearchScreen, print_summary
 
-    fixed = _numbers(fix or [])
-    terms = _terms(objective) if objective else None
-    with Screen(budget) as screen:
+    with SearchScreen(budget) as screen:
         run = campaign.run_search(
             scenario,
             distribution=distribution,
             algorithm=algorithm,
-            settings=_settings(settings or []),
+            settings=options.read_settings(settings),
             budget=budget,
             seed=seed,
             ego=ego,
             ideal=split(ideal or ""),
             time_limit=time_limit,
             axes=axes.split(",") if axes else None,
-            fixed=fixed,
+            fixed=options.read_numbers(fix),
             road_map=road_map,
             junction=junction,
             keep=keep,
             out=out,
-            objective=terms,
+            objective=options.read_terms(objective),
             weights=weights,
             scale=scale,
             objectives=objectives,
-            metrics=_names(metrics),
+            metrics=options.read_names(metrics),
             causes=causes,
             cause=cause,
             adversary=adversary,
@@ -174,15 +105,13 @@ def new(
 @app.command()
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
-    ego: Annotated[
-        str | None, typer.Option(help="The run's driver, where it is one of your own.")
-    ] = None,
+    ego: options.OwnEgo = None,
 ) -> None:
     """Go on with a run that was interrupted; the result is as if it had not been."""
     from bridgegen import campaign
-    from bridgegen.screen import Screen, print_summary
+    from bridgegen.screen.search import SearchScreen, print_summary
 
-    with Screen() as screen:
+    with SearchScreen() as screen:
         run = campaign.resume(folder, ego=ego, watch=screen.watch)
     print_summary(run, screen.seconds)
 
@@ -196,11 +125,11 @@ def coverage(
     strength: Annotated[
         int, typer.Option(help="Count combinations of up to so many parameters' bins: 1, 2, 3.")
     ] = 3,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Show which bins, and combinations of bins, a run evaluated and where it was critical."""
     from bridgegen.campaign.coverage import coverage_of
-    from bridgegen.screen import print_coverage
+    from bridgegen.screen.coverage import print_coverage
 
     settings, found = coverage_of(run, bins=bins, strength=strength)
     print_coverage(run, settings, found, as_json=as_json)
@@ -223,24 +152,22 @@ def regions(
         int | None,
         typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
     ] = None,
-    ego: Annotated[
-        str | None, typer.Option(help="The run's driver, where it is one of your own.")
-    ] = None,
-    as_json: Json = False,
+    ego: options.OwnEgo = None,
+    as_json: options.Json = False,
 ) -> None:
     """Find where scenarios are critical: readable rules, each verified by fresh scenarios."""
     from bridgegen.campaign.regions import regions_of
-    from bridgegen.screen import Bar, print_regions
+    from bridgegen.screen.regions import RegionsScreen, print_regions
 
-    with Bar("simulating") as bar:
+    with RegionsScreen() as screen:
         found = regions_of(
             run,
             ego=ego,
             samples=samples,
             at_least=at_least,
             seed=seed,
-            stage=bar.stage,
-            progress=bar.progress,
+            stage=screen.stage,
+            progress=screen.progress,
         )
     print_regions(found, as_json=as_json)
 
@@ -251,8 +178,8 @@ def simulate(
     ego: Annotated[
         str | None, typer.Option(help="Who drives; what the file says by default.")
     ] = None,
-    ideal: Ideal = None,
-    time_limit: TimeLimit = None,
+    ideal: options.Ideal = None,
+    time_limit: options.TimeLimit = None,
     dt: Annotated[
         float | None,
         typer.Option(help="Time step [s].", show_default="what the file's header says, or 0.05"),
@@ -261,16 +188,14 @@ def simulate(
         Path | None,
         typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
     ] = None,
-    metrics: Annotated[
-        str | None, typer.Option(help="Only these, e.g. pet,drac.", show_default="all there are")
-    ] = None,
+    metrics: options.OnlyMetrics = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
-    from bridgegen.screen import print_file_result
+    from bridgegen.screen.files import print_file_result
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
 
@@ -281,7 +206,7 @@ def simulate(
         ego=ego,
         ideal=stages,
         time_limit=time_limit,
-        metrics=_names(metrics),
+        metrics=options.read_names(metrics),
         time_step=dt,
         skipped=skipped,
     )
@@ -311,56 +236,13 @@ def check_driver(
         list[str] | None,
         typer.Option(help="Try it in this one; may be repeated.", show_default="four that ship"),
     ] = None,
-    time_limit: TimeLimit = None,
-    as_json: Json = False,
+    time_limit: options.TimeLimit = None,
+    as_json: options.Json = False,
 ) -> None:
     """Try a driver of your own: does a scenario's result depend on that scenario alone?"""
     from bridgegen.campaign.driver_contract import SCENARIOS, check_driver
-    from bridgegen.screen import print_checks
+    from bridgegen.screen.files import print_checks
 
     checks = check_driver(driver, scenario or SCENARIOS, time_limit=time_limit)
     if not print_checks(checks, as_json=as_json):
         raise typer.Exit(1)
-
-
-def _terms(text: str) -> dict[str, float | None]:
-    """Read ``metric=weight,…`` or ``metric,…``."""
-    pairs = [pair.strip() for pair in text.split(",")]
-    weighted = _numbers([pair for pair in pairs if "=" in pair], "--objective")
-    return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
-
-
-def _names(text: str | None) -> list[str]:
-    """Read ``name,…``; nothing is none."""
-    return [name.strip() for name in text.split(",")] if text else []
-
-
-def _settings(pairs: list[str]) -> dict[str, bool | int | float | str]:
-    """Read ``name=value`` pairs; a value is a number, true, false, or a text."""
-    values: dict[str, bool | int | float | str] = {}
-    for pair in pairs:
-        name, equals, text = pair.partition("=")
-        if not equals:
-            raise InputError(f"--set must read NAME=VALUE, got '{pair}'")
-        try:
-            value = json.loads(text)
-        except json.JSONDecodeError:
-            value = text
-        values[name] = value if isinstance(value, bool | int | float | str) else text
-    return values
-
-
-def _numbers(pairs: list[str], option: str = "--fix") -> dict[str, float]:
-    """Read ``name=value`` pairs."""
-    values, problems = {}, []
-    for pair in pairs:
-        name, equals, text = pair.partition("=")
-        try:
-            values[name] = float(text)
-        except ValueError:
-            equals = ""
-        if not equals:
-            problems.append(f"{option} must read NAME=NUMBER, got '{pair}'")
-    if problems:
-        raise InputError(*problems)
-    return values

@@ -1,14 +1,13 @@
-"""What a person sees in the terminal of a comparison: one progress bar, then its tables."""
+"""A comparison: one bar for all its runs, then its tables."""
 
 import sys
-import time
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
     from bridgegen.comparison import Comparison, Watch
@@ -17,31 +16,14 @@ if TYPE_CHECKING:
 _STAGES = {"read": "reading the runs", "draw": "drawing"}
 
 
-class ComparisonScreen:
-    """A comparison's live progress on stderr: evaluations of all runs, runs that have ended."""
+class ComparisonScreen(Live):
+    """A comparison's live progress: evaluations of all runs, runs that have ended."""
 
     def __init__(self) -> None:
-        self._console = Console(stderr=True)
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=14),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[facts]}"),
-            TimeRemainingColumn(compact=True),
-            console=self._console,
-            transient=True,
-        )
-        self._task = self._progress.add_task("starting", total=None, facts="")
+        super().__init__()
         self._runs = self._ended = self._budget = self._total = self._failed = 0
         self._evaluations: dict[str, int] = {}
         self._before = 0
-        self._told = False
-        self._began = time.perf_counter()
-
-    @property
-    def seconds(self) -> float:
-        """Since it was made [s]."""
-        return time.perf_counter() - self._began
 
     @property
     def watch(self) -> "Watch":
@@ -49,10 +31,8 @@ class ComparisonScreen:
         from bridgegen.comparison import Watch
 
         return Watch(
-            compile=self._compile, batch=self._batch, ended=self._end, begun=self._begin,
-            stage=lambda stage: self._progress.update(
-                self._task, description=_STAGES[stage], facts=""
-            ),
+            compile=self.say_compiling, batch=self._batch, ended=self._end, begun=self._begin,
+            stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
         )  # fmt: skip
 
     def _begin(self, plan: "Plan", ended: int, made: int) -> None:
@@ -60,16 +40,6 @@ class ComparisonScreen:
         self._budget = plan.budget
         self._total = made + (self._runs - ended) * plan.budget
         self._show()
-
-    def _compile(self) -> None:
-        from bridgegen.compiled import is_compiled
-
-        if not is_compiled() and not self._told:
-            self._told = True
-            self._console.print(
-                "First run: compiling the simulator, which takes a minute or two; later runs start "
-                "at once."
-            )
 
     def _batch(self, name: str, evaluations: int) -> None:
         self._evaluations[name] = evaluations
@@ -79,7 +49,7 @@ class ComparisonScreen:
         self._ended += 1
         if failure is not None:
             self._failed += 1
-            self._console.print(f"{name} failed: {failure}", markup=False, highlight=False)
+            self.console.print(f"{name} failed: {failure}", markup=False, highlight=False)
         self._total -= self._budget - self._evaluations.get(name, 0)
         self._show()
 
@@ -88,21 +58,7 @@ class ComparisonScreen:
         facts = f"{self._ended} of {self._runs} runs"
         if self._failed:
             facts += f", {self._failed} failed"
-        self._progress.update(
-            self._task, description="", total=self._total, completed=made, facts=facts
-        )
-
-    def __enter__(self) -> Self:
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._progress.stop()
+        self.show(what="", done=made, total=self._total, facts=facts)
 
 
 def print_comparison(comparison: "Comparison", seconds: float) -> None:

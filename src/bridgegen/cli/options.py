@@ -1,0 +1,158 @@
+"""The options that several commands have, and how their texts are read."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.errors import InputError
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+Distribution = Annotated[
+    Path | None,
+    typer.Option(
+        help="How the parameters of an OpenSCENARIO file are distributed: a file with a "
+        "ParameterValueDistribution."
+    ),
+]
+Ego = Annotated[
+    str | None,
+    typer.Option(
+        help="Who drives: see 'bridgegen list drivers'; or your own: module:Class, "
+        "file.py:Class (or a compiled driver's function), file.fmu.",
+        show_default="the scenario's choice",
+    ),
+]
+OwnEgo = Annotated[
+    str | None, typer.Option("--ego", help="The run's driver, where it is one of your own.")
+]
+Ideal = Annotated[
+    str | None,
+    typer.Option(
+        help="Stages of the driver that work without fault: perception, prediction, control, "
+        "separated by commas.",
+        show_default="none of them",
+    ),
+]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        help="Seconds that a call of a driver of your own may take; of a compiled one, a scenario.",
+        show_default="10",
+    ),
+]
+Axes = Annotated[str | None, typer.Option(help="What to search, e.g. static,participants,weather.")]
+Fix = Annotated[
+    list[str] | None,
+    typer.Option(help="Hold a parameter, e.g. --fix fog_density=80; may be repeated."),
+]
+Objective = Annotated[
+    str | None,
+    typer.Option(
+        help="Metrics and weights, e.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy."
+    ),
+]
+Weights = Annotated[str | None, typer.Option(help="fixed, or entropy (from a random sample).")]
+Scale = Annotated[str | None, typer.Option(help="raw, or standardised (by a sample).")]
+Objectives = Annotated[
+    str | None,
+    typer.Option(
+        help="one: the metrics' weighted sum; many: each metric by itself.",
+        show_default="what the algorithm is made for",
+    ),
+]
+Metrics = Annotated[
+    str | None,
+    typer.Option(help="Record these as well, e.g. pet,drac; see 'bridgegen list metrics'."),
+]
+OnlyMetrics = Annotated[
+    str | None,
+    typer.Option("--metrics", help="Only these, e.g. pet,drac.", show_default="all there are"),
+]
+Causes = Annotated[
+    bool, typer.Option(help="Find the cause of each critical scenario, by replaying it.")
+]
+Cause = Annotated[
+    str | None,
+    typer.Option(
+        help="Count only this cause's: perception, planning, control or unavoidable.",
+        show_default="any",
+    ),
+]
+Adversary = Annotated[
+    str | None,
+    typer.Option(
+        help="A vehicle that an adversary drives instead of the scenario's events.",
+        show_default="none; with ppo-adversary the first",
+    ),
+]
+RoadMap = Annotated[
+    Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
+]
+Junction = Annotated[str | None, typer.Option(help="Which junction of the map.")]
+
+Setting = bool | int | float | str
+"""A value of an algorithm's setting."""
+
+
+def read_names(text: str | None) -> list[str]:
+    """Read ``name,…``; nothing is none."""
+    return [name.strip() for name in text.split(",")] if text else []
+
+
+def read_numbers(pairs: list[str] | None, option: str = "--fix") -> dict[str, float]:
+    """Read ``name=number`` pairs."""
+    values, problems = {}, []
+    for pair in pairs or ():
+        name, equals, text = pair.partition("=")
+        try:
+            values[name] = float(text)
+        except ValueError:
+            equals = ""
+        if not equals:
+            problems.append(f"{option} must read NAME=NUMBER, got '{pair}'")
+    if problems:
+        raise InputError(*problems)
+    return values
+
+
+def read_terms(text: str | None) -> dict[str, float | None] | None:
+    """Read ``metric=weight,…`` or ``metric,…``; nothing is the scenario's choice."""
+    if not text:
+        return None
+    pairs = read_names(text)
+    weighted = read_numbers([pair for pair in pairs if "=" in pair], "--objective")
+    return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
+
+
+def read_settings(pairs: list[str] | None) -> dict[str, Setting]:
+    """Read ``name=value`` pairs; a value is a number, true, false, or a text."""
+    values: dict[str, Setting] = {}
+    for pair in pairs or ():
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise InputError(f"--set must read NAME=VALUE, got '{pair}'")
+        values[name] = _value(text)
+    return values
+
+
+def read_algorithm_settings(pairs: list[str] | None) -> dict[str, dict[str, Setting]]:
+    """Read ``algorithm.name=value`` pairs."""
+    found: dict[str, dict[str, Setting]] = {}
+    for pair in pairs or ():
+        name, equals, text = pair.partition("=")
+        algorithm, dot, setting = name.partition(".")
+        if not (equals and dot and algorithm and setting):
+            raise InputError(f"--set must read ALGORITHM.NAME=VALUE, got '{pair}'")
+        found.setdefault(algorithm, {})[setting] = _value(text)
+    return found
+
+
+def _value(text: str) -> Setting:
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError:
+        return text
+    return value if isinstance(value, bool | int | float | str) else text

@@ -1,0 +1,78 @@
+"""Progress bars on stderr."""
+
+import time
+from types import TracebackType
+from typing import Any, Self
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+
+class Live:
+    """One live bar on stderr: what is done, how many of how many, facts, the time that remains.
+
+    Args:
+        total: how many there are, if that is known.
+    """
+
+    def __init__(self, total: int | None = None) -> None:
+        self.console = Console(stderr=True)
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=14),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[facts]}"),
+            TimeRemainingColumn(compact=True),
+            console=self.console,
+            transient=True,
+        )
+        self._task: TaskID = self._progress.add_task("starting", total=total, facts="")
+        self._told = False
+        self._began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        """Since it was made [s]."""
+        return time.perf_counter() - self._began
+
+    def show(
+        self,
+        *,
+        what: str | None = None,
+        done: int | None = None,
+        total: int | None = None,
+        facts: str | None = None,
+    ) -> None:
+        """Show what has changed."""
+        fields: dict[str, Any] = {} if facts is None else {"facts": facts}
+        self._progress.update(self._task, description=what, completed=done, total=total, **fields)
+
+    def say_compiling(self) -> None:
+        """Tell, once, why nothing moves, if the kernels are not compiled yet."""
+        from bridgegen.compiled import is_compiled
+
+        if not self._told and not is_compiled():
+            self._told = True
+            self.console.print(
+                "First run: compiling the simulator, which takes a minute or two; later runs start "
+                "at once."
+            )
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._progress.stop()

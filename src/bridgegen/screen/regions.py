@@ -1,0 +1,112 @@
+"""A run's critical regions: the bar while they are verified, then the table."""
+
+import json
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from bridgegen.screen.live import Live
+
+if TYPE_CHECKING:
+    from bridgegen.campaign.regions import RunRegions
+    from bridgegen.regions import Evidence
+
+
+class RegionsScreen(Live):
+    """The live progress of fresh scenarios that are simulated."""
+
+    def stage(self, stage: str) -> None:
+        """Take down what begins."""
+        if stage == "compile":
+            self.say_compiling()
+            self.show(what="compiling")
+
+    def progress(self, done: int, total: int) -> None:
+        """Take down how many are done, and how many there are."""
+        self.show(what="simulating", done=done, total=total)
+
+
+def print_regions(run: "RunRegions", *, as_json: bool) -> None:
+    """Print a run's regions: what holds, then what does not, then what that comes to."""
+    facts, found = run.record, run.found
+    if as_json:
+        print(json.dumps(facts, indent=2))
+        return
+    confirmed = len(found.confirmed)
+    by = f" by {facts['cause']}" if facts["cause"] else ""
+    print(
+        f"{run.folder}: {facts['scenario']}, ego {facts['ego']}, {facts['algorithm']}, "
+        f"{facts['evaluations']} evaluations{'' if facts['finished'] else ' so far'}, "
+        f"{found.critical} critical{by}\n"
+    )
+    least = _percent(facts["at_least"])
+    asked = f"at least {least} of all scenarios are critical, with 95 % confidence"
+    if confirmed:
+        print(f"Regions where {asked}:\n")
+        _print_regions(run, 0, confirmed)
+    else:
+        print(f"No region is confirmed where {asked}.")
+    if others := len(found.regions) - confirmed:
+        print("\nNot confirmed:\n")
+        _print_regions(run, confirmed, confirmed + others)
+    if found.regions:
+        print(
+            "\nfresh: random scenarios of the region, simulated for this table: the share that "
+            "counts, with\nits 95 % interval. run: those that the search chose there, a biased "
+            "share. space: how many\nof all random scenarios lie in the region."
+        )
+    else:
+        print(
+            "No part of the parameters' ranges stands out in a decision tree of the evaluations:\n"
+            "too few are critical, or nowhere enough of them."
+        )
+    if confirmed:
+        print(
+            f"\nThe confirmed {'region holds' if confirmed == 1 else 'regions hold'} "
+            f"{found.critical_held} of the run's {found.critical} critical scenarios, and "
+            f"{_percent(found.space_share)} of all random scenarios."
+        )
+    files = ", ".join(map(str, run.files))
+    print(f"{found.simulations} fresh scenarios, seed {facts['seed']}: {files}")
+    if run.unstated:
+        print(
+            f"{len(run.unstated)} of the confirmed regions cannot be stated as classes: the "
+            "ontology cannot say this\nscenario, or has no value of a parameter that the rule "
+            "names."
+        )
+
+
+def _print_regions(run: "RunRegions", start: int, stop: int) -> None:
+    from bridgegen.regions.words import ANYWHERE, conditions
+
+    failed = any(one.fresh.failed for one in run.found.regions[start:stop])
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
+    for name in ("#", "region", "fresh", "run", "space", *(["failed"] if failed else [])):
+        table.add_column(name, overflow="fold")
+    for number, one in enumerate(run.found.regions[start:stop], start=start + 1):
+        rule = "\nand ".join(conditions(one.box, run.space)) or ANYWHERE
+        note = "\n(narrowed to others)" if one.narrowed else ""
+        table.add_row(
+            str(number),
+            rule + note,
+            _shares(one.fresh),
+            _shares(one.search),
+            _percent(one.space_share),
+            *([str(one.fresh.failed)] if failed else []),
+        )
+    Console(markup=False, emoji=False, highlight=False).print(table)
+
+
+def _shares(one: "Evidence") -> str:
+    if one.share is None:
+        return "none"
+    low, high = map(_percent, one.interval)
+    low = low.removesuffix(" %")
+    return f"{_percent(one.share)}\n{low} to {high}\n{one.critical} of {one.rows}"
+
+
+def _percent(share: float) -> str:
+    from bridgegen.regions.words import percent
+
+    return percent(share)

@@ -1,0 +1,87 @@
+"""A campaign: its bar, and its figures when it has ended."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bridgegen.screen.live import Live
+
+if TYPE_CHECKING:
+    from bridgegen.campaign import Run, Watch
+    from bridgegen.campaign.loop import Progress
+
+_STAGES = {
+    "compile": "compiling",
+    "search": "",  # the bar says it; a terminal has but 80 columns
+    "hand over": "writing the critical scenarios",
+    "report": "writing the report",
+}
+
+MOST_REASONS = 5
+"""Why evaluations failed is told in so many lines at most."""
+
+
+class SearchScreen(Live):
+    """A campaign's live progress: evaluations, critical so far, best d_min, rate.
+
+    Args:
+        budget: of evaluations, if it is known.
+    """
+
+    def __init__(self, budget: int | None = None) -> None:
+        super().__init__(budget)
+        self._critical, self._best = 0, float("inf")
+
+    @property
+    def watch(self) -> "Watch":
+        """The callbacks for a campaign."""
+        from bridgegen.campaign import Watch
+
+        return Watch(stage=self._stage, batch=self._batch)
+
+    def _stage(self, stage: str) -> None:
+        if stage == "compile":
+            self.say_compiling()
+        self.show(what=_STAGES[stage])
+
+    def _batch(self, progress: "Progress") -> None:
+        column = progress.result.metrics[:, progress.metrics.index("d_min")]
+        self._critical += int(progress.result.critical.sum())
+        good = column[progress.result.status == 0]
+        self._best = min(self._best, float(good.min())) if len(good) else self._best
+        rate = progress.evaluations / progress.seconds if progress.seconds > 0 else 0.0
+        self.show(
+            done=progress.evaluations,
+            total=progress.budget,
+            facts=f"{self._critical} critical · best d_min {self._best:.2f} m · {rate:.0f}/s",
+        )
+
+
+def print_summary(run: "Run", seconds: float) -> None:
+    """Print a run's figures, the whole job's time [s], and where its files are."""
+    s, settings = run.summary, run.settings
+    rows = [
+        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
+        ("search", f"{settings.algorithm}, seed {settings.seed}"),
+        ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
+        ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical{_by(settings.cause)})"),
+        *([("causes", ", ".join(f"{k} {n}" for k, n in s.causes.items()))] if s.causes else []),
+        ("first critical after", _count(s.first)),
+        ("50th critical after", _count(s.fiftieth)),
+        ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
+        ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
+        ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
+        ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}"),
+        ("report", str(run.report)),
+    ]
+    reasons = run.failures.most_common(MOST_REASONS)
+    rows += [("failed", f"{count} × {reason}") for reason, count in reasons]
+    for name, value in rows:
+        print(f"{name:<22}{value}")
+
+
+def _by(cause: str | None) -> str:
+    return f" by {cause}" if cause else ""
+
+
+def _count(value: int | None) -> str:
+    return "never" if value is None else f"{value} evaluations"

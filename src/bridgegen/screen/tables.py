@@ -1,0 +1,44 @@
+"""Tables, and lists of parameters."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from bridgegen.odd.scenario import ParameterLine
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_json: bool) -> None:
+    """Print rows as a table, or as a JSON list of objects."""
+    if as_json:
+        print(json.dumps([dict(zip(head, row, strict=True)) for row in rows], indent=2))
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in head:
+        table.add_column(name, overflow="fold")  # nothing is lost in a narrow terminal
+    for row in rows:
+        table.add_row(*("" if value is None else _shown(value) for value in row))
+    Console(markup=False, emoji=False).print(table)
+
+
+def _shown(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None:
+    """Print parameters with range and default; below each, what it is and its constraints."""
+    if as_json:
+        print(json.dumps([{**asdict(line), "axis": str(line.axis)} for line in lines], indent=2))
+        return
+    width = max(len(line.name) for line in lines)
+    for line in lines:
+        span = "derived" if line.low is None else f"{line.low:g} to {line.high:g} {line.unit}"
+        default = "" if line.default is None else f", default {line.default:g}"
+        print(f"{line.name:<{width}}  {line.axis}, {span}{default}")
+        for text in (line.description, *line.bounds.split("; ")):
+            if text:
+                print(f"{'':<{width}}    {text}")
