@@ -11,8 +11,11 @@ DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 
 def broken(name, file=DRIVERS):
     checks = list(check_driver(f"{file}:{name}", ["crossroads-s1"], time_limit=0.5))
-    assert len(checks) == 6
-    return {check.rule: check.problem for check in checks if check.problem}
+    found = {check.rule: check.problem for check in checks if check.problem}
+    timed = "every row is driven to its end" not in found
+    assert [check.rule for check in checks].count("speed") == timed
+    assert len(checks) == 5 + timed
+    return found
 
 
 @pytest.mark.parametrize("name", ["Cruises", "LooksAhead"])
