@@ -11,7 +11,7 @@ from bridgegen.errors import UnsupportedError
 from bridgegen.odd.reader import load
 from bridgegen.openx.openscenario.from_owl.weather import time_of_day
 from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.embedded.environments import sun_at
+from bridgegen.simulation.embedded.compiler.environments import sun_at
 
 from .storyboards import after, crossroads, lane, scenario, simulator, start
 

@@ -11,8 +11,8 @@ from bridgegen.ego import DRIVERS
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded._follow_kernels import at_time
+from bridgegen.simulation.embedded.compiler.trajectories import timetable
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-from bridgegen.simulation.embedded.trajectories import timetable
 
 from .storyboards import (
     condition,

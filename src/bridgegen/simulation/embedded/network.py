@@ -13,8 +13,8 @@ from bridgegen.openx.opendrive.lanes import section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Stretch
 from bridgegen.simulation.embedded._memory_kernels import Roads
+from bridgegen.simulation.embedded.compiler.trajectories import timetable
 from bridgegen.simulation.embedded.program import Program
-from bridgegen.simulation.embedded.trajectories import timetable
 from bridgegen.simulation.embedded.ways import UNKNOWN, Ways, padded, position
 
 NO_GROUND = Ground(np.empty((0, 4)), np.empty(0, np.int64))

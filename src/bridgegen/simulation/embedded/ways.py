@@ -18,7 +18,8 @@ from bridgegen.openx.opendrive.routes import (
     plan_route,
 )
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
-from bridgegen.simulation.embedded import clothoids
+from bridgegen.simulation.embedded.compiler import clothoids
+from bridgegen.simulation.embedded.compiler.trajectories import Corner, polyline, timetable
 from bridgegen.simulation.embedded.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
@@ -29,7 +30,6 @@ from bridgegen.simulation.embedded.program import (
     Point,
     Program,
 )
-from bridgegen.simulation.embedded.trajectories import Corner, polyline, timetable
 
 UNKNOWN, NONE = -1, -2  # in Ways.numbers: not asked for yet; there is no such way
 ENDS, ASKS, LANDS = -1, -2, -3  # in Path.follows, see ``_travel_kernels``

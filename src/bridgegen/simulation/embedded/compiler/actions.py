@@ -14,18 +14,18 @@ from bridgegen.simulation.embedded._codes import (
     LATERALLY,
     TELEPORT,
 )
-from bridgegen.simulation.embedded.controllers import Controllers
-from bridgegen.simulation.embedded.courses import SHAPES, Courses
-from bridgegen.simulation.embedded.global_actions import GlobalActions
-from bridgegen.simulation.embedded.positions import Positions
+from bridgegen.simulation.embedded.compiler.controllers import Controllers
+from bridgegen.simulation.embedded.compiler.courses import SHAPES, Courses
+from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.positions import Positions
+from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
 from bridgegen.simulation.embedded.program import (
     AlongTrajectory,
     LaneCheck,
     PathSpec,
     Spot,
 )
-from bridgegen.simulation.embedded.tables import Tables
-from bridgegen.simulation.embedded.trajectories import compile_trajectory
 
 _SPEED_CHANGE, _LANE_CHANGE, _LANE_OFFSET = 0, 1, 4
 

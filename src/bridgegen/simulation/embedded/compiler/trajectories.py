@@ -10,9 +10,9 @@ from bridgegen.arrays import Float
 from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.simulation.embedded.clothoids import bends
+from bridgegen.simulation.embedded.compiler.clothoids import bends
+from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import AlongTrajectory, Bend, LanePoint, Point
-from bridgegen.simulation.embedded.tables import Tables
 
 STEP = 0.2
 """Between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""

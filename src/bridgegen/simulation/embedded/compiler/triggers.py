@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.global_actions import GlobalActions
-from bridgegen.simulation.embedded.positions import Positions
-from bridgegen.simulation.embedded.probes import Probe, Probes
-from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.positions import Positions
+from bridgegen.simulation.embedded.compiler.probes import Probe, Probes
+from bridgegen.simulation.embedded.compiler.tables import Tables
 
 if TYPE_CHECKING:
-    from bridgegen.simulation.embedded.storyboard import Node
+    from bridgegen.simulation.embedded.compiler.storyboard import Node
 
 _EDGES = {
     osc.ConditionEdge.NONE: codes.NO_EDGE, osc.ConditionEdge.RISING: codes.RISING,

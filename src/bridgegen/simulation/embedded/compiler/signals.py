@@ -2,7 +2,7 @@
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.compiler.tables import Tables
 
 LIGHT_STATES = {
     "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,

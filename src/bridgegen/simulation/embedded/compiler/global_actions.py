@@ -3,10 +3,10 @@
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.environments import Environments
-from bridgegen.simulation.embedded.signals import Signals
-from bridgegen.simulation.embedded.tables import Tables
-from bridgegen.simulation.embedded.values import Values, seconds
+from bridgegen.simulation.embedded.compiler.environments import Environments
+from bridgegen.simulation.embedded.compiler.signals import Signals
+from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.values import Values, seconds
 
 Row = tuple[int, ...]
 

@@ -6,8 +6,8 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.positions import Positions
-from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.compiler.positions import Positions
+from bridgegen.simulation.embedded.compiler.tables import Tables
 
 SPEED_CHANGE = 0
 

@@ -13,7 +13,7 @@ from bridgegen.ego.kinds import (
     TRUCK,
 )
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.compiler.tables import Tables
 
 Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReference
 

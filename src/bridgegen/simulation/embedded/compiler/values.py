@@ -8,7 +8,7 @@ from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.parameters import kind_of
 from bridgegen.openx.openscenario.values import Kind, Value
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.compiler.tables import Tables
 
 EQUALITY = (codes.EQUAL, codes.NOT_EQUAL)
 

@@ -20,8 +20,8 @@ from bridgegen.ego._weather_columns import (
 )
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.embedded.program import UNSAID
-from bridgegen.simulation.embedded.tables import Tables, table
 
 _CLOUDINESS = (
     "cloudiness"  # property of our files' road condition: percent, where classes are coarse

@@ -12,7 +12,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded._codes import CONTROL, LATERALLY, LONGITUDINALLY
-from bridgegen.simulation.embedded.tables import Tables
+from bridgegen.simulation.embedded.compiler.tables import Tables
 
 UNSAID = -1
 

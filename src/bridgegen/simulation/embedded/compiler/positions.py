@@ -18,6 +18,7 @@ from bridgegen.simulation.embedded._codes import (
     ON_LANE,
     ON_ROAD,
 )
+from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import (
     LanePoint,
     LaneSpot,
@@ -27,7 +28,6 @@ from bridgegen.simulation.embedded.program import (
     Spot,
     WorldSpot,
 )
-from bridgegen.simulation.embedded.tables import Tables
 
 RELATIVE_SINCE = 3
 """The minor version from which a missing type of an Orientation means relative."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded import _codes as codes
-from bridgegen.simulation.embedded.actions import Actions
-from bridgegen.simulation.embedded.tables import Tables
-from bridgegen.simulation.embedded.triggers import Triggers
+from bridgegen.simulation.embedded.compiler.actions import Actions
+from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.triggers import Triggers
 
 Part = osc.Story | osc.Act | osc.ManeuverGroup | osc.Maneuver | osc.Event | osc.Action
 

@@ -13,8 +13,8 @@ from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.geometry import TURN_LIMIT, evaluate
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, Spiral
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import Bend
-from bridgegen.simulation.embedded.tables import Tables
 
 STEP = 0.2  # m, between two samples at most
 

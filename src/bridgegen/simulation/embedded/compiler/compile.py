@@ -1,0 +1,224 @@
+"""From an OpenSCENARIO file to a `Program`, or to all that the rollout cannot do with it."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from bridgegen.ego import STORYBOARD, Driver
+from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import walk
+from bridgegen.openx.openscenario.pruning import strays, without
+from bridgegen.openx.openscenario.resolve import texts_resolved
+from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT
+from bridgegen.simulation.embedded.compiler import declared
+from bridgegen.simulation.embedded.compiler.actions import Actions
+from bridgegen.simulation.embedded.compiler.bodies import kind, measures
+from bridgegen.simulation.embedded.compiler.controllers import Controllers
+from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.positions import Positions
+from bridgegen.simulation.embedded.compiler.start import Start
+from bridgegen.simulation.embedded.compiler.storyboard import elements, nodes
+from bridgegen.simulation.embedded.compiler.tables import Tables, table
+from bridgegen.simulation.embedded.compiler.triggers import MAX_STEPS, Triggers
+from bridgegen.simulation.embedded.program import (
+    AlongLanes,
+    AlongTrajectory,
+    PathSpec,
+    Program,
+)
+
+DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
+
+
+def compile_storyboard(
+    scenario: osc.OpenScenario,
+    place: str,
+    *,
+    driver: Driver | None = None,
+    ideal: Iterable[str] | None = None,
+    time_step: float | None = None,
+    skipped: list[str] | None = None,
+) -> Program:
+    """Compile a scenario file.
+
+    Args:
+        scenario: the file, validated.
+        place: its name, for messages.
+        driver: who drives the ego, whatever the file says.
+        ideal: its stages that are ideal, whatever the driver or the file says.
+        time_step: [s], whatever the file says.
+        skipped: takes a sentence for each thing that the rollout cannot do, which is left out then
+            instead of refused, with what it is part of; never the ego.
+
+    Raises:
+        UnsupportedError: what the rollout cannot do, by name and line, all of it at once.
+        InputError: an entity without a start, or no entity at all; stages that the driver has not.
+    """
+    while True:
+        compiler = _Compiler(scenario, place)
+        try:
+            return compiler.compile(driver, ideal, time_step)
+        except InputError as error:
+            left = compiler.without_culprits(scenario)
+            if skipped is None or left is scenario or not compiler.has_ego(left):
+                raise
+            skipped += error.problems
+        while astray := strays(left):
+            skipped += [
+                f"{place}, line {one.line}: {type(one).__name__} of an entity that is not there"
+                for one in astray
+            ]
+            left = without(left, astray)
+        scenario = left
+
+
+class _Compiler:
+    def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
+        scenario, texts = texts_resolved(scenario)
+        self.scenario = scenario
+        self.place = place
+        self.tables = Tables(scenario, place)
+        self.tables.fixed |= texts
+        self.paths: list[PathSpec] = []
+        self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
+        self.everywhere = GlobalActions(self.tables, scenario)
+        self.controllers = Controllers(self.tables, scenario)
+        self.actions = Actions(
+            self.tables, self.paths, self.positions, self.everywhere, self.controllers
+        )
+        self.start = Start(self.tables, self.paths, self.positions, self.actions, self.controllers)
+
+    def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
+        """Return the scenario as it was given without what cannot be run."""
+        culprits = {id(one) for one in self.tables.culprits}
+        pairs = zip(walk(scenario), walk(self.scenario), strict=True)  # one is resolved
+        return without(scenario, [one for one, other in pairs if id(other) in culprits])
+
+    def has_ego(self, left: osc.OpenScenario) -> bool:
+        """Say whether a scenario still has the entity that is this one's ego."""
+        return self.tables.names[:1] == Tables(left, self.place).names[:1]
+
+    def compile(
+        self, driver: Driver | None, ideal: Iterable[str] | None, time_step: float | None
+    ) -> Program:
+        if not self.tables.objects:
+            raise InputError(f"{self.place}: a scenario needs at least one entity, got none")
+        step = declared.time_step(self.scenario, self.place, time_step)
+        storyboard = self.scenario.storyboard
+        found = nodes(storyboard)
+        self.triggers = Triggers(self.tables, step, found, self.positions, self.everywhere)
+        objects = [one.entity_object for one in self.tables.objects]
+        bodies = np.array([measures(self.tables, one) for one in objects])
+        has_driver = (driver or self._declared_driver()) is not STORYBOARD
+        self.controllers.has_driver, self.controllers.replaces = has_driver, driver is not None
+        self.start.compile(storyboard, has_driver)
+        chosen = driver or self._declared_driver()
+        self.controllers.has_driver = has_driver = chosen is not STORYBOARD
+        if driver and self.actions.is_timed(0):
+            self.tables.problems.append(
+                f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
+                "trajectory with times"
+            )
+        if self.tables.problems:
+            raise UnsupportedError(*self.tables.problems)
+        start_slots = [
+            self.tables.slot(path.start.s) if isinstance(path, AlongLanes) else -1
+            for path in self.paths
+        ]
+        aside_slots = [self._aside_slot(path) for path in self.paths]
+        if has_driver:  # its path runs there
+            aside_slots[0] = -1
+        self.triggers.add(storyboard.stop_trigger)
+        duration = self.triggers.stop_time or DEFAULT_DURATION
+        rows = elements(found, self.tables, self.triggers, self.actions)
+        self.actions.refuse_driven()
+        trajectories = [p for p, one in enumerate(self.paths) if isinstance(one, AlongTrajectory)]
+        follows = [
+            trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
+        ]
+        n_steps = round(duration / step) + 1
+        if not 2 <= n_steps <= MAX_STEPS:
+            self.tables.problems.append(
+                f"{self.place}: the stop trigger's simulation time must take 1 to {MAX_STEPS} "
+                f"steps of {step} s, got {duration} s"
+            )
+        if self.tables.problems:
+            raise UnsupportedError(*self.tables.problems)
+        conditions = table(self.triggers.conditions, 5)
+        conditions[:, DELAY] = np.minimum(conditions[:, DELAY], n_steps)
+        everywhere, signals = self.everywhere, self.everywhere.signals
+        time = everywhere.first_time
+        first_time = -1 if time is None else self.tables.slot(time[0])
+        return Program(
+            place=self.place,
+            names=self.tables.names,
+            bodies=bodies,
+            objects=np.array([self.tables.type_of(one) for one in objects], dtype=np.int64),
+            kinds=np.array([kind(one) for one in objects], dtype=np.int64),
+            parameters=self.tables.parameters,
+            slots=self.tables.slots,
+            init=np.array(self.start.speeds, dtype=np.int64),
+            paths=tuple(self.paths),
+            routes=np.array(
+                [self.start.routes.get(e, 0) for e in range(len(objects))], dtype=np.int64
+            ),
+            waypoints=tuple(self.actions.routes),
+            lane_checks=tuple(self.actions.lane_checks),
+            start_slots=np.array(start_slots, dtype=np.int64),
+            aside_slots=np.array(aside_slots, dtype=np.int64),
+            triggers=table(self.triggers.triggers, 2),
+            groups=table(self.triggers.groups, 2),
+            conditions=conditions,
+            probes=table(self.triggers.probes, 11),
+            points=tuple(self.positions.points),
+            marks=np.array(self.triggers.looks.marks, dtype=np.int64),
+            clearances=table(self.triggers.looks.clearances, 3 + len(objects)),
+            ranges=np.array(self.triggers.looks.ranges, dtype=np.float64).reshape(-1, 2),
+            elements=table(rows, 10),
+            courses=table(self.actions.courses.rows, COURSE_WIDTH),
+            entries=table(self.actions.courses.entries, 2),
+            order=np.array(self.actions.courses.order(), dtype=np.int64),
+            initial=np.array(self.actions.initial, dtype=np.int64),
+            actions=table(self.actions.rows, 8),
+            laterals=table(self.actions.laterals, 3),
+            trajectories=np.array(trajectories, dtype=np.int64),
+            follows=np.array(follows, dtype=np.int64),
+            starts=table(self.start.ordered_places(), 2),
+            places=table(self.positions.rows, 8),
+            spots=tuple(self.positions.spots),
+            weathers=everywhere.environments.rows,
+            values=np.array(everywhere.values.slots, dtype=np.int64),
+            lights=tuple(signals.lights),
+            first_states=np.array(signals.first_states, dtype=np.int8),
+            controllers=table(signals.controllers, 4),
+            phases=table(signals.phases, 3),
+            changes=table(signals.changes, 2),
+            first_phases=np.array(
+                [everywhere.first_phases.get(c, -1) for c in range(len(signals.controllers))],
+                dtype=np.int64,
+            ),
+            first_time=first_time,
+            time_passes=int(time is not None and time[1]),
+            absent=np.array([e in self.start.absent for e in range(len(objects))], dtype=np.int64),
+            comes_and_goes=bool(self.start.absent) or self.actions.has_comings_and_goings,
+            drives=np.array(self.controllers.drives, dtype=np.int64),
+            driver=chosen if ideal is None else chosen.idealised(ideal),
+            time_step=step,
+            n_steps=n_steps,
+            fixed=self.tables.fixed,
+            event_names=tuple(one.path[-1] for one in found if one.kind == EVENT),
+            noise_key=declared.noise_key(self.controllers, self.place),
+        )
+
+    def _aside_slot(self, path: PathSpec) -> int:
+        """Return the slot of how far who is on a path is beside it; -1 if on it."""
+        if not isinstance(path, AlongLanes) or path.aside == 0.0:
+            return -1
+        return self.tables.slot(path.aside)
+
+    def _declared_driver(self) -> Driver:
+        """Return the file's driver; the storyboard, where the ego follows a timetable."""
+        if self.actions.is_timed(0):
+            return STORYBOARD
+        return declared.driver(self.controllers, self.place)

@@ -1,0 +1,215 @@
+"""The start of a storyboard: where each entity is, how fast, and which way it goes."""
+
+from collections.abc import Iterable, Iterator
+
+from bridgegen.errors import InputError
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element, walk
+from bridgegen.simulation.embedded._codes import WHOSE
+from bridgegen.simulation.embedded.compiler.actions import CONTROLLING, Actions
+from bridgegen.simulation.embedded.compiler.controllers import Controllers
+from bridgegen.simulation.embedded.compiler.courses import LONGITUDINAL, first_speed
+from bridgegen.simulation.embedded.compiler.positions import Positions
+from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
+from bridgegen.simulation.embedded.program import (
+    AlongLanes,
+    AlongTrajectory,
+    LanePoint,
+    LaneSpot,
+    Nowhere,
+    PathSpec,
+)
+
+Way = osc.AssignRouteAction | osc.AcquirePositionAction
+"""What gives an entity a route."""
+
+
+class Start:
+    """The start of a storyboard, compiled.
+
+    Args:
+        tables: what all parts of the compiler share.
+        paths: of the entities; those that they start on are added, in the entities' order.
+        positions: where places are kept.
+        actions: where actions that begin at the start are kept.
+        controllers: who moves the ego.
+
+    Attributes:
+        speeds: the slot of each entity's speed.
+        routes: the route of each entity that gets one.
+        absent: the entities that are not there at the start.
+    """
+
+    def __init__(
+        self,
+        tables: Tables,
+        paths: list[PathSpec],
+        positions: Positions,
+        actions: Actions,
+        controllers: Controllers,
+    ) -> None:
+        self._tables, self._paths, self._positions = tables, paths, positions
+        self._actions, self._controllers = actions, controllers
+        self._places: dict[int, int] = {}
+        self.speeds: list[int] = []
+        self.routes: dict[int, int] = {}
+        self.absent: list[int] = []
+
+    def compile(self, storyboard: osc.Storyboard, has_driver: bool) -> None:
+        """Compile the start of a storyboard.
+
+        Raises:
+            InputError: entities that nothing puts anywhere.
+        """
+        actions = storyboard.init.actions
+        for command in actions.user_defined_actions:
+            self._tables.unsupported(command, "UserDefinedAction")
+        for one in actions.global_actions:
+            if not isinstance(one.action, osc.EntityAction):
+                self._actions.begin_with_all(one.action)
+        init = dict.fromkeys(self._tables.names, self._tables.slot(0.0))
+        starts = dict(self._added(actions.global_actions))
+        routes: dict[str, Way] = {}
+        tracks: dict[str, AlongTrajectory] = {}
+        first: list[tuple[osc.PrivateAction, int]] = []
+        for private in actions.privates:
+            name = str(private.entity_ref)
+            for wrapped in private.private_actions:
+                action = wrapped.action
+                if isinstance(action, osc.TeleportAction):
+                    whose = getattr(action.position.position, "entity_ref", None)
+                    if name in starts and whose is not None and self._tables.text(whose) == name:
+                        first.append((wrapped, self._tables.entity(name)))  # from where it is put
+                    else:
+                        starts[name] = action.position
+                    continue
+                if isinstance(action, CONTROLLING):
+                    self._controllers.begin(action, self._tables.entity(name))
+                    continue
+                inner = getattr(action, "action", action)
+                if isinstance(inner, LONGITUDINAL):
+                    speed = first_speed(inner)
+                    if speed is None:
+                        first.append((wrapped, self._tables.entity(name)))
+                    else:
+                        init[name] = self._tables.slot(speed)
+                elif isinstance(action, osc.LateralAction):
+                    first.append((wrapped, self._tables.entity(name)))
+                elif isinstance(inner, osc.FollowTrajectoryAction):
+                    tracks[name] = compile_trajectory(self._tables, inner)
+                elif isinstance(inner, Way):
+                    routes[name] = inner
+                else:
+                    self._tables.unsupported(inner, f"an initial {type(inner).__name__}")
+        later = dict(self._added(walk(storyboard)))
+        self.absent = [
+            e
+            for e, name in enumerate(self._tables.names)
+            if name not in {*starts, *tracks} and name in later and not (e == 0 and has_driver)
+        ]
+        waiting = {self._tables.names[e] for e in self.absent}
+        self.absent += self._deleted(actions.global_actions)
+        missing = [name for name in self._tables.names if name not in {*starts, *tracks, *waiting}]
+        if missing and not self._tables.problems:
+            self._tables.culprits += [
+                one for one in self._tables.objects if str(one.name) in missing
+            ]
+            raise InputError(
+                *(
+                    f"{self._tables.place}: entity '{name}' needs an initial TeleportAction, or "
+                    "an AddEntityAction"
+                    for name in missing
+                )
+            )
+        for e, name in enumerate(self._tables.names):
+            if name in tracks:  # there it starts
+                self._paths.append(tracks[name])
+            elif name in starts:
+                self._paths.append(self._start(e, starts[name], routes.get(name), has_driver))
+            elif name in waiting:
+                self._paths.append(self._nowhere(e, routes.get(name)))
+        for one_more, entity in first:
+            self._actions.begin(one_more, entity)
+        self.speeds = [init[name] for name in self._tables.names]
+
+    def ordered_places(self) -> list[tuple[int, int]]:
+        """Return who starts at which position, after those whose place it counts from.
+
+        Raises:
+            InputError: starts that depend on one another.
+        """
+        found: list[tuple[int, int]] = []
+        left = dict(self._places)
+        while left:
+            ready = [
+                e for e, place in left.items() if self._positions.rows[place][WHOSE] not in left
+            ]
+            if not ready:
+                names = ", ".join(f"'{self._tables.names[e]}'" for e in left)
+                raise InputError(
+                    f"{self._tables.place}: the starts of {names} depend on one another"
+                )
+            found += [(e, left.pop(e)) for e in ready]
+        return found
+
+    def _added(self, elements: Iterable[Element]) -> Iterator[tuple[str, osc.Position]]:
+        """Yield whom actions among some elements add, and where."""
+        for one in elements:
+            action = one.action if isinstance(one, osc.GlobalAction) else None
+            if isinstance(action, osc.EntityAction) and isinstance(
+                action.action, osc.AddEntityAction
+            ):
+                yield self._tables.text(action.entity_ref), action.action.position
+
+    def _deleted(self, actions: Iterable[osc.GlobalAction]) -> list[int]:
+        """Return the entities that are deleted at the start."""
+        return [
+            self._tables.entity(one.action.entity_ref)
+            for one in actions
+            if isinstance(one.action, osc.EntityAction)
+            and isinstance(one.action.action, osc.DeleteEntityAction)
+        ]
+
+    def _nowhere(self, e: int, route: Way | None) -> Nowhere:
+        """Return the path of an entity that is not there yet; it keeps the route that it gets."""
+        if route is not None and (spots := self._actions.waypoints(route)):
+            self.routes[e] = self._actions.add_route(spots)
+        return Nowhere()
+
+    def _start(
+        self,
+        e: int,
+        position: osc.Position,
+        route: Way | None,
+        has_driver: bool,
+    ) -> PathSpec:
+        """Return the path that an entity starts on: along its lane, as far as the file tells."""
+        where = position.position
+        spots = () if route is None else self._actions.waypoints(route)
+        if spots:
+            self.routes[e] = self._actions.add_route(spots)
+        if not isinstance(where, osc.LanePosition) or not _faces_ahead(where.orientation):
+            self._places[e] = self._positions.add(position)
+            return Nowhere()
+        point, aside = self._tables.point(position)
+        if has_driver and e == 0:  # it keeps to its path
+            aside = self._tables.literal(where, "offset", aside)
+        if not isinstance(point, LanePoint):
+            return Nowhere()
+        via = tuple(
+            LanePoint(one.road, one.lane, one.s, one.line)
+            for one in spots
+            if isinstance(one, LaneSpot) and one.s is not None
+        )
+        if len(via) < len(spots):
+            self._places[e] = self._positions.add(position)
+            return Nowhere()
+        return AlongLanes(point, via, aside)
+
+
+def _faces_ahead(turned: osc.Orientation | None) -> bool:
+    """Say whether an orientation on a lane is the lane's."""
+    if turned is None or turned.h is None:
+        return True
+    return turned.h == 0.0 and turned.type is not osc.ReferenceContext.ABSOLUTE
