@@ -6,7 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from bridgegen.errors import InputError
 from bridgegen.search import Problem, get
-from bridgegen.search.algorithm import Penalty, resolve
+from bridgegen.search.algorithm import resolve
+from bridgegen.search.penalty import Penalty
 
 
 def test_penalty_by_hand():

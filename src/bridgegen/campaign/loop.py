@@ -4,7 +4,6 @@ Resume is its replay, from the start or from the state that the algorithm was sa
 """
 
 import time
-from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,9 +12,9 @@ from hashlib import blake2b
 import numpy as np
 
 from bridgegen.arrays import Float, Int, as_float
-from bridgegen.cause import Cause
+from bridgegen.campaign.told import Told
 from bridgegen.errors import InputError, StorageError
-from bridgegen.search import Algorithm, Restorable, Results, TakesNotes
+from bridgegen.search import Algorithm, Restorable, TakesNotes
 from bridgegen.store import Checkpoint, Evaluated, Rows, Store
 
 PATIENCE = 100
@@ -143,49 +142,6 @@ def run_loop(
     )
 
 
-class _Told:
-    """What every row came to, by id; the same bits live and in a replay."""
-
-    def __init__(self, n_obj: int, n_metrics: int) -> None:
-        self._n_obj, self._n_metrics = n_obj, n_metrics
-        self._F, self._metrics = array("d"), array("d")
-        self._ok, self._critical, self._cause = array("b"), array("b"), array("b")
-
-    def add(self, result: Evaluated) -> None:
-        """Keep the results of the next rows."""
-        # SQLite keeps neither the sign of zero nor the bits of NaN.
-        F = np.asarray(result.F, np.float64) + 0.0
-        metrics = np.asarray(result.metrics, np.float64) + 0.0
-        metrics = np.where(np.isnan(metrics), np.nan, metrics)
-        ok = (np.asarray(result.status) == 0) & np.isfinite(F).all(axis=1)
-        critical = np.asarray(result.critical, np.bool_) & ok
-        found = getattr(result, "cause", None)
-        cause = np.full(len(F), Cause.NONE) if found is None else np.asarray(found)
-        for kept, values in (
-            (self._F, F),
-            (self._metrics, metrics),
-            (self._ok, ok),
-            (self._critical, critical),
-            (self._cause, cause.astype(np.int8)),
-        ):
-            kept.frombytes(values.tobytes())
-
-    def results(self, ids: Int) -> Results:
-        """Return those of some rows; the id −1 is of a row that was not evaluated."""
-        there = ids >= 0
-        return Results(
-            F=np.frombuffer(self._F).reshape(-1, self._n_obj)[ids],
-            ok=np.frombuffer(self._ok, np.bool_)[ids] & there,
-            critical=np.frombuffer(self._critical, np.bool_)[ids] & there,
-            metrics=np.where(
-                there[:, np.newaxis],
-                np.frombuffer(self._metrics).reshape(-1, self._n_metrics)[ids],
-                np.nan,
-            ),
-            cause=np.frombuffer(self._cause, np.int8)[ids],
-        )
-
-
 class _Session:
     """One call of the loop: which rows are known, and how far it is."""
 
@@ -205,7 +161,7 @@ class _Session:
         self._began: float | None = None
         # id of every row of X met so far, by a 16-byte digest: some 200 MB for a million rows.
         self._known: dict[bytes, int] = {}
-        self._told = _Told(store.n_obj, len(store.metrics))
+        self._told = Told(store.n_obj, len(store.metrics))
         self._idle = 0
 
     @property

@@ -10,7 +10,8 @@ from pymoo.core.problem import Problem as PymooProblem
 from pymoo.core.termination import NoTermination
 
 from bridgegen.arrays import Float
-from bridgegen.search.algorithm import Penalty, Problem, Results
+from bridgegen.search.algorithm import Problem, Results
+from bridgegen.search.penalty import Penalty
 
 Box = tuple[Float, Float]
 """The lowest and the highest value of each parameter."""

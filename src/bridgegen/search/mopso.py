@@ -9,7 +9,6 @@ from bridgegen.arrays import Bool, Float
 from bridgegen.search.algorithm import (
     RESTART_WITHIN,
     Arity,
-    Penalty,
     Problem,
     Results,
     Setting,
@@ -17,6 +16,7 @@ from bridgegen.search.algorithm import (
     resolve,
 )
 from bridgegen.search.dominance import crowding, non_dominated, thin
+from bridgegen.search.penalty import Penalty
 from bridgegen.search.space_filling import latin_hypercube
 
 TURNED = -0.001

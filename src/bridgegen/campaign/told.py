@@ -1,0 +1,53 @@
+"""What an algorithm is told of the rows that it asked for."""
+
+from array import array
+
+import numpy as np
+
+from bridgegen.arrays import Int
+from bridgegen.cause import Cause
+from bridgegen.search import Results
+from bridgegen.store import Evaluated
+
+
+class Told:
+    """What every row came to, by id; the same bits live and in a replay."""
+
+    def __init__(self, n_obj: int, n_metrics: int) -> None:
+        self._n_obj, self._n_metrics = n_obj, n_metrics
+        self._F, self._metrics = array("d"), array("d")
+        self._ok, self._critical, self._cause = array("b"), array("b"), array("b")
+
+    def add(self, result: Evaluated) -> None:
+        """Keep the results of the next rows."""
+        # SQLite keeps neither the sign of zero nor the bits of NaN.
+        F = np.asarray(result.F, np.float64) + 0.0
+        metrics = np.asarray(result.metrics, np.float64) + 0.0
+        metrics = np.where(np.isnan(metrics), np.nan, metrics)
+        ok = (np.asarray(result.status) == 0) & np.isfinite(F).all(axis=1)
+        critical = np.asarray(result.critical, np.bool_) & ok
+        found = getattr(result, "cause", None)
+        cause = np.full(len(F), Cause.NONE) if found is None else np.asarray(found)
+        for kept, values in (
+            (self._F, F),
+            (self._metrics, metrics),
+            (self._ok, ok),
+            (self._critical, critical),
+            (self._cause, cause.astype(np.int8)),
+        ):
+            kept.frombytes(values.tobytes())
+
+    def results(self, ids: Int) -> Results:
+        """Return those of some rows; the id −1 is of a row that was not evaluated."""
+        there = ids >= 0
+        return Results(
+            F=np.frombuffer(self._F).reshape(-1, self._n_obj)[ids],
+            ok=np.frombuffer(self._ok, np.bool_)[ids] & there,
+            critical=np.frombuffer(self._critical, np.bool_)[ids] & there,
+            metrics=np.where(
+                there[:, np.newaxis],
+                np.frombuffer(self._metrics).reshape(-1, self._n_metrics)[ids],
+                np.nan,
+            ),
+            cause=np.frombuffer(self._cause, np.int8)[ids],
+        )
