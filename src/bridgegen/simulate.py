@@ -52,6 +52,7 @@ def simulate_file(
     ideal: Iterable[str] | None = None,
     time_limit: float | None = None,
     metrics: Sequence[str] | None = None,
+    also: Sequence[str] = (),
     time_step: float | None = None,
     skipped: list[str] | None = None,
 ) -> FileResult:
@@ -64,6 +65,7 @@ def simulate_file(
             with another ``ego``.
         time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.
+        also: names of metrics that must be among them.
         time_step: [s]; what the file's header says by default.
         skipped: takes a sentence for each thing that is not supported, which is left out then
             instead of refused, with the event, action, entity or condition group around it.
@@ -85,8 +87,8 @@ def simulate_file(
     )
     held = measures.held_by(simulator.program.driver)
     names = measures.existing(tuple(measures.METRICS), held)
-    if metrics:
-        names = measures.require(metrics, held, f"the driver '{simulator.driver}'")
+    asked = tuple(dict.fromkeys((*(metrics or names), *also)))
+    names = measures.require(asked, held, f"the driver '{simulator.driver}'")
     rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = measures.evaluate(rollout, names)[0]
     return FileResult(

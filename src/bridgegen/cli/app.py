@@ -6,6 +6,10 @@ import typer
 
 from bridgegen.errors import BridgeGenError, Interrupted
 
+FAILED = 3
+"""The exit status if a criterion of ``--fail-if`` is met: 1 is Python's for a bug, 2 a mistake of
+the user's, 130 Ctrl-C."""
+
 app = typer.Typer(
     name="bridgegen",
     help="Search an operational design domain for the scenarios in which a vehicle comes to harm.",

@@ -92,6 +92,25 @@ RoadMap = Annotated[
     Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
 ]
 Junction = Annotated[str | None, typer.Option(help="Which junction of the map.")]
+FailIf = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="End with exit status 3 if this holds, e.g. 'r_critic > 0.1'; may be repeated.",
+        show_default=False,
+    ),
+]
+FileFailIf = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fail-if",
+        help="End with exit status 3 if this holds of its metrics, e.g. 'd_min < 2 and v_d >= 1'; "
+        "may be repeated.",
+        show_default=False,
+    ),
+]
+Junit = Annotated[
+    Path | None, typer.Option(help="Write the verdict as JUnit XML, for Jenkins, GitLab …")
+]
 
 Setting = bool | int | float | str
 """A value of an algorithm's setting."""

@@ -2,14 +2,18 @@
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import app
+from bridgegen.cli.app import FAILED, app
 from bridgegen.ego import split
+
+if TYPE_CHECKING:
+    from bridgegen.report.criteria import Outcome
 
 
 @app.command()
@@ -53,11 +57,15 @@ def search(
     junction: options.Junction = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
     out: Annotated[Path | None, typer.Option(help="The run's folder, new.")] = None,
+    fail_if: options.FailIf = None,
+    junit: options.Junit = None,
 ) -> None:
     """Search a logical scenario for its critical concrete ones."""
     from bridgegen import campaign
+    from bridgegen.campaign.verdict import Gate
     from bridgegen.screen.search import SearchScreen, print_summary
 
+    gate = Gate.read(fail_if or (), junit, causes=causes)
     with SearchScreen(budget) as screen:
         run = campaign.run_search(
             scenario,
@@ -86,6 +94,7 @@ def search(
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)
+    _end(gate.judge(run))
 
 
 @app.command()
@@ -106,14 +115,19 @@ def new(
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
     ego: options.OwnEgo = None,
+    fail_if: options.FailIf = None,
+    junit: options.Junit = None,
 ) -> None:
     """Go on with a run that was interrupted; the result is as if it had not been."""
     from bridgegen import campaign
+    from bridgegen.campaign.verdict import Gate
     from bridgegen.screen.search import SearchScreen, print_summary
 
+    gate = Gate.of_run(fail_if or (), junit, folder)
     with SearchScreen() as screen:
         run = campaign.resume(folder, ego=ego, watch=screen.watch)
     print_summary(run, screen.seconds)
+    _end(gate.judge(run))
 
 
 @app.command()
@@ -192,13 +206,17 @@ def simulate(
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
+    fail_if: options.FileFailIf = None,
+    junit: options.Junit = None,
     as_json: options.Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
+    from bridgegen.report.file_verdict import FileGate
     from bridgegen.screen.files import print_file_result
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
 
+    gate = FileGate.read(fail_if or (), junit)
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
     result = simulate_file(
@@ -207,6 +225,7 @@ def simulate(
         ideal=stages,
         time_limit=time_limit,
         metrics=options.read_names(metrics),
+        also=gate.metrics,
         time_step=dt,
         skipped=skipped,
     )
@@ -225,6 +244,7 @@ def simulate(
         print(json.dumps(facts, indent=2))
     else:
         print_file_result(file, result)
+    _end(gate.judge(file, result))
 
 
 @app.command("check-driver")
@@ -246,3 +266,11 @@ def check_driver(
     checks = check_driver(driver, scenario or SCENARIOS, time_limit=time_limit)
     if not print_checks(checks, as_json=as_json):
         raise typer.Exit(1)
+
+
+def _end(outcomes: "Sequence[Outcome]") -> None:
+    """Print what the criteria came to; end with the exit status for it if one failed."""
+    from bridgegen.screen.verdict import print_outcomes
+
+    if not print_outcomes(outcomes):
+        raise typer.Exit(FAILED)

@@ -1,0 +1,193 @@
+"""Is a run good enough? Criteria held against its figures, as JUnit XML and as an exit status.
+
+A test fails in the XML exactly where the command says so by its exit status.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bridgegen.campaign.run import Run
+from bridgegen.campaign.settings import Settings
+from bridgegen.cause import CAUSES
+from bridgegen.ego import STORYBOARD
+from bridgegen.errors import InputError
+from bridgegen.report.criteria import Criterion, Outcome, read_criteria
+from bridgegen.report.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.store import Store
+
+_CAUSES = {one.label: "critical scenarios of this cause" for one in CAUSES}
+
+FIGURES = {
+    "r_critic": "critical evaluations / all evaluations",
+    "critical": "critical evaluations",
+    "evaluations": "evaluations, failed ones included",
+    "failed": "evaluations that have no result",
+    "first": "evaluations until the first critical one; infinite if there is none",
+    "fiftieth": "evaluations until the 50th critical one; infinite if there is none",
+    "d_min_best": "the smallest d_min [m]",
+    "d_min_median": "the median of d_min [m]",
+    "v_d_best": "the largest v_d [m/s]",
+    "v_d_median": "the median of v_d [m/s]",
+    "seconds": "of search, compilation not included [s]",
+    **_CAUSES,
+}
+"""What ``--fail-if`` can name of a run."""
+
+_OF_THE_RUN = ("evaluations", "failed", "seconds")
+"""No single critical scenario is to blame for these."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """What a run must keep, read and checked before it begins.
+
+    Attributes:
+        criteria: each fails the run if it holds.
+        junit: where the JUnit XML goes, if it is wanted.
+    """
+
+    criteria: tuple[Criterion, ...]
+    junit: Path | None
+
+    @classmethod
+    def read(cls, texts: Sequence[str], junit: Path | None, *, causes: bool = True) -> "Gate":
+        """Read the criteria.
+
+        Args:
+            texts: as `read_criteria` has them, of FIGURES.
+            junit: a new file, or an earlier JUnit XML.
+            causes: whether the run seeks causes.
+
+        Raises:
+            InputError: no criterion; an unknown figure; or a cause, and none is sought.
+            StorageError: no JUnit XML can be written there.
+        """
+        gate = cls(read_criteria(texts, FIGURES), junit)
+        if not causes and (named := sorted(gate.figures & _CAUSES.keys())):
+            raise InputError(
+                f"--fail-if names {', '.join(named)}: causes must be sought, and here they are not"
+            )
+        if junit is not None:
+            refuse_junit(junit)
+        return gate
+
+    @classmethod
+    def of_run(cls, texts: Sequence[str], junit: Path | None, folder: Path) -> "Gate":
+        """Read the criteria for a run that has begun; see ``read``."""
+        if not texts and junit is None:
+            return cls((), None)
+        with Store.open(folder) as store:
+            settings = Settings.from_dict(store.settings, folder)
+        return cls.read(texts, junit, causes=settings.causes)
+
+    @property
+    def figures(self) -> set[str]:
+        """All that are named."""
+        return {name for one in self.criteria for name in one.figures}
+
+    def judge(self, run: Run) -> tuple[Outcome, ...]:
+        """Hold the criteria against a run, and write the JUnit XML if it is wanted.
+
+        Nothing is judged where nothing is asked for. Otherwise the first outcome is the search's
+        own: a run of which every evaluation failed proves nothing.
+        """
+        if not self.criteria and self.junit is None:
+            return ()
+        figures = figures_of(run)
+        outcomes = (_searched(run), *(one.judge(figures) for one in self.criteria))
+        if self.junit is not None:
+            write_junit(self.junit, _suites(run, outcomes))
+        return outcomes
+
+
+def figures_of(run: Run) -> dict[str, float]:
+    """Return FIGURES of a run; NaN is what nobody knows, of its results if there are none."""
+    s, nan = run.summary, float("nan")
+    sought = run.settings.causes and run.settings.ego != STORYBOARD.name
+    figures: dict[str, float] = {
+        "r_critic": s.r_critic,
+        "critical": s.critical,
+        "first": float("inf") if s.first is None else s.first,
+        "fiftieth": float("inf") if s.fiftieth is None else s.fiftieth,
+        "d_min_best": s.d_min_best,
+        "d_min_median": s.d_min_median,
+        "v_d_best": s.v_d_best,
+        "v_d_median": s.v_d_median,
+        **{name: s.causes.get(name, 0) if sought else nan for name in _CAUSES},
+    }
+    if s.failed == s.evaluations:
+        figures = dict.fromkeys(figures, nan)
+    return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
+
+
+def _searched(run: Run) -> Outcome:
+    s = run.summary
+    said = f"{s.evaluations} evaluations, {s.critical} critical, {s.failed} failed"
+    if reasons := run.failures.most_common(3):
+        said += "; " + "; ".join(f"{count} x {reason}" for reason, count in reasons)
+    return Outcome(
+        "the search has results", "unknown" if s.failed == s.evaluations else "passed", said
+    )
+
+
+def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
+    """Return the criteria as one suite, and each handed-over scenario as one of its own."""
+    settings = run.settings
+    name = Path(settings.scenario).stem
+    group = f"bridgegen.{name}.{settings.ego.replace('.', '_')}"
+    facts = {
+        "scenario": settings.scenario,
+        "ego": settings.ego,
+        "algorithm": settings.algorithm,
+        "budget": str(settings.budget),
+        "seed": str(settings.seed),
+        "command": settings.command(run.folder),
+        "report": str(run.report),
+    } | {key: f"{value:.6g}" for key, value in figures_of(run).items()}
+    cases = [case_of(group, one) for one in outcomes]
+    broken = [one for one in outcomes if one.verdict == "failed"]
+    scenarios = [_scenario(run, path, name, group, broken) for path in run.scenarios]
+    return [Suite(f"{name} criteria", cases, facts, run.summary.seconds), *scenarios]
+
+
+def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
+    """Return a handed-over scenario as a test, failed if it is to blame for a criterion."""
+    facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
+    blamed = [one.test for one in broken if _is_to_blame(facts["cause"], one.figures)]
+    values = {key: _told(one) for key, one in facts["metrics"].items()}
+    cause = f", cause: {facts['cause']}" if facts["cause"] else ""
+    what = "collision" if facts["metrics"]["n_collision"]["value"] else "near miss"
+    message = f"{what}: d_min {values['d_min']} at v_d {values['v_d']}{cause}"
+    files = sorted(path.parent.glob(f"{path.stem}.*"))
+    text = "\n".join(
+        [
+            *(f"against: {one}" for one in blamed),
+            f"again: bridgegen simulate {path}",
+            f"playback: {run.report}",
+            f"files: {' '.join(str(file) for file in files)}",
+            "parameters:",
+            *(f"  {key} = {_told(one)}" for key, one in facts["parameters"].items()),
+            "metrics:",
+            *(f"  {key} = {value}" for key, value in values.items()),
+        ]
+    )
+    case = Case(group, f"critical {path.stem}", "failure" if blamed else None, message, text)
+    properties = values | {key: _told(one) for key, one in facts["parameters"].items()}
+    properties |= {"cause": facts["cause"] or "", "evaluation": str(facts["evaluation"])}
+    return Suite(f"{name} {path.stem}", [case], properties)
+
+
+def _is_to_blame(cause: str | None, figures: Sequence[str]) -> bool:
+    """Say whether a critical scenario of that cause speaks for a broken criterion."""
+    return any(name == cause if name in _CAUSES else name not in _OF_THE_RUN for name in figures)
+
+
+def _told(one: dict[str, Any]) -> str:
+    """Return a value with its unit; null is infinite, as what it is written from has no NaN."""
+    if one["value"] is None:
+        return "inf"
+    unit = "" if one["unit"] in ("1", "count") else f" {one['unit']}"
+    return f"{one['value']:.6g}{unit}"

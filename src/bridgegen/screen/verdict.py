@@ -1,0 +1,18 @@
+"""What a job's criteria came to, on stderr: standard output may be JSON."""
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bridgegen.report.criteria import Outcome
+
+_WORDS = {"passed": "passed", "failed": "FAILED", "unknown": "FAILED, cannot be judged"}
+
+
+def print_outcomes(outcomes: "Sequence[Outcome]") -> bool:
+    """Print each outcome; return whether all passed."""
+    for one in outcomes:
+        word = _WORDS[one.verdict]
+        print(f"bridgegen: {word}: {one.test} ({one.said})", file=sys.stderr)
+    return all(one.verdict == "passed" for one in outcomes)

@@ -1,0 +1,145 @@
+"""Runs and files held against criteria, from the command line to the XML."""
+
+import json
+import sys
+from dataclasses import fields
+from xml.etree import ElementTree
+
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.verdict import FIGURES, Gate, figures_of
+from bridgegen.cause import CAUSES
+from bridgegen.cli import main
+from bridgegen.errors import InputError
+from bridgegen.store.summary import Summary
+
+
+@pytest.fixture
+def cli(monkeypatch, capsys):
+    def run(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> "bg.Run":
+    folder = tmp_path_factory.mktemp("verdict") / "s4"
+    return bg.run_search("crossroads-s4", budget=120, keep=2, out=folder)
+
+
+def test_every_figure_of_the_summary_can_be_named():
+    figures = {one.name for one in fields(Summary)} - {"causes"}
+    assert {*FIGURES} == figures | {one.label for one in CAUSES}
+
+
+def test_a_run_s_figures_are_its_rows(run):
+    frame, figures = run.frame(), figures_of(run)
+    assert figures["critical"] == frame.critical.sum() > 0
+    assert figures["r_critic"] == frame.critical.mean()
+    assert figures["first"] == frame.critical.to_numpy().argmax() + 1
+    assert figures["fiftieth"] == float("inf")
+    assert sum(figures[one.label] for one in CAUSES) == frame.critical.sum()
+    assert figures["d_min_best"] == frame.d_min.min()
+
+
+def test_search_and_resume_end_with_the_verdict(cli, tmp_path):
+    folder = tmp_path / "run"
+    words = ("search", "crossroads-s4", "--budget", 120, "--keep", 2, "--out", folder)
+    code, out, err = cli(*words, "--fail-if", "critical > 0", "--junit", folder / "j.xml")
+    assert code == 3
+    assert "report" in out  # the run itself is whole
+    assert "FAILED: not critical > 0 (critical = " in err
+    root = ElementTree.parse(folder / "j.xml").getroot()
+    assert int(root.get("failures")) == 3  # the criterion, and the two scenarios that break it
+    words = ("resume", folder, "--junit", folder / "j.xml")
+    code, _, err = cli(*words, "--fail-if", "critical > 120", "--fail-if", "failed>0")
+    assert code == 0
+    assert err.count("passed: ") == 3
+    root = ElementTree.parse(folder / "j.xml").getroot()
+    assert (root.get("failures"), root.get("errors"), root.get("tests")) == ("0", "0", "5")
+    assert cli("resume", folder)[0] == 0
+
+
+def test_the_xml_tells_what_a_person_needs(run, tmp_path):
+    Gate.read(["r_critic > 0.01"], tmp_path / "j.xml").judge(run)
+    root = ElementTree.parse(tmp_path / "j.xml").getroot()
+    criteria, *scenarios = root
+    facts = {one.get("name"): one.get("value") for one in criteria.iter("property")}
+    assert facts["ego"] == "route-follower"
+    assert facts["command"] == run.settings.command(run.folder)
+    assert len(scenarios) == len(run.scenarios) == 2
+    for suite, path in zip(scenarios, run.scenarios, strict=True):
+        kept = json.loads(path.with_suffix(".json").read_text("utf-8"))
+        told = {one.get("name"): one.get("value") for one in suite.iter("property")}
+        for name, one in {**kept["metrics"], **kept["parameters"]}.items():
+            value = "inf" if one["value"] is None else f"{one['value']:.6g}"
+            assert told[name].split()[0] == value
+        failure = suite.find("testcase/failure")
+        assert f"cause: {kept['cause']}" in failure.get("message")
+        assert "against: not r_critic > 0.01" in failure.text
+        assert f"bridgegen simulate {path}" in failure.text
+
+
+def test_only_who_is_to_blame_fails(run, tmp_path):
+    causes = [json.loads(p.with_suffix(".json").read_text("utf-8"))["cause"] for p in run.scenarios]
+    for cause in {*causes}:
+        Gate.read([f"{cause} > 0"], tmp_path / "j.xml").judge(run)
+        root = ElementTree.parse(tmp_path / "j.xml").getroot()
+        assert len([*root.iter("failure")]) == 1 + causes.count(cause)
+    Gate.read(["evaluations < 1000"], tmp_path / "j.xml").judge(run)
+    assert ElementTree.parse(tmp_path / "j.xml").getroot().get("failures") == "1"
+
+
+def test_what_nobody_knows_is_no_pass(tmp_path):
+    """A driver that fails in every scenario brings about no harm, and is not safe."""
+    driver = tmp_path / "broken.py"
+    driver.write_text(
+        "class Broken:\n"
+        "    def reset(self, n, scene): pass\n"
+        "    def act(self, observation): raise ValueError('no map <&')\n"
+    )
+    run = bg.run_search(
+        "crossroads-s4", ego=f"{driver}:Broken", budget=3, algorithm="random", causes=False,
+        out=tmp_path / "run",
+    )  # fmt: skip
+    outcomes = Gate.read(["critical > 0", "failed > 3"], tmp_path / "j.xml").judge(run)
+    assert [one.verdict for one in outcomes] == ["unknown", "unknown", "passed"]
+    root = ElementTree.parse(tmp_path / "j.xml").getroot()
+    assert root.get("errors") == "2"
+    assert "no map <&" in root.find(".//error").text
+
+
+def test_mistakes_are_found_before_anything_runs(cli, tmp_path, run):
+    def refused(*words: object, message: str) -> None:
+        code, _, err = cli(*words)
+        assert (code, "Traceback" in err) == (2, False)
+        assert message in err
+
+    search = ("search", "crossroads-s4", "--out", tmp_path / "run")
+    refused(*search, "--fail-if", "r_critic", message="--fail-if must read")
+    refused(*search, "--fail-if", "d_min<2", message="unknown figure of --fail-if 'd_min'")
+    refused(*search, "--no-causes", "--fail-if", "planning > 0", message="causes must be sought")
+    refused(*search, "--junit", __file__, message="is no JUnit XML")
+    assert not (tmp_path / "run").exists()
+    file = run.scenarios[0]
+    refused("simulate", file, "--fail-if", "r_critic > 0", message="unknown figure")
+    refused("simulate", file, "--fail-if", "map < 0.5", message="needs detections")
+    with pytest.raises(InputError, match="causes must be sought"):
+        Gate.read(["control == 0"], None, causes=False)
+
+
+def test_simulate_ends_with_the_verdict(cli, tmp_path, run):
+    file, junit = run.scenarios[0], tmp_path / "j.xml"
+    words = ("simulate", file, "--json", "--metrics", "ttc", "--junit", junit)
+    code, out, _ = cli(*words, "--fail-if", "d_min < 2 and v_d >= 1", "--fail-if", "n_brake > 99")
+    assert code == 3
+    assert [*json.loads(out)["metrics"]] == ["ttc", "d_min", "v_d", "n_brake"]
+    root = ElementTree.parse(junit).getroot()
+    assert (root.get("tests"), root.get("failures")) == ("3", "1")
+    assert cli(*words, "--fail-if", "d_min > 1e4")[0] == 0
