@@ -21,6 +21,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
+from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.outcomes import with_outcomes
 from bridgegen.store import Rows
 
@@ -51,13 +52,12 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
 
     Args:
         U: ``(N, n_var)`` unit-cube rows.
-        F: ``(N, n_obj)``, minimised. With many objectives, those that no other dominates come
-            first; then counts the sum of objectives, each scaled to [0, 1] over the critical rows.
+        F: ``(N, n_obj)``, minimised; `by_merit` orders them.
         critical: ``(N,)``, only these are kept.
         keep: how many at most.
     """
     order = np.flatnonzero(critical)
-    order = order[_by_merit(F[order])]
+    order = order[by_merit(F[order])]
     kept: list[int] = []
     for distance in DISTINCT:
         near = np.zeros(len(order), dtype=bool)
@@ -69,24 +69,6 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
             kept.append(best)
             rest = rest[_apart(U[rest], U[best]) >= distance]
     return order[np.isin(order, kept)]
-
-
-def _by_merit(F: Float) -> Int:
-    """Return the rows of F, best first."""
-    low, span = F.min(axis=0, initial=np.inf), np.ptp(F, axis=0) if len(F) else 1.0
-    total = ((F - low) / np.where(span > 0.0, span, 1.0)).sum(axis=1)
-    merit = np.lexsort((*F.T[::-1], total))  # by F where rounding leaves the sums equal
-    if F.shape[1] == 1:
-        return merit
-    # Who has the least sum is dominated by nobody; without those it dominates, so has the next.
-    front, left = [], merit
-    while len(left):
-        best = F[left[0]]
-        front.append(left[0])
-        left = left[1:]
-        left = left[~((best <= F[left]).all(axis=1) & (best < F[left]).any(axis=1))]
-    first = np.array(front, dtype=np.int64)
-    return np.concatenate([first, merit[~np.isin(merit, first)]])
 
 
 def _apart(U: Float, u: Float) -> Float:

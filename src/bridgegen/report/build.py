@@ -47,6 +47,7 @@ def build_report(
     finished: bool,
     version: str,
     notes: Mapping[str, Any],
+    view: str = "",
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -63,6 +64,7 @@ def build_report(
         finished: whether the budget is spent.
         version: of BridgeGen.
         notes: what the algorithm wants kept with the run.
+        view: the command line that shows this run with the motion of every scenario, if there is.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
     terms = pipeline.objective.names
@@ -95,6 +97,7 @@ def build_report(
         finished=finished,
         version=version,
         command=command,
+        view=view,
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             **wanted,

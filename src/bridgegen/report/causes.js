@@ -9,7 +9,6 @@ class Causes {
   constructor({ labels, counts }, hook) {
     this.labels = labels;
     this.chosen = null;
-    this.listRows = [];
     const total = counts.slice(1).reduce((a, b) => a + b, 0);
     const causes = labels.map((label, i) => i).slice(1);
     this.parts = causes.filter((i) => counts[i]).map((i) => {
@@ -29,7 +28,7 @@ class Causes {
     $("causes-list").replaceChildren(...this.buttons.map(([, button]) => element("li", {}, button)));
     $("causes").hidden = false;
     hook.cause = (label) => this.choose(label === null ? null : labels.indexOf(label));
-    // The parallel coordinates have an axis for it, which can be filtered there as well.
+    // It can be filtered by in the table and in the parallel coordinates as well.
     document.addEventListener("filters", ({ detail }) => {
       const range = detail.get("cause");
       const i = range ? Math.round((range[0] + range[1]) / 2) : null;
@@ -38,19 +37,13 @@ class Causes {
   }
 
   choose(i) {
-    const filter = window.bridgegen.filter;
-    if (!filter) this.show(i);
-    else if (i === null) filter("cause");
-    else filter("cause", i - 0.3, i + 0.3);
+    if (i === null) filters.set("cause");
+    else filters.set("cause", i - 0.3, i + 0.3);
   }
 
   show(i) {
     this.chosen = i;
     for (const [k, part] of this.parts) part.classList.toggle("off", i !== null && k !== i);
     for (const [k, button] of this.buttons) button.setAttribute("aria-pressed", `${k === i}`);
-    this.listRows.forEach((row, k) => { row.hidden = i !== null && data.kept[k].cause !== this.labels[i]; });
-    const left = this.listRows.filter((row) => !row.hidden).length;
-    $("list-note").hidden = i === null || left > 0;
-    $("list-note").textContent = i === null ? "" : `None of the kept scenarios is put down to ${this.labels[i]}.`;
   }
 }

@@ -1,6 +1,5 @@
 // The charts over all evaluations, by Plotly: the iterations and the scatter plot.
 
-const rows = data.rows;
 const MOST_GL = 50000, MOST_SVG = 3000; // points that stay fluid
 
 const hasGl = (() => {
@@ -89,14 +88,12 @@ function valuesOf(name) {
   return name === "iteration" ? rows.iteration : columns.get(name).values;
 }
 
-let passes = () => true; // whether a row passes the filters of the parallel coordinates
-
 // At most `most` of the rows that pass, evenly chosen; half of the places are the critical ones'
 // if there are as many.
-function subsample(most, passing = passes) {
+function subsample(most) {
   const every = (list, n) => (list.length <= n ? list : Array.from({ length: n }, (_, i) => list[Math.floor((i * list.length) / n)]));
   const hit = [], other = [];
-  rows.critical.forEach((critical, i) => { if (passing(i)) (critical ? hit : other).push(i); });
+  rows.critical.forEach((critical, i) => { if (filters.passes(i)) (critical ? hit : other).push(i); });
   const room = Math.max(most - other.length, Math.ceil(most / 2));
   const hits = every(hit, room);
   return { hits, others: every(other, most - hits.length) };
@@ -184,9 +181,8 @@ function drawCharts() {
     charts.set($("scatter"), drawScatter);
     $("parallel-card").hidden = !rows.telling.length;
     if (rows.telling.length) {
-      const parallel = new Parallel($("parallel"), () => { if (drawn.has($("scatter"))) drawScatter(); });
+      const parallel = new Parallel($("parallel"));
       charts.set($("parallel"), () => parallel.draw());
-      window.bridgegen.filter = (name, low, high) => parallel.filter(name, low, high);
     }
     for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", drawScatter);
     $("swap").addEventListener("click", () => {
@@ -204,5 +200,11 @@ function drawCharts() {
   for (const plot of charts.keys()) watch.observe(plot);
   window.bridgegen.charts = charts.size;
   darkScheme.addEventListener("change", () => drawn.forEach(redraw));
-  window.bridgegen.chosen = () => { if (drawn.has($("scatter"))) drawScatter(); };
+  let waiting = null;
+  const again = (after) => () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => { if (drawn.has($("scatter"))) drawScatter(); }, after);
+  };
+  document.addEventListener("filters", again(60)); // dragging must not wait for the scatter plot
+  document.addEventListener("shown", again(0));
 }

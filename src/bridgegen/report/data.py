@@ -51,6 +51,7 @@ class RunSummary:
         version: BridgeGen's version.
         command: the exact command line that starts this run again.
         started: when the run began, as ISO 8601 text; may be empty.
+        view: the command line that shows this run's page with the motion of every scenario.
         settings: further settings worth keeping, name → text, in display order.
     """
 
@@ -78,6 +79,7 @@ class RunSummary:
     version: str
     command: str
     started: str = ""
+    view: str = ""
     settings: Mapping[str, str] | None = None
 
 

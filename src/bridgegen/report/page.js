@@ -1,6 +1,7 @@
 // Shared by the report's scripts: the data, formatting, colours; and the parts of the page without motion.
 
 const data = JSON.parse($("data").textContent);
+const rows = data.rows;
 const columns = new Map(data.rows.columns.map((column) => [column.name, column]));
 const darkScheme = matchMedia("(prefers-color-scheme: dark)");
 
@@ -88,68 +89,7 @@ function fillSummary() {
   $("copy-command").addEventListener("click", (event) => copy(s.command, event.currentTarget));
 }
 
-// ---- the list of kept scenarios ----
-
-const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
-const SHORT = { n_collision: "hits" };
-
-function listColumns() {
-  const names = Object.keys(data.kept[0].metrics);
-  const chosen = LISTED.filter((name) => names.includes(name));
-  return chosen.length ? chosen : names.slice(0, 4);
-}
-
-function fillList(choose) {
-  const names = listColumns();
-  const head = element("tr");
-  const body = $("list-body");
-  const sorting = { by: "rank", down: false };
-  const causes = data.causes?.labels;
-  const key = (kept) => ({ rank: kept.rank, cause: causes?.indexOf(kept.cause) }[sorting.by] ?? kept.metrics[sorting.by]);
-  const order = () => {
-    const sign = sorting.down ? -1 : 1;
-    const ranked = data.kept.map((kept, i) => ({ i, value: key(kept) }));
-    // What does not exist sorts last, whichever way.
-    ranked.sort((a, b) => (a.value === null) - (b.value === null) || sign * (a.value - b.value) || a.i - b.i);
-    body.append(...ranked.map(({ i }) => rows[i]));
-    for (const th of head.children) {
-      th.setAttribute("aria-sort", th.dataset.by === sorting.by ? (sorting.down ? "descending" : "ascending") : "none");
-    }
-  };
-  for (const name of ["rank", ...names, ...(causes ? ["cause"] : [])]) {
-    const unit = name === "rank" || name === "cause" ? "" : unitText(columns.get(name)?.unit ?? "");
-    const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? name, element("small", {}, unit || "\u00a0"));
-    button.addEventListener("click", () => {
-      sorting.down = sorting.by === name && !sorting.down;
-      sorting.by = name;
-      order();
-    });
-    head.append(element("th", { scope: "col", "data-by": name }, button));
-  }
-  const rows = data.kept.map((kept, i) => {
-    const label = `Play scenario ${kept.name}, rank ${kept.rank}`;
-    const row = element("tr", {}, element("td", {}, element("button", { type: "button", "aria-label": label }, `${kept.rank}`)));
-    for (const name of names) {
-      const value = kept.metrics[name];
-      const cell = element("td", {}, measured(value, columns.get(name)?.unit, 3));
-      if (name === "n_collision" && value > 0) cell.className = "hit";
-      row.append(cell);
-    }
-    if (causes) row.append(element("td", {}, kept.cause || "–"));
-    row.addEventListener("click", () => choose(i));
-    return row;
-  });
-  body.addEventListener("keydown", (event) => {
-    const step = { ArrowDown: "nextElementSibling", ArrowUp: "previousElementSibling" }[event.key];
-    const next = step && event.target.closest("tr")?.[step];
-    if (!next) return;
-    event.preventDefault();
-    next.querySelector("button").focus();
-  });
-  $("list-head").append(head);
-  order();
-  return rows;
-}
+// ---- the chosen scenario ----
 
 function fillDetails(kept) {
   const line = (name, value, column) => {
@@ -164,7 +104,7 @@ function fillDetails(kept) {
     return box;
   };
   const lines = (values) => Object.entries(values).map(([name, value]) => line(name, value, columns.get(name)));
-  const name = element("h3", {}, `Scenario ${kept.name}, evaluation ${number(kept.evaluation + 1)}`);
+  const name = element("h3", {}, `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"} ${number(kept.evaluation + 1)}`);
   const cause = kept.cause ? [element("div", { title: CAUSE_HELP[data.causes.labels.indexOf(kept.cause)] }, element("span", { class: "name" }, "cause"), element("b", {}, kept.cause))] : [];
   $("measures").replaceChildren(name, ...cause, ...lines(kept.metrics));
   const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
@@ -196,15 +136,19 @@ function start() {
   if (!$("coverage").hidden) new Coverage(data.coverage);
   const hook = { data, state: () => null, charts: 0, chartsDrawn: 0, drawCharts };
   window.bridgegen = hook; // for tests, and for whoever wants to drive the page
-  const causes = data.causes ? new Causes(data.causes, hook) : null;
-  if (data.kept.length) {
-    const player = new Player(hook);
-    if (causes) causes.listRows = player.rows;
-    darkScheme.addEventListener("change", () => { readPalette(); player.redraw(); });
+  hook.filter = (name, low, high) => filters.set(name, low, high);
+  if (data.causes) new Causes(data.causes, hook);
+  darkScheme.addEventListener("change", readPalette);
+  if (rows.critical.includes(1) || data.kept.length) {
+    const opener = new Opener(hook);
+    const table = new Table((i, play) => opener.row(i, play));
+    new TableTools(table);
+    opener.begin();
+    $("copy-no-motion").addEventListener("click", (event) => copy($("no-motion-command").textContent, event.currentTarget));
+    darkScheme.addEventListener("change", () => opener.made?.redraw());
   } else {
     $("kept").hidden = $("made-of").hidden = true;
     $("no-scenarios").hidden = false;
-    $("no-scenarios").textContent = data.rows.critical.includes(1) ? "None was kept." : "None was kept: nothing critical was found.";
-    darkScheme.addEventListener("change", readPalette);
+    $("no-scenarios").textContent = "Nothing critical was found.";
   }
 }

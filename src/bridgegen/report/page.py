@@ -14,13 +14,14 @@ from bridgegen.report.data import ReportData
 from bridgegen.report.payload import to_json
 
 SCRIPTS = (
-    "common.js", "page.js", "causes.js", "notes.js", "geometry.js", "view.js", "scene.js",
+    "common.js", "page.js", "regions.js", "filters.js", "causes.js", "notes.js", "playbacks.js",
+    "table.js", "table_tools.js", "geometry.js", "view.js", "scene.js",
     "curves.js", "picture.js", "player.js", "parallel.js", "charts.js", "coverage.js",
     "coverage_pairs.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
 
-STYLES = ("page.css", "picture.css", "coverage.css", "causes.css", "notes.css")
+STYLES = ("page.css", "picture.css", "coverage.css", "causes.css", "notes.css", "table.css")
 
 
 def write_report(path: Path, data: ReportData) -> None:

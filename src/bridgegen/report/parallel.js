@@ -3,16 +3,13 @@
 const MOST_LINES = 1500;
 
 class Parallel {
-  constructor(canvas, changed) {
+  constructor(canvas) {
     this.canvas = canvas;
-    this.changed = changed;
     const chosen = rows.columns.filter((c) => rows.telling.includes(c.name) || c.name in data.batches.trends);
     this.axes = chosen.map((c) => this.axis(c.name, c.unit, c.values, c.low, c.high));
     if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, 4), words: data.causes.labels });
     this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
     this.byName = new Map(this.axes.map((axis) => [axis.name, axis]));
-    this.filters = new Map(); // axis name → [low, high]
-    passes = (i) => this.passes(i);
     this.connect();
     this.note();
   }
@@ -24,30 +21,20 @@ class Parallel {
     return { name, unit, values, low: ends[0], high: ends[1] };
   }
 
-  passes(i) {
-    for (const [name, [low, high]] of this.filters) {
-      const value = this.byName.get(name).values[i];
-      if (value === null || value < low || value > high) return false;
-    }
-    return true;
+  filter(name, low = null, high = null) {
+    $("filter-axis").value = name;
+    filters.set(name, low, high);
   }
 
-  // Sets or, without numbers, lifts the filter on an axis.
-  filter(name, low = null, high = null) {
-    const axis = this.byName.get(name);
-    if (low === null && high === null) this.filters.delete(name);
-    else this.filters.set(name, [low ?? -Infinity, high ?? Infinity]);
-    $("filter-axis").value = axis.name;
-    document.dispatchEvent(new CustomEvent("filters", { detail: this.filters }));
+  // What is filtered, here or elsewhere, has changed.
+  changed() {
     this.showNumbers();
     this.note();
     this.drawing ??= requestAnimationFrame(() => { this.drawing = null; this.draw(); });
-    clearTimeout(this.waiting);
-    this.waiting = setTimeout(this.changed, 60); // dragging must not wait for the scatter plot
   }
 
   showNumbers() {
-    const range = this.filters.get($("filter-axis").value) ?? [];
+    const range = filters.ranges.get($("filter-axis").value) ?? [];
     ["filter-low", "filter-high"].forEach((id, i) => {
       if (document.activeElement !== $(id)) $(id).value = Number.isFinite(range[i]) ? Number(range[i].toPrecision(4)) : "";
     });
@@ -55,11 +42,11 @@ class Parallel {
 
   note() {
     let all = 0, hits = 0;
-    rows.critical.forEach((critical, i) => { if (this.passes(i)) { all += 1; hits += critical; } });
+    rows.critical.forEach((critical, i) => { if (filters.passes(i)) { all += 1; hits += critical; } });
     const share = all ? ` (${((100 * hits) / all).toFixed(1)}${NARROW}%)` : "";
     const text = `${number(all)} of ${number(rows.critical.length)} pass, ${number(hits)} of them critical${share}`;
-    $("filter-note").textContent = this.filters.size ? text : "";
-    $("filter-clear").disabled = !this.filters.size;
+    $("filter-note").textContent = filters.any ? text : "";
+    $("filter-clear").disabled = !filters.any;
   }
 
   frame() {
@@ -83,7 +70,7 @@ class Parallel {
     const { context: c, width, height } = fitCanvas(this.canvas, { willReadFrequently: true });
     const { x } = this.frame();
     c.clearRect(0, 0, width, height);
-    const { hits, others } = subsample(MOST_LINES, (i) => this.passes(i));
+    const { hits, others } = subsample(MOST_LINES);
     const lines = (list, colour, thick, density) => {
       c.strokeStyle = colour;
       c.lineWidth = thick;
@@ -113,7 +100,7 @@ class Parallel {
     c.moveTo(x, top);
     c.lineTo(x, bottom);
     c.stroke();
-    const range = this.filters.get(axis.name);
+    const range = filters.ranges.get(axis.name);
     if (range) {
       const high = Math.max(top, this.y(axis, range[1])), low = Math.min(bottom, this.y(axis, range[0]));
       c.fillStyle = palette.band;
@@ -163,7 +150,8 @@ class Parallel {
         this.filter(select.value, ...ends);
       });
     }
-    $("filter-clear").addEventListener("click", () => { this.filters.clear(); this.filter(select.value); });
+    $("filter-clear").addEventListener("click", () => filters.clear());
+    document.addEventListener("filters", () => this.changed());
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.listen();
   }

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.cause import CAUSES, Cause
 from bridgegen.report import convergence, sentences
 from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, Lamp, Playback, ReportData
 from bridgegen.report.picture_payload import pictures_payload
+from bridgegen.search.dominance import by_merit
 
 DIGITS = 5
 """Significant digits of the largest value of a column in bulk."""
@@ -70,6 +71,7 @@ def payload(data: ReportData) -> dict[str, Any]:
             "table": sentences.summary_table(s),
             "provenance": sentences.provenance(s),
             "command": s.command,
+            "view": s.view,
             "critical_distance": _number(s.critical_distance),
         },
         "rows": _rows(data.evaluations, [playback.evaluation for playback in data.kept]),
@@ -102,9 +104,24 @@ def _rows(e: Evaluations, kept: list[int]) -> dict[str, Any]:
         "iteration": (e.iteration[ok] + 1).tolist(),
         "critical": e.critical[ok].astype(np.int64).tolist(),
         "cause": None if e.cause is None else e.cause[ok].tolist(),
+        "rank": _ranks(e, ok),
         "columns": [_column(c, group, ok) for group, columns in groups for c in columns],
         "telling": convergence.telling_parameters(e.parameters, e.critical, ok),
     }
+
+
+def _ranks(e: Evaluations, ok: Bool) -> list[int]:
+    """Return each row's place among all critical ones, 1 for the most critical; 0 for others."""
+    critical = np.flatnonzero(e.critical & (e.status == 0))
+    rank = np.zeros(e.critical.size, dtype=np.int64)
+    F = (
+        np.stack([c.values for c in e.objectives], axis=1)
+        if e.objectives
+        else np.zeros((rank.size, 1))
+    )
+    rank[critical[by_merit(F[critical])]] = np.arange(1, critical.size + 1)
+    told: list[int] = rank[ok].tolist()
+    return told
 
 
 def _causes(e: Evaluations) -> dict[str, Any] | None:

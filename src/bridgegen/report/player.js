@@ -9,18 +9,11 @@ class Player {
     this.position = 0; // in steps; whole on a recorded instant
     this.scene = new Scene($("scene"), () => this.redraw());
     this.curves = new Curves($("curves"), (k) => this.seek(k));
-    this.rows = fillList((i) => this.choose(i, true));
     this.connect();
     Object.assign(hook, {
-      select: (i) => this.choose(i), seek: (k) => this.seek(k), play: () => this.play(), pause: () => this.pause(),
+      seek: (k) => this.seek(k), play: () => this.play(), pause: () => this.pause(),
       state: () => ({ ...this.drawn, playing: this.playing }),
     });
-    const wanted = new URLSearchParams(location.hash.slice(1));
-    const named = data.kept.findIndex((kept) => kept.name === wanted.get("scenario"));
-    this.choose(Math.max(0, named));
-    const seconds = Number.parseFloat(wanted.get("t"));
-    if (named >= 0 && seconds >= 0) this.seek(Math.round(seconds / this.kept.time_step));
-    if (named >= 0) $("scenarios").scrollIntoView();
   }
 
   get last() {
@@ -28,21 +21,17 @@ class Player {
   }
 
   // Shows a scenario at its smallest gap, the moment that tells most; a click plays it from the start.
-  choose(i, andPlay = false) {
+  show(kept, andPlay = false) {
     this.pause();
-    this.kept = data.kept[i];
-    this.chosen = i;
-    this.rows.forEach((row, k) => (k === i ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+    this.kept = kept;
+    this.chosen = data.kept.indexOf(kept); // −1 of one that was not handed over
     $("scrub").max = this.last;
     $("scene-name").textContent = `${this.kept.name}`;
     $("to-contact").hidden = !this.kept.contacts.length;
     $("to-closest").hidden = this.kept.closest === null || this.kept.contacts.includes(this.kept.closest);
     this.scene.show(this.kept);
     this.curves.show(this.kept);
-    fillDetails(this.kept);
-    showPicture(this.kept);
     this.seek(this.kept.closest ?? 0, false);
-    this.hook.chosen?.(i);
     if (!andPlay) return;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     if ($("player").getBoundingClientRect().bottom > innerHeight) {
@@ -66,7 +55,8 @@ class Player {
     clearTimeout(this.linking);
     this.linking = setTimeout(() => {
       const time = (Math.round(this.position) * this.kept.time_step).toFixed(2);
-      history.replaceState(null, "", `#${new URLSearchParams({ scenario: this.kept.name, t: time })}`);
+      const which = this.chosen < 0 ? { evaluation: this.kept.evaluation + 1 } : { scenario: this.kept.name };
+      history.replaceState(null, "", `#${new URLSearchParams({ ...which, t: time })}`);
     }, 200);
   }
 

@@ -23,6 +23,24 @@ def non_dominated(F: Float) -> Bool:
     return front
 
 
+def by_merit(F: Float) -> Int:
+    """Return the rows, best first: ``(n,)`` int64.
+
+    With many objectives, those that no other dominates come first; then counts the sum of
+    objectives, each scaled to [0, 1] over the rows.
+
+    Args:
+        F: ``(n, n_obj)`` float64, finite.
+    """
+    low, span = F.min(axis=0, initial=np.inf), np.ptp(F, axis=0) if len(F) else 1.0
+    total = ((F - low) / np.where(span > 0.0, span, 1.0)).sum(axis=1)
+    merit: Int = np.lexsort((*F.T[::-1], total))  # by F where rounding leaves the sums equal
+    if F.shape[1] == 1:
+        return merit
+    front = non_dominated(F)[merit]
+    return np.concatenate([merit[front], merit[~front]])
+
+
 def crowding(F: Float) -> Float:
     """Return each row's crowding distance: ``(n,)`` float64, +inf at the ends of an objective.
 

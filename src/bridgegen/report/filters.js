@@ -1,0 +1,50 @@
+// What the page is narrowed to: ranges of columns, and a region. The table and the charts follow.
+
+class Filters {
+  constructor() {
+    this.ranges = new Map(); // column's name → [low, high]
+    this.region = null; // index in data.regions.regions
+  }
+
+  // Of a column: numbers of the rows, null where there is none.
+  values(name) {
+    if (name === "cause") return rows.cause;
+    return name === "critical" ? rows.critical : columns.get(name)?.values;
+  }
+
+  get any() {
+    return this.ranges.size > 0 || this.region !== null;
+  }
+
+  // Sets or, without numbers, lifts the filter on a column.
+  set(name, low = null, high = null) {
+    if (!this.values(name)) return;
+    if (low === null && high === null) this.ranges.delete(name);
+    else this.ranges.set(name, [low ?? -Infinity, high ?? Infinity]);
+    this.tell();
+  }
+
+  inRegion(region) {
+    this.region = region;
+    this.tell();
+  }
+
+  clear() {
+    this.ranges.clear();
+    this.region = null;
+    this.tell();
+  }
+
+  passes(i) {
+    for (const [name, [low, high]] of this.ranges) {
+      const value = this.values(name)[i];
+      if (value === null || value < low || value > high) return false;
+    }
+    return this.region === null || isInRegion(i, this.region);
+  }
+
+  tell() {
+    document.dispatchEvent(new CustomEvent("filters", { detail: this.ranges }));
+  }
+}
+const filters = new Filters();

@@ -1,0 +1,99 @@
+// Where a scenario's motion comes from: the handed-over ones are in the page's data.
+
+const SOURCES = {
+  kept: "Handed over as files; play it",
+  none: "Its motion is not in this page; show its figures, and the command that plays it",
+};
+
+class Playbacks {
+  constructor() {
+    this.keptAt = new Map(data.kept.map((kept, k) => [kept.evaluation, k]));
+  }
+
+  // A key of SOURCES, or null where the motion is not to be had.
+  source(evaluation) {
+    return this.keptAt.has(evaluation) ? "kept" : null;
+  }
+
+  async get(evaluation) {
+    return data.kept[this.keptAt.get(evaluation)];
+  }
+}
+const playbacks = new Playbacks();
+
+// What is known of a row of the page without its motion, in a playback's shape.
+function factsOf(i) {
+  const values = (group) => Object.fromEntries(rows.columns.filter((c) => c.group === group).map((c) => [c.name, c.values[i]]));
+  const cause = rows.cause?.[i] ? data.causes.labels[rows.cause[i]] : "";
+  return { name: "", evaluation: rows.evaluation[i], parameters: values("parameter"), metrics: values("metric"), files: [], cause, picture: null };
+}
+
+// Shows scenarios in the player, whatever their motion comes from.
+class Opener {
+  constructor(hook) {
+    this.hook = hook;
+    this.at = new Map(rows.evaluation.map((evaluation, i) => [evaluation, i]));
+    this.wanted = null;
+    hook.select = (k) => this.kept(k);
+    hook.open = (evaluation) => this.row(this.at.get(evaluation));
+  }
+
+  get player() {
+    this.made ??= new Player(this.hook);
+    return this.made;
+  }
+
+  kept(k, play = false) {
+    this.wanted = data.kept[k].evaluation;
+    this.show(data.kept[k], play);
+  }
+
+  async row(i, play = false) {
+    const evaluation = rows.evaluation[i];
+    this.wanted = evaluation;
+    if (playbacks.keptAt.has(evaluation)) return this.kept(playbacks.keptAt.get(evaluation), play);
+    const playback = playbacks.source(evaluation) ? await playbacks.get(evaluation) : null;
+    if (this.wanted !== evaluation) return; // another was chosen meanwhile
+    if (playback) this.show(playback, play);
+    else this.without(factsOf(i));
+  }
+
+  show(playback, play) {
+    $("no-motion").hidden = true;
+    $("player").classList.remove("still");
+    this.player.show(playback, play);
+    this.told(playback);
+  }
+
+  // The figures, and how to see the motion.
+  without(facts) {
+    this.made?.pause();
+    $("no-motion").hidden = false;
+    $("player").classList.add("still");
+    $("no-motion-name").textContent = `Evaluation ${number(facts.evaluation + 1)}`;
+    $("no-motion-command").parentNode.parentNode.hidden = !data.summary.view;
+    $("no-motion-command").textContent = `${data.summary.view} --evaluation ${facts.evaluation + 1}`;
+    this.told(facts);
+  }
+
+  told(one) {
+    fillDetails(one);
+    showPicture(one);
+    document.dispatchEvent(new CustomEvent("shown", { detail: one.evaluation }));
+  }
+
+  // What the page's address names, or the most critical.
+  async begin() {
+    const wanted = new URLSearchParams(location.hash.slice(1));
+    const named = data.kept.findIndex((kept) => kept.name === wanted.get("scenario"));
+    const i = this.at.get(Number.parseInt(wanted.get("evaluation"), 10) - 1);
+    if (named >= 0) this.kept(named);
+    else if (i !== undefined) await this.row(i);
+    else if (data.kept.length) this.kept(0);
+    else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
+    const seconds = Number.parseFloat(wanted.get("t"));
+    if (named < 0 && i === undefined) return;
+    if (seconds >= 0 && this.made) this.player.seek(Math.round(seconds / this.player.kept.time_step));
+    $("scenarios").scrollIntoView();
+  }
+}

@@ -1,0 +1,163 @@
+// The table of all critical scenarios: sorted, filtered; only the rows in sight are in the document.
+
+const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
+const SHORT = { n_collision: "hits" };
+const ROW_HEIGHT = 32; // as in table.css
+const SPARE = 6; // rows above and below those in sight
+
+class Table {
+  // open(i, play): told the row of the page to be shown.
+  constructor(open) {
+    this.open = open;
+    this.sorting = { by: "rank", down: false };
+    this.only = null; // a metric that is filtered, but has no column of its own
+    this.scroll = $("list-scroll");
+    this.body = $("list-body");
+    this.shown = null; // evaluation in the player
+    this.first = this.last = -1;
+    this.fillHead();
+    this.connect();
+    this.refill();
+  }
+
+  get columns() {
+    const metrics = rows.columns.filter((column) => column.group === "metric").map((column) => column.name);
+    const listed = LISTED.filter((name) => metrics.includes(name));
+    const chosen = listed.length ? listed : metrics.slice(0, 4);
+    if (this.only && !chosen.includes(this.only)) chosen.push(this.only);
+    return ["rank", ...chosen, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : [])];
+  }
+
+  value(name, i) {
+    if (name === "rank") return rows.rank[i] || null;
+    if (name === "cause") return rows.cause[i];
+    return name === "region" ? regionOf(i) : columns.get(name).values[i];
+  }
+
+  fillHead() {
+    const cells = this.columns.map((name) => {
+      const unit = unitText(columns.get(name)?.unit ?? "");
+      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? name, element("small", {}, unit || "\u00a0"));
+      button.addEventListener("click", () => {
+        this.sorting = { by: name, down: this.sorting.by === name && !this.sorting.down };
+        this.refill();
+      });
+      return element("th", { scope: "col", "data-by": name, "aria-sort": "none" }, button);
+    });
+    $("list-head").replaceChildren(element("tr", {}, ...cells));
+  }
+
+  // Which rows there are, and in which order.
+  refill() {
+    const { by, down } = this.sorting, sign = down ? -1 : 1, kept = $("only-kept").checked;
+    const there = [];
+    for (let i = 0; i < rows.critical.length; i++) {
+      const handed = playbacks.keptAt.has(rows.evaluation[i]);
+      if ((rows.critical[i] || handed) && (handed || !kept) && filters.passes(i)) there.push(i);
+    }
+    const key = new Map(there.map((i) => [i, this.value(by, i)]));
+    const order = (a, b) => {
+      const [x, y] = [key.get(a), key.get(b)];
+      // What does not exist sorts last, whichever way.
+      return (x === null) - (y === null) || sign * (x - y) || (rows.rank[a] || Infinity) - (rows.rank[b] || Infinity) || a - b;
+    };
+    this.order = there.sort(order);
+    for (const th of $("list-head").querySelectorAll("th")) {
+      th.setAttribute("aria-sort", th.dataset.by === by ? (down ? "descending" : "ascending") : "none");
+    }
+    $("list-table").setAttribute("aria-rowcount", this.order.length + 1);
+    this.note();
+    this.draw(true);
+  }
+
+  note() {
+    const all = rows.critical.reduce((a, b) => a + b, 0), n = this.order.length;
+    const some = filters.any || $("only-kept").checked;
+    $("list-note").textContent = some ? `${number(n)} of ${number(all)} critical scenarios` : `${number(all)} critical scenarios`;
+    $("list-clear").hidden = !some;
+  }
+
+  // Draws the rows in sight, if they are not drawn yet.
+  draw(anew = false) {
+    const { scrollTop, clientHeight } = this.scroll;
+    const first = Math.max(0, Math.min(this.order.length, Math.floor(scrollTop / ROW_HEIGHT)) - SPARE);
+    const last = Math.min(this.order.length, Math.ceil((scrollTop + clientHeight) / ROW_HEIGHT) + SPARE);
+    if (!anew && first === this.first && last === this.last) return;
+    [this.first, this.last] = [first, last];
+    const focused = this.body.contains(document.activeElement) ? Number(document.activeElement.closest("tr").dataset.i) : null;
+    const room = (n) => {
+      const cell = element("td", { colspan: this.columns.length });
+      cell.style.height = `${n * ROW_HEIGHT}px`;
+      return element("tr", { class: "room", "aria-hidden": "true" }, cell);
+    };
+    const drawn = this.order.slice(first, last).map((i, k) => this.row(i, first + k));
+    this.body.replaceChildren(...(first ? [room(first)] : []), ...drawn, ...(last < this.order.length ? [room(this.order.length - last)] : []));
+    if (focused !== null) this.buttonOf(focused)?.focus({ preventScroll: true });
+  }
+
+  row(i, place) {
+    const evaluation = rows.evaluation[i], kept = data.kept[playbacks.keptAt.get(evaluation)];
+    const rank = rows.rank[i] || "–", source = playbacks.source(evaluation);
+    const label = `${source ? "Play" : "Show"} ${kept ? `scenario ${kept.name}, ` : ""}evaluation ${evaluation + 1}, rank ${rank}`;
+    const button = element("button", { type: "button", "aria-label": label, title: SOURCES[source ?? "none"], class: `from-${source ?? "none"}` }, `${rank}`);
+    const first = element("td", {}, button);
+    if (kept) button.append(element("small", {}, kept.name));
+    const row = element("tr", { "data-i": i, "aria-rowindex": place + 2 }, first);
+    if (evaluation === this.shown) row.setAttribute("aria-current", "true");
+    for (const name of this.columns.slice(1)) row.append(this.cell(name, i));
+    return row;
+  }
+
+  cell(name, i) {
+    const value = this.value(name, i);
+    if (name === "cause") return element("td", {}, value ? data.causes.labels[value] : "–");
+    if (name === "region") return element("td", {}, value === null ? "–" : `${value}`);
+    const cell = element("td", {}, measured(value, columns.get(name)?.unit, 3));
+    if (name === "n_collision" && value > 0) cell.className = "hit";
+    return cell;
+  }
+
+  buttonOf(i) {
+    return this.body.querySelector(`tr[data-i="${i}"] button`);
+  }
+
+  // Brings a row into sight, if it is in the table.
+  reveal(place, focus = false) {
+    if (place < 0 || place >= this.order.length) return;
+    const top = place * ROW_HEIGHT, head = $("list-head").offsetHeight, seen = this.scroll.clientHeight - head;
+    if (top < this.scroll.scrollTop) this.scroll.scrollTop = top;
+    else if (top + ROW_HEIGHT > this.scroll.scrollTop + seen) this.scroll.scrollTop = top + ROW_HEIGHT - seen;
+    this.draw();
+    if (focus) this.buttonOf(this.order[place])?.focus({ preventScroll: true });
+  }
+
+  mark(evaluation) {
+    this.shown = evaluation;
+    for (const row of this.body.querySelectorAll("tr[data-i]")) {
+      if (rows.evaluation[row.dataset.i] === evaluation) row.setAttribute("aria-current", "true");
+      else row.removeAttribute("aria-current");
+    }
+  }
+
+  connect() {
+    this.scroll.addEventListener("scroll", () => { this.drawing ??= requestAnimationFrame(() => { this.drawing = null; this.draw(); }); });
+    new ResizeObserver(() => this.draw()).observe(this.scroll);
+    this.body.addEventListener("click", (event) => {
+      const i = event.target.closest("tr[data-i]")?.dataset.i;
+      if (i !== undefined) this.open(Number(i), true);
+    });
+    this.body.addEventListener("keydown", (event) => {
+      const row = event.target.closest("tr[data-i]"), page = Math.max(1, Math.floor(this.scroll.clientHeight / ROW_HEIGHT) - 2);
+      const by = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity }[event.key];
+      if (by === undefined || !row || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      event.stopPropagation(); // Home and End are the player's keys too
+      const place = Number(row.getAttribute("aria-rowindex")) - 2 + by;
+      this.reveal(Math.min(this.order.length - 1, Math.max(0, place)), true);
+    });
+    $("only-kept").addEventListener("change", () => this.refill());
+    $("list-clear").addEventListener("click", () => { $("only-kept").checked = false; filters.clear(); });
+    document.addEventListener("filters", () => this.refill());
+    document.addEventListener("shown", ({ detail }) => this.mark(detail));
+  }
+}

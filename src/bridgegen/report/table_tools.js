@@ -1,0 +1,49 @@
+// The fields above the table of critical scenarios: by a metric, by cause, by region.
+
+class TableTools {
+  constructor(table) {
+    this.table = table;
+    const metrics = rows.columns.filter((column) => column.group === "metric");
+    $("list-metric").append(...metrics.map(({ name, description }) => element("option", { value: name, title: description }, titled(name))));
+    const first = LISTED.find((name) => metrics.some((column) => column.name === name));
+    if (first) $("list-metric").value = first;
+    this.choices($("list-cause"), data.causes?.labels.slice(1).map((label, k) => [k + 1, label]));
+    this.choices($("list-region"), data.regions?.regions.map((region, k) => [k, `${region.number}: ${region.rule}`]));
+    $("list-metric").addEventListener("change", () => { this.column(); this.show(); });
+    for (const id of ["list-low", "list-high"]) $(id).addEventListener("input", () => this.metric());
+    $("list-cause").addEventListener("change", ({ target: { value } }) => {
+      if (value === "") filters.set("cause");
+      else filters.set("cause", value - 0.3, Number(value) + 0.3);
+    });
+    $("list-region").addEventListener("change", ({ target: { value } }) => filters.inRegion(value === "" ? null : Number(value)));
+    document.addEventListener("filters", () => this.show());
+  }
+
+  choices(select, options) {
+    select.closest("label").hidden = !options;
+    if (options) select.append(...options.map(([value, text]) => element("option", { value }, text)));
+  }
+
+  metric() {
+    const ends = [$("list-low"), $("list-high")].map((field) => (field.value === "" ? null : Number(field.value)));
+    filters.set($("list-metric").value, ...ends);
+  }
+
+  // A metric that is filtered by is to be seen.
+  column() {
+    const name = $("list-metric").value;
+    if (this.table.only === name) return;
+    this.table.only = name;
+    this.table.fillHead();
+    this.table.refill();
+  }
+
+  show() {
+    const range = filters.ranges.get($("list-metric").value) ?? [], cause = filters.ranges.get("cause");
+    ["list-low", "list-high"].forEach((id, k) => {
+      if (document.activeElement !== $(id)) $(id).value = Number.isFinite(range[k]) ? Number(range[k].toPrecision(4)) : "";
+    });
+    $("list-cause").value = cause && cause[1] - cause[0] < 1 ? Math.round((cause[0] + cause[1]) / 2) : "";
+    $("list-region").value = filters.region ?? "";
+  }
+}
