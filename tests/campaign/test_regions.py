@@ -148,6 +148,17 @@ def test_the_command_says_what_holds_and_what_does_not(folder, found, cli, monke
     assert (code, json.loads(out)) == (0, json.loads(json.dumps(found.record)))
 
 
+def test_a_report_that_is_there_is_written_again_with_the_regions(folder, tmp_path):
+    place = copied(folder, tmp_path / "run")
+    assert "report.html" not in {file.name for file in regions_of(place, samples=20).files}
+    (place / "report.html").write_text("an old one")
+    made = regions_of(place, samples=20)
+    assert made.files[-1] == place / "report.html"
+    text = made.files[-1].read_text()
+    assert json.dumps(made.record["regions"][0]["rule"])[1:-1] in text
+    assert f'"view":"bridgegen view {place}"' in text
+
+
 def test_nothing_that_holds_is_said_and_leaves_no_class(folder, tmp_path, cli):
     place = copied(folder, tmp_path / "run")
     (place / "regions.owl").write_text("of an earlier time", "utf-8")

@@ -15,7 +15,7 @@ def test_a_long_run_is_thinned_evenly_and_keeps_the_kept(monkeypatch):
         critical=np.arange(n) % 3 == 0,
         status=np.where(np.arange(n) % 100 == 0, 1, 0),
     )
-    rows = payload._rows(evaluations, [501, 502])
+    rows = payload._rows(evaluations, payload._shown(evaluations, [501, 502]))
     found = np.array(rows["evaluation"])
     assert (rows["n"], rows["n_failed"]) == (1000, 10)
     assert {501, 502} <= set(rows["evaluation"])

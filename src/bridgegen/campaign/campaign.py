@@ -9,19 +9,17 @@ from bridgegen import search as toolkit
 from bridgegen.campaign.chosen import chosen_objective, columns_of
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
+from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
-from bridgegen.campaign.run import REPORT, Run
+from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.odd.adversary import adversarial
 from bridgegen.pipeline import Pipeline
-from bridgegen.report.build import build_report
-from bridgegen.report.page import write_report
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.store import Store, refuse_used
-from bridgegen.store.summary import summarise
 
 MAX_BUDGET = 10_000_000
 
@@ -266,20 +264,7 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
     best = most_critical(rows.U, rows.F, rows.critical, settings.keep)
     kept = hand_over(pipeline, rows.take(best), store.folder, watch.written)
     watch.stage("report")
-    metric = store.metrics.index
-    summary = summarise(
-        rows.critical, rows.status == 0,
-        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
-        store.seconds,
-    )  # fmt: skip
-    data = build_report(
-        pipeline, rows, summary,
-        kept=[(one.name, one.evaluation, one.files) for one in kept],
-        algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
-        command=settings.command(store.folder), finished=store.finished is not None,
-        version=store.version, notes=store.notes,
-    )  # fmt: skip
-    write_report(store.folder / REPORT, data)
+    write_run_report(pipeline, store, settings, rows, kept)
 
 
 def _check_numbers(budget: int, seed: int, keep: int) -> None:

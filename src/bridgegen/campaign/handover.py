@@ -120,6 +120,30 @@ def hand_over(
     return tuple(kept)
 
 
+def handed_over(folder: Path) -> tuple[Kept, ...]:
+    """Return what a run has handed over, most critical first; nothing before it has.
+
+    Args:
+        folder: the run's.
+
+    Raises:
+        StorageError: a scenario's ``.json`` is not what was written.
+    """
+    kept = []
+    for path in sorted((folder / FOLDER).glob("*.json")):
+        try:
+            evaluation = int(json.loads(path.read_text(encoding="utf-8"))["evaluation"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise StorageError(
+                f"{path}: is not what was handed over: {error}; "
+                f"'bridgegen resume {folder}' writes the files again"
+            ) from None
+        files = (path.with_suffix(f".{kind}") for kind in ("owl", "xodr", "xosc", "json"))
+        names = tuple(f"{FOLDER}/{file.name}" for file in files if file.is_file())
+        kept.append(Kept(path.stem, evaluation, names))
+    return tuple(kept)
+
+
 def write_scenario(
     pipeline: Pipeline, x: Float, folder: Path, name: str, cause: Cause = Cause.NONE
 ) -> list[Path]:

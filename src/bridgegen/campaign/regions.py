@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.campaign.handover import handed_over
+from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of
+from bridgegen.campaign.run import REPORT
 from bridgegen.campaign.settings import Settings
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError
@@ -17,10 +20,10 @@ from bridgegen.ontology.files import save
 from bridgegen.pipeline import Pipeline
 from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
 from bridgegen.regions.owl import carriers, classes, statable
-from bridgegen.regions.record import to_json
+from bridgegen.regions.record import JSON_FILE, to_json
 from bridgegen.store import Store
 
-JSON_FILE, OWL_FILE = "regions.json", "regions.owl"
+OWL_FILE = "regions.owl"
 MAX_SEED = 2**32 - 1
 
 
@@ -59,7 +62,8 @@ def regions_of(
 ) -> RunRegions:
     """Find and verify the critical regions of a run, finished or not; write them beside it.
 
-    ``regions.json`` has all of them, ``regions.owl`` a class for each that is confirmed.
+    ``regions.json`` has all of them, ``regions.owl`` a class for each that is confirmed. A report
+    that is there is written again, with the regions.
 
     Args:
         folder: of the run.
@@ -68,7 +72,7 @@ def regions_of(
         at_least: the share of critical scenarios that makes a region critical.
         seed: of the fresh scenarios; the run's by default.
         threads: to simulate with, one for each core by default; the results do not depend on it.
-        stage: told what begins: "compile", "regions".
+        stage: told what begins: "compile", "regions", "report".
         progress: told how many fresh scenarios are simulated, of how many.
 
     Raises:
@@ -114,9 +118,15 @@ def regions_of(
     write_whole(place / JSON_FILE, [text.encode()])
     origin = f"{len(rows)} evaluations of {settings.algorithm} with seed {settings.seed}"
     stated = _state(pipeline, found, place / OWL_FILE, origin)
+    files = [place / JSON_FILE, *([place / OWL_FILE] if stated else [])]
+    if (place / REPORT).is_file():
+        stage("report")
+        with Store.open(folder) as store:
+            kept = handed_over(place)
+            files.append(write_run_report(pipeline, store, settings, store.read(), kept))
     return RunRegions(
         place, space, found, record,
-        files=(place / JSON_FILE, *([place / OWL_FILE] if stated else [])),
+        files=tuple(files),
         unstated=tuple(one for one in found.confirmed if one not in stated),
     )  # fmt: skip
 

@@ -1,12 +1,65 @@
 """What was found, as JSON: for machines, and to be drawn."""
 
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from bridgegen.errors import FileFormatError
 from bridgegen.odd.space import SearchSpace
 from bridgegen.regions.box import Box, whole
 from bridgegen.regions.evidence import CONFIDENCE, Evidence
 from bridgegen.regions.find import Found, Region
 from bridgegen.regions.words import rule, sentence
+
+JSON_FILE = "regions.json"
+"""Its name in a run's folder."""
+
+
+def read_record(path: Path) -> Mapping[str, Any] | None:
+    """Return what `to_json` gave for a run, as it was written; None where there is no file.
+
+    Raises:
+        FileFormatError: it cannot be read, or is something else.
+    """
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        for one in record["regions"]:
+            _check(one)
+        for key in ("evaluations", "critical", "critical_held"):
+            int(record[key])
+        for key in ("confidence", "at_least", "space_share"):
+            _finite(record[key])
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise FileFormatError(
+            f"{path}: must be what 'bridgegen regions' writes, and {_said(error)}; "
+            "run that again, or delete the file"
+        ) from None
+    return record  # type: ignore[no-any-return]
+
+
+def _check(one: Mapping[str, Any]) -> None:
+    """Raise a KeyError, TypeError or ValueError where a region lacks what a page needs."""
+    int(one["number"]), bool(one["confirmed"]), str(one["rule"]), str(one["sentence"])
+    ends = [end for name in one["named"] for end in (one["box"][name][k] for k in ("low", "high"))]
+    for evidence in (one["fresh"], one["search"]):
+        int(evidence["rows"]), int(evidence["critical"])
+        low, high = evidence["interval"]
+        ends += [low, high]
+    for end in (*ends, one["space_share"]):
+        _finite(end)
+
+
+def _finite(value: float) -> None:
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not finite")
+
+
+def _said(error: Exception) -> str:
+    return f"lacks {error}" if isinstance(error, KeyError) else f"is not: {error}"
 
 
 def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:

@@ -48,6 +48,7 @@ def build_report(
     version: str,
     notes: Mapping[str, Any],
     view: str = "",
+    regions: Mapping[str, Any] | None = None,
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -65,6 +66,7 @@ def build_report(
         version: of BridgeGen.
         notes: what the algorithm wants kept with the run.
         view: the command line that shows this run with the motion of every scenario, if there is.
+        regions: the critical ones, as `regions.record` has them, if they are known.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
     terms = pipeline.objective.names
@@ -110,6 +112,7 @@ def build_report(
         _playbacks(pipeline, rows, kept),
         _coverage(pipeline, rows),
         tables(notes, pipeline.space),
+        regions,
     )
 
 

@@ -156,10 +156,29 @@ function scatterFigure() {
   ];
 }
 
+// The shadows of the regions on the two axes; one that names neither would cover everything.
+function regionShapes(nameX, nameY) {
+  const shapes = [], annotations = [];
+  for (const region of drawnRegions()) {
+    const x = region.box[nameX], y = region.box[nameY];
+    if (!x && !y) continue;
+    const [x0, x1] = x ?? [0, 1], [y0, y1] = y ?? [0, 1], xref = x ? "x" : "x domain", yref = y ? "y" : "y domain";
+    const line = { color: palette.accent, width: 2, dash: region.confirmed ? "solid" : "dot" };
+    shapes.push({ type: "rect", xref, yref, x0, x1, y0, y1, line, fillcolor: palette.band, layer: "below" });
+    annotations.push({
+      xref, yref, x: x0, y: y1, text: `${region.number}`, showarrow: false, xanchor: "left", yanchor: "top",
+      font: { size: 12, color: palette.accent }, bgcolor: palette.card, borderpad: 2,
+    });
+  }
+  return { shapes, annotations };
+}
+
 function drawScatter() {
   const plot = $("scatter"), narrow = innerWidth < 700;
   const axis = (id) => ({ title: { text: plain(titled($(id).value)), standoff: 8 }, zeroline: false });
-  const extra = { xaxis: axis("axis-x"), yaxis: axis("axis-y"), dragmode: narrow ? false : "zoom", hovermode: "closest" };
+  const boxes = regionShapes($("axis-x").value, $("axis-y").value);
+  $("regions-drawn").hidden = !boxes.shapes.length;
+  const extra = { ...boxes, xaxis: axis("axis-x"), yaxis: axis("axis-y"), dragmode: narrow ? false : "zoom", hovermode: "closest" };
   // Only these buttons: Plotly's own set has one that hands the data to a website.
   const config = {
     ...CONFIG, displayModeBar: narrow ? false : "hover", modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]],

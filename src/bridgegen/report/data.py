@@ -7,6 +7,7 @@ time to collision); the page shows a dash there.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -289,6 +290,7 @@ class ReportData:
         kept: the scenarios that were handed over, most critical first; may be empty.
         coverage: which bins and pairs of bins were evaluated, if it is to be shown.
         notes: what the algorithm learnt.
+        regions: the critical ones, as `bridgegen.regions.record` has them, if they are known.
     """
 
     summary: RunSummary
@@ -296,6 +298,7 @@ class ReportData:
     kept: tuple[Playback, ...] = ()
     coverage: CoverageMap | None = None
     notes: tuple[NoteTable, ...] = ()
+    regions: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

@@ -138,6 +138,7 @@ function start() {
   window.bridgegen = hook; // for tests, and for whoever wants to drive the page
   hook.filter = (name, low, high) => filters.set(name, low, high);
   if (data.causes) new Causes(data.causes, hook);
+  if (data.regions) new Regions(data.regions);
   darkScheme.addEventListener("change", readPalette);
   if (rows.critical.includes(1) || data.kept.length) {
     const opener = new Opener(hook);

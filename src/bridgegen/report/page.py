@@ -21,7 +21,15 @@ SCRIPTS = (
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
 
-STYLES = ("page.css", "picture.css", "coverage.css", "causes.css", "notes.css", "table.css")
+STYLES = (
+    "page.css",
+    "picture.css",
+    "coverage.css",
+    "causes.css",
+    "notes.css",
+    "table.css",
+    "regions.css",
+)
 
 
 def write_report(path: Path, data: ReportData) -> None:

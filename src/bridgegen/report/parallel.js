@@ -90,6 +90,35 @@ class Parallel {
     lines(others, palette.plain, 1, 120);
     lines(hits, palette.critical, 1.2, 60);
     this.axes.forEach((axis, a) => this.drawAxis(c, axis, x(a), a));
+    drawnRegions().forEach((region, k) => this.drawRegion(c, region, k, x));
+  }
+
+  // A bracket with the region's number beside each axis that it narrows.
+  drawRegion(c, region, k, x) {
+    c.strokeStyle = c.fillStyle = palette.accent;
+    c.lineWidth = 2.5;
+    c.font = FONT.replace("600 12px", "600 11px");
+    c.textAlign = "left";
+    c.setLineDash(region.confirmed ? [] : [3, 3]);
+    this.axes.forEach((axis, a) => {
+      const ends = region.box[axis.name];
+      if (!ends) return;
+      const at = x(a) + 9 + 9 * k, low = this.y(axis, ends[0]), high = this.y(axis, ends[1]);
+      c.beginPath();
+      c.moveTo(at - 4, high);
+      c.lineTo(at, high);
+      c.lineTo(at, low);
+      c.lineTo(at - 4, low);
+      c.stroke();
+      c.lineWidth = 3.5;
+      c.strokeStyle = palette.card;
+      const beside = high < this.frame().top + 14; // no room above it
+      c.strokeText(`${region.number}`, at + (beside ? 3 : -3), high + (beside ? 6 : -7));
+      c.fillText(`${region.number}`, at + (beside ? 3 : -3), high + (beside ? 6 : -7));
+      c.strokeStyle = palette.accent;
+      c.lineWidth = 2.5;
+    });
+    c.setLineDash([]);
   }
 
   drawAxis(c, axis, x, a) {

@@ -16,6 +16,7 @@ from bridgegen.report import convergence, sentences
 from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, Lamp, Playback, ReportData
 from bridgegen.report.picture_payload import pictures_payload
+from bridgegen.report.regions_payload import regions_payload
 from bridgegen.search.dominance import by_merit
 
 DIGITS = 5
@@ -50,6 +51,7 @@ def script_json(value: Any) -> str:
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
     s = data.summary
+    shown = _shown(data.evaluations, [playback.evaluation for playback in data.kept])
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
@@ -74,7 +76,8 @@ def payload(data: ReportData) -> dict[str, Any]:
             "view": s.view,
             "critical_distance": _number(s.critical_distance),
         },
-        "rows": _rows(data.evaluations, [playback.evaluation for playback in data.kept]),
+        "rows": _rows(data.evaluations, shown),
+        "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,
         "batches": _batches(data.evaluations),
         "causes": _causes(data.evaluations),
         "roads": roads,
@@ -88,18 +91,23 @@ def payload(data: ReportData) -> dict[str, Any]:
     }
 
 
-def _rows(e: Evaluations, kept: list[int]) -> dict[str, Any]:
-    ok = e.status == 0
-    n_failed = int(np.count_nonzero(~ok))
+def _shown(e: Evaluations, kept: list[int]) -> Bool:
+    """Return which rows the page holds, ``(N,)``: none that failed, and of a long run some."""
+    ok: Bool = e.status == 0
     if ok.size > ROWS:
         some = np.zeros(ok.size, dtype=np.bool_)
         some[np.linspace(0, ok.size - 1, ROWS).round().astype(np.int64)] = True
         some[kept] = True
         ok &= some
+    return ok
+
+
+def _rows(e: Evaluations, ok: Bool) -> dict[str, Any]:
     groups = [("parameter", e.parameters), ("metric", e.metrics), ("objective", e.objectives)]
     return {
         "n": int(e.status.size),
-        "n_failed": n_failed,
+        "n_failed": int(np.count_nonzero(e.status)),
+        "n_critical": int(np.count_nonzero(e.critical & (e.status == 0))),
         "evaluation": np.flatnonzero(ok).tolist(),
         "iteration": (e.iteration[ok] + 1).tolist(),
         "critical": e.critical[ok].astype(np.int64).tolist(),

@@ -71,9 +71,10 @@ class Table {
   }
 
   note() {
-    const all = rows.critical.reduce((a, b) => a + b, 0), n = this.order.length;
+    const here = rows.critical.reduce((a, b) => a + b, 0), all = rows.n_critical, n = this.order.length;
     const some = filters.any || $("only-kept").checked;
-    $("list-note").textContent = some ? `${number(n)} of ${number(all)} critical scenarios` : `${number(all)} critical scenarios`;
+    const which = here < all ? `${number(here)} of ${number(all)} critical scenarios, evenly chosen` : `${number(all)} critical scenarios`;
+    $("list-note").textContent = some ? `${number(n)} of ${which}` : which;
     $("list-clear").hidden = !some;
   }
 

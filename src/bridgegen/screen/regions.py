@@ -21,6 +21,8 @@ class RegionsScreen(Live):
         if stage == "compile":
             self.say_compiling()
             self.show(what="compiling")
+        if stage == "report":
+            self.show(what="writing the report")
 
     def progress(self, done: int, total: int) -> None:
         """Take down how many are done, and how many there are."""

@@ -1,0 +1,62 @@
+"""The report of a run on disk, as it stands."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from bridgegen.campaign.handover import Kept
+from bridgegen.campaign.run import REPORT
+from bridgegen.campaign.settings import Settings
+from bridgegen.pipeline import Pipeline
+from bridgegen.regions.record import JSON_FILE, read_record
+from bridgegen.report.build import build_report
+from bridgegen.report.data import ReportData
+from bridgegen.report.page import write_report
+from bridgegen.store import Rows, Store
+from bridgegen.store.summary import summarise
+
+
+def write_run_report(
+    pipeline: Pipeline, store: Store, settings: Settings, rows: Rows, kept: Sequence[Kept]
+) -> Path:
+    """Write a run's report, its critical regions included if they are known; return its path.
+
+    Args:
+        pipeline: the run's.
+        store: the run's.
+        settings: of the run.
+        rows: all of it, in order.
+        kept: what was handed over, most critical first.
+
+    Raises:
+        StorageError: the page cannot be written.
+        FileFormatError: the regions' file is not one.
+    """
+    path = store.folder / REPORT
+    write_report(path, run_data(pipeline, store, settings, rows, kept))
+    return path
+
+
+def run_data(
+    pipeline: Pipeline, store: Store, settings: Settings, rows: Rows, kept: Sequence[Kept]
+) -> ReportData:
+    """Return what the report of a run says; arguments and errors as for `write_run_report`."""
+    metric = store.metrics.index
+    summary = summarise(
+        rows.critical, rows.status == 0,
+        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
+        store.seconds,
+    )  # fmt: skip
+    return build_report(
+        pipeline, rows, summary,
+        kept=[(one.name, one.evaluation, one.files) for one in kept],
+        algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
+        command=settings.command(store.folder), finished=store.finished is not None,
+        version=store.version, notes=store.notes, view=view_command(store.folder),
+        regions=read_record(store.folder / JSON_FILE),
+    )  # fmt: skip
+
+
+def view_command(folder: Path) -> str:
+    """Return the command line that serves a run's page."""
+    return shlex.join(["bridgegen", "view", str(folder)])

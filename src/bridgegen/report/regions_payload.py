@@ -1,0 +1,47 @@
+"""Critical regions as the plain data that the page draws."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bridgegen.arrays import Bool
+from bridgegen.report.data import Evaluations
+
+
+def regions_payload(
+    record: Mapping[str, Any], evaluations: Evaluations, shown: Bool
+) -> dict[str, Any]:
+    """Return what the page needs to tell, draw and filter by regions.
+
+    Args:
+        record: as `bridgegen.regions.record` has it.
+        evaluations: of the run.
+        shown: ``(N,)``, the rows that the page holds; a region names those that lie in it by their
+            places among these.
+    """
+    columns = {one.name: one.values for one in evaluations.parameters}
+    keys = ("evaluations", "critical", "critical_held", "space_share", "confidence", "at_least")
+    told = []
+    for one in record["regions"]:
+        box = {name: one["box"][name] for name in one["named"]}
+        inside = shown.copy()
+        for name, ends in box.items():
+            x = columns.get(name)
+            inside &= False if x is None else (ends["low"] <= x) & (x <= ends["high"])
+        told.append(
+            {
+                **{key: one[key] for key in ("number", "confirmed", "rule", "sentence")},
+                "narrowed": bool(one.get("narrowed")),
+                "space_share": one["space_share"],
+                "box": {name: [ends["low"], ends["high"]] for name, ends in box.items()},
+                "fresh": _evidence(one["fresh"]),
+                "search": _evidence(one["search"]),
+                "rows": np.flatnonzero(inside[shown]).tolist(),
+            }
+        )
+    return {**{key: record[key] for key in keys}, "regions": told}
+
+
+def _evidence(one: Mapping[str, Any]) -> dict[str, Any]:
+    return {"rows": one["rows"], "critical": one["critical"], "interval": one["interval"]}
