@@ -1,8 +1,11 @@
 """A file to start from: valid as it is, and nobody's file is overwritten."""
 
+import json
+
 import pytest
 
 from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.odd.json_schema import schema
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.starter import start_scenario
 
@@ -37,4 +40,17 @@ def test_mistakes(tmp_path):
         start_scenario("cut-in", folder=tmp_path)
     with pytest.raises(StorageError, match="cannot be written"):
         start_scenario("mine", folder=tmp_path / "nowhere")
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "bridgegen.schema.json").write_text("{}")
+    with pytest.raises(StorageError, match="is no schema of ours, and is not overwritten"):
+        start_scenario("mine", folder=tmp_path / "taken")
+    assert [path.name for path in (tmp_path / "taken").iterdir()] == ["bridgegen.schema.json"]
+    assert {path.name for path in tmp_path.glob("*.*")} == {"mine.yaml", "bridgegen.schema.json"}
+
+
+def test_editors_find_its_schema(tmp_path):
+    for name in ("mine", "other"):  # the second replaces the first's
+        first, *_ = start_scenario(name, folder=tmp_path).read_text("utf-8").splitlines()
+    key, _, path = first.rpartition("=")
+    assert key == "# yaml-language-server: $schema"
+    assert json.loads((tmp_path / path).read_text("utf-8")) == schema()

@@ -2,13 +2,15 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from bridgegen.cli import options
 from bridgegen.cli.app import app, ontology
 from bridgegen.errors import InputError
+
+SchemaKind = Literal["scenario", "fragment"]
 
 
 @app.command()
@@ -97,6 +99,25 @@ def validate(
             print(f"{file}: valid")
     if broken:
         raise InputError(*broken)
+
+
+@app.command()
+def schema(
+    kind: Annotated[
+        SchemaKind, typer.Argument(help="Of which files: scenario or fragment.")
+    ] = "scenario",
+    out: Annotated[
+        Path | None, typer.Option(help="A file for it, new or an earlier schema; else printed.")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of scenario files, from which editors complete them."""
+    from bridgegen.odd.json_schema import schema_text, write_schema
+
+    if out is None:
+        print(schema_text(kind), end="")
+        return
+    write_schema(out, kind)
+    print(out)
 
 
 @app.command()

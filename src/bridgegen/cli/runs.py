@@ -99,7 +99,10 @@ def search(
 
 @app.command()
 def new(
-    name: Annotated[str, typer.Argument(help="Of your scenario; NAME.yaml is written.")],
+    name: Annotated[
+        str,
+        typer.Argument(help="Of your scenario; NAME.yaml is written, and a schema for editors."),
+    ],
     like: Annotated[
         str | None, typer.Option(help="Start from a copy of this one of the catalogue.")
     ] = None,

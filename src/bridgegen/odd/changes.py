@@ -13,9 +13,9 @@ from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import Quantity, RoadsSpec
-from bridgegen.odd.schema import JamSection, WorksSection
 from bridgegen.odd.shape import section
 from bridgegen.odd.story import Jam, Participant, RoadWorks, Waypoint
+from bridgegen.odd.story_schema import JamSection, WorksSection
 
 _BESIDE = 0.75
 """How far from the carriageway's edge a sign stands [m]; source: RSA 21, 0.5 to 1.5 m."""

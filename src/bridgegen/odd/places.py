@@ -6,8 +6,8 @@ from itertools import pairwise
 from bridgegen.odd.plain_yaml import Path
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import LETTERS, Quantity, RoadsSpec
-from bridgegen.odd.schema import WaypointSection
 from bridgegen.odd.story import Waypoint
+from bridgegen.odd.story_schema import WaypointSection
 
 
 class Places:

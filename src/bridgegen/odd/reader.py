@@ -17,6 +17,7 @@ from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_ya
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import KNOBS, RoadsSpec
 from bridgegen.odd.roads_reader import read_roads
+from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.rules import bounds_between_layers
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.schema import (
@@ -25,7 +26,6 @@ from bridgegen.odd.schema import (
     FragmentFile,
     ObjectiveSection,
     ParameterSection,
-    RoadsSection,
     ScenarioFile,
 )
 from bridgegen.odd.shape import Section, section, shape_problems

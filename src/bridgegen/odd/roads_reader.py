@@ -18,7 +18,7 @@ from bridgegen.odd.roads import (
     knob_problems,
     knobs_of,
 )
-from bridgegen.odd.schema import LegSection, RoadsSection
+from bridgegen.odd.roads_schema import LegSection, RoadsSection
 
 LEAST_ANGLE = 45.0
 """Between two legs of a junction [deg]."""

@@ -1,5 +1,6 @@
-"""The shape of a scenario file: which keys there are and what type each takes.
+"""The shape of a scenario file: which keys there are, what type each takes, what it means.
 
+The texts under the keys are what editors and the documentation show (`bridgegen.odd.json_schema`).
 Rules about values are kept by the types that the file becomes (``parameters``, ``story``, …).
 """
 
@@ -7,15 +8,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from bridgegen.odd.shape import (
-    AxisName,
-    Formula,
-    LaneField,
-    Number,
-    QuantityField,
-    ShapedSection,
-    Text,
-    Word,
+from bridgegen.odd.roads_schema import RoadsSection
+from bridgegen.odd.shape import AxisName, Formula, Number, ShapedSection, Text, Word
+from bridgegen.odd.story_schema import (
+    EventSection,
+    JamSection,
+    ParticipantSection,
+    WorksSection,
 )
 
 
@@ -23,228 +22,152 @@ class ParameterSection(ShapedSection):
     """One entry of ``parameters``."""
 
     axis: AxisName
+    """The part of the search space that it belongs to."""
     unit: Text
+    """SI; see the list of units."""
     low: Number
+    """The smallest value."""
     high: Number
+    """The largest value."""
     default: Number
+    """The value while its axis is not searched."""
     kind: Literal["float", "integer"] = "float"
+    """Whether it takes any number, or whole ones."""
     description: Text
+    """What it is."""
     source: Text
+    """Where its range comes from."""
 
 
 class BoundSection(ShapedSection):
     """One entry of ``bounds``."""
 
     target: Text
+    """The parameter that is limited."""
     lo: Formula | None = None
+    """It is at least this: a formula of other parameters."""
     hi: Formula | None = None
+    """It is at most this: a formula of other parameters."""
     why: Text
+    """The reason."""
     source: Text
+    """Who says so."""
 
 
 class DerivedSection(ShapedSection):
     """One entry of ``derived``."""
 
     axis: AxisName
+    """The axis that it belongs to."""
     unit: Text
+    """SI; see the list of units."""
     value: Formula
+    """A formula of parameters."""
     why: Text
+    """The reason."""
     source: Text
+    """Who says so."""
     description: Text
+    """What it is."""
 
 
 class FragmentFile(ShapedSection):
     """A file that scenarios include: parameters and their constraints."""
 
     fragment: Word
+    """Its name."""
     description: Text
+    """What it is."""
     parameters: dict[str, ParameterSection] = {}
+    """By name: what may vary."""
     bounds: list[BoundSection] = []
+    """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}
-
-
-class LegSection(ShapedSection):
-    """One leg of ``roads.legs``."""
-
-    heading: Number | None = None
-    lanes_in: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
-    lanes_out: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
-    turns: list[list[Literal["left", "straight", "right"]]] = []
-    sign: Literal["stop", "yield"] | None = None
-    crosswalk: Annotated[bool, Field(strict=True)] | None = None
-
-
-class SegmentSection(ShapedSection):
-    """One stretch of ``roads.segments``."""
-
-    length: QuantityField
-    curvature: QuantityField = 0.0
-    end_curvature: QuantityField | None = None
-
-
-class RoadsSection(ShapedSection):
-    """The road network: what is said of its legs, and its knobs (see ``roads.KNOBS``)."""
-
-    legs: dict[str, LegSection] = {}
-    segments: list[SegmentSection] = []
-    crosswalk_at: Number | None = None
-    crosswalks: Annotated[bool, Field(strict=True)] = False
-    signals: Literal["none", "two-phase"] = "none"
-    road_type: Literal["town", "rural", "motorway"] | None = None
-    lane_width: QuantityField | None = None
-    speed_limit: QuantityField | None = None
-    sidewalk_width: QuantityField | None = None
-    shoulder_width: QuantityField | None = None
-    crosswalk_width: QuantityField | None = None
-    closing_fog_density: QuantityField | None = None
-    closing_precipitation: QuantityField | None = None
-    lanes_per_direction: QuantityField | None = None
-    arm_length: QuantityField | None = None
-    intersection_size: QuantityField | None = None
-    green_time: QuantityField | None = None
-    yellow_time: QuantityField | None = None
-    all_red_time: QuantityField | None = None
-    signal_offset: QuantityField | None = None
-    radius: QuantityField | None = None
-    ring_lane_width: QuantityField | None = None
-    lanes: QuantityField | None = None
-    lanes_against: QuantityField | None = None
-    length: QuantityField | None = None
-    merge_length: QuantityField | None = None
-    taper_length: QuantityField | None = None
-    after_length: QuantityField | None = None
-
-
-class WaypointSection(ShapedSection):
-    """A place on a leg."""
-
-    point: Annotated[str, Field(strict=True, pattern=r"^P([1-9]|10)$")] | None = None
-    leg: Word | None = None
-    way: Literal["in", "out"] | None = None
-    distance: QuantityField
-    lane: LaneField = 1
-    offset: QuantityField = 0.0
-
-
-class ParticipantSection(ShapedSection):
-    """One entry of ``participants``."""
-
-    type: Literal[
-        "car", "van", "truck", "bus", "motorcycle", "emergency",
-        "bicycle", "pedestrian", "animal", "obstacle",
-    ]  # fmt: skip
-    start: WaypointSection | None = None
-    end: WaypointSection | None = None
-    path: list[WaypointSection] = []
-    speed: QuantityField = 0.0
-
-
-class ConditionSection(ShapedSection):
-    """One alternative of an event's ``when``; or several conditions that must hold together."""
-
-    kind: (
-        Literal["time", "distance", "ttc", "headway", "speed", "travelled", "standstill", "after"]
-        | None
-    ) = None
-    value: QuantityField = 0.0
-    to: Word | None = None
-    of: Word | None = None
-    event: Word | None = None
-    all: "list[ConditionSection]" = []
-
-
-class LaneChangeSection(ShapedSection):
-    """A lane change of an event."""
-
-    lanes: Annotated[Number, Field(ge=-5, le=5, multiple_of=1)]
-    time: QuantityField | None = None
-    distance: QuantityField | None = None
-    shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
-
-
-class EventSection(ShapedSection):
-    """One entry of ``events``."""
-
-    participant: Word | None = None
-    speed: QuantityField | None = None
-    rate: QuantityField | None = None
-    time: QuantityField | None = None
-    distance: QuantityField | None = None
-    shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
-    lane_change: LaneChangeSection | None = None
-    weather: Word | None = None
-    when: Annotated[list[ConditionSection], Field(min_length=1)]
-
-
-class JamSection(ShapedSection):
-    """One entry of ``jams``: a queue of standing vehicles."""
-
-    tail: WaypointSection
-    vehicles: Annotated[list[Literal["car", "van", "truck", "bus"]], Field(min_length=1)]
-    gap: QuantityField = 3.0
-
-
-class WorksSection(ShapedSection):
-    """One entry of ``road_works``: a lane that is closed by cones."""
-
-    start: WaypointSection
-    length: Number
-    taper: Number
-    spacing: Number = 5.0
-    sign_before: Number = 40.0
+    """By name: what follows from parameters."""
 
 
 class EffectSection(ShapedSection):
     """One entry of ``effects``: a function of the user's that adds to each scenario."""
 
     function: Text
+    """FILE.py:FUNCTION beside the scenario, or the name of an entry point."""
 
 
 class TermSection(ShapedSection):
     """One metric of the objective."""
 
     metric: Word
+    """See 'bridgegen list metrics'."""
     weight: Number | None = None
+    """With ``weights: fixed``."""
 
 
 class CriticalSection(ShapedSection):
     """What makes a scenario critical."""
 
     n_collision_above: Number = 0.0
+    """More collisions than this are critical."""
     d_min_below: Number = 2.0
+    """Nearer than this [m] is critical,"""
     v_d_at_least: Number = 1.0
+    """if the ego is at least so fast then [m/s]."""
 
 
 class ObjectiveSection(ShapedSection):
     """What is optimised."""
 
     terms: Annotated[list[TermSection], Field(min_length=1)]
+    """What is minimised or maximised."""
     weights: Literal["fixed", "entropy"]
+    """Of the terms, or by the entropy of a random sample."""
     scale: Literal["raw", "standardised"]
+    """In the units of the metrics, or standardised by a random sample."""
     critical: CriticalSection = CriticalSection()
+    """What makes a scenario critical."""
 
 
 class ScenarioFile(ShapedSection):
     """A logical scenario."""
 
     scenario: Word
+    """Its name; the file's name is NAME.yaml."""
     title: Text
+    """A few words."""
     description: Text
+    """What happens, in a sentence or two."""
     source: Text
+    """Where it comes from: a standard, an accident database, a drive."""
     template: Literal["crossroads", "t-junction", "roundabout", "merge", "road"]
+    """The kind of road network (layers 1 and 2)."""
     roads: RoadsSection = RoadsSection()
+    """Its measures."""
     driver: Word = "route-follower"
+    """Who drives the ego, unless --ego says otherwise; see 'bridgegen list drivers'."""
     duration: Number
+    """Of the simulation [s]."""
     time_step: Number
+    """Of the simulation [s]."""
     axes: Annotated[list[AxisName], Field(min_length=1)]
+    """What is searched, unless --axes says otherwise."""
     include: list[Text] = []
+    """Fragments: of the catalogue, or files beside this one; "NAME as PREFIX_" again."""
     participants: dict[str, ParticipantSection]
+    """By name (layer 4); one is ``ego``."""
     events: dict[str, EventSection] = {}
+    """By name: what happens, and when."""
     jams: dict[str, JamSection] = {}
+    """By name (layer 3)."""
     road_works: dict[str, WorksSection] = {}
+    """By name (layer 3)."""
     effects: list[EffectSection] = []
+    """Functions of yours that add to each scenario."""
     parameters: dict[str, ParameterSection] = {}
+    """By name: what may vary."""
     defaults: dict[str, Number] = {}
+    """Of included parameters, otherwise than their file says."""
     bounds: list[BoundSection] = []
+    """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}
+    """By name: what follows from parameters."""
     objective: ObjectiveSection
+    """What is optimised, and what counts as critical."""

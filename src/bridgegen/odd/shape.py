@@ -11,12 +11,15 @@ from pydantic import (
     PlainValidator,
     StringConstraints,
     ValidationError,
+    WithJsonSchema,
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from bridgegen.odd.parameters import nearest
 from bridgegen.odd.plain_yaml import Document, Path
 from bridgegen.odd.story import STRIPS
+
+_PARAMETER = "[A-Za-z][A-Za-z0-9_]{0,63}"
 
 
 def _number_or(what: str, pattern: str) -> PlainValidator:
@@ -49,20 +52,37 @@ Number = Annotated[float, Field(strict=True)]
 Text = Annotated[
     str,
     StringConstraints(strict=True, strip_whitespace=True, min_length=1, max_length=20_000),
+    WithJsonSchema({"type": "string", "pattern": r"\S"}),
 ]
 Word = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
 QuantityField = Annotated[
-    float | str, _number_or("the name of a parameter", "[A-Za-z][A-Za-z0-9_]{0,63}")
+    float | str,
+    _number_or("the name of a parameter", _PARAMETER),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_PARAMETER}$"}]}
+    ),
 ]
-LaneField = Annotated[int | str, _lane()]
-Formula = Annotated[float | str, _number_or("a formula", ".+")]
+LaneField = Annotated[
+    int | str,
+    _lane(),
+    WithJsonSchema(
+        {"anyOf": [{"type": "integer", "minimum": 1, "maximum": 9}, {"enum": list(STRIPS)}]}
+    ),
+]
+Formula = Annotated[
+    float | str,
+    _number_or("a formula", ".+"),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}),
+]
 AxisName = Literal["static", "temporary", "participants", "weather", "extension"]
 
 
 class ShapedSection(BaseModel):
     """A mapping of a file with the keys that it may have, and no others."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True
+    )
 
 
 Section = TypeVar("Section", bound=ShapedSection)

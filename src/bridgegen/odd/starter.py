@@ -1,4 +1,7 @@
-"""A scenario file to start from: a commented one, or a copy of one that ships."""
+"""A scenario file to start from: a commented one, or a copy of one that ships.
+
+Beside it goes the schema that its first line names, from which editors complete and check it.
+"""
 
 import os
 import re
@@ -6,13 +9,14 @@ from importlib import resources
 from pathlib import Path
 
 from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.odd.json_schema import FILE, refuse_other_schema, write_schema
 from bridgegen.odd.reader import names
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
 def start_scenario(name: str, *, like: str | None = None, folder: Path | None = None) -> Path:
-    """Write ``NAME.yaml``, a valid scenario that its reader can make their own.
+    """Write ``NAME.yaml``, a valid scenario that its reader can make their own, and its schema.
 
     Args:
         name: of the scenario and its file.
@@ -25,7 +29,8 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
     Raises:
         InputError: the name is no word.
         UnknownNameError: no such scenario.
-        StorageError: there is such a file already, or it cannot be written.
+        StorageError: there is such a file already, or what is called like the schema and is none,
+            or it cannot be written.
     """
     if not _WORD.fullmatch(name):
         raise InputError(
@@ -42,6 +47,8 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
     else:
         raise UnknownNameError("scenario", like, names())
     path = (folder or Path()) / f"{name}.yaml"
+    refuse_other_schema(path.with_name(FILE))
+    text = f"# yaml-language-server: $schema={FILE}\n{text}"
     try:
         with os.fdopen(
             os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "w", encoding="utf-8"
@@ -51,4 +58,5 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
         raise StorageError(f"{path}: exists already, and is not overwritten") from None
     except OSError as error:
         raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
+    write_schema(path.with_name(FILE))
     return path

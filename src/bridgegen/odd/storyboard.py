@@ -7,12 +7,6 @@ from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
 from bridgegen.odd.quantities import Quantities
 from bridgegen.odd.roads import LETTERS, Quantity, RoadsSpec
-from bridgegen.odd.schema import (
-    ConditionSection,
-    EventSection,
-    ParticipantSection,
-    WaypointSection,
-)
 from bridgegen.odd.shape import section
 from bridgegen.odd.story import (
     CONDITIONS,
@@ -26,6 +20,12 @@ from bridgegen.odd.story import (
     SpeedChange,
     Waypoint,
     WeatherChange,
+)
+from bridgegen.odd.story_schema import (
+    ConditionSection,
+    EventSection,
+    ParticipantSection,
+    WaypointSection,
 )
 
 EGO = "ego"

@@ -1,0 +1,74 @@
+"""The shape of a scenario file's ``roads``: its keys, what each takes and means."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from bridgegen.odd.shape import Number, QuantityField, ShapedSection
+
+
+class LegSection(ShapedSection):
+    """One leg of a junction or roundabout."""
+
+    heading: Number | None = None
+    """Outwards [deg], counter-clockwise from east; legs are 45° apart at least."""
+    lanes_in: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
+    """Number of lanes towards the junction."""
+    lanes_out: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
+    """Number of lanes away from the junction."""
+    turns: list[list[Literal["left", "straight", "right"]]] = []
+    """Where each lane towards the junction leads, innermost first, e.g. [[left], [straight]]."""
+    sign: Literal["stop", "yield"] | None = None
+    """What stands at its stop line."""
+    crosswalk: Annotated[bool, Field(strict=True)] | None = None
+    """Whether people cross it at the junction; as ``crosswalks`` says by default."""
+
+
+class SegmentSection(ShapedSection):
+    """One stretch of a road."""
+
+    length: QuantityField
+    """[m]"""
+    curvature: QuantityField = 0.0
+    """At its start [1/m], left positive."""
+    end_curvature: QuantityField | None = None
+    """At its end [1/m]; the same by default."""
+
+
+class RoadsSection(ShapedSection):
+    """The road network: what is said of its legs, and its measures (see ``roads.KNOBS``)."""
+
+    legs: dict[str, LegSection] = {}
+    """Of a junction or roundabout, by letter, A to E."""
+    segments: list[SegmentSection] = []
+    """Of a road, one after the other; straight by default."""
+    crosswalk_at: Number | None = None
+    """Of a road: where its crosswalk's centre lies [m]."""
+    crosswalks: Annotated[bool, Field(strict=True)] = False
+    """Whether there are crosswalks on all legs."""
+    signals: Literal["none", "two-phase"] = "none"
+    """Traffic lights at a junction: none, or a phase for each pair of opposite legs."""
+    road_type: Literal["town", "rural", "motorway"] | None = None
+    """What kind of road it is."""
+    lane_width: QuantityField | None = None
+    speed_limit: QuantityField | None = None
+    sidewalk_width: QuantityField | None = None
+    shoulder_width: QuantityField | None = None
+    crosswalk_width: QuantityField | None = None
+    closing_fog_density: QuantityField | None = None
+    closing_precipitation: QuantityField | None = None
+    lanes_per_direction: QuantityField | None = None
+    arm_length: QuantityField | None = None
+    intersection_size: QuantityField | None = None
+    green_time: QuantityField | None = None
+    yellow_time: QuantityField | None = None
+    all_red_time: QuantityField | None = None
+    signal_offset: QuantityField | None = None
+    radius: QuantityField | None = None
+    ring_lane_width: QuantityField | None = None
+    lanes: QuantityField | None = None
+    lanes_against: QuantityField | None = None
+    length: QuantityField | None = None
+    merge_length: QuantityField | None = None
+    taper_length: QuantityField | None = None
+    after_length: QuantityField | None = None
