@@ -24,6 +24,7 @@ from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
+from bridgegen.simulation.embedded.intentions import Intentions
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
@@ -74,6 +75,24 @@ class Evaluation:
             messages,
             np.concatenate(sought) if sought else None,
         )
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A rollout of N rows, with what it does not hold itself.
+
+    Attributes:
+        rollout: what happened.
+        intentions: what the egos meant to do.
+        ways: by row and number the ways that these name, ``(n, 2)`` float64 [m] each.
+        weathers: by row the weather from the start on, and from each change of it: the instant, and
+            ``(WEATHER,)`` as sensors feel it (``ego._weather_columns``).
+    """
+
+    rollout: Rollout
+    intentions: Intentions
+    ways: Sequence[Mapping[int, Float]]
+    weathers: Sequence[Sequence[tuple[int, Float]]]
 
 
 class Pipeline:
@@ -253,6 +272,20 @@ class Pipeline:
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         return self._run(*self._roads_of(X), X)
+
+    def replay(self, X: Float) -> Replay:
+        """Roll out N rows as ``evaluate`` does, and find out what went on besides."""
+        assert isinstance(self.simulator, EmbeddedSimulator)
+        roads, rows = self._roads_of(X)
+        rollout = self._run(roads, rows, X)
+        columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
+        intentions = self.simulator.intentions(roads, rows, columns, rollout)
+        ways = [
+            {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}
+            for p, named in zip(rows.tolist(), intentions.way, strict=True)
+        ]
+        weathers = [self.simulator.weathers(columns, rollout, i) for i in range(len(X))]
+        return Replay(rollout, intentions, ways, weathers)
 
     def _run(
         self, roads: Network, rows: Int, X: Float, replay: Counterfactual | None = None

@@ -17,15 +17,8 @@ from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build as build_individuals
-from bridgegen.report.data import (
-    Column,
-    Entity,
-    Evaluations,
-    Outline,
-    Playback,
-    ReportData,
-    RunSummary,
-)
+from bridgegen.report.data import Column, Evaluations, ReportData, RunSummary
+from bridgegen.report.playback import Entity, Outline, Playback
 
 ARM, HALF, LANE, LANES = 60.0, 13.0, 3.5, 2
 CAR = {"length": 4.6, "width": 1.9, "center_ahead": 1.4}

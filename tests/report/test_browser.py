@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.report.data import Entity, Lamp, ReportData
+from bridgegen.report.data import ReportData
 from bridgegen.report.page import write_report
+from bridgegen.report.playback import Entity, Lamp
 
 pytestmark = pytest.mark.browser
 
@@ -228,9 +229,12 @@ def test_a_click_in_the_curves_jumps(opened, report):
     page.evaluate("bridgegen.select(0)")
     page.locator("#curves").scroll_into_view_if_needed()
     box = page.locator("#curves").bounding_box()
-    left, right = 40, box["width"] - 14
-    page.mouse.click(box["x"] + left + 0.25 * (right - left), box["y"] + 60)
-    assert opened.state()["index"] == pytest.approx(0.25 * (report.kept[0].n_steps - 1), abs=1)
+    k = report.kept[0].n_steps // 4
+    for panel in (0, 1):
+        scrub(page, 0)
+        x, y = page.evaluate(f"bridgegen.curves.pixelOf({panel}, {k})")
+        page.mouse.click(box["x"] + x, box["y"] + y)
+        assert opened.state()["index"] == pytest.approx(k, abs=1)
 
 
 def test_critical_rows_differ_by_colour_and_by_shape(opened, report):
@@ -294,7 +298,7 @@ def test_nothing_complained_so_far(opened):
 
 
 def test_a_link_opens_scenario_and_time(show, report):
-    opened = show(report, "#scenario=0002&t=3.05")
+    opened = show(report, "#0002@3.05")
     assert (opened.state()["scenario"], opened.state()["index"]) == ("0002", 61)
     opened.page.close()
 

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.report.data import Column, Entity, Outline
+from bridgegen.report.data import Column
+from bridgegen.report.playback import Entity, Outline
 
 
 def test_a_column_of_another_length_is_named(report):

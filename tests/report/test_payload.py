@@ -10,6 +10,8 @@ from hypothesis.extra.numpy import arrays
 
 from bridgegen.report.data import Column
 from bridgegen.report.payload import decimals, payload, significant, to_json
+from bridgegen.report.playback_payload import SCALE
+from bridgegen.report.series import unpacked
 
 HOSTILE = [
     "</script><script>window.hacked = 1</script>", "<!-- <script>", "\"'`\\", "\u2028\u2029\x00",
@@ -43,9 +45,11 @@ def test_a_playback_comes_back_to_the_millimetre_and_no_longer_than_it_ran(repor
     data = read(to_json(report))
     for sent, p in zip(data["kept"], report.kept, strict=True):
         for name in "xyhv":
-            want = getattr(p, name)[:, : p.n_steps]
-            assert np.array(sent[name]) == pytest.approx(want, abs=5.01e-4)
-        assert len(sent["distance"]) == p.n_steps
+            for runs, row in zip(sent["series"][name], getattr(p, name), strict=True):
+                got = unpacked(runs, p.n_steps, SCALE[name])
+                assert got == pytest.approx(row[: p.n_steps], abs=5.01e-4)
+        distance = unpacked(sent["series"]["distance"], p.n_steps, SCALE["distance"])
+        assert distance == pytest.approx(p.distance[: p.n_steps], abs=5.01e-4)
         assert sent["metrics"] == {  # each to the last bit
             name: value if math.isfinite(value) else None for name, value in p.metrics.items()
         }
@@ -68,7 +72,7 @@ def test_contacts_and_the_smallest_gap_are_found_before_rounding(report):
     sent = payload(replace(report, kept=(p,)))["kept"][0]
     assert sent["contacts"] == [50, 90]
     assert sent["closest"] == 50
-    assert sent["distance"][70] == 0.0
+    assert unpacked(sent["series"]["distance"], 401, SCALE["distance"])[70] == 0.0
 
 
 def test_an_entity_alone_has_no_smallest_gap(report):
@@ -80,7 +84,7 @@ def test_an_entity_alone_has_no_smallest_gap(report):
     sent = payload(replace(report, kept=(alone,)))["kept"][0]
     assert sent["closest"] is None
     assert sent["contacts"] == []
-    assert set(sent["distance"]) == {None}
+    assert sent["series"]["distance"] == []
 
 
 def test_failed_rows_are_counted_but_not_drawn(report):

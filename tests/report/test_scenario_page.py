@@ -12,7 +12,7 @@ from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.starter import start_scenario
 from bridgegen.pipeline import Pipeline
-from bridgegen.report.build import _playbacks
+from bridgegen.report.playbacks import playbacks
 from bridgegen.report.scenario_words import story_lines
 from bridgegen.report.show import show_scenario
 from bridgegen.report.sketch import HEIGHT, WIDTH, sketch
@@ -137,14 +137,15 @@ def test_a_report_has_no_place_for_who_is_not_there(monkeypatch):
     scenario = load("crossroads-s4")
     pipeline = Pipeline(scenario, scenario.space())
     X = pipeline.space.row({})[np.newaxis]
-    rollout = pipeline.rollout(X)
-    present = np.ones(rollout.x.shape, dtype=np.bool_)
+    replay = pipeline.replay(X)
+    present = np.ones(replay.rollout.x.shape, dtype=np.bool_)
     present[0, 1, 20:] = False
-    monkeypatch.setattr(pipeline, "rollout", lambda _: replace(rollout, present=present))
+    gone = replace(replay, rollout=replace(replay.rollout, present=present))
+    monkeypatch.setattr(pipeline, "replay", lambda _: gone)
     rows = SimpleNamespace(
         X=X, metrics=np.zeros((1, len(pipeline.metrics))), critical=[True], cause=np.zeros(1, int)
     )
-    (shown,) = _playbacks(pipeline, rows, [("0001", 0, ())])
-    for name in ("x", "y"):
+    (shown,) = playbacks(pipeline, rows, [("0001", 0, ())])
+    for name in "xyva":
         assert (np.isnan(getattr(shown, name)) == ~present[0]).all()
     assert np.isinf(shown.distance[20:]).all()

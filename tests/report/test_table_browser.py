@@ -107,7 +107,7 @@ def test_a_handed_over_one_plays(page, report):
     state = page.evaluate("bridgegen.state()")
     assert (state["scenario"], state["playing"]) == (report.kept[2].name, True)
     page.evaluate("bridgegen.pause()")
-    page.wait_for_function("location.hash.startsWith('#scenario=0003&t=')")
+    page.wait_for_function("location.hash.startsWith('#0003@')")
     page.uncheck("#only-kept")
 
 

@@ -32,6 +32,31 @@ def ttc(rollout: Rollout) -> Float:
     return without_failed(rollout, out)
 
 
+def ttc_over_time(rollout: Rollout) -> Float:
+    """Return the ego's least time to collision at each instant; its least is what ``ttc`` returns.
+
+    Returns:
+        ``(N, T)`` float64 [s], 0 in contact, +inf where nothing would collide; NaN where a scenario
+        failed. Padded instants repeat the last.
+    """
+    from bridgegen.metrics import _ttc_kernels
+
+    n, e, t = rollout.shape
+
+    def instants(of: Float) -> Float:  # each a scenario of one instant
+        return np.ascontiguousarray(of.transpose(0, 2, 1)).reshape(n * t, e, 1)
+
+    out = np.empty(n * t)
+    _ttc_kernels.least_time(
+        np.ascontiguousarray(rollout.box, dtype=np.float64),
+        *(instants(recorded(rollout, field)) for field in ("x", "y", "h", "v")),
+        instants(distance(rollout)),
+        np.ones(n * t, dtype=np.int64),
+        out,
+    )
+    return without_failed(rollout, out.reshape(n, t))
+
+
 METRIC = Metric(
     name="ttc",
     unit="s",

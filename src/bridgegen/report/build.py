@@ -11,19 +11,15 @@ from bridgegen.cause import Cause
 from bridgegen.errors import ScenarioError
 from bridgegen.objective import Thresholds
 from bridgegen.odd.coverage import CoverageMap, coverage_map
-from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
     Column,
     Evaluations,
-    Playback,
     ReportData,
     RunSummary,
 )
 from bridgegen.report.notes import tables
-from bridgegen.report.painter import paint
-from bridgegen.report.scenery import Scenery, bodies, lamps
-from bridgegen.simulation.outcomes import with_outcomes
+from bridgegen.report.playbacks import playbacks
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
 
@@ -109,7 +105,7 @@ def build_report(
     return ReportData(
         head,
         _evaluations(pipeline, rows),
-        _playbacks(pipeline, rows, kept),
+        playbacks(pipeline, rows, kept),
         _coverage(pipeline, rows),
         tables(notes, pipeline.space),
         regions,
@@ -169,47 +165,3 @@ def _coverage(pipeline: Pipeline, rows: Rows) -> CoverageMap:
     except ScenarioError:
         # Constraints that contradict each other where the search never was: no sample, then.
         return coverage_map(space, X, critical, strength=strength, sample=0)
-
-
-def _playbacks(
-    pipeline: Pipeline, rows: Rows, kept: Sequence[tuple[str, int, tuple[str, ...]]]
-) -> tuple[Playback, ...]:
-    if not kept:
-        return ()
-    at = [evaluation for _, evaluation, _ in kept]
-    rollout = pipeline.rollout(rows.X[at])
-    entities, scenery = bodies(rollout, pipeline.source.bodies), Scenery(pipeline)
-    nearest = rollout.distance.min(axis=1)
-    checked = constraints_in_words(pipeline.source.constraints)
-    playbacks = []
-    for k, (name, evaluation, files) in enumerate(kept):
-        concrete = pipeline.concrete(rows.X[evaluation])
-        x, y = rollout.x[k], rollout.y[k]
-        if rollout.present.size:  # the page shows nobody where there is no place
-            x, y = (np.where(rollout.present[k], one, np.nan) for one in (x, y))
-        lanes, lights = scenery.road(rows.X[evaluation])
-        picture = None
-        if concrete.individuals is not None:
-            whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
-            picture = paint(whole, (), checked)
-        playbacks.append(
-            Playback(
-                name=name,
-                rank=k + 1,
-                evaluation=evaluation,
-                parameters=pipeline.facts(rows.X[evaluation]),
-                metrics=dict(zip(pipeline.metrics, rows.metrics[evaluation].tolist(), strict=True)),
-                critical=bool(rows.critical[evaluation]),
-                time_step=rollout.time_step,
-                entities=entities,
-                x=x, y=y, h=rollout.h[k], v=rollout.v[k],
-                distance=nearest[k],
-                lanes=lanes,
-                n_steps=int(rollout.n_steps[k]),
-                files=files,
-                picture=picture,
-                lamps=lamps(rollout, k, lights),
-                cause=Cause(rows.cause[evaluation]).label,
-            )
-        )  # fmt: skip
-    return tuple(playbacks)

@@ -1,22 +1,27 @@
-// Distance and speeds over time, under the bird's-eye view; a click or a drag jumps to an instant.
+// Distance, time to collision, speeds and accelerations over time; a click or a drag jumps to an instant.
+
+const FAR = 20, LATE = 10; // m, s: what is beyond runs out of its panel, where what is near would be flat otherwise
+const HARD = 4.9; // m/s², what the metric n_brake counts
 
 function roundStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((m) => m * power).find((step) => step >= least * 0.999);
 }
 
-function ticks(top, wanted) {
-  const step = roundStep(top / wanted), list = [];
-  for (let i = 0; i * step <= top * 1.0001; i++) list.push(i * step);
+function ticks(low, high, wanted) {
+  const step = roundStep((high - low) / wanted), list = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + step * 1e-4; i++) list.push(i * step || 0); // no −0
   return list;
 }
+
+const present = (values) => values.filter((value) => value !== null);
 
 class Curves {
   constructor(canvas, jump) {
     this.canvas = canvas;
     const to = (event) => {
       const box = canvas.getBoundingClientRect();
-      jump(this.indexAt(event.clientX - box.left));
+      jump(this.indexAt(event.clientX - box.left, event.clientY - box.top));
     };
     canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); to(event); });
     canvas.addEventListener("pointermove", (event) => { if (event.buttons) to(event); });
@@ -24,80 +29,117 @@ class Curves {
 
   show(kept) {
     this.kept = kept;
-    const finite = kept.distance.filter((d) => d !== null);
-    const speeds = kept.v.flat().filter((v) => v !== null);
-    // What happens near counts: the far part of a close encounter runs out of the panel.
-    const far = Math.max(1, ...finite) * 1.05, near = kept.closest !== null && kept.distance[kept.closest] < 8;
-    this.tops = [near ? Math.min(far, 20) : far, Math.max(1, ...speeds) * 1.15];
+    const players = playersOf(kept), critical = data.summary.critical_distance;
+    const line = (values, e = null) => ({
+      values, colour: () => (e === null ? palette.ink : colourOf(kept, e)), dashes: e === null ? [] : DASHES[players.indexOf(e) % DASHES.length],
+      name: e === null ? "" : kept.entities[e].name,
+    });
+    const gaps = present(kept.distance), least = Math.min(...gaps, Infinity), speeds = present(players.flatMap((e) => kept.v[e]));
+    const panels = [{
+      title: "distance", unit: "m", lines: [line(kept.distance)], low: 0, high: least < 8 ? Math.min(Math.max(1, ...gaps) * 1.05, FAR) : Math.max(1, ...gaps) * 1.05,
+      mark: critical === null ? null : [critical, `critical below ${number(critical, 3)} m`],
+    }, {
+      title: "speed", unit: "m/s", lines: players.map((e) => line(kept.v[e], e)), low: 0, high: Math.max(1, ...speeds) * 1.15,
+    }];
+    if (kept.ttc) {
+      const finite = present(kept.ttc);
+      panels.splice(1, 0, {
+        title: "time to collision", unit: "s", lines: [line(kept.ttc)], low: 0, high: Math.min(LATE, Math.max(1, ...finite) * 1.1),
+        empty: finite.length ? null : "never on a collision course",
+      });
+    }
+    if (kept.a) {
+      const all = present(players.flatMap((e) => kept.a[e].slice(0, -1)));
+      const low = Math.min(-1, ...all) * 1.1, high = Math.max(1, ...all) * 1.1;
+      panels.push({
+        title: "acceleration", unit: "m/s²", lines: players.map((e) => line(kept.a[e], e)), low, high, steps: true,
+        mark: low < -HARD ? [-HARD, `hard braking below −${HARD} m/s²`] : null,
+      });
+    }
+    this.panels = panels;
   }
 
-  // Left and right end of the time axis, and each panel's top and bottom, in CSS pixels.
-  frame() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const half = (height - 22) / 2;
-    return { left: 40, right: width - 14, panels: [[28, half - 6], [half + 24, height - 22]] };
+  // Places the panels, two beside each other where there is room; in CSS pixels.
+  place() {
+    const { clientWidth: width, clientHeight: height } = this.canvas, across = width >= 560 ? 2 : 1;
+    const rows = Math.ceil(this.panels.length / across), w = width / across, h = (height - 20) / rows;
+    this.panels.forEach((panel, i) => {
+      const column = across === 1 ? 0 : Math.floor(i / rows), row = i - column * rows;
+      Object.assign(panel, { left: column * w + 42, right: (column + 1) * w - 14, top: row * h + 26, bottom: (row + 1) * h - 6, last: row === rows - 1 || i === this.panels.length - 1 });
+    });
   }
 
-  indexAt(x) {
-    const { left, right } = this.frame(), last = this.kept.distance.length - 1;
+  // The nearest instant in the panel at (x, y).
+  indexAt(x, y) {
+    this.place();
+    const outside = (panel) => Math.max(0, panel.left - x, x - panel.right) + Math.max(0, panel.top - y, y - panel.bottom);
+    const { left, right } = this.panels.reduce((best, panel) => (outside(panel) < outside(best) ? panel : best));
+    const last = this.kept.n_steps - 1;
     return Math.min(last, Math.max(0, Math.round(((x - left) / (right - left)) * last)));
+  }
+
+  // Where an instant is in a panel, for who wants to click there.
+  pixelOf(panel, index) {
+    this.place();
+    const { left, right, top, bottom } = this.panels[panel];
+    return [left + ((right - left) * index) / Math.max(1, this.kept.n_steps - 1), (top + bottom) / 2];
   }
 
   draw(state) {
     const { context: c, width, height } = fitCanvas(this.canvas);
-    const { kept } = this, last = kept.distance.length - 1;
-    const { left, right, panels } = this.frame();
-    const x = (k) => left + (right - left) * (last ? k / last : 0);
-    const y = (panel, value) => {
-      const [top, bottom] = panels[panel];
-      return bottom - (bottom - top) * (value / this.tops[panel]);
-    };
+    this.place();
     c.clearRect(0, 0, width, height);
     c.lineJoin = "round";
     c.font = FONT.replace("600 12px", "11.5px");
-    this.drawAxes(c, x, y, last);
-    const threshold = data.summary.critical_distance;
-    if (threshold !== null && threshold < this.tops[0]) this.drawThreshold(c, left, right, y(0, threshold), threshold);
-    c.save();
-    c.beginPath();
-    c.rect(left, panels[0][0], right - left, panels[0][1] - panels[0][0] + 3);
-    c.clip();
-    this.drawLine(c, kept.distance, x, (v) => y(0, v), palette.ink, []);
-    c.restore();
-    playersOf(kept).forEach((e) => this.drawLine(c, kept.v[e], x, (v) => y(1, v), entityColour(e), DASHES[e % DASHES.length]));
-    this.drawCursor(c, state, x, y, panels);
-    this.drawMarks(c, x, y, panels);
-    this.drawHeadings(c, state, left, right, panels);
+    const last = this.kept.n_steps - 1;
+    for (const panel of this.panels) {
+      const { left, right, top, bottom, low, high } = panel;
+      const x = (k) => left + (right - left) * (last ? k / last : 0);
+      const y = (value) => bottom - ((bottom - top) * (value - low)) / (high - low);
+      this.drawAxes(c, panel, x, y);
+      c.save();
+      c.beginPath();
+      c.rect(left, top - 1, right - left, bottom - top + 2);
+      c.clip();
+      if (panel.mark && panel.mark[0] < high && panel.mark[0] > low) this.drawMark(c, panel, y);
+      for (const line of panel.lines) this.drawLine(c, line, x, y, panel.steps);
+      c.restore();
+      this.drawMoments(c, panel, x, y);
+      this.drawCursor(c, panel, state, x, y);
+      this.drawHeading(c, panel, state);
+    }
   }
 
-  drawAxes(c, x, y, last) {
-    const { left, right, panels } = this.frame(), duration = last * this.kept.time_step;
+  drawAxes(c, panel, x, y) {
+    const { left, right, bottom, low, high } = panel, duration = (this.kept.n_steps - 1) * this.kept.time_step;
     c.strokeStyle = palette.grid;
     c.fillStyle = palette.muted;
     c.lineWidth = 1;
     c.textBaseline = "middle";
     c.textAlign = "right";
-    panels.forEach((_, panel) => {
-      for (const value of ticks(this.tops[panel], 3)) {
-        const at = Math.round(y(panel, value)) + 0.5;
-        c.beginPath();
-        c.moveTo(left, at);
-        c.lineTo(right, at);
-        c.stroke();
-        c.fillText(number(value, 3), left - 6, at);
-      }
-    });
+    for (const value of ticks(low, high, low < 0 ? 4 : 3)) {
+      const at = Math.round(y(value)) + 0.5;
+      c.beginPath();
+      c.moveTo(left, at);
+      c.lineTo(right, at);
+      c.stroke();
+      c.fillText(number(value, 3), left - 6, at);
+    }
+    if (panel.empty) {
+      c.textAlign = "center";
+      c.fillText(panel.empty, (left + right) / 2, (panel.top + bottom) / 2);
+    }
+    if (!panel.last || !duration) return;
     c.textBaseline = "top";
-    c.textAlign = "center";
-    if (!last) return;
-    for (const seconds of ticks(duration, right - left > 500 ? 10 : 5)) {
-      const end = seconds / duration > 0.96;
+    for (const seconds of ticks(0, duration, (right - left) / 70)) {
+      const end = seconds / duration > 0.95;
       c.textAlign = end ? "right" : "center";
-      c.fillText(`${number(seconds, 3)} s`, x(seconds / this.kept.time_step) + (end ? 6 : 0), panels[1][1] + 6);
+      c.fillText(`${number(seconds, 3)} s`, x(seconds / this.kept.time_step) + (end ? 6 : 0), bottom + 6);
     }
   }
 
-  drawThreshold(c, left, right, at, threshold) {
+  drawMark(c, { left, right, mark: [value, text] }, y) {
+    const at = y(value);
     c.strokeStyle = c.fillStyle = palette.hit;
     c.lineWidth = 1;
     c.setLineDash([5, 4]);
@@ -108,36 +150,42 @@ class Curves {
     c.setLineDash([]);
     c.textAlign = "left";
     c.textBaseline = "bottom";
-    c.fillText(`critical below ${number(threshold, 3)} m`, left + 6, at - 1);
+    c.fillText(text, left + 6, at - 1);
   }
 
-  drawLine(c, row, x, y, colour, dashes) {
-    c.strokeStyle = colour;
+  // A gap where there is no value; an acceleration lasts from one instant to the next.
+  drawLine(c, { values, colour, dashes }, x, y, steps) {
+    c.strokeStyle = colour();
     c.lineWidth = 2;
     c.setLineDash(dashes);
     c.beginPath();
     let down = false;
-    row.forEach((value, k) => {
-      if (value !== null) c[down ? "lineTo" : "moveTo"](x(k), y(value));
+    values.forEach((value, k) => {
+      if (value !== null) {
+        c[down ? "lineTo" : "moveTo"](x(k), y(value));
+        if (steps && k + 1 < values.length) c.lineTo(x(k + 1), y(value));
+        else if (!down) c.lineTo(x(k) + 0.01, y(value)); // a lone value is a dot
+      }
       down = value !== null;
     });
     c.stroke();
     c.setLineDash([]);
   }
 
-  drawMarks(c, x, y, panels) {
-    const { closest, contacts, distance, time_step: step } = this.kept;
+  // The contacts in every panel; the smallest gap in that of the distance.
+  drawMoments(c, panel, x, y) {
+    const { closest, contacts, distance, time_step: step } = this.kept, { left, right, top, bottom } = panel;
     c.lineWidth = 1.5;
     c.strokeStyle = palette.hit;
     for (const k of contacts) {
       c.beginPath();
-      c.moveTo(x(k), panels[0][0]);
-      c.lineTo(x(k), panels[1][1]);
+      c.moveTo(x(k), top);
+      c.lineTo(x(k), bottom);
       c.stroke();
     }
-    if (closest === null) return;
+    if (closest === null || panel !== this.panels[0]) return;
     const hit = contacts.length > 0;
-    const [px, py] = [x(closest), y(0, distance[closest])];
+    const [px, py] = [x(closest), y(Math.min(distance[closest], panel.high))];
     c.fillStyle = hit ? palette.hit : palette.ink;
     c.beginPath();
     if (hit) { // a diamond for a contact, a disc for a near miss
@@ -148,9 +196,9 @@ class Curves {
     const text = `${hit ? "collision" : `d_min ${distance[closest].toFixed(2)} m`} at ${(closest * step).toFixed(2)} s`;
     c.textBaseline = "middle";
     c.textAlign = "left";
-    const w = c.measureText(text).width, { left, right } = this.frame();
+    const w = c.measureText(text).width;
     const at = Math.max(left, px + 10 + w > right ? px - w - 10 : px + 10);
-    const middle = Math.max(panels[0][0] + 8, py - 12);
+    const middle = Math.max(top + 8, py - 12);
     c.save();
     c.fillStyle = palette.card;
     c.globalAlpha = 0.85;
@@ -159,52 +207,59 @@ class Curves {
     c.fillText(text, at, middle);
   }
 
-  drawCursor(c, state, x, y, panels) {
-    const at = x(state.time / this.kept.time_step);
+  now(values, state) {
+    const { index } = state, f = state.time / this.kept.time_step - index;
+    const value = values[index], next = values[index + 1];
+    return f < 1e-6 || value === null || next === null || next === undefined ? value : value + f * (next - value);
+  }
+
+  drawCursor(c, panel, state, x, y) {
+    const { top, bottom, low, high, lines, steps } = panel, at = x(state.time / this.kept.time_step);
     c.strokeStyle = palette.accent;
     c.lineWidth = 1.5;
     c.beginPath();
-    c.moveTo(at, panels[0][0] - 4);
-    c.lineTo(at, panels[1][1]);
+    c.moveTo(at, top - 4);
+    c.lineTo(at, bottom);
     c.stroke();
-    const dot = (value, panel, colour) => {
-      if (value === null || value > this.tops[panel]) return;
-      c.fillStyle = colour;
+    for (const { values, colour } of lines) {
+      const value = steps ? values[state.index] : this.now(values, state);
+      if (value === null || value > high || value < low) continue;
+      c.fillStyle = colour();
       c.strokeStyle = palette.card;
       c.beginPath();
-      c.arc(at, y(panel, value), 4, 0, 2 * Math.PI);
+      c.arc(at, y(value), 4, 0, 2 * Math.PI);
       c.fill();
       c.stroke();
-    };
-    dot(state.distance, 0, palette.ink);
-    playersOf(this.kept).forEach((e) => dot(state.entities[e].v, 1, entityColour(e)));
+    }
   }
 
-  // The panels' titles, with the legend and the values of this instant.
-  drawHeadings(c, state, left, right, panels) {
+  // The panel's title, with the legend and the values of this instant as far as there is room.
+  drawHeading(c, panel, state) {
+    const { left, right, top, lines, steps, title, unit } = panel, y = top - 13, name = `${title} [${unit}]`;
     c.textBaseline = "middle";
     c.textAlign = "left";
     c.fillStyle = palette.muted;
-    c.fillText("distance [m]", 8, panels[0][0] - 14);
-    c.fillText("speed [m/s]", 8, panels[1][0] - 14);
+    c.fillText(name, left - 34, y);
+    const least = left - 34 + c.measureText(name).width + 10;
     c.textAlign = "right";
-    c.fillStyle = palette.ink;
-    c.fillText(state.distance === null ? "–" : state.distance.toFixed(2), right, panels[0][0] - 14);
     let end = right;
-    for (const e of playersOf(this.kept).toReversed()) {
-      const text = `${state.entities[e].name} ${measured(state.entities[e].v, "m/s", 2)}`;
-      const y = panels[1][0] - 14, w = c.measureText(text).width;
+    for (const line of lines.toReversed()) {
+      const value = steps ? line.values[state.index] : this.now(line.values, state);
+      const shown = value === null ? "–" : `${value < 0 ? "−" : ""}${Math.abs(value).toFixed(unit === "m" ? 2 : 1)}`;
+      const text = `${line.name} ${shown}`, w = c.measureText(text).width;
+      if (end - w - (line.name ? 28 : 0) < least) break;
       c.fillStyle = palette.ink;
       c.fillText(text, end, y);
-      c.strokeStyle = entityColour(e);
+      if (!line.name) continue;
+      c.strokeStyle = line.colour();
       c.lineWidth = 2.5;
-      c.setLineDash(DASHES[e % DASHES.length]);
+      c.setLineDash(line.dashes);
       c.beginPath();
       c.moveTo(end - w - 28, y);
       c.lineTo(end - w - 6, y);
       c.stroke();
       c.setLineDash([]);
-      end -= w + 42;
+      end -= w + 38;
     }
   }
 }

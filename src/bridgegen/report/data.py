@@ -6,7 +6,6 @@ time to collision); the page shows a dash there.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.odd.coverage import CoverageMap
 from bridgegen.report.notes import NoteTable
-from bridgegen.report.picture import Picture
-
-AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median", "stripe"})
-LINE_KINDS = frozenset({"edge", "solid", "broken", "centre", "stop", "route", "sign"})
+from bridgegen.report.playback import Playback
 
 
 @dataclass(frozen=True)
@@ -149,135 +145,6 @@ class Evaluations:
     def columns(self) -> tuple[Column, ...]:
         """Parameters, metrics and objectives, in this order."""
         return self.parameters + self.metrics + self.objectives
-
-
-@dataclass(frozen=True)
-class Entity:
-    """A body on the road; its position is its reference point, the rear axle's of a vehicle.
-
-    Attributes:
-        name: "ego", "bv" …
-        length: box length [m].
-        width: box width [m].
-        center_ahead: how far the box's centre lies ahead of the reference point [m].
-        type: what it is: "car", "truck", "bicycle", "pedestrian", "cone" …
-    """
-
-    name: str
-    length: float
-    width: float
-    center_ahead: float
-    type: str = "car"
-
-    def __post_init__(self) -> None:
-        if not (0.0 < self.length < inf and 0.0 < self.width < inf and isfinite(self.center_ahead)):
-            raise ValueError(
-                f"box of '{self.name}' [m] must have length > 0, width > 0 and a finite centre, "
-                f"got {self.length}, {self.width}, {self.center_ahead}"
-            )
-
-
-@dataclass(frozen=True)
-class Lamp:
-    """A traffic light and what it shows.
-
-    Attributes:
-        x: [m].
-        y: [m].
-        h: the direction of the traffic that it is for [rad].
-        states: ``(T,)``: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
-    """
-
-    x: float
-    y: float
-    h: float
-    states: npt.NDArray[np.int8]
-
-
-@dataclass(frozen=True)
-class Outline:
-    """One polyline of the road's picture.
-
-    Attributes:
-        kind: an area (closed by itself, filled): one of ``AREA_KINDS``; or a line: "edge" (border
-            of the asphalt), "solid" and "broken" (between lanes of one direction), "centre"
-            (between the directions), "stop" (stop line), "sign" (seen from above), "route" (where
-            an entity wants to go).
-        points: ``(n, 2)`` float64 [m], n ≥ 2, x east and y north, in the entities' frame.
-    """
-
-    kind: str
-    points: Float
-
-    def __post_init__(self) -> None:
-        if self.kind not in AREA_KINDS | LINE_KINDS:
-            known = ", ".join(sorted(AREA_KINDS | LINE_KINDS))
-            raise ValueError(f"kind of an outline must be one of {known}; got '{self.kind}'")
-        as_float(f"points of a '{self.kind}' outline [m]", self.points, (None, 2))
-        if len(self.points) < 2:
-            raise ValueError(f"a '{self.kind}' outline needs 2 points, got {len(self.points)}")
-
-
-@dataclass(frozen=True)
-class Playback:
-    """One kept scenario, recorded: E entities over T instants, instant k at ``k · time_step``.
-
-    Attributes:
-        name: its name in the run folder ("0001").
-        rank: 1 for the most critical.
-        evaluation: its row in ``Evaluations``, from 0.
-        parameters: all parameters' values, in the units of the columns of the same name.
-        metrics: all metrics' values, likewise.
-        critical: whether it counts as critical.
-        cause: what its harm is put down to; may be empty.
-        time_step: seconds between two instants.
-        entities: E bodies, the ego first.
-        x: ``(E, T)`` float64 [m], rear axle; NaN where an entity is not there.
-        y: ``(E, T)`` float64 [m], likewise.
-        h: ``(E, T)`` float64 [rad], heading, counter-clockwise from +x, continuous.
-        v: ``(E, T)`` float64 [m/s].
-        distance: ``(T,)`` float64 [m], from the ego's box to the nearest other, 0 at contact;
-            +inf if there is no other.
-        lanes: the road, drawn in the order given (areas first). Playbacks on the same road should
-            share one tuple: the page then holds it once.
-        n_steps: in 1..T, how many instants are real.
-        files: paths of its files relative to the page ("critical/0001.xosc").
-        picture: its individuals in five columns, if they are to be shown.
-        lamps: the traffic lights.
-    """
-
-    name: str
-    rank: int
-    evaluation: int
-    parameters: Mapping[str, float]
-    metrics: Mapping[str, float]
-    critical: bool
-    time_step: float
-    entities: tuple[Entity, ...]
-    x: Float
-    y: Float
-    h: Float
-    v: Float
-    distance: Float
-    lanes: tuple[Outline, ...]
-    n_steps: int
-    files: tuple[str, ...] = ()
-    picture: Picture | None = None
-    lamps: tuple[Lamp, ...] = ()
-    cause: str = ""
-
-    def __post_init__(self) -> None:
-        place = f"playback '{self.name}'"
-        if not self.entities:
-            raise ValueError(f"{place} needs an entity, the ego")
-        shape = (len(self.entities), self.x.shape[-1] if self.x.ndim else 0)
-        for axis, unit in (("x", "m"), ("y", "m"), ("h", "rad"), ("v", "m/s")):
-            as_float(f"{axis} [{unit}] of {place}", getattr(self, axis), shape, finite=False)
-        as_float(f"distance [m] of {place}", self.distance, shape[1:], finite=False)
-        if not 1 <= self.n_steps <= shape[1]:
-            raise ValueError(f"n_steps of {place} must be in 1..{shape[1]}, got {self.n_steps}")
-        if not 0.0 < self.time_step < inf:
-            raise ValueError(f"time_step [s] of {place} must be > 0, got {self.time_step}")
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ function nearestPoints(first, second) {
 
 // The state at a fractional step: straight between the recorded instants, exact on them.
 function stateAt(kept, position) {
-  const last = kept.distance.length - 1;
+  const last = kept.n_steps - 1;
   const k = Math.min(last, Math.max(0, Math.floor(position + 1e-9)));
   const f = k === last ? 0 : Math.max(0, position - k);
   const mix = (row) => (f < 1e-9 ? row[k] : row[k] === null || row[k + 1] === null ? null : row[k] + f * (row[k + 1] - row[k]));
@@ -43,6 +43,8 @@ function stateAt(kept, position) {
     index: k,
     time: (k + (f < 1e-9 ? 0 : f)) * kept.time_step,
     distance: mix(kept.distance),
+    ttc: kept.ttc && mix(kept.ttc),
+    a: kept.a && kept.a.map((row) => row[k]),
     entities: kept.entities.map((entity, e) => ({
       name: entity.name, x: mix(kept.x[e]), y: mix(kept.y[e]), h: mix(kept.h[e]), v: mix(kept.v[e]),
     })),
@@ -59,6 +61,12 @@ function playersOf(kept) {
     if (near && !kept.players.includes(near.entity)) kept.players.push(near.entity);
   }
   return kept.players;
+}
+
+// The ego is always the same colour; those that are named count on from it, whatever stands about besides.
+function colourOf(kept, e) {
+  const place = playersOf(kept).indexOf(e);
+  return entityColour(place < 0 ? 3 : place);
 }
 
 // The entity nearest to the ego, and the two nearest points of their boxes.

@@ -15,7 +15,8 @@ from bridgegen.report.payload import to_json
 
 SCRIPTS = (
     "common.js", "page.js", "regions.js", "filters.js", "causes.js", "notes.js", "playbacks.js",
-    "table.js", "table_tools.js", "geometry.js", "view.js", "scene.js",
+    "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
+    "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "scene.js",
     "curves.js", "picture.js", "player.js", "parallel.js", "charts.js", "coverage.js",
     "coverage_pairs.js",
 )  # fmt: skip
@@ -29,6 +30,7 @@ STYLES = (
     "notes.css",
     "table.css",
     "regions.css",
+    "playback.css",
 )
 
 

@@ -14,16 +14,19 @@ from bridgegen.arrays import Bool, Float
 from bridgegen.cause import CAUSES, Cause
 from bridgegen.report import convergence, sentences
 from bridgegen.report.coverage_payload import coverage_payload
-from bridgegen.report.data import Column, Evaluations, Lamp, Playback, ReportData
+from bridgegen.report.data import Column, Evaluations, ReportData
 from bridgegen.report.picture_payload import pictures_payload
+from bridgegen.report.playback_payload import (
+    ROAD_SCALE,
+    SCALE,
+    playback_payload,
+    road_payload,
+)
 from bridgegen.report.regions_payload import regions_payload
 from bridgegen.search.dominance import by_merit
 
 DIGITS = 5
 """Significant digits of the largest value of a column in bulk."""
-MILLIMETRE = 3
-ANGLE = 5
-"""Decimals of headings: 1e-5 rad moves a car's front by 0.05 mm."""
 
 ROWS = 20_000
 """Rows of a longer run that the page holds, evenly spread; the iterations show all of it."""
@@ -61,8 +64,8 @@ def payload(data: ReportData) -> dict[str, Any]:
         key = tuple((lane.kind, lane.points.tobytes()) for lane in playback.lanes)
         if key not in index:
             index[key] = len(roads)
-            roads.append(_road(playback))
-        kept.append(_playback(playback, index[key], number.get(playback.name)))
+            roads.append(road_payload(playback))
+        kept.append(playback_payload(playback, index[key], number.get(playback.name)))
     return {
         "summary": {
             "title": s.title,
@@ -80,6 +83,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,
         "batches": _batches(data.evaluations),
         "causes": _causes(data.evaluations),
+        "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
         "kept": kept,
         "coverage": coverage_payload(data.coverage) if data.coverage else None,
@@ -177,63 +181,6 @@ def _batches(e: Evaluations) -> dict[str, Any]:
         "share": significant(found.share),
         "cumulative": significant(found.cumulative),
         "trends": trends,
-    }
-
-
-def _road(playback: Playback) -> list[dict[str, Any]]:
-    return [
-        {"kind": lane.kind, "points": decimals(lane.points.ravel(), MILLIMETRE)}
-        for lane in playback.lanes
-    ]
-
-
-def _playback(p: Playback, road: int, picture: int | None) -> dict[str, Any]:
-    real = slice(0, p.n_steps)
-    contact = p.distance[real] <= 0.0  # before rounding: a miss by 0.1 mm is a miss
-    begins = np.flatnonzero(contact & ~np.concatenate([[False], contact[:-1]]))
-    finite = np.where(np.isfinite(p.distance[real]), p.distance[real], np.inf)
-    return {
-        "name": p.name,
-        "rank": int(p.rank),
-        "evaluation": int(p.evaluation),
-        "critical": bool(p.critical),
-        "cause": p.cause,
-        "parameters": {name: _number(value) for name, value in p.parameters.items()},
-        "metrics": {name: _number(value) for name, value in p.metrics.items()},
-        "files": list(p.files),
-        "time_step": float(p.time_step),
-        "road": road,
-        "picture": picture,
-        "entities": [
-            {
-                "name": e.name,
-                "length": float(e.length),
-                "width": float(e.width),
-                "center_ahead": float(e.center_ahead),
-                "type": e.type,
-            }
-            for e in p.entities
-        ],
-        "lamps": [_lamp(lamp, p.n_steps) for lamp in p.lamps],
-        "x": [decimals(row[real], MILLIMETRE) for row in p.x],
-        "y": [decimals(row[real], MILLIMETRE) for row in p.y],
-        "h": [decimals(row[real], ANGLE) for row in p.h],
-        "v": [decimals(row[real], MILLIMETRE) for row in p.v],
-        "distance": decimals(p.distance[real], MILLIMETRE),
-        "closest": int(finite.argmin()) if np.isfinite(finite).any() else None,
-        "contacts": begins.tolist(),
-    }
-
-
-def _lamp(lamp: Lamp, n_steps: int) -> dict[str, Any]:
-    """Return a light with the steps at which it changes, and to what."""
-    states = lamp.states[:n_steps]
-    changes = [0, *(np.flatnonzero(np.diff(states)) + 1).tolist()]
-    return {
-        "x": round(float(lamp.x), MILLIMETRE),
-        "y": round(float(lamp.y), MILLIMETRE),
-        "h": round(float(lamp.h), ANGLE),
-        "changes": [[k, int(states[k])] for k in changes],
     }
 
 

@@ -84,16 +84,21 @@ class Opener {
 
   // What the page's address names, or the most critical.
   async begin() {
-    const wanted = new URLSearchParams(location.hash.slice(1));
-    const named = data.kept.findIndex((kept) => kept.name === wanted.get("scenario"));
-    const i = this.at.get(Number.parseInt(wanted.get("evaluation"), 10) - 1);
+    addEventListener("hashchange", () => this.go());
+    if (await this.go()) return;
+    if (data.kept.length) this.kept(0);
+    else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
+  }
+
+  // Shows what the page's address names, at that time; says whether it names one.
+  async go() {
+    const { name, evaluation, seconds } = readAddress();
+    const named = data.kept.findIndex((kept) => kept.name === name), i = this.at.get(evaluation);
     if (named >= 0) this.kept(named);
     else if (i !== undefined) await this.row(i);
-    else if (data.kept.length) this.kept(0);
-    else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
-    const seconds = Number.parseFloat(wanted.get("t"));
-    if (named < 0 && i === undefined) return;
-    if (seconds >= 0 && this.made) this.player.seek(Math.round(seconds / this.player.kept.time_step));
+    else return false;
+    if (seconds !== null && this.made) this.player.seek(Math.round(seconds / this.player.kept.time_step));
     $("scenarios").scrollIntoView();
+    return true;
   }
 }

@@ -12,18 +12,18 @@ class Player {
     this.connect();
     Object.assign(hook, {
       seek: (k) => this.seek(k), play: () => this.play(), pause: () => this.pause(),
-      state: () => ({ ...this.drawn, playing: this.playing }),
+      state: () => ({ ...this.drawn, playing: this.playing }), curves: this.curves,
     });
   }
 
   get last() {
-    return this.kept.distance.length - 1;
+    return this.kept.n_steps - 1;
   }
 
   // Shows a scenario at its smallest gap, the moment that tells most; a click plays it from the start.
   show(kept, andPlay = false) {
     this.pause();
-    this.kept = kept;
+    this.kept = unpack(kept);
     this.chosen = data.kept.indexOf(kept); // −1 of one that was not handed over
     $("scrub").max = this.last;
     $("scene-name").textContent = `${this.kept.name}`;
@@ -31,6 +31,7 @@ class Player {
     $("to-closest").hidden = this.kept.closest === null || this.kept.contacts.includes(this.kept.closest);
     this.scene.show(this.kept);
     this.curves.show(this.kept);
+    this.showLegend();
     this.seek(this.kept.closest ?? 0, false);
     if (!andPlay) return;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -54,10 +55,35 @@ class Player {
   link() {
     clearTimeout(this.linking);
     this.linking = setTimeout(() => {
-      const time = (Math.round(this.position) * this.kept.time_step).toFixed(2);
-      const which = this.chosen < 0 ? { evaluation: this.kept.evaluation + 1 } : { scenario: this.kept.name };
-      history.replaceState(null, "", `#${new URLSearchParams({ ...which, t: time })}`);
-    }, 200);
+      history.replaceState(null, "", this.address());
+      $("said").textContent = $("now").textContent; // once it rests: who listens is not told every frame
+    }, 250);
+  }
+
+  // The page's address with the present scenario and time, to the instant.
+  address() {
+    return addressOf(this.kept, this.chosen >= 0, Math.round(this.position));
+  }
+
+  copyLink() {
+    copy(`${location.href.split("#")[0]}${this.address()}`, $("copy-link"));
+  }
+
+  // Shows or hides one of the layers over the road.
+  toggleLayer(layer) {
+    this.scene.layers[layer] = !this.scene.layers[layer];
+    this.showLegend();
+    this.redraw();
+  }
+
+  showLegend() {
+    const has = { sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length };
+    for (const item of $("legend").children) {
+      const shown = this.scene.layers[item.dataset.layer], button = item.querySelector("button");
+      item.hidden = !has[item.dataset.layer] || (!button && !shown);
+      button?.setAttribute("aria-pressed", shown);
+    }
+    if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
   }
 
   play() {
@@ -107,11 +133,18 @@ class Player {
     $("follow").setAttribute("aria-pressed", this.scene.view.follow);
     this.drawFlag(state);
     $("scrub").value = Math.round(this.position);
-    $("scrub").setAttribute("aria-valuetext", `${state.time.toFixed(2)} seconds`);
+    const now = stateWords(this.kept, state), weather = weatherAt(this.kept, state.index);
+    $("now").textContent = now;
+    $("scrub").setAttribute("aria-valuetext", this.playing ? `${state.time.toFixed(2)} seconds` : now);
+    $("weather").hidden = !weather;
+    if (weather) $("weather").textContent = weatherWords(weather);
     this.drawn = {
       scenario: this.kept.name, chosen: this.chosen, position: this.position, ...state,
       screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
       scale: this.scene.view.scale,
+      lights: this.kept.lamps.map((lamp) => lightAt(lamp, state.index)),
+      detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
+      intention: intentionAt(this.kept, state), weather,
     };
   }
 
@@ -133,6 +166,8 @@ class Player {
     $("zoom-out").addEventListener("click", () => this.scene.view.zoom(1 / 1.4));
     $("zoom-fit").addEventListener("click", () => this.fit());
     $("follow").addEventListener("click", () => this.follow());
+    $("copy-link").addEventListener("click", () => this.copyLink());
+    for (const item of $("legend").children) item.querySelector("button")?.addEventListener("click", () => this.toggleLayer(item.dataset.layer));
     $("to-closest").addEventListener("click", () => this.jump(this.kept.closest));
     $("to-contact").addEventListener("click", () => this.jump(this.kept.contacts[0]));
     document.addEventListener("keydown", (event) => this.key(event));
@@ -157,13 +192,10 @@ class Player {
     this.redraw();
   }
 
-  // Keeps the ego in the middle, near enough to see it well; off again by itself when dragged.
   follow() {
     const view = this.scene.view;
     if (view.follow) return this.fit();
-    view.follow = true;
-    view.fitted = false;
-    view.scale = Math.max(view.scale, 14);
+    this.scene.follow();
     this.redraw();
   }
 
@@ -177,7 +209,8 @@ class Player {
     const faster = (by) => { speed.selectedIndex = Math.min(speed.length - 1, Math.max(0, speed.selectedIndex + by)); };
     const actions = {
       " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
-      e: () => this.follow(), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.fit(),
+      ",": () => this.step(-1), ".": () => this.step(1), s: () => this.toggleLayer("sensed"), p: () => this.toggleLayer("course"), w: () => this.toggleLayer("weather"),
+      l: () => this.copyLink(), e: () => this.follow(), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.fit(),
       d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.kept.contacts.length) this.jump(this.kept.contacts[0]); },
       "+": () => this.scene.view.zoom(1.4), "=": () => this.scene.view.zoom(1.4), "-": () => this.scene.view.zoom(1 / 1.4),
       "[": () => faster(-1), "]": () => faster(1),

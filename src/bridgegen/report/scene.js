@@ -7,28 +7,22 @@ const LINES = { // colour, width [m], dashes [m]
   sign: ["hit", 0.3, []],
 };
 
-const SMALL = { pedestrian: "person", animal: "person", bicycle: "cycle", motorcycle: "cycle", cone: "cone", sign: "sign", obstacle: "thing" };
-const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
-  { at: 2.2, lit: [1, 2], colour: "#ff4d4d" }, { at: 0, lit: [2, 3], colour: "#ffd23f" }, { at: -2.2, lit: [4], colour: "#38d39f" },
-];
-
-function overlap([ax0, ay0, ax1, ay1], [bx0, by0, bx1, by1]) {
-  return Math.max(0, Math.min(ax1, bx1) - Math.max(ax0, bx0)) * Math.max(0, Math.min(ay1, by1) - Math.max(ay0, by0));
-}
+const TOO_SMALL = 3, NEAR = 8; // pixels per metre: below the one a car is a few pixels; the other shows it
 
 class Scene {
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.view = new View(canvas, changed);
+    this.atmosphere = new Atmosphere();
+    this.layers = { sensed: true, course: true, weather: true };
   }
 
   show(kept) {
     this.kept = kept;
-    this.places = null;
+    this.labels = new Labels(kept);
     this.outlines = data.roads[kept.road].map(({ kind, points }) => {
       const path = new Path2D();
-      path.moveTo(points[0], points[1]);
-      for (let i = 2; i < points.length; i += 2) path.lineTo(points[i], points[i + 1]);
+      unpackLine(points).forEach((p, i) => path[i ? "lineTo" : "moveTo"](...p));
       if (kind in AREAS) path.closePath();
       return { kind, path };
     });
@@ -37,15 +31,24 @@ class Scene {
       return isPlaced(state) ? boxCentre(entity, state.x, state.y, state.h) : null;
     }));
     this.fit();
+    if (this.view.scale < TOO_SMALL) this.follow();
   }
 
   fit() {
     this.view.fit(playersOf(this.kept).flatMap((e) => this.centres[e]).filter(Boolean));
   }
 
+  // Keeps the ego in the middle, near enough to see it well; off again when the view is dragged.
+  follow() {
+    this.view.follow = true;
+    this.view.fitted = false;
+    this.view.scale = Math.max(this.view.scale, NEAR);
+  }
+
   draw(state) {
     const { context: c, width, height, ratio } = fitCanvas(this.canvas);
     this.size = { width, height };
+    if (!width || !height) return; // not laid out yet
     if (this.view.follow && isPlaced(state.entities[0])) {
       const { x, y, h } = state.entities[0];
       [this.view.x, this.view.y] = boxCentre(this.kept.entities[0], x, y, h);
@@ -53,18 +56,42 @@ class Scene {
     const { x, y, scale } = this.view;
     c.fillStyle = palette.ground;
     c.fillRect(0, 0, width, height);
-    c.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * (width / 2 - x * scale), ratio * (height / 2 + y * scale));
+    const metres = () => c.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * (width / 2 - x * scale), ratio * (height / 2 + y * scale));
+    const pixels = () => c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const weather = this.layers.weather ? weatherAt(this.kept, state.index) : null;
+    metres();
     c.lineJoin = "round";
     this.drawRoad(c, scale);
-    this.drawLamps(c, state.index, scale);
+    if (weather) {
+      this.atmosphere.drawRoadState(c, weather, this.outlines);
+      pixels();
+      this.atmosphere.over(c, this, state, weather);
+      metres();
+    }
+    drawStreetLights(c, this.kept.street_lights, scale);
+    drawLamps(c, this.kept.lamps, state.index, scale);
+    if (this.layers.course) drawCourse(c, this.kept, state, scale);
     state.entities.forEach((_, e) => this.drawTrail(c, e, state.index, scale));
     this.drawGhosts(c, state, scale);
-    state.entities.forEach((s, e) => { if (isPlaced(s)) this.drawBody(c, this.kept.entities[e], s, entityColour(e), scale); });
-    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    state.entities.forEach((s, e) => { if (isPlaced(s)) drawBody(c, this.kept.entities[e], s, colourOf(this.kept, e), scale); });
+    if (this.layers.sensed) drawDetections(c, this.kept, state, scale);
+    pixels();
     this.drawContacts(c, state);
     this.drawGap(c, state);
-    this.drawLabels(c, state);
-    this.drawScaleBar(c, width, height, scale);
+    const words = labelLamps(c, this.kept, state.index, this.view, this.size);
+    const boxes = this.layers.sensed ? detectedBoxes(this.kept, state, this.view) : [];
+    this.labels.draw(c, state, this.view, this.size, this.texts(state), [...words, ...boxes]);
+    drawScaleBar(c, this.size, scale);
+  }
+
+  // What stands beside each body: who it is and how fast, and how the ego sees it.
+  texts(state) {
+    const players = playersOf(this.kept);
+    return state.entities.map((s, e) => {
+      if (!players.includes(e)) return null;
+      const seen = this.layers.sensed && e > 0 ? detectionWords(detectionAt(this.kept, e, state.index)) : "";
+      return `${s.name}  ${measured(s.v, "m/s", 2)} m/s${seen && seen !== "seen" ? `  ${seen}` : ""}`;
+    });
   }
 
   drawRoad(c, scale) {
@@ -90,7 +117,7 @@ class Scene {
     const centres = this.centres[e];
     const stroke = (from, to, alpha, pixels) => {
       c.globalAlpha = alpha;
-      c.strokeStyle = entityColour(e);
+      c.strokeStyle = colourOf(this.kept, e);
       c.lineWidth = pixels / scale;
       c.beginPath();
       let down = false;
@@ -112,90 +139,6 @@ class Scene {
       c.fill();
     }
     c.globalAlpha = 1;
-  }
-
-  drawBody(c, entity, state, colour, scale) {
-    const { length, width } = entity;
-    c.save();
-    c.translate(...boxCentre(entity, state.x, state.y, state.h));
-    c.rotate(state.h);
-    if (entity.type in SMALL) {
-      this.drawSmall(c, entity, colour, scale);
-      c.restore();
-      return;
-    }
-    c.beginPath();
-    if (c.roundRect && scale > 3) c.roundRect(-length / 2, -width / 2, length, width, width * 0.22);
-    else c.rect(-length / 2, -width / 2, length, width);
-    c.fillStyle = colour;
-    c.fill();
-    c.lineWidth = 1.5 / scale;
-    c.strokeStyle = palette.marking;
-    c.stroke();
-    // Windscreen and roof line tell front from rear.
-    c.fillStyle = "rgba(8, 16, 26, 0.62)";
-    c.beginPath();
-    c.moveTo(length * 0.12, -width * 0.34);
-    c.lineTo(length * 0.27, -width * 0.41);
-    c.lineTo(length * 0.27, width * 0.41);
-    c.lineTo(length * 0.12, width * 0.34);
-    c.closePath();
-    c.fill();
-    c.fillRect(-length * 0.36, -width * 0.34, length * 0.08, width * 0.68);
-    c.fillStyle = "rgba(255, 255, 255, 0.9)";
-    for (const side of [-1, 1]) c.fillRect(length * 0.455, side * width * 0.33 - width * 0.08, length * 0.035, width * 0.16);
-    c.restore();
-  }
-
-  // People, cycles and things: seen from afar they are a few pixels, so they are told by their shape.
-  drawSmall(c, { type, length, width }, colour, scale) {
-    const shape = SMALL[type], half = Math.max(0.5 * Math.max(length, width), 2.5 / scale);
-    c.beginPath();
-    if (shape === "person" || shape === "cone") c.arc(0, 0, half, 0, 2 * Math.PI);
-    else if (shape === "cycle") c.ellipse(0, 0, Math.max(length / 2, half), Math.max(width / 2, 2 / scale), 0, 0, 2 * Math.PI);
-    else c.rect(-Math.max(length / 2, 1.5 / scale), -half, Math.max(length, 3 / scale), 2 * half);
-    c.fillStyle = shape === "cone" || shape === "sign" ? palette.cone : colour;
-    c.fill();
-    c.lineWidth = 1.2 / scale;
-    c.strokeStyle = palette.marking;
-    c.stroke();
-    if (shape === "cone") {
-      c.beginPath();
-      c.arc(0, 0, half * 0.45, 0, 2 * Math.PI);
-      c.fillStyle = palette.marking;
-      c.fill();
-    } else if (shape === "person" || shape === "cycle") {
-      c.beginPath();
-      c.arc(0, 0, half * (shape === "person" ? 0.5 : 0.3), 0, 2 * Math.PI);
-      c.fillStyle = "rgba(8, 16, 26, 0.62)";
-      c.fill();
-    }
-  }
-
-  // A housing beside the lane, red farthest ahead; the place of the lamp that is lit tells as much as its colour.
-  drawLamps(c, index, scale) {
-    for (const lamp of this.kept.lamps) {
-      const state = lamp.changes.reduce((now, [k, to]) => (k <= index ? to : now), 0);
-      const r = Math.max(0.45, 3.2 / scale);
-      c.save();
-      c.translate(lamp.x, lamp.y);
-      c.rotate(lamp.h);
-      c.fillStyle = "#10161d";
-      c.strokeStyle = palette.marking;
-      c.lineWidth = 1 / scale;
-      c.beginPath();
-      if (c.roundRect) c.roundRect(-3.6 * r, -1.3 * r, 7.2 * r, 2.6 * r, 1.2 * r);
-      else c.rect(-3.6 * r, -1.3 * r, 7.2 * r, 2.6 * r);
-      c.fill();
-      c.stroke();
-      LAMPS.forEach(({ at, lit, colour }) => {
-        c.beginPath();
-        c.arc(at * r, 0, 0.85 * r, 0, 2 * Math.PI);
-        c.fillStyle = lit.includes(state) ? colour : "#3a434e";
-        c.fill();
-      });
-      c.restore();
-    }
   }
 
   // Where both stood at the smallest gap, as dashed outlines.
@@ -228,7 +171,7 @@ class Scene {
     c.stroke();
     c.setLineDash([]);
     const apart = Math.hypot(to[0] - from[0], to[1] - from[1]);
-    if (apart > 46) this.pill(c, `${state.distance.toFixed(1)} m`, (from[0] + to[0]) / 2, (from[1] + to[1]) / 2, palette.ink);
+    if (apart > 46) pill(c, this.size, `${state.distance.toFixed(1)} m`, (from[0] + to[0]) / 2, (from[1] + to[1]) / 2, palette.ink);
   }
 
   // A cross where a contact began, from that instant on.
@@ -252,81 +195,5 @@ class Scene {
       }
       c.lineCap = "butt";
     }
-  }
-
-  // A label goes to that one of eight places around its vehicle which hides least; the side away
-  // from the others and the place it had before are preferred, so that it does not jump about.
-  drawLabels(c, state) {
-    const bodies = state.entities.map((s, e) => {
-      if (!isPlaced(s)) return null;
-      const corners = boxCorners(this.kept.entities[e], s.x, s.y, s.h).map((p) => this.view.toScreen(p));
-      const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]);
-      return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
-    });
-    const { width, height } = this.size;
-    const taken = [...bodies.filter(Boolean), [0, 0, width, 44], [0, height - 36, 130, height]]; // clock, zoom, scale bar
-    const middles = bodies.map((box) => box && [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2]);
-    const seen = middles.filter(Boolean);
-    const hub = [0, 1].map((i) => seen.reduce((sum, p) => sum + p[i], 0) / seen.length);
-    c.font = FONT;
-    const players = playersOf(this.kept);
-    state.entities.forEach((s, e) => {
-      if (!bodies[e] || !players.includes(e)) return;
-      const text = `${s.name}  ${measured(s.v, "m/s", 2)} m/s`;
-      const w = c.measureText(text).width + 14, h = 20, [mx, my] = middles[e], [x0, y0, x1, y1] = bodies[e];
-      const away = seen.length > 1 ? Math.atan2(my - hub[1], mx - hub[0]) : -Math.PI / 2;
-      let best = { cost: Infinity };
-      for (let place = 0; place < 8; place++) {
-        const angle = (place * Math.PI) / 4;
-        const x = mx + Math.cos(angle) * ((x1 - x0) / 2 + w / 2 + 5), y = my + Math.sin(angle) * ((y1 - y0) / 2 + h / 2 + 6);
-        const box = [x - w / 2, y - h / 2, x + w / 2, y + h / 2];
-        const hidden = taken.reduce((sum, other) => sum + overlap(box, other), 0);
-        const outside = w * h - overlap(box, [0, 0, width, height]);
-        const turned = 0.15 * w * h * (1 - Math.cos(angle - away)), kept = this.places?.[e] === place ? 0.35 * w * h : 0;
-        const cost = hidden + outside + turned - kept;
-        if (cost < best.cost) best = { cost, place, x, y, box };
-      }
-      (this.places ??= [])[e] = best.place;
-      taken.push(best.box);
-      this.pill(c, text, best.x, best.y, entityColour(e));
-    });
-  }
-
-  pill(c, text, x, y, colour) {
-    c.font = FONT;
-    const w = c.measureText(text).width + 14, h = 20;
-    const left = Math.min(this.size.width - w - 4, Math.max(4, x - w / 2));
-    const top = Math.min(this.size.height - h - 4, Math.max(4, y - h / 2));
-    c.fillStyle = palette.label;
-    c.strokeStyle = colour;
-    c.lineWidth = 1.5;
-    c.beginPath();
-    if (c.roundRect) c.roundRect(left, top, w, h, 10);
-    else c.rect(left, top, w, h);
-    c.fill();
-    c.stroke();
-    c.fillStyle = palette.ink;
-    c.textBaseline = "middle";
-    c.textAlign = "left";
-    c.fillText(text, left + 7, top + h / 2 + 0.5);
-  }
-
-  drawScaleBar(c, width, height, scale) {
-    const metres = [1, 2, 5, 10, 20, 50, 100].find((m) => m * scale >= 50) ?? 100;
-    const x = 14, y = height - 16;
-    c.fillStyle = palette.label;
-    c.fillRect(x - 6, y - 15, metres * scale + 12, 23);
-    c.strokeStyle = c.fillStyle = palette.ink;
-    c.lineWidth = 1.5;
-    c.beginPath();
-    c.moveTo(x, y - 3);
-    c.lineTo(x, y + 2);
-    c.lineTo(x + metres * scale, y + 2);
-    c.lineTo(x + metres * scale, y - 3);
-    c.stroke();
-    c.font = FONT;
-    c.textBaseline = "alphabetic";
-    c.textAlign = "center";
-    c.fillText(`${metres} m`, x + (metres * scale) / 2, y - 2);
   }
 }

@@ -1,13 +1,34 @@
 """What is drawn of a concrete scenario besides its motion: the road, the bodies, the lights."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.openx.opendrive.lanes import points
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.outline import outline
 from bridgegen.openx.opendrive.outline_furniture import Light, lights
+from bridgegen.openx.opendrive.to_owl.furniture import class_of
 from bridgegen.pipeline import Pipeline
-from bridgegen.report.data import Entity, Lamp, Outline
+from bridgegen.report.playback import Entity, Lamp, Outline
 from bridgegen.simulation.rollout import Rollout
+
+
+@dataclass(frozen=True)
+class RoadPicture:
+    """A road network from above.
+
+    Attributes:
+        outlines: in the order in which they are drawn.
+        lights: its traffic lights.
+        street_lights: ``(n, 2)`` float64 [m].
+    """
+
+    outlines: tuple[Outline, ...]
+    lights: list[Light]
+    street_lights: Float
 
 
 class Scenery:
@@ -19,17 +40,28 @@ class Scenery:
 
     def __init__(self, pipeline: Pipeline) -> None:
         self._pipeline = pipeline
-        self._known: dict[bytes, tuple[tuple[Outline, ...], list[Light]]] = {}
+        self._known: dict[bytes, RoadPicture] = {}
 
-    def road(self, x: Float) -> tuple[tuple[Outline, ...], list[Light]]:
+    def road(self, x: Float) -> RoadPicture:
         """Return the drawing of a row's road network, the same objects for the same network."""
         space, source = self._pipeline.space, self._pipeline.source
         key = x[[space.index(name) for name in source.static_names]].tobytes()
         if key not in self._known:
             model = self._pipeline.concrete(x).roads
             shapes = (Outline(kind, points) for kind, points in outline(model, source.junction))
-            self._known[key] = tuple(shapes), lights(model)
+            self._known[key] = RoadPicture(tuple(shapes), lights(model), street_lights(model))
         return self._known[key]
+
+
+def street_lights(model: OpenDrive) -> Float:
+    """Return where the street lights of a road network stand, ``(n, 2)`` float64 [m]."""
+    found = [
+        points(road, np.array([min(one.s, road.length)]), np.array([one.t]))[0]
+        for road in model.roads
+        for one in road.objects
+        if class_of(one) == "StreetLight"
+    ]
+    return np.array(found, dtype=np.float64).reshape(-1, 2)
 
 
 def bodies(rollout: Rollout, types: Mapping[str, str]) -> tuple[Entity, ...]:
@@ -44,7 +76,7 @@ def lamps(rollout: Rollout, row: int, found: list[Light]) -> tuple[Lamp, ...]:
     """Return the lights that change in one scenario of a rollout, with what they show."""
     shown = {name: number for number, name in enumerate(rollout.light_names)}
     return tuple(
-        Lamp(one.x, one.y, one.h, rollout.lights[row, shown[one.id]])
+        Lamp(one.x, one.y, one.h, rollout.lights[row, shown[one.id]], one.id)
         for one in found
         if one.id in shown
     )

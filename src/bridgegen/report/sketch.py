@@ -9,7 +9,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.pipeline import Pipeline
-from bridgegen.report.data import AREA_KINDS, Entity, Lamp, Outline
+from bridgegen.report.playback import AREA_KINDS, Entity, Lamp, Outline
 from bridgegen.report.scenery import Scenery, bodies, lamps
 
 WIDTH, HEIGHT = 960, 430
@@ -67,7 +67,7 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
     """
     x = pipeline.space.row({}) if x is None else x
     rollout = pipeline.rollout(x[np.newaxis])
-    road, lights = Scenery(pipeline).road(x)
+    road = Scenery(pipeline).road(x)
     n = int(rollout.n_steps[0])
     distance = rollout.distance[0].min(axis=0)[:n]
     closest = int(distance.argmin()) if np.isfinite(distance).any() else n - 1
@@ -78,7 +78,7 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
     moving = [e == 0 or bool((rollout.v[0, e, :n] > _MOVES).any()) for e in range(len(entities))]
     seen = there & np.array(moving)[:, np.newaxis]
     view = _view(where[:, : last + 1][seen[:, : last + 1]], where[0, closest])
-    parts = [*_roads(road, view), *_lamps(lamps(rollout, 0, lights), closest, view)]
+    parts = [*_roads(road.outlines, view), *_lamps(lamps(rollout, 0, road.lights), closest, view)]
     labels = []
     for e, body in enumerate(entities):
         colour = "#d9480f" if body.type in ("cone", "sign") else _COLOURS[_number(e, moving)]

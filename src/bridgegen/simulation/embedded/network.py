@@ -66,6 +66,11 @@ class Network:
         """P."""
         return len(self._ways)
 
+    def way(self, p: int, number: int) -> Float:
+        """Return the samples x, y of a way on road network p, ``(n, 2)`` float64 [m]."""
+        way: Float = self.tables.paths[p, number, : self.tables.counts[p, number], :2]
+        return way
+
     def amend(self, name: str, first: int, part: Float) -> None:
         """Change a stretch of an entity's timed trajectory on each road network.
 

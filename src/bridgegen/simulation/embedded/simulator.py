@@ -13,7 +13,9 @@ from bridgegen.ego import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard
+from bridgegen.simulation.embedded.intentions import Intentions, intentions
 from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.weathers import weathers
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
@@ -151,6 +153,18 @@ class EmbeddedSimulator:
         from bridgegen.simulation.embedded.own_driver import OwnDriver  # numba is slow to import
 
         return OwnDriver(self.program.driver)
+
+    def weathers(
+        self, values: Mapping[str, npt.ArrayLike], rollout: Rollout, row: int
+    ) -> list[tuple[int, Float]]:
+        """Return one row's weather as a rollout went through it; see `weathers.weathers`."""
+        return weathers(self.program, values, rollout, row)
+
+    def intentions(
+        self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike], rollout: Rollout
+    ) -> Intentions:
+        """Return what the egos of a rollout meant to do; see `intentions.intentions`."""
+        return intentions(self.program, roads, rows, values, rollout)
 
     def batch(
         self,

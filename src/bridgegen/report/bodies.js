@@ -1,0 +1,104 @@
+// What stands and moves in the bird's-eye view: vehicles, people, things, traffic lights. In metres.
+
+const SMALL = { pedestrian: "person", animal: "person", bicycle: "cycle", motorcycle: "cycle", cone: "cone", sign: "sign", obstacle: "thing" };
+const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
+  { at: 2.2, lit: [1, 2], colour: "#ff4d4d" }, { at: 0, lit: [2, 3], colour: "#ffd23f" }, { at: -2.2, lit: [4], colour: "#38d39f" },
+];
+
+function roundBox(c, x, y, width, height, radius) {
+  c.beginPath();
+  if (c.roundRect) c.roundRect(x, y, width, height, radius);
+  else c.rect(x, y, width, height);
+}
+
+function drawBody(c, entity, state, colour, scale) {
+  const { length, width } = entity;
+  c.save();
+  c.translate(...boxCentre(entity, state.x, state.y, state.h));
+  c.rotate(state.h);
+  if (entity.type in SMALL) {
+    drawSmall(c, entity, colour, scale);
+    c.restore();
+    return;
+  }
+  roundBox(c, -length / 2, -width / 2, length, width, scale > 3 ? width * 0.22 : 0);
+  c.fillStyle = colour;
+  c.fill();
+  c.lineWidth = 1.5 / scale;
+  c.strokeStyle = palette.marking;
+  c.stroke();
+  // Windscreen and roof line tell front from rear.
+  c.fillStyle = "rgba(8, 16, 26, 0.62)";
+  c.beginPath();
+  c.moveTo(length * 0.12, -width * 0.34);
+  c.lineTo(length * 0.27, -width * 0.41);
+  c.lineTo(length * 0.27, width * 0.41);
+  c.lineTo(length * 0.12, width * 0.34);
+  c.closePath();
+  c.fill();
+  c.fillRect(-length * 0.36, -width * 0.34, length * 0.08, width * 0.68);
+  c.fillStyle = "rgba(255, 255, 255, 0.9)";
+  for (const side of [-1, 1]) c.fillRect(length * 0.455, side * width * 0.33 - width * 0.08, length * 0.035, width * 0.16);
+  c.restore();
+}
+
+// People, cycles and things: seen from afar they are a few pixels, so they are told by their shape.
+function drawSmall(c, { type, length, width }, colour, scale) {
+  const shape = SMALL[type], half = Math.max(0.5 * Math.max(length, width), 2.5 / scale);
+  c.beginPath();
+  if (shape === "person" || shape === "cone") c.arc(0, 0, half, 0, 2 * Math.PI);
+  else if (shape === "cycle") c.ellipse(0, 0, Math.max(length / 2, half), Math.max(width / 2, 2 / scale), 0, 0, 2 * Math.PI);
+  else c.rect(-Math.max(length / 2, 1.5 / scale), -half, Math.max(length, 3 / scale), 2 * half);
+  c.fillStyle = shape === "cone" || shape === "sign" ? palette.cone : colour;
+  c.fill();
+  c.lineWidth = 1.2 / scale;
+  c.strokeStyle = palette.marking;
+  c.stroke();
+  if (shape === "cone") {
+    c.beginPath();
+    c.arc(0, 0, half * 0.45, 0, 2 * Math.PI);
+    c.fillStyle = palette.marking;
+    c.fill();
+  } else if (shape === "person" || shape === "cycle") {
+    c.beginPath();
+    c.arc(0, 0, half * (shape === "person" ? 0.5 : 0.3), 0, 2 * Math.PI);
+    c.fillStyle = "rgba(8, 16, 26, 0.62)";
+    c.fill();
+  }
+}
+
+// A housing beside the lane, red farthest ahead; the place of the lamp that is lit tells as much as its colour.
+function drawLamps(c, lamps, index, scale) {
+  for (const lamp of lamps) {
+    const state = lightAt(lamp, index), r = Math.max(0.45, 3.2 / scale);
+    c.save();
+    c.translate(lamp.x, lamp.y);
+    c.rotate(lamp.h);
+    c.fillStyle = "#10161d";
+    c.strokeStyle = palette.marking;
+    c.lineWidth = 1 / scale;
+    roundBox(c, -3.6 * r, -1.3 * r, 7.2 * r, 2.6 * r, 1.2 * r);
+    c.fill();
+    c.stroke();
+    for (const { at, lit, colour } of LAMPS) {
+      c.beginPath();
+      c.arc(at * r, 0, 0.85 * r, 0, 2 * Math.PI);
+      c.fillStyle = lit.includes(state) ? colour : "#3a434e";
+      c.fill();
+    }
+    c.restore();
+  }
+}
+
+// Posts; where it is dark, ``atmosphere.js`` lights what is below them.
+function drawStreetLights(c, posts, scale) {
+  c.fillStyle = "#f4c542";
+  c.strokeStyle = "#10161d";
+  c.lineWidth = 1 / scale;
+  for (const [x, y] of posts) {
+    c.beginPath();
+    c.arc(x, y, Math.max(0.35, 2.4 / scale), 0, 2 * Math.PI);
+    c.fill();
+    c.stroke();
+  }
+}

@@ -1,0 +1,51 @@
+"""What the ego's sensors made of the others, taken out of a rollout frame by frame."""
+
+import numpy as np
+
+from bridgegen.ego import detections as column
+from bridgegen.ego.kinds import NAMES
+from bridgegen.metrics.perceived import THRESHOLDS, perceived
+from bridgegen.report.playback import Sensed
+from bridgegen.simulation.rollout import Rollout
+
+TOLERANCE = float(THRESHOLDS[0])
+"""[m] A detection that is farther off is no hit at the strictest of nuScenes's thresholds."""
+
+
+def sensed(rollout: Rollout) -> list[Sensed]:
+    """Return what the egos of N scenarios sensed; nothing where they have no sensors.
+
+    Which entities count, and which detection is whose, is as the metrics of perception say it.
+    """
+    if not rollout.detections.size:
+        return []
+    counts = perceived(rollout).counts
+    found = []
+    for row, n_steps in enumerate(rollout.n_steps.tolist()):
+        told = rollout.detections[row, :, :n_steps]
+        steps = np.flatnonzero((told[1:, :, column.SEEN_BY] >= column.NOBODY).any(axis=0))
+        frames = told[:, steps]
+        seen_by = frames[:, :, column.SEEN_BY].astype(np.int64)
+        seen_by[0] = -1
+        if rollout.present.size:
+            seen_by[~rollout.present[row][:, steps]] = -1
+        nothing = seen_by <= column.NOBODY
+
+        def of(name: int, frames: np.ndarray = frames, nothing: np.ndarray = nothing) -> np.ndarray:
+            return np.where(nothing, np.nan, frames[:, :, name])
+
+        found.append(
+            Sensed(
+                steps=steps,
+                seen_by=seen_by,
+                counts=counts[row][:, steps],
+                x=of(column.X), y=of(column.Y), h=of(column.HEADING),
+                length=of(column.LENGTH), width=of(column.WIDTH),
+                confidence=of(column.CONFIDENCE),
+                kind=np.where(nothing, -1, frames[:, :, column.KIND]).astype(np.int64),
+                kinds=NAMES,
+                kind_of=rollout.kinds,
+                tolerance=TOLERANCE,
+            )
+        )  # fmt: skip
+    return found

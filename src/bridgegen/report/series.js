@@ -1,0 +1,14 @@
+// Numbers over time, see series.py: runs of [first instant, length, value, difference, second differences …].
+
+function unpackSeries(runs, n, scale) {
+  const values = new Array(n).fill(null);
+  for (const [first, length, start, ...told] of runs) {
+    let value = start, step = 0;
+    for (let i = 0; i < length; i++) {
+      values[first + i] = value / scale;
+      step += told[i] ?? 0;
+      value += step;
+    }
+  }
+  return values;
+}

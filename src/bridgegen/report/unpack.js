@@ -1,0 +1,99 @@
+// A playback as it is written (playback_payload.py) made into arrays, once; and what holds at an instant of it.
+
+const LETTERS = { "-": [-1, true], 0: [0, true], 1: [1, true], 2: [2, true], 3: [3, true], m: [0, false], a: [1, false], b: [2, false], c: [3, false] };
+const SENSORS = ["nobody", "camera", "LiDAR", "camera and LiDAR"];
+const SIGNALS = ["off", "red", "red and yellow", "yellow", "green"];
+
+const running = (differences) => { let sum = 0; return differences.map((d) => (sum += d)); };
+
+// x, y of a line's points [m], from the differences in whole units.
+function unpackLine(told) {
+  const points = [];
+  let x = 0, y = 0;
+  for (let i = 0; i < told.length; i += 2) {
+    x += told[i];
+    y += told[i + 1];
+    points.push([x / data.scale.road, y / data.scale.road]);
+  }
+  return points;
+}
+
+function unpack(kept) {
+  if (kept.x) return kept;
+  const n = kept.n_steps, { series } = kept, scale = data.scale;
+  const one = (name) => unpackSeries(series[name], n, scale[name]);
+  const all = (name) => series[name].map((runs) => unpackSeries(runs, n, scale[name]));
+  for (const name of "xyhv") kept[name] = all(name);
+  kept.a = series.a ? all("a") : null;
+  kept.distance = one("distance");
+  kept.ttc = series.ttc ? one("ttc") : null;
+  if (kept.sensed) kept.sensed = unpackSensed(kept.sensed, n);
+  if (kept.course) kept.course = unpackCourse(kept.course, n);
+  return kept;
+}
+
+// Which entry of an ascending list holds at each of n instants: the last that is not later; -1 before the first.
+function holding(steps, n) {
+  const at = new Int32Array(n).fill(-1);
+  steps.forEach((k, i) => at.fill(i, k));
+  return at;
+}
+
+function unpackSensed(told, n) {
+  const steps = running(told.steps), scale = data.scale;
+  const entities = told.entities.map(({ seen, numbers, taken_for }) => {
+    const kinds = new Map(taken_for);
+    let next = 0;
+    return [...seen].map((letter) => {
+      const [by, counts] = LETTERS[letter];
+      if (by <= 0) return { by, counts };
+      const i = next++;
+      const [dx, dy, dh, length, width, confidence] = numbers.map((column) => column[i]);
+      return {
+        by, counts, dx: dx / scale.length, dy: dy / scale.length, dh: dh / scale.h, length: length / scale.length,
+        width: width / scale.width, confidence: confidence / scale.confidence, kind: kinds.has(i) ? told.kinds[kinds.get(i)] : null,
+      };
+    });
+  });
+  return { steps, frame: holding(steps, n), entities, tolerance: told.tolerance };
+}
+
+function unpackCourse(told, n) {
+  const steps = running(told.steps), p = steps.length, scale = data.scale;
+  const held = (changes, nothing) => {
+    const values = new Array(p).fill(nothing);
+    changes.forEach(([i, ...value]) => values.fill(value, i));
+    return values;
+  };
+  return {
+    steps, at: holding(steps, n), ways: told.ways.map(unpackLine),
+    way: held(told.way, [-1]).map(([number]) => number),
+    station: unpackSeries(told.station, p, scale.station),
+    acceleration: unpackSeries(told.acceleration, p, scale.a),
+    shift: held(told.shift, [0, 0, 0, 0]),
+  };
+}
+
+// What the ego's sensors made of an entity in the latest frame; null where nobody asks, or where it is
+// too far away for a miss to count.
+function detectionAt(kept, e, index) {
+  const frame = kept.sensed?.frame[index] ?? -1;
+  const found = frame < 0 ? null : kept.sensed.entities[e][frame];
+  if (!found || found.by < 0 || (found.by === 0 && !found.counts)) return null;
+  if (found.by === 0) return { status: "missed" };
+  const k = kept.sensed.steps[frame], body = kept.entities[e], h = kept.h[e][k];
+  const [cx, cy] = boxCentre(body, kept.x[e][k], kept.y[e][k], h);
+  const off = Math.hypot(found.dx, found.dy);
+  return {
+    status: off > kept.sensed.tolerance ? "displaced" : "seen", off, sensor: SENSORS[found.by], kind: found.kind, counts: found.counts,
+    confidence: found.confidence, x: cx + found.dx, y: cy + found.dy, h: h + found.dh, length: found.length, width: found.width, truth: [cx, cy],
+  };
+}
+
+function lightAt(lamp, index) {
+  return lamp.changes.reduce((now, [k, to]) => (k <= index ? to : now), 0);
+}
+
+function weatherAt(kept, index) {
+  return kept.weather.reduce((now, one) => (one.step <= index ? one : now), null);
+}

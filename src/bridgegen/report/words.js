@@ -1,0 +1,51 @@
+// The moment in words: for who cannot see the picture, and for who wants to copy it.
+
+function weatherWords(weather) {
+  const { sun, visual_range: range, rain, snow, friction } = weather, words = [];
+  const degrees = (sun * 180) / Math.PI;
+  words.push(degrees < -6 ? "night" : degrees < 0 ? "dusk" : "day");
+  if (range < 1000) words.push(`fog, visibility ${number(range, 2)} m`);
+  else if (range < 5000) words.push(`haze, visibility ${number(range / 1000, 2)} km`);
+  if (rain > 0) words.push(`rain ${number(rain, 2)} mm/h`);
+  if (snow > 0) words.push(`snow ${number(snow, 2)} mm/h`);
+  if (friction < 0.95) words.push(`friction ${Math.round(friction * 100)} % of dry`);
+  return words.join(", ");
+}
+
+function detectionWords(found) {
+  if (!found) return "";
+  if (found.status === "missed") return "missed";
+  const off = found.status === "displaced" ? `seen ${found.off.toFixed(1)} m off` : "seen";
+  return found.kind ? `${off}, as ${found.kind}` : off;
+}
+
+function intentionWords(kept, state) {
+  const meant = intentionAt(kept, state);
+  if (!meant || meant.planned === null) return "";
+  if (meant.stands && state.entities[0].v < 0.05) return "it plans to stand";
+  if (meant.stands) return `it plans to stop in ${meant.standsIn.toFixed(1)} s`;
+  const a = meant.planned;
+  return Math.abs(a) < 0.05 ? "it plans to hold its speed" : `it plans to ${a < 0 ? "brake" : "speed up"} at ${Math.abs(a).toFixed(1)} m/s²`;
+}
+
+// All that the picture and the curves show now, in sentences.
+function stateWords(kept, state) {
+  const value = (v, unit, places) => (v === null || v === undefined ? "none" : `${v.toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−")} ${unit}`);
+  const told = [`${state.time.toFixed(2)} s`];
+  const [ego] = state.entities;
+  if (kept.contacts.some((k) => state.index >= k && state.index < k + 1 / kept.time_step)) told.push("collision");
+  told.push(`${ego.name} ${value(ego.v, "m/s", 1)}, acceleration ${value(state.a?.[0], "m/s²", 1)}`);
+  const plans = intentionWords(kept, state);
+  if (plans) told.push(plans);
+  told.push(`gap ${value(state.distance, "m", 2)}, time to collision ${value(state.ttc, "s", 1)}`);
+  for (const e of playersOf(kept)) {
+    const s = state.entities[e];
+    if (e === 0 || !isPlaced(s)) continue;
+    const seen = detectionWords(detectionAt(kept, e, state.index));
+    told.push(`${s.name} ${value(s.v, "m/s", 1)}${seen ? `, ${seen}` : ""}`);
+  }
+  for (const lamp of kept.lamps) told.push(`light ${lamp.name} ${SIGNALS[lightAt(lamp, state.index)] ?? "other"}`);
+  const weather = weatherAt(kept, state.index);
+  if (weather) told.push(weatherWords(weather));
+  return `${told.join("; ")}.`;
+}
