@@ -11,13 +11,26 @@ if TYPE_CHECKING:
     from bridgegen.campaign import Run, resume, run_search
     from bridgegen.comparison import Comparison, compare
     from bridgegen.odd.reader import load
+    from bridgegen.reproduction import Reproduction, reproduce
     from bridgegen.simulate import simulate_file
 
-__all__ = ["Comparison", "Run", "compare", "load", "resume", "run_search", "simulate_file"]
+__all__ = [
+    "Comparison",
+    "Reproduction",
+    "Run",
+    "compare",
+    "load",
+    "reproduce",
+    "resume",
+    "run_search",
+    "simulate_file",
+]
 
 _HOMES = {
     "Comparison": "bridgegen.comparison",
     "compare": "bridgegen.comparison",
+    "Reproduction": "bridgegen.reproduction",
+    "reproduce": "bridgegen.reproduction",
     "Run": "bridgegen.campaign",
     "load": "bridgegen.odd.reader",
     "resume": "bridgegen.campaign",

@@ -62,6 +62,7 @@ def compare(
     causes: bool = False,
     cause: str | None = None,
     adversary: str | None = None,
+    deliver: bool = True,
     watch: Watch | None = None,
 ) -> Comparison:
     """Run algorithms on scenarios with several seeds, and say which is better at what.
@@ -98,6 +99,7 @@ def compare(
         causes: whether to find the cause of each critical scenario; takes longer.
         cause: the only one that counts.
         adversary: the participant that an adversary drives, with every algorithm.
+        deliver: whether to write tables, figures and page; the same call with True does it later.
         watch: told how it is getting on.
 
     Returns:
@@ -144,7 +146,7 @@ def compare(
     done: list[str] = []
     try:
         failures = _run(plan, jobs or _cores(), watch, done)
-        return _conclude(plan, failures, watch)
+        return _conclude(plan, failures, watch, deliver=deliver)
     except KeyboardInterrupt:
         raise Interrupted(
             plan.out, len(done), len(plan.cells), what="runs", command=plan.command()
@@ -185,8 +187,10 @@ def _run(plan: Plan, jobs: int, watch: Watch, done: list[str]) -> dict[Cell, str
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
 
 
-def _conclude(plan: Plan, failures: Mapping[Cell, str], watch: Watch) -> Comparison:
-    """Read the runs, measure and test them, and write it all."""
+def _conclude(
+    plan: Plan, failures: Mapping[Cell, str], watch: Watch, *, deliver: bool
+) -> Comparison:
+    """Read the runs, measure and test them, and write it all if that is wanted."""
     watch.stage("read")
     gaps, records = dict(failures), {}
     spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
@@ -210,10 +214,11 @@ def _conclude(plan: Plan, failures: Mapping[Cell, str], watch: Watch) -> Compari
     values = {cell: row for one in measured.values() for cell, row in one.values.items()}
     kinds = measures(plan.budget)
     lines = summarise(values, plan.scenarios, list(plan.algorithms), plan.baseline, kinds)
-    write_tables(plan, records, values, gaps, lines, kinds)
     result = Comparison(plan, records, measured, gaps, lines, kinds)
-    watch.stage("draw")
-    write_page(result)
+    if deliver:
+        write_tables(plan, records, values, gaps, lines, kinds)
+        watch.stage("draw")
+        write_page(result)
     return result
 
 

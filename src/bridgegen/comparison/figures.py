@@ -1,58 +1,16 @@
 """The figures of a comparison, drawn by matplotlib in colours that the colour-blind can tell."""
 
-import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.comparison.drawing import Theme, canvas, png
 from bridgegen.comparison.statistics import quartiles
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 """Of lines; the next one begins when the colours begin again."""
-
-WIDTH = 5.4
-"""[inches]: text of nine points can be read where a phone shows the figure at 350 pixels."""
-
-DPI = 180
-
-
-@dataclass(frozen=True)
-class Theme:
-    """What a figure is drawn in.
-
-    Attributes:
-        paper: behind it.
-        ink: text, and the baseline.
-        muted: axes.
-        grid: behind the data.
-        colours: of the other algorithms.
-    """
-
-    paper: str
-    ink: str
-    muted: str
-    grid: str
-    colours: tuple[str, ...]
-
-
-LIGHT = Theme(
-    "#ffffff", "#17202c", "#566273", "#e4e9f0",
-    ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
-)  # fmt: skip
-"""Okabe and Ito's colours (2008), without yellow, which white paper swallows, and black."""
-
-DARK = Theme(
-    "#171e27", "#e7ecf3", "#9ba8b8", "#2c3643",
-    ("#3d9fe0", "#ff7f3f", "#1fc796", "#e39ac6", "#f2b73a", "#a5d8f5"),
-)  # fmt: skip
-"""The same hues, lighter."""
 
 
 def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme) -> bytes:
@@ -65,7 +23,7 @@ def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme)
         theme: what to draw in.
     """
     names = list(samples)
-    figure, axes = _figure(0.9 + 0.34 * len(names), theme)
+    figure, axes = canvas(0.9 + 0.34 * len(names), theme)
     for row, (name, colour, _) in enumerate(_looks(names, baseline, theme)):
         values = samples[name]
         if not len(values):
@@ -83,7 +41,7 @@ def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlabel(label)
     axes.grid(axis="x", color=theme.grid, linewidth=0.8)
-    return _png(figure)
+    return png(figure)
 
 
 def curves(
@@ -107,7 +65,7 @@ def curves(
             the evaluations, so that ends that differ little can be told apart.
     """
     names = [name for name in samples if len(samples[name])]
-    figure, axes = _figure(3.1 + 0.2 * -(-len(names) // 4), theme)
+    figure, axes = canvas(3.1 + 0.2 * -(-len(names) // 4), theme)
     for name, colour, style in _looks(list(samples), baseline, theme):
         if name not in names:
             continue
@@ -130,7 +88,7 @@ def curves(
         )
         for text in legend.get_texts():
             text.set_color(theme.ink)
-    return _png(figure)
+    return png(figure)
 
 
 def _looks(names: Sequence[str], baseline: str, theme: Theme) -> list[tuple[str, str, Any]]:
@@ -141,28 +99,3 @@ def _looks(names: Sequence[str], baseline: str, theme: Theme) -> list[tuple[str,
         hue, style = k % len(theme.colours), k // len(theme.colours) % len(STYLES)
         looks[name] = (theme.colours[hue], STYLES[style])
     return [(name, *looks[name]) for name in names]
-
-
-def _figure(height: float, theme: Theme) -> "tuple[Figure, Axes]":
-    from matplotlib.figure import Figure
-
-    # Not pyplot's: nothing here touches the settings or the figures of whoever calls.
-    figure = Figure((WIDTH, height), dpi=DPI, facecolor=theme.paper, layout="constrained")
-    axes = figure.add_subplot(facecolor=theme.paper)
-    axes.tick_params(colors=theme.muted, labelsize=9)
-    axes.xaxis.label.set(color=theme.ink, fontsize=9.5)
-    axes.yaxis.label.set(color=theme.ink, fontsize=9.5)
-    for name, spine in axes.spines.items():
-        spine.set_color(theme.muted)
-        spine.set_visible(name in ("left", "bottom"))
-    axes.set_axisbelow(True)
-    return figure, axes
-
-
-def _png(figure: "Figure") -> bytes:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()

@@ -10,6 +10,7 @@ from importlib.resources import files
 import numpy as np
 
 from bridgegen.comparison import figures, words
+from bridgegen.comparison.drawing import DARK, LIGHT
 from bridgegen.comparison.measures import Measure, ordinal, waited_for
 from bridgegen.comparison.plan import RUNS, Cell
 from bridgegen.comparison.record import points
@@ -161,7 +162,7 @@ def _figures(comparison: Comparison, scenario: str) -> str:
     at = points(plan.budget).tolist()
     band = "Median over the runs, and the band between the quartiles"
     drawn = []
-    for theme in (figures.LIGHT, figures.DARK):
+    for theme in (LIGHT, DARK):
         critical = figures.curves(found, at, plan.baseline, "critical scenarios", theme)
         volume = figures.curves(volumes, at, plan.baseline, "hypervolume", theme, from_zero=False)
         drawn.append((figures.boxes(shares, plan.baseline, "R_critic", theme), critical, volume))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _STAGES = {"read": "reading the runs", "draw": "drawing"}
 
 
-class ComparisonScreen(Live):
-    """A comparison's live progress: evaluations of all runs, runs that have ended."""
+class RunsScreen(Live):
+    """The live progress of many runs: evaluations of all, runs that have ended."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -25,27 +25,20 @@ class ComparisonScreen(Live):
         self._evaluations: dict[str, int] = {}
         self._before = 0
 
-    @property
-    def watch(self) -> "Watch":
-        """The callbacks for a comparison."""
-        from bridgegen.comparison import Watch
-
-        return Watch(
-            compile=self.say_compiling, batch=self._batch, ended=self._end, begun=self._begin,
-            stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
-        )  # fmt: skip
-
-    def _begin(self, plan: "Plan", ended: int, made: int) -> None:
-        self._runs, self._ended, self._before = len(plan.cells), ended, made
-        self._budget = plan.budget
-        self._total = made + (self._runs - ended) * plan.budget
+    def begin(self, runs: int, budget: int, ended: int, made: int) -> None:
+        """Begin with so many runs, of which some have ended, with that many evaluations."""
+        self._runs, self._ended, self._before = runs, ended, made
+        self._budget = budget
+        self._total = made + (runs - ended) * budget
         self._show()
 
-    def _batch(self, name: str, evaluations: int) -> None:
+    def batch(self, name: str, evaluations: int) -> None:
+        """Show that a run has so many evaluations."""
         self._evaluations[name] = evaluations
         self._show()
 
-    def _end(self, name: str, failure: str | None) -> None:
+    def end(self, name: str, failure: str | None) -> None:
+        """Show that a run has ended, or why it failed."""
         self._ended += 1
         if failure is not None:
             self._failed += 1
@@ -59,6 +52,23 @@ class ComparisonScreen(Live):
         if self._failed:
             facts += f", {self._failed} failed"
         self.show(what="", done=made, total=self._total, facts=facts)
+
+
+class ComparisonScreen(RunsScreen):
+    """A comparison's live progress."""
+
+    @property
+    def watch(self) -> "Watch":
+        """The callbacks for a comparison."""
+        from bridgegen.comparison import Watch
+
+        return Watch(
+            compile=self.say_compiling, batch=self.batch, ended=self.end, begun=self._begin,
+            stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
+        )  # fmt: skip
+
+    def _begin(self, plan: "Plan", ended: int, made: int) -> None:
+        self.begin(len(plan.cells), plan.budget, ended, made)
 
 
 def print_comparison(comparison: "Comparison", seconds: float) -> None:

@@ -1,0 +1,61 @@
+"""The command that reproduces the paper's evaluation."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli import options
+from bridgegen.cli.app import app
+from bridgegen.errors import InputError
+
+
+@app.command()
+def reproduce(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="One seed of everything, in a minute or two.")
+    ] = False,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            help="Runs of each method in each scenario, with the seeds 0, 1, 2 …",
+            show_default="10",
+        ),
+    ] = None,
+    iterations: Annotated[
+        int, typer.Option(help="Of each run, 40 evaluations each; the paper's are 25.")
+    ] = 25,
+    scenarios: Annotated[
+        str | None,
+        typer.Option(help="Which of crossroads-s1 to -s4, S4 among them.", show_default="all"),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="Runs at a time.", show_default="one on each core")
+    ] = None,
+    road_map: options.RoadMap = None,
+    junction: options.Junction = None,
+    out: Annotated[
+        Path, typer.Option(help="The reproduction's folder; one that was stopped goes on.")
+    ] = Path("reproduction"),
+) -> None:
+    """Make the paper's evaluation, Section V, again: tables, figures and a page."""
+    if quick and seeds is not None:
+        raise InputError(f"--quick is one seed; leave out --seeds {seeds}, or --quick")
+    from bridgegen import reproduction
+    from bridgegen.screen.reproduction import ReproductionScreen, print_reproduction
+
+    chosen = {} if scenarios is None else {"scenarios": options.read_names(scenarios)}
+    with ReproductionScreen() as screen:
+        result = reproduction.reproduce(
+            seeds=1 if quick else 10 if seeds is None else seeds,
+            iterations=iterations,
+            **chosen,
+            jobs=jobs,
+            road_map=road_map,
+            junction=junction,
+            out=out,
+            watch=screen.watch,
+        )
+    print_reproduction(result, screen.seconds)
+    if result.gaps:
+        raise typer.Exit(1)

@@ -1,0 +1,58 @@
+"""Why critical scenarios with the reference driver are critical, as bars."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from bridgegen.cause import CAUSES
+from bridgegen.comparison.drawing import Theme
+from bridgegen.reproduction.figures.look import SIZE, legend, panels, title_of
+from bridgegen.reproduction.perception import Causes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_HATCHES = ("", "////", "....", "xx")
+
+
+def causes(found: Sequence[Causes], theme: Theme) -> "Figure":
+    """Draw, for each scenario and method, the shares of the causes of all critical scenarios."""
+    from matplotlib.patches import Patch
+
+    figure, (axes,) = panels(1, 0.9 + 0.21 * max(len(found), 3), theme)
+    axes.grid(visible=False, axis="y")
+    colours = (theme.colours[0], theme.colours[4], theme.colours[5], theme.grid)
+    place, places, names = 0.0, [], []
+    last = None
+    for one in found:
+        if last is not None and one.scenario != last:
+            place += 0.6
+        last, left = one.scenario, 0.0
+        for count, colour, hatch in zip(one.by_cause, colours, _HATCHES, strict=True):
+            if count:
+                width = 100.0 * count / one.critical
+                axes.barh(place, width, left=left, height=0.74, color=colour, hatch=hatch,
+                          edgecolor=theme.muted, linewidth=0.6)  # fmt: skip
+                left += width
+        axes.text(101.5, place, f"{one.critical:,} of {one.evaluations:,}", va="center",
+                  fontsize=SIZE - 0.5, color=theme.ink)  # fmt: skip
+        places.append(place)
+        names.append(f"S{one.scenario[-1]}  {title_of(one.algorithm)}")
+        place += 1.0
+    axes.set_yticks(places, names, color=theme.ink)
+    axes.set_ylim(max(place - 0.4, 0.6), -0.6)
+    axes.set_xlim(0, 118)
+    axes.set_xticks(range(0, 101, 20))
+    axes.set_xlabel(
+        "share of the critical scenarios [%]; beside: how many, of how many evaluations"
+    )
+    words = ("perception: vanish when it is ideal", "planning", "control", "unavoidable")
+    legend(
+        figure,
+        [
+            Patch(facecolor=colour, hatch=hatch, edgecolor=theme.muted, label=word)
+            for colour, hatch, word in zip(colours, _HATCHES, words, strict=True)
+        ],
+        theme,
+    )
+    assert len(words) == len(CAUSES)
+    return figure

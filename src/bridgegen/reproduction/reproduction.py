@@ -1,0 +1,302 @@
+"""The reproduction from start to finish: run what is missing, read, test, draw, write."""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridgegen.cause import CAUSES
+from bridgegen.comparison.comparison import Watch as ComparisonWatch
+from bridgegen.comparison.comparison import compare
+from bridgegen.comparison.plan import RUNS, Cell
+from bridgegen.comparison.result import Comparison
+from bridgegen.comparison.runs import evaluations_of
+from bridgegen.disk import write_whole
+from bridgegen.errors import InputError, Interrupted, StorageError
+from bridgegen.reproduction import paper
+from bridgegen.reproduction.claims import judge, of_fronts
+from bridgegen.reproduction.document import FIGURES, TABLES, Document, Picture, markdown
+from bridgegen.reproduction.page import html
+from bridgegen.reproduction.perception import causes_of, paired_of
+from bridgegen.reproduction.pictures import pictures
+from bridgegen.reproduction.protocol import PARTS, PRINTED, Part, Protocol, make_protocol
+from bridgegen.reproduction.results import of_run, results_of
+from bridgegen.reproduction.runs import Run, read_run
+from bridgegen.reproduction.story import RUNS_FILE, Found, in_short, tell
+from bridgegen.reproduction.table import to_csv, to_latex, to_markdown
+
+MARK, PAGE, README, TIMES_FILE = "reproduction.json", "index.html", "README.md", "times.csv"
+
+NUMBERS = (
+    "r_critic", "evaluations_to_k", "avg_d_min", "median_d_min", "avg_v_d", "median_v_d",
+    "avg_fitness", "median_fitness",
+)  # fmt: skip
+TIMES = ("seconds_to_k", "runtime")
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who wants to know how a reproduction is getting on.
+
+    Attributes:
+        begun: told the protocol, how many of its runs have ended already, and their evaluations.
+        compile: told that the simulator is being compiled, maybe.
+        batch: told a run's name and its evaluations so far.
+        ended: told a run's name, and why it failed if it did.
+        stage: told what begins when the runs are done: "read", "draw".
+    """
+
+    begun: Callable[[Protocol, int, int], None] = lambda protocol, ended, made: None
+    compile: Callable[[], None] = lambda: None
+    batch: Callable[[str, int], None] = lambda name, evaluations: None
+    ended: Callable[[str, str | None], None] = lambda name, failure: None
+    stage: Callable[[str], None] = lambda stage: None
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What a reproduction came to.
+
+    Attributes:
+        folder: of all its files.
+        found: the numbers.
+        document: what was written.
+    """
+
+    folder: Path
+    found: Found
+    document: Document
+
+    @property
+    def page(self) -> Path:
+        """What to open first."""
+        return self.folder / PAGE
+
+    @property
+    def in_short(self) -> list[tuple[str, str]]:
+        """What was found, in sentences, each with a few words before it."""
+        return in_short(self.found)
+
+    @property
+    def gaps(self) -> Mapping[tuple[str, Cell], str]:
+        """Why runs failed, by part's name and run."""
+        return self.found.gaps
+
+
+def reproduce(
+    *,
+    seeds: int = 10,
+    iterations: int = paper.ITERATIONS,
+    scenarios: Iterable[str] = paper.SCENARIOS,
+    out: Path | str = "reproduction",
+    jobs: int | None = None,
+    road_map: Path | str | None = None,
+    junction: str | None = None,
+    watch: Watch | None = None,
+) -> Reproduction:
+    """Run the paper's evaluation, Section V, and write it down beside the paper's numbers.
+
+    Three comparisons' folders under ``out``: Section V as printed, the same with the reference
+    driver and its perception, and the random scenarios again with ideal perception. Then tables,
+    figures, ``README.md`` and ``index.html``. Killed at any moment and called again, it goes on;
+    called with more seeds, it makes those runs besides.
+
+    Args:
+        seeds: runs of each method in each scenario, with the seeds 0, 1, 2 …
+        iterations: of each run, of 40 evaluations; the paper's are 25.
+        scenarios: of ``paper.SCENARIOS``; S4 must be among them.
+        out: the folder.
+        jobs: runs at a time; as many as there are cores by default. No result depends on it.
+        road_map: a map to run on, CARLA's Town05 as in the paper, say; a generated crossroads by
+            default.
+        junction: which junction of the map.
+        watch: told how it is getting on.
+
+    Returns:
+        The reproduction. A run that failed is a gap in it; PPO is missing where its packages are.
+
+    Raises:
+        InputError: anything that the arguments say wrongly.
+        StorageError: the folder holds something else, is being written, or cannot be.
+        Interrupted: Ctrl-C; every run keeps what it has done.
+    """
+    watch = watch or Watch()
+    if jobs is not None and jobs < 1:
+        raise InputError(f"1 <= jobs must hold, got {jobs}")
+    protocol = make_protocol(
+        seeds=seeds,
+        iterations=iterations,
+        scenarios=tuple(scenarios),
+        out=Path(out),
+        road_map=None if road_map is None else Path(road_map).resolve(),
+        junction=junction,
+    )
+    _begin(protocol)
+    done: set[str] = set()
+    comparisons: dict[str, Comparison] = {}
+    try:
+        _tell_begun(protocol, watch, done)
+        for part in PARTS:
+            seen = _watch_part(part, watch, done)
+            arguments = protocol.arguments(part)
+            comparisons[part.name] = compare(**arguments, jobs=jobs, deliver=False, watch=seen)
+        watch.stage("read")
+        found = _read(protocol, comparisons)
+        watch.stage("draw")
+        document = tell(found, pictures(found, comparisons[PRINTED.name]))
+        _write(found, document)
+    except (KeyboardInterrupt, Interrupted):
+        total = sum(1 for _ in protocol.cells())
+        raise Interrupted(
+            protocol.out, len(done), total, what="runs", command=protocol.command()
+        ) from None
+    return Reproduction(protocol.out, found, document)
+
+
+def _begin(protocol: Protocol) -> None:
+    """Make the folder, or find that it holds a reproduction.
+
+    Raises:
+        StorageError: it holds something else, or cannot be used.
+    """
+    out = protocol.out
+    try:
+        if out.exists() and not (out / MARK).exists() and any(out.iterdir()):
+            raise StorageError(
+                f"{out}: is not empty and holds no reproduction, so it is left alone; choose "
+                "another --out"
+            )
+        for folder in (out, out / TABLES, out / FIGURES):
+            folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{out}: cannot be used: {error.strerror}") from None
+    mark = {"reproduction": "Section V", "parts": [part.name for part in PARTS]}
+    write_whole(out / MARK, [json.dumps(mark, indent=1).encode()])
+
+
+def _tell_begun(protocol: Protocol, watch: Watch, done: set[str]) -> None:
+    made = 0
+    for part, cell in protocol.cells():
+        try:
+            evaluations, is_ended = evaluations_of(protocol.run_folder(part, cell))
+        except StorageError:
+            continue  # the comparison tells of it
+        if is_ended:
+            done.add(_name(part, cell.name))
+            made += evaluations
+    watch.begun(protocol, len(done), made)
+
+
+def _watch_part(part: Part, watch: Watch, done: set[str]) -> ComparisonWatch:
+    """Return who watches one comparison, and passes on what it is told under the part's name."""
+
+    def ended(name: str, failure: str | None) -> None:
+        done.add(_name(part, name))
+        watch.ended(_name(part, name), failure)
+
+    return ComparisonWatch(
+        compile=watch.compile,
+        batch=lambda name, evaluations: watch.batch(_name(part, name), evaluations),
+        ended=ended,
+    )
+
+
+def _name(part: Part, run: str) -> str:
+    return f"{part.name}/{run}"
+
+
+def _read(protocol: Protocol, comparisons: Mapping[str, Comparison]) -> Found:
+    """Read every run, and work out all that is told of them."""
+    runs: dict[tuple[str, Cell], Run] = {}
+    gaps: dict[tuple[str, Cell], str] = {}
+    for part, cell in protocol.cells():
+        key = (part.name, cell)
+        why = comparisons[part.name].gaps.get(cell)
+        if why is not None:
+            gaps[key] = why
+            continue
+        name = f"{part.name}/{RUNS}/{cell.name}"
+        replay = f"replay/{part.name}/{cell.name}"
+        try:
+            runs[key] = read_run(protocol.run_folder(part, cell), name, replay)
+        except StorageError as error:
+            gaps[key] = str(error)
+    results = {name: results_of(protocol, runs, name) for name in protocol.scenarios}
+    measured = comparisons[PRINTED.name].measured
+    fronts = {
+        name: of_fronts(measured[name], protocol.algorithms) if name in measured else {}
+        for name in protocol.scenarios
+    }
+    return Found(
+        protocol=protocol,
+        runs=runs,
+        gaps=gaps,
+        results=results,
+        verdicts={name: judge(results[name], fronts[name]) for name in protocol.scenarios},
+        causes=causes_of(protocol, runs),
+        paired=paired_of(protocol, runs),
+    )
+
+
+def _write(found: Found, document: Document) -> None:
+    """Write all files; those that hold no seconds are the same bytes every time."""
+    out = found.protocol.out
+    for shown in document.tables():
+        table = shown.table
+        for ending, text in (
+            ("md", f"# {table.title}\n\n{to_markdown(table)}"),
+            ("csv", to_csv(table)),
+            ("tex", to_latex(table)),
+        ):
+            write_whole(out / TABLES / f"{table.name}.{ending}", [text.encode()])
+    for picture in document.pictures():
+        _write_picture(out / FIGURES, picture)
+    k = found.main.k
+    write_whole(out / RUNS_FILE, [_csv(_runs(found, k)).encode()])
+    write_whole(out / TIMES_FILE, [_csv(_times(found, k)).encode()])
+    write_whole(out / README, [markdown(document).encode()])
+    write_whole(out / PAGE, [html(document).encode()])
+
+
+def _write_picture(folder: Path, picture: Picture) -> None:
+    write_whole(folder / f"{picture.name}.png", [picture.light])
+    write_whole(folder / f"{picture.name}.pdf", [picture.pdf])
+
+
+def _csv(rows: Iterable[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for row in rows:
+        writer.writerow(
+            ["" if isinstance(value, float) and value != value else value for value in row]
+        )
+    return text.getvalue()
+
+
+def _cells(found: Found) -> Iterator[tuple[Part, Cell, Run]]:
+    for part, cell in found.protocol.cells():
+        if (part.name, cell) in found.runs:
+            yield part, cell, found.runs[part.name, cell]
+
+
+def _runs(found: Found, k: int) -> Iterator[Sequence[object]]:
+    labels = [cause.label for cause in CAUSES]
+    yield ("part", "scenario", "algorithm", "seed", "evaluations", "critical", *NUMBERS, *labels,
+           "folder", "command")  # fmt: skip
+    for part, cell, run in _cells(found):
+        numbers = of_run(run, k)
+        yield (
+            part.name, cell.scenario, cell.algorithm, cell.seed, len(run.critical), len(run.hits),
+            *(numbers[name] for name in NUMBERS),
+            *(int((run.cause == cause).sum()) if part.causes else "" for cause in CAUSES),
+            run.folder, run.command,
+        )  # fmt: skip
+
+
+def _times(found: Found, k: int) -> Iterator[Sequence[object]]:
+    yield ("part", "scenario", "algorithm", "seed", *TIMES)
+    for part, cell, run in _cells(found):
+        numbers = of_run(run, k)
+        yield (part.name, cell.scenario, cell.algorithm, cell.seed, *(numbers[n] for n in TIMES))

@@ -1,0 +1,45 @@
+"""A reproduction: one bar for all its runs, then what it came to."""
+
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from bridgegen.screen.comparison import RunsScreen
+
+if TYPE_CHECKING:
+    from bridgegen.reproduction import Reproduction, Watch
+    from bridgegen.reproduction.protocol import Protocol
+
+_STAGES = {"read": "reading the runs", "draw": "drawing"}
+
+
+class ReproductionScreen(RunsScreen):
+    """A reproduction's live progress: evaluations of all runs, runs that have ended."""
+
+    @property
+    def watch(self) -> "Watch":
+        """The callbacks for a reproduction."""
+        from bridgegen.reproduction import Watch
+
+        return Watch(
+            begun=self._begin, compile=self.say_compiling, batch=self.batch, ended=self.end,
+            stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
+        )  # fmt: skip
+
+    def _begin(self, protocol: "Protocol", ended: int, made: int) -> None:
+        self.begin(sum(1 for _ in protocol.cells()), protocol.budget, ended, made)
+
+
+def print_reproduction(result: "Reproduction", seconds: float) -> None:
+    """Print what was found in sentences, and where the files are."""
+    console = Console(markup=False, emoji=False, highlight=False)
+    for title, text in result.in_short:
+        console.print(f"{title}: {text}\n")
+    for name, path in (
+        ("page", result.page),
+        ("tables", result.folder / "tables"),
+        ("figures", result.folder / "figures"),
+        ("runs", result.folder / "runs.csv"),
+    ):
+        print(f"{name:<10}{path}")
+    print(f"{'wall time':<10}{seconds:.1f} s")
