@@ -1,8 +1,10 @@
-"""Settings for the whole suite, and the strangers that judge our files."""
+"""Settings for the whole suite, the strangers that judge our files, and a browser for pages."""
 
 import importlib.util
 import os
+import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,3 +35,18 @@ def checkers() -> Any:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module.Checkers(Path(venv))
+
+
+OPTIONS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update"]
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("chromium is not installed")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
+        yield browser
+        browser.close()

@@ -1,13 +1,11 @@
 """A run that never happened, but could have: a left turn into the path of a crossing car.
 
-Besides, a scenario with something in every layer, and a browser to look at pages with.
+Besides, a scenario with something in every layer.
 """
 
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -219,20 +217,3 @@ def values(layered) -> dict[str, float]:
 @pytest.fixture(scope="session")
 def individuals(layered, values) -> Individuals:
     return build_individuals(layered, values, driver="route-follower")
-
-
-# -- a browser -------------------------------------------------------------------------------------
-
-OPTIONS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update"]
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("chromium is not installed")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
-        yield browser
-        browser.close()

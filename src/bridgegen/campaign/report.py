@@ -38,9 +38,27 @@ def write_run_report(
 
 
 def run_data(
-    pipeline: Pipeline, store: Store, settings: Settings, rows: Rows, kept: Sequence[Kept]
+    pipeline: Pipeline,
+    store: Store,
+    settings: Settings,
+    rows: Rows,
+    kept: Sequence[Kept],
+    *,
+    coverage: bool = True,
 ) -> ReportData:
-    """Return what the report of a run says; arguments and errors as for `write_run_report`."""
+    """Return what the report of a run says.
+
+    Args:
+        pipeline: the run's.
+        store: the run's.
+        settings: of the run.
+        rows: all of it, in order.
+        kept: what was handed over, most critical first.
+        coverage: whether to count what was covered.
+
+    Raises:
+        FileFormatError: the regions' file is not one.
+    """
     metric = store.metrics.index
     summary = summarise(
         rows.critical, rows.status == 0,
@@ -53,7 +71,7 @@ def run_data(
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
         command=settings.command(store.folder), finished=store.finished is not None,
         version=store.version, notes=store.notes, view=view_command(store.folder),
-        regions=read_record(store.folder / JSON_FILE),
+        regions=read_record(store.folder / JSON_FILE), coverage=coverage,
     )  # fmt: skip
 
 

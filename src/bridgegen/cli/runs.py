@@ -134,6 +134,26 @@ def resume(
 
 
 @app.command()
+def view(
+    run: Annotated[Path, typer.Argument(help="The folder of a run, which may still grow.")],
+    port: Annotated[int, typer.Option(help="On 127.0.0.1.", show_default="one that is free")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in your browser.")] = True,
+    evaluation: Annotated[
+        int | None, typer.Option(help="Show this evaluation's scenario, counted from 1.")
+    ] = None,
+    ego: options.OwnEgo = None,
+) -> None:
+    """Serve a run's report on this machine, live while the search goes on; any scenario plays."""
+    from bridgegen.screen.view import serve
+    from bridgegen.view.run_view import RunView
+    from bridgegen.view.server import Server
+
+    site = RunView(run, ego=ego)
+    fragment = "" if evaluation is None else site.fragment(evaluation)
+    serve(Server(site, port), browser=browser, fragment=fragment)
+
+
+@app.command()
 def coverage(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     bins: Annotated[

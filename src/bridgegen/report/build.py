@@ -45,6 +45,7 @@ def build_report(
     notes: Mapping[str, Any],
     view: str = "",
     regions: Mapping[str, Any] | None = None,
+    coverage: bool = True,
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -63,6 +64,7 @@ def build_report(
         notes: what the algorithm wants kept with the run.
         view: the command line that shows this run with the motion of every scenario, if there is.
         regions: the critical ones, as `regions.record` has them, if they are known.
+        coverage: whether to count what was covered.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
     terms = pipeline.objective.names
@@ -106,7 +108,7 @@ def build_report(
         head,
         _evaluations(pipeline, rows),
         playbacks(pipeline, rows, kept),
-        _coverage(pipeline, rows),
+        _coverage(pipeline, rows) if coverage else None,
         tables(notes, pipeline.space),
         regions,
     )

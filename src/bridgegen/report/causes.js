@@ -6,9 +6,22 @@ const CAUSE_HELP = [
 ];
 
 class Causes {
-  constructor({ labels, counts }, hook) {
-    this.labels = labels;
+  constructor(causes, hook) {
     this.chosen = null;
+    this.fill(causes);
+    $("causes").hidden = false;
+    hook.cause = (label) => this.choose(label === null ? null : this.labels.indexOf(label));
+    // It can be filtered by in the table and in the parallel coordinates as well.
+    document.addEventListener("filters", ({ detail }) => {
+      const range = detail.get("cause");
+      const i = range ? Math.round((range[0] + range[1]) / 2) : null;
+      this.show(range && range[1] - range[0] < 1 ? i : null);
+    });
+  }
+
+  fill({ labels, counts }) {
+    const focused = this.buttons?.find(([, button]) => button === document.activeElement)?.[0];
+    this.labels = labels;
     const total = counts.slice(1).reduce((a, b) => a + b, 0);
     const causes = labels.map((label, i) => i).slice(1);
     this.parts = causes.filter((i) => counts[i]).map((i) => {
@@ -26,14 +39,8 @@ class Causes {
     });
     $("causes-bar").replaceChildren(...this.parts.map(([, part]) => part));
     $("causes-list").replaceChildren(...this.buttons.map(([, button]) => element("li", {}, button)));
-    $("causes").hidden = false;
-    hook.cause = (label) => this.choose(label === null ? null : labels.indexOf(label));
-    // It can be filtered by in the table and in the parallel coordinates as well.
-    document.addEventListener("filters", ({ detail }) => {
-      const range = detail.get("cause");
-      const i = range ? Math.round((range[0] + range[1]) / 2) : null;
-      this.show(range && range[1] - range[0] < 1 ? i : null);
-    });
+    this.buttons.find(([i]) => i === focused)?.[1].focus();
+    this.show(this.chosen);
   }
 
   choose(i) {

@@ -67,16 +67,19 @@ function shareFigure() {
 
 function trendPlots() {
   const host = $("trend-plots");
-  const figures = Object.entries(data.batches.trends).map(([name, trend]) => [`${name} [${unitText(trend.unit)}]`, () => trendFigure(name, trend)]);
+  const figures = Object.entries(data.batches.trends).map(([name, trend]) => [`${name} [${unitText(trend.unit)}]`, () => trendFigure(name, data.batches.trends[name])]);
   figures.push(["critical share [%]", shareFigure]);
   return figures.map(([title, traces]) => {
     const plot = element("div", { class: "plot", role: "img", "aria-label": `${title} over the iterations` });
     host.append(element("div", { class: "card" }, element("h3", {}, title), plot));
-    const share = traces === shareFigure, top = Math.max(5, 110 * Math.max(...data.batches.share));
-    const last = data.batches.last.at(-1), whole = { range: [0.4, last + 0.6], ...(last < 12 ? { dtick: 1 } : {}) };
-    const xaxis = { title: { text: "iteration", standoff: 6 }, ...whole };
-    const axes = { xaxis, yaxis: { rangemode: "tozero", ...(share ? { range: [0, top] } : {}) } };
-    return [plot, () => Plotly.react(plot, traces(), layout({ ...axes, bargap: 0.15 }), CONFIG)];
+    const draw = () => {
+      const share = traces === shareFigure, top = Math.max(5, 110 * Math.max(...data.batches.share));
+      const last = data.batches.last.at(-1), whole = { range: [0.4, last + 0.6], ...(last < 12 ? { dtick: 1 } : {}) };
+      const xaxis = { title: { text: "iteration", standoff: 6 }, ...whole };
+      const axes = { xaxis, yaxis: { rangemode: "tozero", ...(share ? { range: [0, top] } : {}) } };
+      Plotly.react(plot, traces(), layout({ ...axes, bargap: 0.15 }), CONFIG);
+    };
+    return [plot, draw];
   });
 }
 
@@ -202,6 +205,7 @@ function drawCharts() {
     if (rows.telling.length) {
       const parallel = new Parallel($("parallel"));
       charts.set($("parallel"), () => parallel.draw());
+      window.bridgegen.grown = () => { parallel.rescale(); drawn.forEach((plot) => charts.get(plot)()); };
     }
     for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", drawScatter);
     $("swap").addEventListener("click", () => {

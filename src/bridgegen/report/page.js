@@ -75,10 +75,10 @@ function fillTable(body, rows) {
 }
 
 function fillSummary() {
-  const s = data.summary;
+  const s = data.summary; // another object once a served page has taken in what is new
   $("title").textContent = s.title;
   $("facts").replaceChildren(...s.facts.map((fact) => element("li", {}, fact)));
-  if (!s.finished) $("facts").append(element("li", { class: "warn" }, "not finished"));
+  if (!s.finished && !data.live) $("facts").append(element("li", { class: "warn" }, "not finished"));
   $("sentences").replaceChildren(...s.sentences.map((sentence) => element("p", {}, sentence)));
   $("description").textContent = s.description;
   $("description").hidden = !s.description;
@@ -86,8 +86,11 @@ function fillSummary() {
   const failed = data.rows.n_failed;
   fillTable($("settings"), failed ? [...s.provenance, ["Failed evaluations", `${failed}, counted but not drawn`]] : s.provenance);
   $("command").textContent = s.command;
-  $("copy-sentences").addEventListener("click", (event) => copy(s.sentences.join(" "), event.currentTarget));
-  $("copy-command").addEventListener("click", (event) => copy(s.command, event.currentTarget));
+}
+
+function connectSummary() {
+  $("copy-sentences").addEventListener("click", (event) => copy(data.summary.sentences.join(" "), event.currentTarget));
+  $("copy-command").addEventListener("click", (event) => copy(data.summary.command, event.currentTarget));
 }
 
 // ---- the chosen scenario ----
@@ -123,8 +126,10 @@ const showPicture = (() => {
   return (kept) => {
     $("made-of").hidden = kept.picture === null;
     if (kept.picture === null) return;
-    picture ??= new Picture($("layers"), data.pictures);
-    picture.show(data.pictures.pictures[kept.picture]);
+    const pictures = kept.pictures ?? data.pictures;
+    picture ??= new Picture($("layers"), pictures);
+    Object.assign(picture, { layers: pictures.layers, columns: pictures.columns });
+    picture.show(pictures.pictures[kept.picture]);
     $("made-of-title").textContent = `What scenario ${kept.name} is made of`;
   };
 })();
@@ -132,18 +137,20 @@ const showPicture = (() => {
 function start() {
   readPalette();
   fillSummary();
+  connectSummary();
   fillNotes(data.notes);
   $("coverage").hidden = !data.coverage?.parameters.length;
   if (!$("coverage").hidden) new Coverage(data.coverage);
   const hook = { data, state: () => null, charts: 0, chartsDrawn: 0, drawCharts };
   window.bridgegen = hook; // for tests, and for whoever wants to drive the page
   hook.filter = (name, low, high) => filters.set(name, low, high);
-  if (data.causes) new Causes(data.causes, hook);
+  const causes = data.causes ? new Causes(data.causes, hook) : null;
   if (data.regions) new Regions(data.regions);
   darkScheme.addEventListener("change", readPalette);
+  let table = null;
   if (rows.critical.includes(1) || data.kept.length) {
     const opener = new Opener(hook);
-    const table = new Table((i, play) => opener.row(i, play));
+    table = new Table((i, play) => opener.row(i, play));
     new TableTools(table);
     opener.begin();
     $("copy-no-motion").addEventListener("click", (event) => copy($("no-motion-command").textContent, event.currentTarget));
@@ -151,6 +158,15 @@ function start() {
   } else {
     $("kept").hidden = $("made-of").hidden = true;
     $("no-scenarios").hidden = false;
-    $("no-scenarios").textContent = "Nothing critical was found.";
+    $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.`;
   }
+  if (!data.live) return;
+  new Live(() => {
+    fillSummary();
+    causes?.fill(data.causes);
+    takeRegions();
+    table?.refill();
+    hook.grown?.();
+    document.dispatchEvent(new CustomEvent("filters", { detail: filters.ranges }));
+  });
 }

@@ -15,6 +15,7 @@ from bridgegen.report.payload import to_json
 
 SCRIPTS = (
     "common.js", "page.js", "regions.js", "filters.js", "causes.js", "notes.js", "playbacks.js",
+    "live.js",
     "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
     "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "scene.js",
     "curves.js", "picture.js", "player.js", "parallel.js", "charts.js", "coverage.js",
@@ -31,6 +32,7 @@ STYLES = (
     "table.css",
     "regions.css",
     "playback.css",
+    "live.css",
 )
 
 
@@ -42,8 +44,20 @@ def write_report(path: Path, data: ReportData) -> None:
     Raises:
         StorageError: the file cannot be written (no such folder, read-only, disk full).
     """
+    write_whole(Path(path), report_page(data))
+
+
+def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
+    """Return the report as HTML, in parts.
+
+    Args:
+        data: what it shows.
+        live: whether it is served by ``bridgegen view``, which it may ask for what is new.
+    """
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
-    write_page(Path(path), "page.html", SCRIPTS, title, to_json(data), plotly=_plotly())
+    connect = b"'self'" if live else b"'none'"
+    text = to_json(data, live=live)
+    return filled("page.html", SCRIPTS, title, text, plotly=_plotly(), connect=connect)
 
 
 def write_page(
@@ -55,19 +69,31 @@ def write_page(
     styles: Iterable[str] = STYLES,
     **more: bytes,
 ) -> None:
-    """Write a page, whole or not at all; what is put in is never searched for placeholders again.
+    """Write a page, whole or not at all; arguments as for `filled`.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    write_whole(path, filled(template, scripts, title, data, styles, **more))
+
+
+def filled(
+    template: str,
+    scripts: Iterable[str],
+    title: str,
+    data: str,
+    styles: Iterable[str] = STYLES,
+    **more: bytes,
+) -> list[bytes]:
+    """Return a page in parts; what is put in is never searched for placeholders again.
 
     Args:
-        path: where to.
         template: file of this folder.
         scripts: files of this folder.
         title: plain text.
         data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
         styles: files of this folder.
         more: of the template's other placeholders.
-
-    Raises:
-        StorageError: the file cannot be written.
     """
     fill = {
         "title": html.escape(title).encode("utf-8", "replace"),
@@ -77,7 +103,7 @@ def write_page(
         **more,
     }
     parts = re.split(rb"\{\{(\w+)\}\}", _own(template))
-    write_whole(path, [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)])
+    return [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
 
 
 @cache

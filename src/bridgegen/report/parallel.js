@@ -2,21 +2,29 @@
 
 const MOST_LINES = 1500;
 
+const least = (values) => values.reduce((a, b) => Math.min(a, b), Infinity);
+
 class Parallel {
   constructor(canvas) {
     this.canvas = canvas;
     const chosen = rows.columns.filter((c) => rows.telling.includes(c.name) || c.name in data.batches.trends);
-    this.axes = chosen.map((c) => this.axis(c.name, c.unit, c.values, c.low, c.high));
-    if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, 4), words: data.causes.labels });
-    this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
-    this.byName = new Map(this.axes.map((axis) => [axis.name, axis]));
+    this.names = chosen.map((column) => column.name);
+    this.rescale();
     this.connect();
     this.note();
   }
 
+  // The axes, as far as the rows go.
+  rescale() {
+    const chosen = this.names.map((name) => columns.get(name));
+    this.axes = chosen.map((c) => this.axis(c.name, c.unit, c.values, c.low, c.high));
+    if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, 4), words: data.causes.labels });
+    this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
+  }
+
   axis(name, unit, values, low, high) {
     const finite = values.filter((v) => v !== null);
-    const ends = [low ?? Math.min(...finite), high ?? Math.max(...finite)];
+    const ends = [low ?? least(finite), high ?? -least(finite.map((v) => -v))];
     if (!(ends[1] > ends[0])) ends[1] = ends[0] + 1;
     return { name, unit, values, low: ends[0], high: ends[1] };
   }

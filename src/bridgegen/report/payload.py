@@ -35,9 +35,14 @@ TRENDS = {"d_min": False, "v_d": True}
 """The metrics shown over iterations, and whether a larger one is worse."""
 
 
-def to_json(data: ReportData) -> str:
-    """Return the page's data as JSON that is safe inside a ``<script>`` element."""
-    return script_json(payload(data))
+def to_json(data: ReportData, *, live: bool = False) -> str:
+    """Return the page's data as JSON that is safe inside a ``<script>`` element.
+
+    Args:
+        data: what the page shows.
+        live: whether the page may ask the server that it comes from for what is new.
+    """
+    return script_json({**payload(data), "live": live})
 
 
 def script_json(value: Any) -> str:
@@ -53,7 +58,6 @@ def script_json(value: Any) -> str:
 
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
-    s = data.summary
     shown = _shown(data.evaluations, [playback.evaluation for playback in data.kept])
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
@@ -67,18 +71,7 @@ def payload(data: ReportData) -> dict[str, Any]:
             roads.append(road_payload(playback))
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
     return {
-        "summary": {
-            "title": s.title,
-            "description": s.description,
-            "facts": [s.scenario, s.road, f"ego {s.ego}", s.algorithm, f"seed {s.seed}"],
-            "finished": s.finished,
-            "sentences": sentences.sentences(data),
-            "table": sentences.summary_table(s),
-            "provenance": sentences.provenance(s),
-            "command": s.command,
-            "view": s.view,
-            "critical_distance": _number(s.critical_distance),
-        },
+        "summary": _summary(data),
         "rows": _rows(data.evaluations, shown),
         "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,
         "batches": _batches(data.evaluations),
@@ -92,6 +85,43 @@ def payload(data: ReportData) -> dict[str, Any]:
             for t in data.notes
         ],
         "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
+    }
+
+
+def news(data: ReportData, after: int) -> dict[str, Any]:
+    """Return what a page lacks that knows the first ``after`` evaluations.
+
+    Of the rows those that are new, and the ranks of all; or all of them anew, ``whole``, where a
+    long run is thinned. Everything else as it is now.
+    """
+    e = data.evaluations
+    shown = _shown(e, [])
+    whole = e.status.size > ROWS
+    new = shown if whole else shown & (np.arange(shown.size) >= after)
+    return {
+        "summary": _summary(data),
+        "whole": whole,
+        "rows": {**_rows(e, new), "rank": _ranks(e, shown)},
+        "batches": _batches(e),
+        "causes": _causes(e),
+        "regions": regions_payload(data.regions, e, shown) if data.regions else None,
+    }
+
+
+def _summary(data: ReportData) -> dict[str, Any]:
+    s = data.summary
+    return {
+        "title": s.title,
+        "description": s.description,
+        "facts": [s.scenario, s.road, f"ego {s.ego}", s.algorithm, f"seed {s.seed}"],
+        "finished": s.finished,
+        "budget": int(s.budget),
+        "sentences": sentences.sentences(data),
+        "table": sentences.summary_table(s),
+        "provenance": sentences.provenance(s),
+        "command": s.command,
+        "view": s.view,
+        "critical_distance": _number(s.critical_distance),
     }
 
 

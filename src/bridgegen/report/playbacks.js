@@ -2,24 +2,46 @@
 
 const SOURCES = {
   kept: "Handed over as files; play it",
+  served: "Play it: it is simulated when asked for",
   none: "Its motion is not in this page; show its figures, and the command that plays it",
 };
 
 class Playbacks {
   constructor() {
     this.keptAt = new Map(data.kept.map((kept, k) => [kept.evaluation, k]));
+    this.fetched = new Map();
   }
 
   // A key of SOURCES, or null where the motion is not to be had.
   source(evaluation) {
-    return this.keptAt.has(evaluation) ? "kept" : null;
+    if (this.keptAt.has(evaluation)) return "kept";
+    return data.live ? "served" : null;
   }
 
+  // Of one that was not handed over; null if it cannot be had after all.
   async get(evaluation) {
-    return data.kept[this.keptAt.get(evaluation)];
+    const playback = this.fetched.get(evaluation) ?? (await this.fetch(evaluation));
+    if (playback) this.fetched.set(evaluation, playback);
+    return playback;
+  }
+
+  async fetch(evaluation) {
+    try {
+      const told = await (await fetch(`motion/${evaluation}`)).json();
+      return told.playback ? taken(told) : null;
+    } catch {
+      return null;
+    }
   }
 }
 const playbacks = new Playbacks();
+
+// A playback that comes with a road and a picture of its own, as one of the page's.
+function taken({ playback, roads, pictures }) {
+  playback.road = data.roads.push(...roads) - 1;
+  playback.pictures = pictures;
+  return playback;
+}
 
 // What is known of a row of the page without its motion, in a playback's shape.
 function factsOf(i) {
@@ -32,10 +54,9 @@ function factsOf(i) {
 class Opener {
   constructor(hook) {
     this.hook = hook;
-    this.at = new Map(rows.evaluation.map((evaluation, i) => [evaluation, i]));
     this.wanted = null;
     hook.select = (k) => this.kept(k);
-    hook.open = (evaluation) => this.row(this.at.get(evaluation));
+    hook.open = (evaluation) => this.row(rows.evaluation.indexOf(evaluation));
   }
 
   get player() {
@@ -52,7 +73,9 @@ class Opener {
     const evaluation = rows.evaluation[i];
     this.wanted = evaluation;
     if (playbacks.keptAt.has(evaluation)) return this.kept(playbacks.keptAt.get(evaluation), play);
+    $("player").setAttribute("aria-busy", "true");
     const playback = playbacks.source(evaluation) ? await playbacks.get(evaluation) : null;
+    $("player").removeAttribute("aria-busy");
     if (this.wanted !== evaluation) return; // another was chosen meanwhile
     if (playback) this.show(playback, play);
     else this.without(factsOf(i));
@@ -93,9 +116,9 @@ class Opener {
   // Shows what the page's address names, at that time; says whether it names one.
   async go() {
     const { name, evaluation, seconds } = readAddress();
-    const named = data.kept.findIndex((kept) => kept.name === name), i = this.at.get(evaluation);
+    const named = data.kept.findIndex((kept) => kept.name === name), i = rows.evaluation.indexOf(evaluation);
     if (named >= 0) this.kept(named);
-    else if (i !== undefined) await this.row(i);
+    else if (i >= 0) await this.row(i);
     else return false;
     if (seconds !== null && this.made) this.player.seek(Math.round(seconds / this.player.kept.time_step));
     $("scenarios").scrollIntoView();

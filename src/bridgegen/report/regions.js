@@ -1,7 +1,13 @@
 // Critical regions: which rows lie in them, and the table that tells what fresh scenarios say of them.
 
-const regionList = data.regions?.regions ?? [];
-const inRegions = regionList.map((region) => new Set(region.rows)); // rows of the page
+let regionList = [];
+let inRegions = []; // rows of the page
+
+function takeRegions() {
+  regionList = data.regions?.regions ?? [];
+  inRegions = regionList.map((region) => new Set(region.rows));
+}
+takeRegions();
 
 function isInRegion(i, region) {
   return inRegions[region].has(i);

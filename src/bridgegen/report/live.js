@@ -1,0 +1,67 @@
+// A page that is served takes in what is new of its run, while another process goes on with it.
+
+const EVERY = 1500; // ms between two questions while the run grows
+const SELDOM = 5000; // and once it has ended
+
+class Live {
+  // grown(): told that there are more rows.
+  constructor(grown) {
+    this.grown = grown;
+    this.finished = data.summary.finished;
+    $("live").hidden = false;
+    $("live-reload").addEventListener("click", () => location.reload());
+    this.say(this.finished ? "The search has ended" : "Live: the search goes on");
+    this.ask();
+  }
+
+  say(text, state = this.finished ? "ended" : "grows") {
+    if ($("live-text").textContent !== text) $("live-text").textContent = text;
+    $("live").dataset.state = state;
+  }
+
+  async ask() {
+    if (!document.hidden) await this.fetch();
+    setTimeout(() => this.ask(), this.finished ? SELDOM : EVERY);
+  }
+
+  async fetch() {
+    try {
+      const response = await fetch(`news?after=${rows.n}`);
+      const told = await response.json();
+      if (told.error) throw new Error(told.error.join("; "));
+      this.finished = told.finished;
+      if (told.rows) this.take(told);
+      const done = `${number(rows.n)} of ${number(data.summary.budget)} evaluations`;
+      this.say(this.finished ? `The search has ended: ${done}` : `Live: ${done}`);
+      $("live-reload").hidden = told.kept <= data.kept.length;
+    } catch (error) {
+      this.say(error instanceof TypeError ? "No longer served: this is what was known last" : `Cannot be read: ${error.message}`, "lost");
+    }
+  }
+
+  take(told) {
+    const shape = () => [rows.critical.includes(1), rows.cause === null, data.regions === null].join();
+    const before = shape();
+    if (told.whole) ["evaluation", "iteration", "critical", "cause"].forEach((name) => { if (rows[name]) rows[name].length = 0; });
+    for (const name of ["evaluation", "iteration", "critical"]) append(rows[name], told.rows[name]);
+    const first = rows.evaluation.length - told.rows.evaluation.length;
+    if (told.rows.cause) rows.cause = append(rows.cause ?? new Array(first).fill(0), told.rows.cause);
+    else if (rows.cause) append(rows.cause, new Array(told.rows.evaluation.length).fill(0));
+    for (const { name, values } of told.rows.columns) {
+      const column = columns.get(name);
+      if (told.whole) column.values.length = 0;
+      append(column.values, values);
+    }
+    const { n, n_failed, n_critical, rank, front } = told.rows;
+    Object.assign(rows, { n, n_failed, n_critical, rank, front });
+    Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions });
+    if (shape() !== before) location.reload(); // there is something that the page has no place for yet
+    else this.grown();
+  }
+}
+
+// Pushing in one call would need too many arguments.
+function append(list, more) {
+  for (const one of more) list.push(one);
+  return list;
+}

@@ -1,0 +1,44 @@
+"""The motion of a single scenario that the page has not got, simulated when it is asked for."""
+
+from typing import Any, Protocol
+
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.picture_payload import pictures_payload
+from bridgegen.report.playback_payload import playback_payload, road_payload
+from bridgegen.report.playbacks import playbacks
+from bridgegen.store import Rows
+
+
+class Named(Protocol):
+    """A scenario that was handed over."""
+
+    @property
+    def name(self) -> str:
+        """Of its files."""
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Relative to the run's folder."""
+
+
+def motion_payload(
+    pipeline: Pipeline, rows: Rows, evaluation: int, handed: Named | None = None
+) -> dict[str, Any]:
+    """Return a scenario's playback, with the road and the picture that belong to it.
+
+    ``playback`` is as in the page's data, but that its road is the first of ``roads`` and its
+    picture, if it has one, the first of ``pictures``.
+
+    Args:
+        pipeline: what evaluated the rows.
+        rows: of the run, in order.
+        evaluation: which of them, from 0.
+        handed: what it was handed over as, if it was.
+    """
+    name = handed.name if handed else f"evaluation {evaluation + 1}"
+    (one,) = playbacks(pipeline, rows, [(name, evaluation, handed.files if handed else ())])
+    return {
+        "roads": [road_payload(one)],
+        "pictures": pictures_payload([one.picture]) if one.picture else None,
+        "playback": playback_payload(one, 0, 0 if one.picture else None),
+    }

@@ -1,0 +1,4 @@
+"""A run's page, served to a browser on this machine while the run may still grow.
+
+``run_view.py`` reads the run and says what the page asks for; ``server.py`` serves it on loopback.
+"""

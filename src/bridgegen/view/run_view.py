@@ -1,0 +1,109 @@
+"""A run as the site that shows it: its page, what is new, any scenario's motion, its files."""
+
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bridgegen.campaign.handover import Kept, handed_over
+from bridgegen.campaign.regions import OWL_FILE
+from bridgegen.campaign.report import run_data
+from bridgegen.campaign.restored import pipeline_of
+from bridgegen.campaign.settings import Settings
+from bridgegen.errors import InputError
+from bridgegen.regions.record import JSON_FILE
+from bridgegen.report.motion import motion_payload
+from bridgegen.report.page import report_page
+from bridgegen.report.payload import news
+from bridgegen.store import Rows, Store
+
+
+class RunView:
+    """A run that may be growing in another process; it is read only, and never held.
+
+    May be called from several threads at a time.
+
+    Args:
+        folder: of the run.
+        ego: where a driver of your own drives, that same driver.
+        threads: to simulate with, one for each core by default.
+
+    Raises:
+        StorageError: not a run, or its scenario or map is not what it was.
+        InputError: the scenario or the map is missing, or the ego has to be named.
+    """
+
+    def __init__(
+        self, folder: Path | str, *, ego: str | None = None, threads: int | None = None
+    ) -> None:
+        self.folder = Path(folder)
+        with Store.open(folder) as store:
+            self.settings = Settings.from_dict(store.settings, store.folder)
+            self._rows = store.read()
+            metrics = store.metrics
+        self._pipeline = pipeline_of(
+            self.settings, metrics, self.folder,
+            ego=ego, command="view", causes=False, threads=threads,
+        )  # fmt: skip
+        self._lock = threading.Lock()
+
+    def fragment(self, evaluation: int) -> str:
+        """Return what the page's address ends with to show an evaluation, counted from 1.
+
+        Raises:
+            InputError: there is none, or it failed.
+        """
+        n = len(self._rows)
+        if not 1 <= evaluation <= n:
+            raise InputError(f"1 <= evaluation <= {n} must hold in {self.folder}, got {evaluation}")
+        if self._rows.status[evaluation - 1] != 0:
+            raise InputError(f"{self.folder}: evaluation {evaluation} failed: it has no motion")
+        return f"#evaluation-{evaluation}"
+
+    def page(self) -> bytes:
+        """Return the run's page, as it stands."""
+        with self._lock, Store.open(self.folder) as store:
+            rows, kept = self._read(store), self._kept()
+            data = run_data(self._pipeline, store, self.settings, rows, kept)
+        return b"".join(report_page(data, live=True))
+
+    def news(self, after: int) -> Mapping[str, Any]:
+        """Return what is new since the page knew of so many evaluations."""
+        with self._lock, Store.open(self.folder) as store:
+            rows = self._read(store)
+            state = {"finished": store.finished is not None, "kept": len(self._kept())}
+            if len(rows) == after:
+                return state
+            data = run_data(self._pipeline, store, self.settings, rows, (), coverage=False)
+        return {**state, **news(data, after)}
+
+    def motion(self, evaluation: int) -> Mapping[str, Any] | None:
+        """Return the motion of an evaluation; None if there is none, or if it failed."""
+        with self._lock:
+            if evaluation >= len(self._rows):
+                with Store.open(self.folder) as store:
+                    self._read(store)
+            if evaluation >= len(self._rows) or self._rows.status[evaluation] != 0:
+                return None
+            known = {one.evaluation: one for one in self._kept()}
+            return motion_payload(self._pipeline, self._rows, evaluation, known.get(evaluation))
+
+    def file(self, name: str) -> bytes | None:
+        """Return a handed-over file, or one that tells the regions; None of any other name."""
+        names = {name for one in self._kept() for name in one.files} | {JSON_FILE, OWL_FILE}
+        try:
+            return (self.folder / name).read_bytes() if name in names else None
+        except FileNotFoundError:
+            return None
+
+    def _kept(self) -> tuple[Kept, ...]:
+        return handed_over(self.folder)
+
+    def _read(self, store: Store) -> Rows:
+        """Return all rows; only those are read that are new."""
+        known, n = len(self._rows), len(store)
+        if n < known:  # another run took its place
+            self._rows = store.read()
+        elif n > known:
+            self._rows = Rows.join([self._rows, store.read(known)])
+        return self._rows

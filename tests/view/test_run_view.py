@@ -1,0 +1,180 @@
+"""What is served of a run is the run, also while it grows; and the command that serves it."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+
+import numpy as np
+import pytest
+
+from bridgegen.cli import main
+from bridgegen.errors import InputError, StorageError
+from bridgegen.report.payload import ROWS
+from bridgegen.view.run_view import RunView
+
+
+@pytest.fixture(scope="module")
+def view(finished):
+    return RunView(finished)
+
+
+def data_of(page: bytes) -> dict:
+    (text,) = re.findall(rb'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+    return json.loads(text)
+
+
+def test_the_page_is_the_report_and_may_ask_its_server(view, finished):
+    page = view.page()
+    told, written = data_of(page), data_of((finished / "report.html").read_bytes())
+    assert (told.pop("live"), written.pop("live")) == (True, False)
+    assert told == written
+    assert b"connect-src 'self'" in page
+    assert b"connect-src 'none'" in (finished / "report.html").read_bytes()
+
+
+def test_any_evaluation_has_its_motion(view, finished):
+    kept = data_of(view.page())["kept"]
+    rows = view._rows
+    others = [i for i in range(len(rows)) if i not in {one["evaluation"] for one in kept}]
+    told = view.motion(others[7])
+    assert told["playback"]["evaluation"] == others[7]
+    assert told["playback"]["files"] == []
+    shown = told["playback"]["metrics"]["d_min"]
+    assert shown == rows.metrics[others[7], view._pipeline.metrics.index("d_min")]
+    json.dumps(told, allow_nan=False)
+    # Of one that was handed over it is what the page holds, to the last digit.
+    again = view.motion(kept[0]["evaluation"])["playback"]
+    assert {k: v for k, v in again.items() if k not in ("rank", "road")} == {
+        k: v for k, v in kept[0].items() if k not in ("rank", "road")
+    }
+
+
+def test_what_is_no_evaluation_has_none(view):
+    assert view.motion(len(view._rows)) is None
+    with pytest.raises(InputError, match=r"1 <= evaluation <= 120 must hold in .*, got 121"):
+        view.fragment(121)
+    with pytest.raises(InputError, match="got 0"):
+        view.fragment(0)
+    assert view.fragment(120) == "#evaluation-120"
+
+
+def test_only_files_that_were_handed_over_are_given(view, finished):
+    assert view.file("critical/0001.xosc") == (finished / "critical/0001.xosc").read_bytes()
+    for name in ("run.sqlite", "report.html", "critical", "critical/../run.sqlite", "", "/etc"):
+        assert view.file(name) is None
+    assert view.file("regions.json") is None  # there is none
+    (finished / "critical" / "notes.txt").write_text("mine")
+    assert view.file("critical/notes.txt") is None
+
+
+def test_news_are_the_rows_that_the_page_lacks(growing):
+    growing.grow(70)
+    view = RunView(growing.folder)
+    assert data_of(view.page())["rows"]["n"] == 70
+    assert view.news(70) == {"finished": False, "kept": 0}
+    growing.grow(30)
+    told, rows = view.news(70), growing.rows
+    assert told["rows"]["evaluation"] == list(range(70, 100))
+    assert (told["rows"]["n"], told["whole"], told["finished"]) == (100, False, False)
+    assert told["rows"]["critical"] == rows.critical[70:100].astype(int).tolist()
+    assert told["rows"]["cause"] is None or len(told["rows"]["cause"]) == 30
+    assert sum(told["causes"]["counts"]) == 100
+    ranks = np.array(told["rows"]["rank"])
+    assert len(ranks) == 100
+    order = np.flatnonzero(ranks)[np.argsort(ranks[ranks > 0])]
+    assert order.tolist() == [
+        i for i in np.argsort(rows.F[:100, 0], kind="stable") if rows.critical[i]
+    ]
+    x = next(one for one in told["rows"]["columns"] if one["name"] == "ego_speed")["values"]
+    column = view._pipeline.space.names.index("ego_speed")
+    assert x == pytest.approx(rows.X[70:100, column], rel=1e-4)
+    json.dumps(told, allow_nan=False)
+    growing.grow(20)
+    growing.end()
+    assert view.news(120) == {"finished": True, "kept": 2}
+    assert view.motion(119)["playback"]["evaluation"] == 119
+
+
+def test_a_run_with_no_row_yet_can_be_looked_at(growing):
+    view = RunView(growing.folder)
+    assert data_of(view.page())["rows"]["n"] == 0
+    growing.grow(5)
+    assert len(view.news(0)["rows"]["evaluation"]) == 5
+
+
+def test_a_long_run_comes_thinned_as_a_whole(growing, monkeypatch):
+    monkeypatch.setattr("bridgegen.report.payload.ROWS", 50)
+    assert ROWS == 20_000
+    growing.grow(120)
+    told = RunView(growing.folder).news(100)
+    assert told["whole"]
+    assert 45 <= len(told["rows"]["evaluation"]) <= 50
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["{nowhere}"], "there is no such folder"),
+        (["{run}", "--port", "70000"], "0 <= port <= 65535 must hold, got 70000"),
+        (["{run}", "--evaluation", "500"], "1 <= evaluation <= 120 must hold"),
+        (["{run}", "--ego", "mine.py:Mine"], "ego"),
+    ],
+)
+def test_every_mistake_is_one_clear_error(finished, tmp_path, monkeypatch, capsys, words, message):
+    words = [word.format(run=finished, nowhere=tmp_path / "nowhere") for word in words]
+    monkeypatch.setattr(sys, "argv", ["bridgegen", "view", "--no-browser", *words])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+
+
+def test_what_was_handed_over_must_be_readable(growing):
+    growing.grow(5)
+    (growing.folder / "critical").mkdir()
+    (growing.folder / "critical" / "0001.json").write_text('{"evaluation": "one"}')
+    with pytest.raises(StorageError, match=r"0001\.json: is not what was handed over"):
+        RunView(growing.folder).page()
+
+
+def test_the_command_serves_until_ctrl_c(finished):
+    code = "import sys; from bridgegen.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, "view", str(finished), "--no-browser"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    server = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    )
+    try:
+        url = server.stdout.readline().split()[0]
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", url)
+        with urllib.request.urlopen(f"{url}news?after=120", timeout=60) as reply:
+            assert json.load(reply) == {"finished": True, "kept": 2}
+        server.send_signal(signal.SIGINT)
+        out, error = server.communicate(timeout=60)
+    finally:
+        server.kill()
+    assert (server.returncode, error) == (0, "")
+    assert out.strip().endswith("No longer served.")
+
+
+def test_the_browser_is_opened_at_the_evaluation(finished, monkeypatch, capsys):
+    opened = []
+
+    def interrupted(url):
+        opened.append(url)
+        raise KeyboardInterrupt
+
+    words = ["bridgegen", "view", str(finished), "--evaluation", "17"]
+    monkeypatch.setattr(sys, "argv", words)
+    monkeypatch.setattr("webbrowser.open", interrupted)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 0
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#evaluation-17", opened[0])
+    assert "No longer served." in capsys.readouterr().out

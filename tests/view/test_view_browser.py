@@ -1,0 +1,106 @@
+"""The served page in a real browser: it grows with its run, and plays any scenario."""
+
+import pytest
+
+from bridgegen.view.run_view import RunView
+from bridgegen.view.server import Server
+
+pytestmark = pytest.mark.browser
+
+COUNTS = """[bridgegen.data.rows.n, document.getElementById("scatter").data?.slice(0, 2)
+  .reduce((sum, trace) => sum + trace.x.length, 0)]"""
+
+
+@pytest.fixture
+def opened(browser, growing):
+    """The page of a run with 60 rows, its server, and what it asked for and complained of."""
+    growing.grow(60)
+    server = Server(RunView(growing.folder))
+    server.start()
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.complaints, page.asked = [], []
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.on("console", lambda m: page.complaints.append(m.text) if m.type == "error" else None)
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.goto(server.url)
+    yield page, server
+    page.close()
+    server.shutdown()
+    server.server_close()
+
+
+def test_it_grows_with_its_run_and_says_so(opened, growing):
+    page, server = opened
+    critical = growing.rows.critical
+    assert critical[:60].sum() != critical[:100].sum()
+    page.locator("#scatter").scroll_into_view_if_needed()
+    page.wait_for_function("document.getElementById('scatter').data")
+    page.fill("#list-low", "0")  # a filter stays
+    before = page.evaluate("bridgegen.state().position")
+    growing.grow(40)
+    page.wait_for_function("bridgegen.data.rows.n === 100")
+    page.wait_for_function(f"({COUNTS})[1] === 100")
+    assert page.inner_text("#live-text") == "Live: 100 of 120 evaluations"
+    n = critical[:100].sum()
+    assert page.inner_text("#list-note") == f"{n} of {n} critical scenarios"
+    assert "100 concrete scenarios" in page.inner_text("#sentences")
+    assert page.evaluate("bridgegen.state().position") == before
+    last = "Math.max(...document.querySelector('#trend-plots .plot').data[2].x)"
+    assert page.evaluate(last) == page.evaluate("bridgegen.data.batches.last.at(-1)")
+
+    growing.grow(20)
+    growing.end()
+    page.wait_for_selector("#live-reload")
+    assert page.inner_text("#live-text") == "The search has ended: 120 of 120 evaluations"
+    page.click("#live-reload")
+    page.wait_for_function("bridgegen.data.kept.length === 2")
+    assert page.inner_text("#scene-name") == "0001"
+    assert page.complaints == []
+    assert all(url.startswith((server.url, "data:", "blob:")) for url in page.asked)
+
+
+def test_any_row_plays_and_its_address_brings_it_back(opened, growing):
+    page, _ = opened
+    ranks = page.evaluate("bridgegen.data.rows.rank")
+    third = ranks.index(3)
+    page.locator("#list-body button.from-served").nth(2).click()
+    page.wait_for_function(f"bridgegen.state()?.scenario === 'evaluation {third + 1}'")
+    page.evaluate("bridgegen.pause(); bridgegen.seek(20)")
+    page.wait_for_function(f"location.hash.startsWith('#evaluation-{third + 1}@')")
+    told = RunView(growing.folder).motion(third)["playback"]
+    assert page.inner_text("#measures h3") == f"Evaluation {third + 1}"
+    assert page.evaluate("bridgegen.state().index") == 20
+    assert page.is_visible("#made-of")  # its individuals come with it
+    address = page.url
+    page.goto("about:blank")
+    page.goto(address)
+    page.wait_for_function(f"bridgegen.state()?.scenario === '{told['name']}'")
+    assert page.evaluate("bridgegen.state().index") == 20
+    assert page.complaints == []
+
+
+def test_a_server_that_is_gone_is_told(opened):
+    page, server = opened
+    server.shutdown()
+    server.server_close()
+    page.wait_for_function("document.getElementById('live').dataset.state === 'lost'")
+    assert page.inner_text("#live-text").startswith("No longer served")
+    # What it has not got it says, and how to see it.
+    page.locator("#list-body button").nth(3).click()
+    page.wait_for_selector("#no-motion")
+    assert "--evaluation" in page.inner_text("#no-motion-command")
+
+
+def test_a_run_without_a_row_is_shown_once_there_are_some(browser, growing):
+    server = Server(RunView(growing.folder))
+    server.start()
+    page = browser.new_page()
+    page.goto(server.url)
+    assert "has been simulated yet" in page.inner_text("#sentences")
+    assert "yet" in page.inner_text("#no-scenarios")
+    growing.grow(60)
+    page.wait_for_selector("#list-body button")
+    assert page.is_visible("#space")
+    page.close()
+    server.shutdown()
+    server.server_close()
