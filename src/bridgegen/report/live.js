@@ -1,7 +1,7 @@
 // A page that is served takes in what is new of its run, while another process goes on with it.
 
 const EVERY = 1500; // ms between two questions while the run grows
-const SELDOM = 5000; // and once it has ended
+const SELDOM = 5000; // once it has ended, or nobody answers
 
 class Live {
   // grown(): told that there are more rows.
@@ -21,7 +21,8 @@ class Live {
 
   async ask() {
     if (!document.hidden) await this.fetch();
-    setTimeout(() => this.ask(), this.finished ? SELDOM : EVERY);
+    const seldom = this.finished || $("live").dataset.state === "lost";
+    setTimeout(() => this.ask(), seldom ? SELDOM : EVERY);
   }
 
   async fetch() {
