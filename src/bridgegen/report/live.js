@@ -66,3 +66,13 @@ function append(list, more) {
   for (const one of more) list.push(one);
   return list;
 }
+
+// The motion of an evaluation from the server; null if it cannot be had after all.
+async function askMotion(evaluation) {
+  try {
+    const told = await (await fetch(`motion/${evaluation}`)).json();
+    return told.playback ? taken(told) : null;
+  } catch {
+    return null;
+  }
+}

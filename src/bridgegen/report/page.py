@@ -15,13 +15,15 @@ from bridgegen.report.payload import to_json
 
 SCRIPTS = (
     "common.js", "page.js", "regions.js", "filters.js", "causes.js", "notes.js", "playbacks.js",
-    "live.js",
     "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
     "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "scene.js",
     "curves.js", "picture.js", "player.js", "parallel.js", "charts.js", "coverage.js",
     "coverage_pairs.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
+
+SERVED = ("live.js",)
+"""Besides, where the page is served; a page on disk has nothing that could ask for anything."""
 
 STYLES = (
     "page.css",
@@ -57,7 +59,8 @@ def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
     connect = b"'self'" if live else b"'none'"
     text = to_json(data, live=live)
-    return filled("page.html", SCRIPTS, title, text, plotly=_plotly(), connect=connect)
+    scripts = (*SERVED, *SCRIPTS) if live else SCRIPTS
+    return filled("page.html", scripts, title, text, plotly=_plotly(), connect=connect)
 
 
 def write_page(

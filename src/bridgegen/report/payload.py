@@ -71,6 +71,7 @@ def payload(data: ReportData) -> dict[str, Any]:
             roads.append(road_payload(playback))
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
     return {
+        "live": False,
         "summary": _summary(data),
         "rows": _rows(data.evaluations, shown),
         "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,

@@ -20,18 +20,9 @@ class Playbacks {
 
   // Of one that was not handed over; null if it cannot be had after all.
   async get(evaluation) {
-    const playback = this.fetched.get(evaluation) ?? (await this.fetch(evaluation));
+    const playback = this.fetched.get(evaluation) ?? (await askMotion(evaluation));
     if (playback) this.fetched.set(evaluation, playback);
     return playback;
-  }
-
-  async fetch(evaluation) {
-    try {
-      const told = await (await fetch(`motion/${evaluation}`)).json();
-      return told.playback ? taken(told) : null;
-    } catch {
-      return null;
-    }
   }
 }
 const playbacks = new Playbacks();
