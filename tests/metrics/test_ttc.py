@@ -8,7 +8,7 @@ import shapely
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from bridgegen.metrics.ttc import ttc
+from bridgegen.metrics.ttc import ttc, ttc_over_time
 
 CAR = (4.0, 2.0, 0.0)  # length, width, the centre at the reference point
 
@@ -265,3 +265,18 @@ def test_skipping_instants_changes_nothing(driven, shape, within):
     assert (got == 0).any()
     assert (np.isfinite(got) & (got > 0)).any()
     assert (got == np.inf).any() or shape[1] > 2
+
+
+def test_over_time_it_is_that_of_each_instant(rollout_of):
+    """Head on at 10 m/s from 50 m; the second row stops after two instants, the third failed."""
+    t = np.arange(5) * 0.5
+    x = np.stack([5.0 * t, 54.0 - 5.0 * t])
+    rollout = rollout_of(
+        x=np.stack([x] * 3), h=[[[0.0], [pi]]], v=5.0, box=CAR, n_steps=[5, 2, 5], status=[0, 0, 1],
+        time_step=0.5,
+    )  # fmt: skip
+    got = ttc_over_time(rollout)
+    assert got[0] == pytest.approx(5.0 - t)
+    assert got[1, :2] == pytest.approx(5.0 - t[:2])
+    assert np.isnan(got[2]).all()
+    assert np.nanmin(got[0]) == ttc(rollout)[0]

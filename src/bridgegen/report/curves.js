@@ -1,6 +1,7 @@
 // Distance, time to collision, speeds and accelerations over time; a click or a drag jumps to an instant.
 
 const FAR = 20, LATE = 10; // m, s: what is beyond runs out of its panel, where what is near would be flat otherwise
+const CURVE_FONT = FONT.replace("600 12px", "11.5px");
 const HARD = 4.9; // m/s², what the metric n_brake counts
 
 function roundStep(least) {
@@ -85,17 +86,34 @@ class Curves {
     return [left + ((right - left) * index) / Math.max(1, this.kept.n_steps - 1), (top + bottom) / 2];
   }
 
+  // What stays is drawn once and kept; at each instant only the cursor and the values are new.
   draw(state) {
-    const { context: c, width, height } = fitCanvas(this.canvas);
-    this.place();
+    const { context: c, width, height, ratio } = fitCanvas(this.canvas);
+    if (!width || !height) return; // not laid out yet
+    const still = [this.kept, palette, width, height, ratio];
+    if (still.some((one, i) => one !== this.still?.[i])) {
+      this.still = still;
+      this.drawStill(width, height, ratio);
+    }
     c.clearRect(0, 0, width, height);
-    c.lineJoin = "round";
-    c.font = FONT.replace("600 12px", "11.5px");
-    const last = this.kept.n_steps - 1;
+    c.drawImage(this.layer, 0, 0, width, height);
+    c.font = CURVE_FONT;
     for (const panel of this.panels) {
-      const { left, right, top, bottom, low, high } = panel;
-      const x = (k) => left + (right - left) * (last ? k / last : 0);
-      const y = (value) => bottom - ((bottom - top) * (value - low)) / (high - low);
+      const { x, y } = this.scales(panel);
+      this.drawCursor(c, panel, state, x, y);
+      this.drawHeading(c, panel, state);
+    }
+  }
+
+  drawStill(width, height, ratio) {
+    this.place();
+    this.layer = Object.assign(document.createElement("canvas"), { width: width * ratio, height: height * ratio });
+    const c = this.layer.getContext("2d");
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    c.lineJoin = "round";
+    c.font = CURVE_FONT;
+    for (const panel of this.panels) {
+      const { left, right, top, bottom, low, high } = panel, { x, y } = this.scales(panel);
       this.drawAxes(c, panel, x, y);
       c.save();
       c.beginPath();
@@ -105,9 +123,16 @@ class Curves {
       for (const line of panel.lines) this.drawLine(c, line, x, y, panel.steps);
       c.restore();
       this.drawMoments(c, panel, x, y);
-      this.drawCursor(c, panel, state, x, y);
-      this.drawHeading(c, panel, state);
     }
+  }
+
+  // An instant, and a value, in pixels.
+  scales({ left, right, top, bottom, low, high }) {
+    const last = Math.max(1, this.kept.n_steps - 1);
+    return {
+      x: (k) => left + ((right - left) * k) / last,
+      y: (value) => bottom - ((bottom - top) * (value - low)) / (high - low),
+    };
   }
 
   drawAxes(c, panel, x, y) {

@@ -111,7 +111,7 @@ class Opener {
     if (named >= 0) this.kept(named);
     else if (i >= 0) await this.row(i);
     else return false;
-    if (seconds !== null && this.made) this.player.seek(Math.round(seconds / this.player.kept.time_step));
+    if (seconds !== null && this.made?.kept.evaluation === this.wanted) this.player.seek(Math.round(seconds / this.player.kept.time_step));
     $("scenarios").scrollIntoView();
     return true;
   }

@@ -6,6 +6,7 @@ class Player {
   constructor(hook) {
     this.hook = hook;
     this.playing = false;
+    this.toldAt = 0; // [ms], when it was told in words
     this.position = 0; // in steps; whole on a recorded instant
     this.scene = new Scene($("scene"), () => this.redraw());
     this.curves = new Curves($("curves"), (k) => this.seek(k));
@@ -133,11 +134,8 @@ class Player {
     $("follow").setAttribute("aria-pressed", this.scene.view.follow);
     this.drawFlag(state);
     $("scrub").value = Math.round(this.position);
-    const now = stateWords(this.kept, state), weather = weatherAt(this.kept, state.index);
-    $("now").textContent = now;
-    $("scrub").setAttribute("aria-valuetext", this.playing ? `${state.time.toFixed(2)} seconds` : now);
-    $("weather").hidden = !weather;
-    if (weather) $("weather").textContent = weatherWords(weather);
+    const weather = weatherAt(this.kept, state.index);
+    this.tell(state, weather);
     this.drawn = {
       scenario: this.kept.name, chosen: this.chosen, position: this.position, ...state,
       screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
@@ -146,6 +144,17 @@ class Player {
       detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
       intention: intentionAt(this.kept, state), weather,
     };
+  }
+
+  // In words; while it plays, as often as one can read.
+  tell(state, weather) {
+    if (this.playing && performance.now() - this.toldAt < 250) return;
+    this.toldAt = performance.now();
+    const now = stateWords(this.kept, state);
+    $("now").textContent = now;
+    $("scrub").setAttribute("aria-valuetext", now);
+    $("weather").hidden = !weather;
+    if (weather) $("weather").textContent = weatherWords(weather);
   }
 
   drawFlag(state) {

@@ -26,6 +26,7 @@ class Scene {
       if (kind in AREAS) path.closePath();
       return { kind, path };
     });
+    this.hits = kept.contacts.map((k) => [k, nearestTo(kept, stateAt(kept, k))]).filter(([, gap]) => gap);
     this.centres = kept.entities.map((entity, e) => kept.x[e].map((x, k) => {
       const state = { x, y: kept.y[e][k], h: kept.h[e][k] };
       return isPlaced(state) ? boxCentre(entity, state.x, state.y, state.h) : null;
@@ -71,7 +72,7 @@ class Scene {
     drawStreetLights(c, this.kept.street_lights, scale);
     drawLamps(c, this.kept.lamps, state.index, scale);
     if (this.layers.course) drawCourse(c, this.kept, state, scale);
-    state.entities.forEach((_, e) => this.drawTrail(c, e, state.index, scale));
+    for (const e of playersOf(this.kept)) this.drawTrail(c, e, state.index, scale);
     this.drawGhosts(c, state, scale);
     state.entities.forEach((s, e) => { if (isPlaced(s)) drawBody(c, this.kept.entities[e], s, colourOf(this.kept, e), scale); });
     if (this.layers.sensed) drawDetections(c, this.kept, state, scale);
@@ -176,10 +177,8 @@ class Scene {
 
   // A cross where a contact began, from that instant on.
   drawContacts(c, state) {
-    for (const k of this.kept.contacts) {
+    for (const [k, gap] of this.hits) {
       if (k > state.index) continue;
-      const gap = nearestTo(this.kept, stateAt(this.kept, k));
-      if (!gap) continue;
       const [x, y] = this.view.toScreen([(gap.from[0] + gap.to[0]) / 2, (gap.from[1] + gap.to[1]) / 2]);
       const r = 8;
       c.lineCap = "round";

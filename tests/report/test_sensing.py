@@ -1,0 +1,64 @@
+"""What the page calls seen and missed is what the metrics of perception count."""
+
+import numpy as np
+import pytest
+
+from bridgegen.ego.detections import DETECTION
+from bridgegen.metrics.e_position import e_position
+from bridgegen.metrics.perceived import perceived
+from bridgegen.odd.reader import load
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.sensing import TOLERANCE, sensed
+
+
+@pytest.fixture(scope="module")
+def rollout():
+    logical = load("jam-tail-in-fog")
+    space = logical.space()
+    pipeline = Pipeline(logical, space, ego="reference")
+    return pipeline.rollout(space.decode(np.random.default_rng(1).random((4, space.n_var))))
+
+
+def off(rollout, row, one):
+    """Distance of each detection from the truth, ``(E, F)``; NaN where there is none."""
+    k, box = one.steps, rollout.box
+    cx = rollout.x[row][:, k] + box[:, 2:] * np.cos(rollout.h[row][:, k])
+    cy = rollout.y[row][:, k] + box[:, 2:] * np.sin(rollout.h[row][:, k])
+    return np.hypot(one.x - cx, one.y - cy)
+
+
+def test_the_mean_error_of_what_counts_is_e_position(rollout):
+    for row, one in enumerate(sensed(rollout)):
+        error = off(rollout, row, one)
+        told = one.counts & (one.seen_by > 0)
+        assert error[told].mean() == pytest.approx(e_position(rollout)[row], rel=1e-12)
+
+
+def test_what_counts_and_is_not_seen_is_missed(rollout):
+    truth = perceived(rollout)
+    missed = 0
+    for row, one in enumerate(sensed(rollout)):
+        counted = truth.counts[row][:, one.steps]
+        assert (one.counts == counted).all()
+        assert counted.sum() == truth.counts[row].sum()  # no frame is left out
+        seen = rollout.detections[row][:, one.steps, 0] > 0
+        assert (seen[1:] == (one.seen_by[1:] > 0)).all()
+        assert (one.seen_by[0] == -1).all()
+        missed += int((counted & ~seen).sum())
+    assert missed > 10
+
+
+def test_displaced_is_what_is_no_hit_at_the_strictest_threshold(rollout):
+    one = sensed(rollout)[0]
+    assert one.tolerance == TOLERANCE == 0.5
+    assert np.isnan(one.x[one.seen_by <= 0]).all()
+    assert np.isfinite(one.x[one.seen_by > 0]).all()
+    assert ((one.kind >= 0) == (one.seen_by > 0)).all()
+
+
+def test_without_sensors_there_is_nothing():
+    logical = load("crossroads-s4")
+    pipeline = Pipeline(logical, logical.space(), ego="route-follower")
+    rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
+    assert rollout.detections.shape[-1] == DETECTION
+    assert sensed(rollout) == []
