@@ -1,6 +1,8 @@
 """What the documentation shows is what there is."""
 
 import importlib.util
+import re
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -69,14 +71,6 @@ def test_the_examples_run(tmp_path):
     assert 'value="$oil_at"' in text
 
 
-def test_the_driver_of_the_documentation_keeps_the_contract():
-    from bridgegen.campaign.driver_contract import check_driver
-
-    checks = list(check_driver(f"{DOCS / 'examples' / 'my_driver.py'}:MyDriver", ["cut-in"]))
-    assert checks
-    assert not [check for check in checks if check.problem]
-
-
 def test_the_documentation_of_drivers_names_what_there_is():
     from bridgegen.ego.fmu import _is_known
 
@@ -139,3 +133,50 @@ def test_the_algorithm_of_the_documentation_is_found_and_searches(tmp_path, monk
     assert rows[0].U.tobytes() == rows[1].U.tobytes()
     with pytest.raises(InputError, match=r"step must be in 0 \.\. 1, got 7"):
         bg.run_search("crossroads-s1", algorithm="neighbours", settings={"step": 7}, out=tmp_path)
+
+
+@pytest.mark.parametrize("path", sorted(DOCS.glob("*.md")), ids=lambda path: path.stem)
+def test_links_lead_somewhere(path):
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text("utf-8")):
+        assert (DOCS / target).exists() or target.startswith("generated/"), target
+
+
+def test_the_architecture_has_a_paragraph_for_each_folder():
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text("utf-8"))
+    (contract,) = project["tool"]["importlinter"]["contracts"]
+    layers = [name for layer in contract["layers"] for name in re.split(r" [|:] ", layer)]
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    told = [re.sub(r"/$|\.py$", "", name) for row in rows for name in re.findall("`([^`]+)`", row)]
+    assert sorted(told) == sorted(layers)
+
+
+def test_ci_names_every_figure_and_status():
+    from bridgegen.campaign.verdict import FIGURES
+    from bridgegen.cli.app import FAILED
+
+    text = (DOCS / "ci.md").read_text("utf-8")
+    assert [name for name in FIGURES if f"`{name}`" not in text] == []
+    assert f"exit status is **{FAILED}**" in text
+
+
+def test_every_function_of_a_formula_is_named():
+    from bridgegen.odd.expression import FUNCTIONS
+
+    text = (DOCS / "extend.md").read_text("utf-8")
+    (named,) = re.findall(r"^`([a-z ]+)`, with angles in radians", text, re.MULTILINE)
+    assert sorted(named.split()) == sorted(FUNCTIONS)
+
+
+def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):
+    spec = importlib.util.spec_from_file_location("make_reference", DOCS / "make_reference.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.write(tmp_path)
+    commands = (tmp_path / "command-line.md").read_text("utf-8")
+    for words in ("## bridgegen search", "## bridgegen list parameters", "`--fail-if <"):
+        assert words in commands
+    keys = (tmp_path / "scenario-files.md").read_text("utf-8")
+    assert "| **`template`** | `crossroads`, `t-junction`" in keys
+    assert "| `to` | text | The other participant" in keys
+    assert "cloudiness ≥ precipitation" in (tmp_path / "weather.md").read_text("utf-8")

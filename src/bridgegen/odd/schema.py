@@ -108,9 +108,9 @@ class CriticalSection(ShapedSection):
     n_collision_above: Number = 0.0
     """More collisions than this are critical."""
     d_min_below: Number = 2.0
-    """Nearer than this [m] is critical,"""
+    """Nearer than this [m] is critical, if v_d is large enough."""
     v_d_at_least: Number = 1.0
-    """if the ego is at least so fast then [m/s]."""
+    """How fast the ego must be at d_min for that [m/s]."""
 
 
 class ObjectiveSection(ShapedSection):

@@ -1,0 +1,198 @@
+"""Every snippet of the documentation is run, in the order of its page, in a folder of its own.
+
+``sh``: each line; ``bridgegen`` and ``python`` in this process, everything else by the shell.
+``python``: executed, a page's blocks one after the other. ``yaml``: a scenario, or parts of one, is
+read and held against the schema. ``xml``: well formed. ``text`` is output.
+
+Searches are shortened (``shortened``). A comment before a block says what else is to be known:
+``<!-- not run: WHY -->`` (its commands must still parse), ``<!-- file: NAME -->`` (what the reader
+saves as that file), ``<!-- exit: 3 -->``, ``<!-- ci -->`` (another program's YAML).
+"""
+
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+from typer.main import get_command
+
+from bridgegen.cli import app, main
+from bridgegen.odd.json_schema import schema
+from bridgegen.odd.plain_yaml import read_plain_yaml
+from bridgegen.odd.reader import load
+from bridgegen.odd.starter import start_scenario
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(path.stem for path in DOCS.glob("*.md"))
+BUDGET = "80"
+SHORT = {
+    "search": {"--budget": BUDGET, "--keep": "1"},
+    "compare": {"--seeds": "2", "--budget": "40", "--jobs": "1"},
+    "regions": {"--samples": "20"},
+    "check-driver": {"--scenario": "cut-in"},
+}
+"""What commands are run with instead of what the page says."""
+
+_BLOCK = re.compile(
+    r"(?:^<!-- (?P<mark>[^\n]*) -->\n)?^ *```(?P<kind>[a-z]+)\n(?P<text>.*?)^ *```$", re.M | re.S
+)
+
+
+@dataclass(frozen=True)
+class Block:
+    kind: str
+    text: str
+    mark: str
+    value: str
+
+
+def blocks(page: str) -> list[Block]:
+    found = []
+    for match in _BLOCK.finditer((DOCS / f"{page}.md").read_text("utf-8")):
+        mark, _, value = (match["mark"] or "").partition(":")
+        found.append(Block(match["kind"], match["text"], mark.strip(), value.strip()))
+    return found
+
+
+def lines(text: str) -> list[str]:
+    return [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
+
+
+def words_of(line: str) -> list[str]:
+    return shlex.split(line, comments=True)
+
+
+def shortened(words: list[str]) -> list[str]:
+    """Return a bridgegen command that takes less time."""
+    short = dict(SHORT.get(words[1], {}))
+    found = list(words)
+    for option, value in short.items():
+        if option in found:
+            found[found.index(option) + 1] = value
+        else:
+            found += [option, value]
+    return found
+
+
+def must_parse(words: list[str]) -> None:
+    command = get_command(app)
+    rest = words[1:]
+    while hasattr(command, "commands"):
+        command = command.commands[rest.pop(0)]
+    command.make_context(command.name, rest)
+
+
+class Page:
+    """Runs a page's blocks."""
+
+    def __init__(self, monkeypatch) -> None:
+        self.patch, self.names = monkeypatch, {"__name__": "a_page"}
+
+    def run(self, block: Block) -> None:
+        if block.mark == "file":
+            Path(block.value).write_text(block.text, "utf-8")
+        getattr(self, block.kind)(block)
+
+    def sh(self, block: Block) -> None:
+        for line in lines(block.text):
+            words = words_of(line)
+            if not words:
+                continue
+            if words[0] == "bridgegen":
+                must_parse(words)
+            if block.mark == "not run":
+                continue
+            assert self.command(words) == int(block.value if block.mark == "exit" else 0), line
+
+    def command(self, words: list[str]) -> int:
+        if words[0] == "bridgegen":
+            self.patch.setattr(sys, "argv", shortened(words))
+            with pytest.raises(SystemExit) as end:
+                main()
+            return int(end.value.code or 0)
+        if words[0] == "python":
+            self.patch.setattr(sys, "argv", words[1:])
+            runpy.run_path(words[1], run_name="__main__")
+            return 0
+        return subprocess.run(words, check=False).returncode
+
+    def python(self, block: Block) -> None:
+        text = re.sub(r"budget=\d+", f"budget={BUDGET}", block.text)
+        code = compile(text.replace("seeds=20", "seeds=2, jobs=1"), "page", "exec")
+        if block.mark != "not run":
+            exec(code, self.names)
+
+    def yaml(self, block: Block) -> None:
+        if block.mark == "ci":
+            for line in re.findall(r"bridgegen search.*", block.text):
+                must_parse(words_of(line))
+            yaml.safe_load(block.text)
+            return
+        path = Path("a_scenario.yaml")
+        if "scenario:" not in block.text:  # parts of one: they take the place of the starter's
+            whole = yaml.safe_load(start_scenario("made").read_text("utf-8"))
+            for key, value in yaml.safe_load(block.text).items():
+                if isinstance(value, dict):
+                    whole[key] |= value
+                else:
+                    whole[key] = value
+            path.write_text(yaml.safe_dump(whole, allow_unicode=True), "utf-8")
+            Path("made.yaml").unlink()
+        else:
+            path.write_text(block.text, "utf-8")
+        data = read_plain_yaml(path.read_bytes(), "page").data
+        assert [one.message for one in validator().iter_errors(data)] == []
+        load(path)
+
+    def xml(self, block: Block) -> None:
+        ElementTree.fromstring(block.text)
+
+    def toml(self, block: Block) -> None:
+        tomllib.loads(block.text)
+
+    def text(self, block: Block) -> None:
+        """Output, or a picture of text."""
+
+
+@lru_cache
+def validator():
+    from jsonschema import Draft7Validator
+
+    return Draft7Validator(schema())
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch) -> Page:
+    shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
+    shutil.copy(DOCS / "examples" / "oil_spill.py", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return Page(monkeypatch)
+
+
+@pytest.mark.parametrize("name", [name for name in PAGES if blocks(name)])
+def test_every_snippet_runs(name, page):
+    for block in blocks(name):
+        page.run(block)
+
+
+def test_few_snippets_cannot_be_run():
+    found = [block for name in PAGES for block in blocks(name) if block.mark == "not run"]
+    assert all(len(block.value) > 10 for block in found)  # and says why
+    every = [block for name in PAGES for block in blocks(name) if block.kind in ("sh", "python")]
+    assert len(found) <= 0.2 * len(every)
+
+
+def test_marks_are_those_that_are_known():
+    for name in PAGES:
+        for block in blocks(name):
+            assert block.mark in ("", "not run", "file", "exit", "ci"), block.mark
