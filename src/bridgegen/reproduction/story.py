@@ -37,6 +37,9 @@ from bridgegen.reproduction.table import Table
 
 RUNS_FILE = "runs.csv"
 
+FEW = 50
+"""Fewer critical scenarios than these say little about causes."""
+
 
 @dataclass(frozen=True)
 class Found:
@@ -137,7 +140,7 @@ def in_short(found: Found) -> list[tuple[str, str]]:
     told.append(("R_critic on S4", _shares(found)))
     told.append(("Perception", _perception(found)))
     if found.paired:
-        told.append(("Ideal perception is no cure", _pairs(found.paired)))
+        told.append(("The same scenarios, perceived ideally", _pairs(found.paired)))
     if "ppo" in found.protocol.missing:
         told.append(
             (
@@ -161,20 +164,20 @@ def _orders(found: Found) -> str:
             f"{count['agrees']} are the same in our runs of S4, by their medians alone: so few "
             "seeds cannot show any."
         )
-        word, apart = "disagrees", "not so here"
+        word, apart = "disagrees", "Not so here"
     else:
         text += (
             f"{count['holds']} hold in our runs of S4, the opposite of {count['opposite']} does, "
             f"and {count['not shown']} {'is' if count['not shown'] == 1 else 'are'} not shown "
             "either way."
         )
-        word, apart = "opposite", "the opposite holds"
+        word, apart = "opposite", "The opposite holds of"
     other = [
         f"{paper.TITLES[c.ahead]} ahead of {paper.TITLES[c.behind]} in {c.title}"
         for c, v in zip(CLAIMS, verdicts, strict=True)
         if v.word == word
     ]
-    return text + (f" Of these {apart}: {'; '.join(other)}." if other else "")
+    return text + (f" {apart}: {'; '.join(other)}." if other else "")
 
 
 def _shares(found: Found) -> str:
@@ -204,7 +207,7 @@ def _perception(found: Found) -> str:
     text = (
         f"With the reference driver, who perceives by camera and LiDAR, {gone:,} of {total:,} "
         f"critical scenarios ({share(gone, total)}) vanish with ideal perception, all scenarios "
-        "and seeds together"
+        "and seeds together: what a test of planning and control alone would miss"
     )
     by_method = []
     for method in paper.METHODS:
@@ -212,13 +215,15 @@ def _perception(found: Found) -> str:
         critical, vanish = sum(one.critical for one in these), sum(one.vanish for one in these)
         if critical:
             by_method.append(f"{method.title} {share(vanish, critical)} of {critical:,}")
-    text += f"; by method: {', '.join(by_method)}." if by_method else "."
+    text += f". By method: {', '.join(by_method)}." if by_method else "."
     here = [one for one in found.causes if one.scenario == paper.MAIN]
     critical = sum(one.critical for one in here)
     evaluations = sum(one.evaluations for one in here)
     if here:
-        text += f" On S4 it comes to harm in {critical:,} of {evaluations:,} evaluations" + (
-            ": the claim has to be tried on the others." if critical < 50 else "."
+        text += (
+            f" On S4 it comes to harm in {critical:,} of {evaluations:,} evaluations, of which "
+            f"{sum(one.vanish for one in here):,} vanish"
+            + (": too few to go by, so look at the others." if critical < FEW else ".")
         )
     return text
 

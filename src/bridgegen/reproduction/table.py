@@ -78,7 +78,7 @@ def to_html(table: Table) -> str:
     rows = "".join(
         f'<tr><th scope="row">{escape(row[0])}</th>'
         + "".join(
-            f"<td{' class=text' if k < table.texts else ''}>{escape(cell)}</td>"
+            f"<td{' class=text' if k < table.texts else ''}>{_html(cell)}</td>"
             for k, cell in enumerate(row[1:], 1)
         )
         + "</tr>"
@@ -90,6 +90,14 @@ def to_html(table: Table) -> str:
         f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
         f"</div>{f'<ul class=notes>{notes}</ul>' if notes else ''}</div>"
     )
+
+
+def _html(cell: str) -> str:
+    """Return a cell; what is in brackets after a number goes below it."""
+    number, bracket, rest = cell.partition(" (")
+    if bracket and " to " in rest and rest.endswith(")"):
+        return f"{escape(number)} <small>({escape(rest)}</small>"
+    return escape(cell)
 
 
 _LATEX = {
@@ -115,19 +123,20 @@ def to_latex(table: Table) -> str:
         return f"{' & '.join(latex(cell) for cell in cells)} \\\\"
 
     parts = [
-        "% needs \\usepackage{booktabs}",
+        "% needs \\usepackage{booktabs,graphicx}",
         "\\begin{table*}",
         "\\centering",
         f"\\caption{{{latex(table.title)}}}",
         f"\\label{{tab:{table.name}}}",
         "\\small",
+        "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%",
         f"\\begin{{tabular}}{{{columns}}}",
         "\\toprule",
         line(table.head),
         "\\midrule",
         *map(line, table.rows),
         "\\bottomrule",
-        "\\end{tabular}",
+        "\\end{tabular}}",
     ]
     if table.notes:
         parts += ["", "\\medskip", "\\begin{minipage}{\\linewidth}\\footnotesize"]

@@ -77,12 +77,20 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
         for row in range(len(chosen)):
             found = [one for one in accidents(rollout, row) if one.who[0] == rollout.names[0]]
             places += [(one.x, one.y) for one in found[:1]]
-    # Clear weather, and a background vehicle that gets as far as it can while the ego lets it.
-    bv, ego = scenario.parameters["bv_speed"], scenario.parameters["ego_speed"]
-    x = pipeline.space.row({"bv_speed": bv.high, "ego_speed": ego.low, "bv_trigger_time": 0.0})
-    nominal = pipeline.rollout(x[np.newaxis])
-    n = int(nominal.n_steps[0])
-    ways = tuple(np.column_stack([nominal.x[0, e, :n], nominal.y[0, e, :n]]) for e in (0, 1))
+    x = pipeline.space.row({})
+    # How they drive while the other is not in the way: each gets as far as it can.
+    limits = scenario.parameters
+    when, near = limits["bv_trigger_time"], limits["bv_trigger_distance"]
+    bv, ego = limits["bv_speed"], limits["ego_speed"]
+    alone = [
+        {"ego_speed": ego.high, "bv_trigger_time": when.high, "bv_trigger_distance": near.low},
+        {"ego_speed": ego.low, "bv_trigger_time": when.low, "bv_speed": bv.high},
+    ]
+    nominal = pipeline.rollout(np.stack([pipeline.space.row(values) for values in alone]))
+    ways = tuple(
+        np.column_stack([one[e, e, : nominal.n_steps[e]] for one in (nominal.x, nominal.y)])
+        for e in (0, 1)
+    )
     road = Scenery(pipeline).road(x).outlines
     junction = [one.points for one in road if one.kind == "junction"]
     middle = np.concatenate(junction).mean(axis=0) if junction else ways[0].mean(axis=0)
