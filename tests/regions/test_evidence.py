@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bridgegen.regions.evidence import Evidence, clopper_pearson
+from bridgegen.regions.evidence import Evidence, clopper_pearson, wilson
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,16 @@ def test_nothing_says_nothing():
     none = Evidence(0, 0, 7)
     assert (none.share, none.interval) == (None, (0.0, 1.0))
     assert Evidence(4, 1).share == 0.25
+
+
+def test_wilson_is_what_is_worked_by_hand_and_near_the_exact_one():
+    low, high = wilson(10, 100)
+    assert (low, high) == pytest.approx((0.05522914, 0.17436566), abs=1e-7)
+    for k, n in ((0, 50), (3, 1000), (844, 1000), (50, 50)):
+        low, high = wilson(k, n)
+        exact = clopper_pearson(k, n)
+        assert low <= k / n <= high
+        assert (low, high) == pytest.approx(exact, abs=0.03)
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert wilson(0, 9)[0] == 0.0
+    assert wilson(9, 9)[1] == 1.0

@@ -64,7 +64,7 @@ def test_nothing_critical(with_summary):
 
 def test_stopped_early(with_summary):
     data = with_summary(finished=False, budget=5000)
-    assert of(data)[0].endswith("in 3.4 s; the run stopped before its budget of 5,000.")
+    assert of(data)[0].endswith("in 3.4 s, so far, of a budget of 5,000.")
     assert ("Done", "120 evaluations, interrupted") in sentences.provenance(data.summary)
 
 
@@ -109,3 +109,19 @@ def test_settings_follow_in_the_order_given(with_summary):
 )
 def test_a_duration_takes_the_unit_that_suits_it(seconds, text):
     assert sentences.duration(seconds).replace(THIN, " ") == text
+
+
+def test_r_critic_has_an_interval_and_what_it_means_is_said(with_summary):
+    told = {"n_evaluations": 100, "n_critical": 10, "r_critic": 0.1}
+    chosen, drawn = with_summary(**told), with_summary(**told, independent=True, algorithm="random")
+    for data in (chosen, drawn):
+        table = {k: v.replace(THIN, " ") for k, v in sentences.summary_table(data.summary)}
+        assert table["R_critic, 95 % interval *"] == "5.5 to 17.4 %"  # worked by hand
+    assert "pso chose them by plan or by what earlier ones" in sentences.interval_note(
+        chosen.summary
+    )
+    assert "not how likely harm is" in sentences.interval_note(chosen.summary)
+    assert "independent random draws, so it holds" in sentences.interval_note(drawn.summary)
+    empty = with_summary(n_evaluations=0, n_critical=0).summary
+    assert sentences.interval_note(empty) == ""
+    assert dict(sentences.summary_table(empty))["R_critic, 95 % interval *"] == "–"

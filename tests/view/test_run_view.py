@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.report.payload import ROWS
+from bridgegen.store import Store
 from bridgegen.view.run_view import RunView
 
 
@@ -34,6 +36,17 @@ def test_the_page_is_the_report_and_may_ask_its_server(view, finished):
     assert told == written
     assert b"connect-src 'self'" in page
     assert b"connect-src 'none'" in (finished / "report.html").read_bytes()
+
+
+def test_the_digest_of_the_results_is_theirs(view, growing):
+    told = dict(data_of(view.page())["summary"]["provenance"])["Results, SHA-256"].split()[0]
+    growing.grow(120)
+    with Store.open(growing.folder) as store:
+        rows = store.read()
+    assert rows.digest() == told  # recorded in another batch, at another time
+    X = rows.X.copy()
+    X[7, 1] = np.nextafter(X[7, 1], 1.0)
+    assert replace(rows, X=X).digest() != told
 
 
 def test_any_evaluation_has_its_motion(view, finished):

@@ -72,7 +72,15 @@ def run_data(
         command=settings.command(store.folder), finished=store.finished is not None,
         version=store.version, notes=store.notes, view=view_command(store.folder),
         regions=read_record(store.folder / JSON_FILE), coverage=coverage,
+        hashes=_hashes(settings, rows),
     )  # fmt: skip
+
+
+def _hashes(settings: Settings, rows: Rows) -> dict[str, str]:
+    found = {"Scenario, SHA-256": settings.fingerprint}
+    if settings.map_digest is not None:
+        found["Map, SHA-256"] = settings.map_digest
+    return {**found, "Results, SHA-256": f"{rows.digest()} (the command above gives the same)"}
 
 
 def view_command(folder: Path) -> str:

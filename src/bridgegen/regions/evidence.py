@@ -1,9 +1,13 @@
 """How many of some scenarios are critical, and how sure that makes one of the share."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 CONFIDENCE = 0.95
+
+Z_95 = 1.959963984540054
+"""The standard normal distribution's quantile at 1 − (1 − 0.95)/2."""
 
 
 def clopper_pearson(
@@ -26,6 +30,25 @@ def clopper_pearson(
     low = float(betaincinv(successes, failures + 1, miss)) if successes else 0.0
     high = float(betaincinv(successes + 1, failures, 1.0 - miss)) if failures else 1.0
     return low, high
+
+
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """Return where a probability is, with about 95 % confidence; quick, and near the exact one.
+
+    Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), doi:10.1080/01621459.1927.10502953.
+
+    Args:
+        successes: 0 .. trials.
+        trials: none gives (0, 1).
+    """
+    if not trials:
+        return 0.0, 1.0
+    z2, share = Z_95**2, successes / trials
+    middle = (share + z2 / (2 * trials)) / (1.0 + z2 / trials)
+    half = Z_95 * math.sqrt(share * (1.0 - share) / trials + z2 / (4 * trials**2))
+    half /= 1.0 + z2 / trials
+    low, high = max(0.0, middle - half), min(1.0, middle + half)
+    return (low if successes else 0.0), (high if successes < trials else 1.0)
 
 
 @dataclass(frozen=True)

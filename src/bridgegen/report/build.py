@@ -26,6 +26,9 @@ from bridgegen.store.summary import Summary
 SAMPLE = 50_000
 """Random scenarios that tell what is feasible: fewer than `bridgegen coverage` draws, for speed."""
 
+INDEPENDENT = "random"
+"""The algorithm whose rows are independent draws."""
+
 TRIPLES = 25_000_000
 """Scenarios times triples of parameters up to which triples are counted: a tenth of a second."""
 
@@ -45,6 +48,7 @@ def build_report(
     notes: Mapping[str, Any],
     view: str = "",
     regions: Mapping[str, Any] | None = None,
+    hashes: Mapping[str, str] | None = None,
     coverage: bool = True,
 ) -> ReportData:
     """Return all that the page shows.
@@ -64,6 +68,7 @@ def build_report(
         notes: what the algorithm wants kept with the run.
         view: the command line that shows this run with the motion of every scenario, if there is.
         regions: the critical ones, as `regions.record` has them, if they are known.
+        hashes: of what the run was made from and of what came of it.
         coverage: whether to count what was covered.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
@@ -98,6 +103,8 @@ def build_report(
         version=version,
         command=command,
         view=view,
+        independent=algorithm == INDEPENDENT,
+        hashes=hashes,
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             **wanted,

@@ -146,6 +146,7 @@ function scatterFigure() {
       color: palette.critical, size: 5 + 3 * crowd, opacity: 0.5 + 0.3 * crowd, symbol: "diamond",
       line: { width: 0.5, color: palette.card },
     }),
+    ...(rows.front.length ? [frontTrace(nameX, nameY, x, y)] : []),
     {
       type: "scatter", mode: "markers+text", name: "kept (click to play)", x: keptOn(nameX), y: keptOn(nameY),
       text: data.kept.map((kept) => `${kept.rank}`), textposition: "top right", textfont: { size: 11, color: palette.ink },
@@ -208,6 +209,7 @@ function drawCharts() {
       window.bridgegen.grown = () => { parallel.rescale(); drawn.forEach((plot) => charts.get(plot)()); };
     }
     for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", drawScatter);
+    connectFront(drawScatter);
     $("swap").addEventListener("click", () => {
       [$("axis-x").value, $("axis-y").value] = [$("axis-y").value, $("axis-x").value];
       drawScatter();

@@ -49,6 +49,8 @@ class RunSummary:
         command: the exact command line that starts this run again.
         started: when the run began, as ISO 8601 text; may be empty.
         view: the command line that shows this run's page with the motion of every scenario.
+        independent: whether each row was drawn by itself, as random search draws them.
+        hashes: of what the run was made from and of what came of it, name → digest.
         settings: further settings worth keeping, name → text, in display order.
     """
 
@@ -77,6 +79,8 @@ class RunSummary:
     command: str
     started: str = ""
     view: str = ""
+    independent: bool = False
+    hashes: Mapping[str, str] | None = None
     settings: Mapping[str, str] | None = None
 
 

@@ -83,6 +83,7 @@ function fillSummary() {
   $("description").textContent = s.description;
   $("description").hidden = !s.description;
   fillTable($("figures"), s.table);
+  $("figures-note").textContent = s.note;
   const failed = data.rows.n_failed;
   fillTable($("settings"), failed ? [...s.provenance, ["Failed evaluations", `${failed}, counted but not drawn`]] : s.provenance);
   $("command").textContent = s.command;

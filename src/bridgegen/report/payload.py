@@ -23,7 +23,7 @@ from bridgegen.report.playback_payload import (
     road_payload,
 )
 from bridgegen.report.regions_payload import regions_payload
-from bridgegen.search.dominance import by_merit
+from bridgegen.search.dominance import by_merit, non_dominated
 
 DIGITS = 5
 """Significant digits of the largest value of a column in bulk."""
@@ -102,7 +102,7 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
     return {
         "summary": _summary(data),
         "whole": whole,
-        "rows": {**_rows(e, new), "rank": _ranks(e, shown)},
+        "rows": {**_rows(e, new), "rank": _ranks(e, shown), "front": _front(e, shown)},
         "batches": _batches(e),
         "causes": _causes(e),
         "regions": regions_payload(data.regions, e, shown) if data.regions else None,
@@ -119,6 +119,7 @@ def _summary(data: ReportData) -> dict[str, Any]:
         "budget": int(s.budget),
         "sentences": sentences.sentences(data),
         "table": sentences.summary_table(s),
+        "note": sentences.interval_note(s),
         "provenance": sentences.provenance(s),
         "command": s.command,
         "view": s.view,
@@ -148,6 +149,7 @@ def _rows(e: Evaluations, ok: Bool) -> dict[str, Any]:
         "critical": e.critical[ok].astype(np.int64).tolist(),
         "cause": None if e.cause is None else e.cause[ok].tolist(),
         "rank": _ranks(e, ok),
+        "front": _front(e, ok),
         "columns": [_column(c, group, ok) for group, columns in groups for c in columns],
         "telling": convergence.telling_parameters(e.parameters, e.critical, ok),
     }
@@ -165,6 +167,18 @@ def _ranks(e: Evaluations, ok: Bool) -> list[int]:
     rank[critical[by_merit(F[critical])]] = np.arange(1, critical.size + 1)
     told: list[int] = rank[ok].tolist()
     return told
+
+
+def _front(e: Evaluations, ok: Bool) -> list[int]:
+    """Return the places, among the rows shown, of those that no other one dominates.
+
+    Nothing where there are not several objectives.
+    """
+    if len(e.objectives) < 2 or not ok.any():
+        return []
+    F = np.stack([c.values[ok] for c in e.objectives], axis=1)
+    places: list[int] = np.flatnonzero(non_dominated(F)).tolist()
+    return places
 
 
 def _causes(e: Evaluations) -> dict[str, Any] | None:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from bridgegen.cause import CAUSES, Cause
+from bridgegen.regions.evidence import wilson
 from bridgegen.report.data import ReportData, RunSummary
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
@@ -28,7 +29,7 @@ def sentences(data: ReportData) -> list[str]:
         f"on {s.road}, chosen by {s.algorithm} in {duration(s.wall_seconds)}."
     ]
     if not s.finished:
-        words[0] = words[0][:-1] + f"; the run stopped before its budget of {s.budget:,}."
+        words[0] = words[0][:-1] + f", so far, of a budget of {s.budget:,}."
     if s.n_critical == 0:
         none = "It is not" if s.n_evaluations == 1 else "None of them is"
         return [*words, f"{none} critical (critical means {s.critical_rule})."]
@@ -49,6 +50,7 @@ def summary_table(s: RunSummary) -> list[tuple[str, str]]:
             "Critical share, R_critic",
             f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})",
         ),
+        ("R_critic, 95 % interval *", _interval(s)),
         ("First critical", _at(s.first_critical)),
         ("50th critical", _at(s.fiftieth_critical)),
         ("Distance d_min, smallest", metres(s.d_min_best)),
@@ -57,6 +59,24 @@ def summary_table(s: RunSummary) -> list[tuple[str, str]]:
         ("Speed v_d at d_min, median", speed(s.v_d_median)),
         ("Wall time", duration(s.wall_seconds)),
     ]
+
+
+def interval_note(s: RunSummary) -> str:
+    """Return what the interval of R_critic means, and what it does not."""
+    if not s.n_evaluations:
+        return ""
+    if s.independent:
+        return (
+            "* Wilson's interval. The rows are independent random draws, so it holds for the share "
+            "of critical scenarios in this domain, drawn as random search draws them."
+        )
+    return (
+        "* Wilson's interval for as many independent draws. These rows are none: "
+        f"{s.algorithm} chose them by plan or by what earlier ones had shown. It tells how much so "
+        "many rows can say of this search, not how likely harm is in this domain: random search "
+        "and the fresh scenarios of 'bridgegen regions' tell that, and 'bridgegen compare' how "
+        "R_critic varies from seed to seed."
+    )
 
 
 def provenance(s: RunSummary) -> list[tuple[str, str]]:
@@ -73,7 +93,10 @@ def provenance(s: RunSummary) -> list[tuple[str, str]]:
         ("Started", s.started),
         ("BridgeGen", s.version),
     ]
-    return [row for row in rows if row[1]] + list((s.settings or {}).items())
+    return [row for row in rows if row[1]] + [
+        *(s.settings or {}).items(),
+        *(s.hashes or {}).items(),
+    ]
 
 
 def share(value: float) -> str:
@@ -135,6 +158,14 @@ def _worst(data: ReportData) -> str:
     if math.isfinite(data.summary.d_min_best):
         return f"There is no collision; the closest pass leaves {metres(data.summary.d_min_best)}."
     return ""
+
+
+def _interval(s: RunSummary) -> str:
+    if not s.n_evaluations:
+        return "–"
+    low, high = wilson(s.n_critical, s.n_evaluations)
+    digits = 1 if high - low > 0.01 else 2
+    return f"{100.0 * low:.{digits}f} to {100.0 * high:.{digits}f}{NARROW}%"
 
 
 def _count(n: int, noun: str) -> str:

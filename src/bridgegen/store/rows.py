@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from hashlib import sha256
 from typing import Any, Protocol
 
 import numpy as np
@@ -83,6 +84,16 @@ class Rows:
     def join(cls, parts: Sequence["Rows"]) -> "Rows":
         """Return the rows of several parts, at least one, in their order."""
         return cls(*(np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(cls)))
+
+    def digest(self) -> str:
+        """Return SHA-256 of all that was evaluated and came of it, times left out.
+
+        One seed gives one digest.
+        """
+        digest = sha256()
+        for array in (self.U, self.X, self.metrics, self.F, self.status, self.critical, self.cause):
+            digest.update(array.astype(array.dtype.newbyteorder("<")).tobytes())
+        return digest.hexdigest()
 
     def take(self, at: Int) -> "Rows":
         """Return the rows at some positions, in that order."""
