@@ -1,6 +1,7 @@
 """A reproduction from start to finish: every number is its runs', however they were made."""
 
 import csv
+import itertools
 import math
 import re
 import shlex
@@ -11,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from shapely.affinity import rotate, translate
 from shapely.geometry import Point, box
 
@@ -291,6 +294,8 @@ def test_the_last_spread_is_the_run_s(done):
     folder, result = done
     protocol = result.found.protocol
     arguments = {**protocol.arguments(PRINTED), "out": folder / "as-printed"}
+    told = result.found.commands["as-printed"]
+    assert "--algorithms random,pso,nsga2-dt --seeds 2 --budget 120 --ego route-follower" in told
     comparison = bg.compare(**arguments, jobs=1, deliver=False)
     measured = comparison.measured["crossroads-s4"]
     for cell, values in measured.values.items():
@@ -379,6 +384,27 @@ def test_mistakes_are_told_before_anything_is_run(tmp_path, arguments, told):
     with pytest.raises(InputError, match=re.escape(told)):
         bg.reproduce(**{"out": tmp_path / "r", **arguments})
     assert not [*tmp_path.rglob("run.sqlite")]
+
+
+@given(st.lists(st.sampled_from([*paper.SCENARIOS, "cut-in", "", "S4"]), max_size=6),
+       st.integers(-2, 2000), st.integers(-2, 20_000))  # fmt: skip
+def test_what_is_asked_for_is_run_or_refused(scenarios, seeds, iterations):
+    try:
+        made = protocol.make_protocol(
+            seeds=seeds, iterations=iterations, scenarios=tuple(scenarios), out=Path("r"),
+            road_map=None, junction=None,
+        )  # fmt: skip
+    except InputError:
+        good = set(scenarios) <= set(paper.SCENARIOS) and len(set(scenarios)) == len(scenarios)
+        in_range = 1 <= seeds <= 1000 and 1 <= iterations <= 10_000
+        assert not (good and in_range and paper.MAIN in scenarios)
+        return
+    assert set(made.scenarios) == set(scenarios)
+    assert len(made.scenarios) == len(scenarios)
+    cells = [(part.name, cell) for part, cell in itertools.islice(made.cells(), 500)]
+    assert len(set(cells)) == len(cells)
+    assert made.scenarios[0] == paper.MAIN
+    assert shlex.split(made.command())[:2] == ["bridgegen", "reproduce"]
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):

@@ -2,7 +2,7 @@
 
 import importlib.util
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -178,8 +178,3 @@ def available() -> tuple[str, ...]:
     """Return the paper's algorithms that can be run with what is installed."""
     has_ppo = all(importlib.util.find_spec(name) for name in NEEDED_BY_PPO)
     return tuple(m.algorithm for m in METHODS if m is not PPO or has_ppo)
-
-
-def identity(protocol: Protocol) -> Mapping[str, Any]:
-    """Return what tells a reproduction's folder, as JSON's types."""
-    return {"reproduction": "Section V", "iterations": protocol.iterations}

@@ -53,6 +53,7 @@ class Found:
         verdicts: on each claim, by scenario.
         causes: with the reference driver.
         paired: the same random scenarios with sensors and with ideal perception.
+        commands: by part's name, the command line that writes that comparison's own page.
     """
 
     protocol: Protocol
@@ -62,6 +63,7 @@ class Found:
     verdicts: Mapping[str, Sequence[Verdict]]
     causes: Sequence[Causes]
     paired: Sequence[Paired]
+    commands: Mapping[str, str]
 
     @property
     def main(self) -> Results:
@@ -240,19 +242,36 @@ def _pairs(paired: Sequence[Paired]) -> str:
 
 def _again(found: Found) -> list[Block]:
     protocol = found.protocol
-    parts = tuple(
-        (part.title, f"{part.name}/, a comparison’s folder; the driver is {part.ego}"
-         + (f", its {', '.join(part.ideal)} ideal." if part.ideal else "."))
+    parts = [
+        (
+            f"{part.name}/",
+            f"Runs of {part.title}; the driver is {part.ego}"
+            + (f", its {', '.join(part.ideal)} ideal." if part.ideal else "."),
+        )
         for part in PARTS
-    )  # fmt: skip
+    ]
     return [
         Command(protocol.command()),
         Text(
             "The same command goes on where it was stopped, makes more runs where more seeds are "
-            "asked for, and gives the same files, to the byte, but for what is made of seconds. "
-            "“bridgegen resume FOLDER” hands a run’s critical scenarios over and writes its report."
+            "asked for, and gives the same files, to the byte, but for what is made of seconds."
         ),
-        Points(parts),
+        Points(
+            (
+                *parts,
+                (
+                    "A run",
+                    "is an ordinary run’s folder: “bridgegen resume FOLDER” hands its critical "
+                    "scenarios over and writes its report, with playback.",
+                ),
+                (
+                    "All measures",
+                    "of “bridgegen compare”, with tests and figures for each scenario, are written "
+                    "by these commands, which find the runs made:",
+                ),
+            )
+        ),
+        *(Command(command) for command in found.commands.values()),
         Folded("Every run, and the command that makes it again", _run_table(found), RUNS_FILE),
     ]
 
