@@ -43,3 +43,12 @@ def setup(app: Any) -> None:
     import make_reference
 
     app.connect("builder-inited", lambda _: make_reference.write(HERE / "generated"))
+    app.connect("doctree-resolved", dash)
+
+
+def dash(_app: Any, tree: Any, _page: str) -> None:
+    """Put a dash between a parameter and its text, as Sphinx's own quotes would have done."""
+    from docutils.nodes import Text
+
+    for one in tree.findall(lambda node: isinstance(node, Text) and node.astext() == " -- "):
+        one.parent.replace(one, Text(" – "))
