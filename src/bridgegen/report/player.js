@@ -78,7 +78,7 @@ class Player {
   }
 
   showLegend() {
-    const has = { sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length };
+    const has = { motion: true, sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length };
     for (const item of $("legend").children) {
       const shown = this.scene.layers[item.dataset.layer], button = item.querySelector("button");
       item.hidden = !has[item.dataset.layer] || (!button && !shown);

@@ -7,14 +7,15 @@ const LINES = { // colour, width [m], dashes [m]
   sign: ["hit", 0.3, []],
 };
 
-const TOO_SMALL = 3, NEAR = 8; // pixels per metre: below the one a car is a few pixels; the other shows it
+const TOO_SMALL = 3; // pixels per metre: below that a car is a few pixels
+const AROUND = 100; // m across, that are shown where the ego is kept in the middle
 
 class Scene {
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.view = new View(canvas, changed);
     this.atmosphere = new Atmosphere();
-    this.layers = { sensed: true, course: true, weather: true };
+    this.layers = { motion: true, sensed: true, course: true, weather: true }; // the first cannot be hidden
   }
 
   show(kept) {
@@ -43,7 +44,7 @@ class Scene {
   follow() {
     this.view.follow = true;
     this.view.fitted = false;
-    this.view.scale = Math.max(this.view.scale, NEAR);
+    this.view.scale = Math.max(this.view.scale, Math.min(8, this.canvas.clientWidth / AROUND));
   }
 
   draw(state) {
