@@ -180,3 +180,12 @@ def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):
     assert "| **`template`** | `crossroads`, `t-junction`" in keys
     assert "| `to` | text | The other participant" in keys
     assert "cloudiness ≥ precipitation" in (tmp_path / "weather.md").read_text("utf-8")
+
+
+def test_the_sections_of_a_report_are_called_as_the_page_calls_them():
+    page = (DOCS.parent / "src/bridgegen/report/page.html").read_text("utf-8")
+    headings = re.findall(r"<h[23][^>]*>([^<]+)</h[23]>", page)
+    text = (DOCS / "read-a-report.md").read_text("utf-8")
+    told = [name.rstrip(".") for name in re.findall(r"^\*\*([^*]+)\*\*", text, re.MULTILINE)]
+    assert len(told) > 8
+    assert [name for name in told if name not in headings] == []
