@@ -134,12 +134,12 @@ def test_the_table_of_perception_is_of_the_stores(done):
         for label in ("perception", "planning", "control", "unavoidable"):
             assert int(line[label]) == causes.count(label)
     pairs = {one["scenario"]: one for one in table(folder, "tables/perception-paired.csv")}
-    assert set(pairs) == {"S3", "S4"}
+    assert set(pairs) == {"crossroads-s3", "crossroads-s4"}
     total = 0
-    for title, pair in pairs.items():
+    for scenario, pair in pairs.items():
         vanish = appear = by_cause = 0
         for seed in (0, 1):
-            name = f"runs/crossroads-{title.lower()}-random-{seed}"
+            name = f"runs/{scenario}-random-{seed}"
             real, ideal = rows(folder / "with-perception" / name), rows(
                 folder / "ideal-perception" / name)  # fmt: skip
             assert [one["u"] for one in real] == [one["u"] for one in ideal]
@@ -150,7 +150,7 @@ def test_the_table_of_perception_is_of_the_stores(done):
             by_cause += sum(one["cause"] == "perception" for one in real)
         assert (int(pair["vanish"]), int(pair["appear"])) == (vanish, appear)
         assert vanish == by_cause  # the replay and the run with ideal perception agree
-        total += int(pair["critical, sensors"])
+        total += int(pair["critical_sensors"])
     assert total > 0, "nothing was tested"
     assert sum(one.real for one in result.found.paired) == total
 

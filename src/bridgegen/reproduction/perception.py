@@ -5,7 +5,7 @@ critical scenarios that a driver with sensors meets, how many vanish once it per
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -168,5 +168,9 @@ def table_paired(found: Sequence[Paired]) -> Table:
         (
             "Ideal perception takes harm away and adds some: who sees farther drives faster, and "
             "who reacts otherwise meets the other somewhere else.",
+        ),
+        (
+            ("scenario", "scenarios", "critical_sensors", "critical_ideal", "vanish", "appear"),
+            *(astuple(one) for one in found),
         ),
     )  # fmt: skip

@@ -34,7 +34,9 @@ def pictures(found: Found, printed: Comparison) -> dict[str, Picture]:
     drawn = {}
     for name, caption, draw in _drawings(found, printed):
         figure = draw(LIGHT)
-        drawn[name] = Picture(name, caption, png(figure), png(draw(DARK)), pdf(figure))
+        light = png(figure)
+        figure.set_layout_engine("none")  # the PDF is laid out as the PNG was
+        drawn[name] = Picture(name, caption, light, png(draw(DARK)), pdf(figure))
     return drawn
 
 
