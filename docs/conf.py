@@ -35,6 +35,7 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
+html_show_search_summary = False  # from disk, a browser may not fetch the pages for it
 html_theme_options: dict[str, Any] = {"navigation_with_keys": True}
 
 
