@@ -80,7 +80,8 @@ class Verdict:
             scenario; NaN where there is nothing to test.
         a12: how probable it is that a run of the first is ahead of one of the second.
         word: "holds", "opposite" or "not shown"; "agrees" or "disagrees" by the medians alone,
-            where there are too few runs to show anything; "–" where nothing was run.
+            where there are too few runs to show anything; "–" where there is
+            nothing to compare.
     """
 
     ahead: float

@@ -160,26 +160,27 @@ def _orders(found: Found) -> str:
     verdicts = found.verdicts[paper.MAIN]
     count = Counter(one.word for one in verdicts)
     asked = len(verdicts) - count["–"]
-    text = f"Of the {asked} orders of two methods that Section V-C tells and that could be tried, "
+    told = []
+    if count["holds"] or count["opposite"] or count["not shown"]:
+        told.append(
+            f"{count['holds']} hold in our runs of S4, {count['opposite']} are the other way "
+            f"round, {count['not shown']} are not shown either way"
+        )
     if count["agrees"] or count["disagrees"]:
-        text += (
-            f"{count['agrees']} are the same in our runs of S4, by their medians alone: so few "
-            "seeds cannot show any."
+        told.append(
+            f"{count['agrees']} are the same in our runs of S4 by their medians alone, and "
+            f"{count['disagrees']} are not: so few seeds can show nothing"
         )
-        word, apart = "disagrees", "Not so here"
-    else:
-        text += (
-            f"{count['holds']} hold in our runs of S4, the opposite of {count['opposite']} does, "
-            f"and {count['not shown']} {'is' if count['not shown'] == 1 else 'are'} not shown "
-            "either way."
-        )
-        word, apart = "opposite", "The opposite holds of"
+    text = (
+        f"Of the {asked} orders of two methods that Section V-C tells and that could be tried, "
+        f"{'; '.join(told) or 'none was'}."
+    )
     other = [
         f"{paper.TITLES[c.ahead]} ahead of {paper.TITLES[c.behind]} in {c.title}"
         for c, v in zip(CLAIMS, verdicts, strict=True)
-        if v.word == word
+        if v.word in ("opposite", "disagrees")
     ]
-    return text + (f" {apart}: {'; '.join(other)}." if other else "")
+    return text + (f" Other than the paper has it: {'; '.join(other)}." if other else "")
 
 
 def _shares(found: Found) -> str:
