@@ -184,6 +184,26 @@ def test_detections_are_classified_as_the_metrics_match_them(opened):
                     assert math.dist((drawn[e]["x"], drawn[e]["y"]), spot) < 0.01
 
 
+def test_the_strip_tells_when_who_was_seen(opened):
+    case, page = opened
+    page.evaluate("bridgegen.select(0)")
+    rows = page.evaluate("bridgegen.curves.strip.rows")
+    assert rows
+    for row in rows:
+        told = [None] * int(case.rollout.n_steps[0])
+        for spell in row["spells"]:
+            told[spell["from"] : spell["to"]] = [spell["status"]] * (spell["to"] - spell["from"])
+        want = [expected(case, 0, row["e"], k)[0] for k in range(len(told))]
+        assert told == want, row["name"]
+    x, y = page.evaluate(
+        "(({ left, right, top }) => [left + 0.5 * (right - left), top + 5])(bridgegen.curves.strip)"
+    )
+    page.locator("#curves").scroll_into_view_if_needed()
+    box = page.locator("#curves").bounding_box()
+    page.mouse.click(box["x"] + x, box["y"] + y)
+    assert state(page)["index"] == pytest.approx(0.5 * (len(told) - 1), abs=1)
+
+
 def test_each_kind_of_detection_is_drawn_and_told(show, fog):
     """An instant for each kind; hiding them changes the picture. Who has a label is told, too."""
     found = {

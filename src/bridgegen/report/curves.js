@@ -30,6 +30,8 @@ class Curves {
 
   show(kept) {
     this.kept = kept;
+    this.strip = new Strip(kept);
+    this.canvas.style.setProperty("--strip", `${this.strip.height}px`);
     const players = playersOf(kept), critical = data.summary.critical_distance;
     const line = (values, e = null) => ({
       values, colour: () => (e === null ? palette.ink : colourOf(kept, e)), dashes: e === null ? [] : DASHES[players.indexOf(e) % DASHES.length],
@@ -63,10 +65,11 @@ class Curves {
   // Places the panels, two beside each other where there is room; in CSS pixels.
   place() {
     const { clientWidth: width, clientHeight: height } = this.canvas, across = width >= 560 ? 2 : 1;
-    const rows = Math.ceil(this.panels.length / across), w = width / across, h = (height - 20) / rows;
+    const rows = Math.ceil(this.panels.length / across), w = width / across, { height: under } = this.strip, h = (height - under - 20) / rows;
+    this.strip.place(width);
     this.panels.forEach((panel, i) => {
       const column = across === 1 ? 0 : Math.floor(i / rows), row = i - column * rows;
-      Object.assign(panel, { left: column * w + 42, right: (column + 1) * w - 14, top: row * h + 26, bottom: (row + 1) * h - 6, last: row === rows - 1 || i === this.panels.length - 1 });
+      Object.assign(panel, { left: column * w + 42, right: (column + 1) * w - 14, top: under + row * h + 26, bottom: under + (row + 1) * h - 6, last: row === rows - 1 || i === this.panels.length - 1 });
     });
   }
 
@@ -74,7 +77,8 @@ class Curves {
   indexAt(x, y) {
     this.place();
     const outside = (panel) => Math.max(0, panel.left - x, x - panel.right) + Math.max(0, panel.top - y, y - panel.bottom);
-    const { left, right } = this.panels.reduce((best, panel) => (outside(panel) < outside(best) ? panel : best));
+    const all = this.strip.height ? [this.strip, ...this.panels] : this.panels;
+    const { left, right } = all.reduce((best, panel) => (outside(panel) < outside(best) ? panel : best));
     const last = this.kept.n_steps - 1;
     return Math.min(last, Math.max(0, Math.round(((x - left) / (right - left)) * last)));
   }
@@ -98,6 +102,7 @@ class Curves {
     c.clearRect(0, 0, width, height);
     c.drawImage(this.layer, 0, 0, width, height);
     c.font = CURVE_FONT;
+    if (this.strip.height) this.drawLineAt(c, this.strip, this.scales(this.strip).x(state.time / this.kept.time_step));
     for (const panel of this.panels) {
       const { x, y } = this.scales(panel);
       this.drawCursor(c, panel, state, x, y);
@@ -112,6 +117,7 @@ class Curves {
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.lineJoin = "round";
     c.font = CURVE_FONT;
+    this.strip.draw(c);
     for (const panel of this.panels) {
       const { left, right, top, bottom, low, high } = panel, { x, y } = this.scales(panel);
       this.drawAxes(c, panel, x, y);
@@ -246,14 +252,18 @@ class Curves {
     return f < 1e-6 || value === null || next === null || next === undefined ? value : value + f * (next - value);
   }
 
-  drawCursor(c, panel, state, x, y) {
-    const { top, bottom, low, high, lines, steps } = panel, at = x(state.time / this.kept.time_step);
+  drawLineAt(c, { top, bottom }, at) {
     c.strokeStyle = palette.accent;
     c.lineWidth = 1.5;
     c.beginPath();
     c.moveTo(at, top - 4);
     c.lineTo(at, bottom);
     c.stroke();
+  }
+
+  drawCursor(c, panel, state, x, y) {
+    const { low, high, lines, steps } = panel, at = x(state.time / this.kept.time_step);
+    this.drawLineAt(c, panel, at);
     for (const { values, colour } of lines) {
       const value = steps ? values[state.index] : this.now(values, state);
       if (value === null || value > high || value < low) continue;

@@ -7,7 +7,7 @@ const LINES = { // colour, width [m], dashes [m]
   sign: ["hit", 0.3, []],
 };
 
-const TOO_SMALL = 3; // pixels per metre: below that a car is a few pixels
+const TOO_SMALL = 2; // pixels per metre: below that a car is a few pixels
 const AROUND = 100; // m across, that are shown where the ego is kept in the middle
 
 class Scene {
