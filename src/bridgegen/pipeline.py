@@ -83,14 +83,14 @@ class Replay:
 
     Attributes:
         rollout: what happened.
-        intentions: what the egos meant to do.
+        intentions: what the egos meant to do, if that was asked for.
         ways: by row and number the ways that these name, ``(n, 2)`` float64 [m] each.
         weathers: by row the weather from the start on, and from each change of it: the instant, and
             ``(WEATHER,)`` as sensors feel it (``ego._weather_columns``).
     """
 
     rollout: Rollout
-    intentions: Intentions
+    intentions: Intentions | None
     ways: Sequence[Mapping[int, Float]]
     weathers: Sequence[Sequence[tuple[int, Float]]]
 
@@ -273,17 +273,24 @@ class Pipeline:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         return self._run(*self._roads_of(X), X)
 
-    def replay(self, X: Float) -> Replay:
-        """Roll out N rows as ``evaluate`` does, and find out what went on besides."""
+    def replay(self, X: Float, *, plans: bool = True) -> Replay:
+        """Roll out N rows as ``evaluate`` does, and find out what went on besides.
+
+        Args:
+            X: ``(N, len(space.names))`` float64.
+            plans: whether to find out what the egos meant to do, which takes many times as long.
+        """
         assert isinstance(self.simulator, EmbeddedSimulator)
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
-        intentions = self.simulator.intentions(roads, rows, columns, rollout)
-        ways = [
-            {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}
-            for p, named in zip(rows.tolist(), intentions.way, strict=True)
-        ]
+        intentions, ways = None, []
+        if plans:
+            intentions = self.simulator.intentions(roads, rows, columns, rollout)
+            ways = [
+                {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}
+                for p, named in zip(rows.tolist(), intentions.way, strict=True)
+            ]
         weathers = [self.simulator.weathers(columns, rollout, i) for i in range(len(X))]
         return Replay(rollout, intentions, ways, weathers)
 

@@ -1,7 +1,7 @@
 """The report of a run on disk, as it stands."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from bridgegen.campaign.handover import Kept
@@ -33,7 +33,9 @@ def write_run_report(
         FileFormatError: the regions' file is not one.
     """
     path = store.folder / REPORT
-    write_report(path, run_data(pipeline, store, settings, rows, kept))
+    files = {name: (store.folder / name).read_bytes() for one in kept for name in one.files}
+    data = run_data(pipeline, store, settings, rows, kept, files=files, more=True)
+    write_report(path, data)
     return path
 
 
@@ -45,6 +47,8 @@ def run_data(
     kept: Sequence[Kept],
     *,
     coverage: bool = True,
+    files: Mapping[str, bytes] | None = None,
+    more: bool = False,
 ) -> ReportData:
     """Return what the report of a run says.
 
@@ -55,6 +59,8 @@ def run_data(
         rows: all of it, in order.
         kept: what was handed over, most critical first.
         coverage: whether to count what was covered.
+        files: that were handed over, by their paths in the run's folder, if the page holds them.
+        more: whether the page holds the motion of more than ``kept``.
 
     Raises:
         FileFormatError: the regions' file is not one.
@@ -72,7 +78,7 @@ def run_data(
         command=settings.command(store.folder), finished=store.finished is not None,
         version=store.version, notes=store.notes, view=view_command(store.folder),
         regions=read_record(store.folder / JSON_FILE), coverage=coverage,
-        hashes=_hashes(settings, rows),
+        hashes=_hashes(settings, rows), files=files, more=more,
     )  # fmt: skip
 
 

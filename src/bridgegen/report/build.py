@@ -19,12 +19,22 @@ from bridgegen.report.data import (
     RunSummary,
 )
 from bridgegen.report.notes import tables
+from bridgegen.report.playback import Playback
 from bridgegen.report.playbacks import playbacks
+from bridgegen.search.dominance import by_merit
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
 
 SAMPLE = 50_000
 """Random scenarios that tell what is feasible: fewer than `bridgegen coverage` draws, for speed."""
+
+MOTIONS, MOTIONS_ON_OWN_ROADS = 200, 20
+"""Scenarios whose motion the page holds besides those of the kept: half a second's work. Of a long
+run as many as a tenth of its rows; a road of its own takes ten times as long to draw. None where a
+driver of the user's drives, who may take his time."""
+
+AT_A_TIME = 40
+"""Scenarios that are rolled out together for it: long ones with many others take 2 MB."""
 
 INDEPENDENT = "random"
 """The algorithm whose rows are independent draws."""
@@ -50,6 +60,8 @@ def build_report(
     regions: Mapping[str, Any] | None = None,
     hashes: Mapping[str, str] | None = None,
     coverage: bool = True,
+    files: Mapping[str, bytes] | None = None,
+    more: bool = True,
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -70,6 +82,8 @@ def build_report(
         regions: the critical ones, as `regions.record` has them, if they are known.
         hashes: of what the run was made from and of what came of it.
         coverage: whether to count what was covered.
+        files: those of ``kept``, by their paths relative to the page, if it is to hold them.
+        more: whether the page is to hold the motion of more than ``kept``.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
     terms = pipeline.objective.names
@@ -118,6 +132,8 @@ def build_report(
         _coverage(pipeline, rows) if coverage else None,
         tables(notes, pipeline.space),
         regions,
+        more=_more(pipeline, rows, {evaluation for _, evaluation, _ in kept}) if more else (),
+        files=files or {},
     )
 
 
@@ -162,6 +178,20 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
     return Evaluations(
         rows.batch, parameters, metrics, objectives, rows.critical, rows.status, cause
     )
+
+
+def _more(pipeline: Pipeline, rows: Rows, kept: set[int]) -> tuple[Playback, ...]:
+    """Return the playbacks of the most critical scenarios besides those that were kept."""
+    critical = np.flatnonzero(rows.critical & (rows.status == 0))
+    order = [i for i in critical[by_merit(rows.F[critical])].tolist() if i not in kept]
+    own_roads = {*pipeline.source.static_names} & {*pipeline.space.variables}
+    most = MOTIONS_ON_OWN_ROADS if own_roads else max(MOTIONS, len(rows) // 10)
+    order = [] if pipeline.driver.is_own else order[:most]
+    found: list[Playback] = []
+    for start in range(0, len(order), AT_A_TIME):
+        some = [(f"evaluation {i + 1}", i, ()) for i in order[start : start + AT_A_TIME]]
+        found += playbacks(pipeline, rows, some, brief=True)
+    return tuple(found)
 
 
 def _coverage(pipeline: Pipeline, rows: Rows) -> CoverageMap:

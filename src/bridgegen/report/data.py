@@ -5,7 +5,7 @@ time to collision); the page shows a dash there.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -159,6 +159,9 @@ class ReportData:
         summary: the run in figures.
         evaluations: every row.
         kept: the scenarios that were handed over, most critical first; may be empty.
+        more: further scenarios, whose motion the page holds as far as there is room, likewise.
+        files: those of the kept scenarios, by their paths relative to the page, in the order in
+            which they matter; the page holds them as far as there is room.
         coverage: which bins and pairs of bins were evaluated, if it is to be shown.
         notes: what the algorithm learnt.
         regions: the critical ones, as `bridgegen.regions.record` has them, if they are known.
@@ -170,10 +173,12 @@ class ReportData:
     coverage: CoverageMap | None = None
     notes: tuple[NoteTable, ...] = ()
     regions: Mapping[str, Any] | None = None
+    more: tuple[Playback, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size
-        for playback in self.kept:
+        for playback in (*self.kept, *self.more):
             if not 0 <= playback.evaluation < n:
                 raise ValueError(
                     f"evaluation of playback '{playback.name}' must be in 0..{n - 1}, "

@@ -71,7 +71,7 @@ function append(list, more) {
 async function askMotion(evaluation) {
   try {
     const told = await (await fetch(`motion/${evaluation}`)).json();
-    return told.playback ? taken(told) : null;
+    return told.playback ? taken({ ...told, playbacks: [told.playback] })[0] : null;
   } catch {
     return null;
   }

@@ -26,8 +26,8 @@ def motion_payload(
 ) -> dict[str, Any]:
     """Return a scenario's playback, with the road and the picture that belong to it.
 
-    ``playback`` is as in the page's data, but that its road is the first of ``roads`` and its
-    picture, if it has one, the first of ``pictures``.
+    ``playback`` is as in the page's data, but that its road, number −1, is the first of ``roads``
+    and its picture, if it has one, the first of ``pictures``.
 
     Args:
         pipeline: what evaluated the rows.
@@ -40,5 +40,5 @@ def motion_payload(
     return {
         "roads": [road_payload(one)],
         "pictures": pictures_payload([one.picture]) if one.picture else None,
-        "playback": playback_payload(one, 0, 0 if one.picture else None),
+        "playback": playback_payload(one, -1, 0 if one.picture else None),
     }

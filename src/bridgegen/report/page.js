@@ -114,8 +114,7 @@ function fillDetails(kept) {
   $("measures").replaceChildren(name, ...cause, ...lines(kept.metrics));
   const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
   if (kept.files.length) {
-    // Always relative: a path with a scheme or a leading slash cannot lead elsewhere.
-    const links = kept.files.map((file) => element("a", { href: `./${file.split("/").map(encodeURIComponent).join("/")}` }, file));
+    const links = kept.files.map(fileLink);
     parts.push(element("h3", {}, "Its files"), element("div", { class: "files" }, ...links));
   }
   $("details").replaceChildren(...parts);

@@ -15,6 +15,7 @@ from bridgegen.cause import CAUSES, Cause
 from bridgegen.report import convergence, sentences
 from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, ReportData
+from bridgegen.report.packed import packed_files, packed_motions, road_key
 from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.playback_payload import (
     ROAD_SCALE,
@@ -58,14 +59,14 @@ def script_json(value: Any) -> str:
 
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
-    shown = _shown(data.evaluations, [playback.evaluation for playback in data.kept])
+    shown = _shown(data.evaluations, [p.evaluation for p in (*data.kept, *data.more)])
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
     index: dict[tuple[tuple[str, bytes], ...], int] = {}
     kept = []
     for playback in data.kept:
-        key = tuple((lane.kind, lane.points.tobytes()) for lane in playback.lanes)
+        key = road_key(playback)
         if key not in index:
             index[key] = len(roads)
             roads.append(road_payload(playback))
@@ -80,6 +81,8 @@ def payload(data: ReportData) -> dict[str, Any]:
         "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
         "kept": kept,
+        "packed": packed_motions(data.more, index),
+        "files": packed_files(data.files),
         "coverage": coverage_payload(data.coverage) if data.coverage else None,
         "notes": [
             {"title": t.title, "columns": t.columns, "rows": t.rows, "left_out": t.left_out}

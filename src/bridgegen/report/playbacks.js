@@ -2,6 +2,7 @@
 
 const SOURCES = {
   kept: "Handed over as files; play it",
+  packed: "Play it",
   served: "Play it: it is simulated when asked for",
   none: "Its motion is not in this page; show its figures, and the command that plays it",
 };
@@ -9,30 +10,26 @@ const SOURCES = {
 class Playbacks {
   constructor() {
     this.keptAt = new Map(data.kept.map((kept, k) => [kept.evaluation, k]));
+    this.packed = new Packed(data.packed);
     this.fetched = new Map();
   }
 
   // A key of SOURCES, or null where the motion is not to be had.
   source(evaluation) {
     if (this.keptAt.has(evaluation)) return "kept";
+    if (this.packed.has(evaluation)) return "packed";
     return data.live ? "served" : null;
   }
 
   // Of one that was not handed over; null if it cannot be had after all.
   async get(evaluation) {
+    if (this.packed.has(evaluation)) return this.packed.get(evaluation);
     const playback = this.fetched.get(evaluation) ?? (await askMotion(evaluation));
     if (playback) this.fetched.set(evaluation, playback);
     return playback;
   }
 }
 const playbacks = new Playbacks();
-
-// A playback that comes with a road and a picture of its own, as one of the page's.
-function taken({ playback, roads, pictures }) {
-  playback.road = data.roads.push(...roads) - 1;
-  playback.pictures = pictures;
-  return playback;
-}
 
 // What is known of a row of the page without its motion, in a playback's shape.
 function factsOf(i) {
@@ -85,8 +82,8 @@ class Opener {
     $("no-motion").hidden = false;
     $("player").classList.add("still");
     $("no-motion-name").textContent = `Evaluation ${number(facts.evaluation + 1)}`;
-    $("no-motion-command").parentNode.parentNode.hidden = !data.summary.view;
     $("no-motion-command").textContent = `${data.summary.view} --evaluation ${facts.evaluation + 1}`;
+    history.replaceState(null, "", `#evaluation-${facts.evaluation + 1}`);
     this.told(facts);
   }
 

@@ -22,7 +22,11 @@ THIN = 0.01
 
 
 def playbacks(
-    pipeline: Pipeline, rows: Rows, kept: Sequence[tuple[str, int, tuple[str, ...]]]
+    pipeline: Pipeline,
+    rows: Rows,
+    kept: Sequence[tuple[str, int, tuple[str, ...]]],
+    *,
+    brief: bool = False,
 ) -> tuple[Playback, ...]:
     """Return the playbacks of some of a run's scenarios.
 
@@ -30,10 +34,13 @@ def playbacks(
         pipeline: what evaluated the rows.
         rows: all of the run, in order.
         kept: name, evaluation and files of each, most critical first.
+        brief: without the individuals' picture and the ego's planned course, which take most of the
+            time.
     """
     if not kept:
         return ()
-    replay = pipeline.replay(rows.X[[evaluation for _, evaluation, _ in kept]])
+    at = [evaluation for _, evaluation, _ in kept]
+    replay = pipeline.replay(rows.X[at], plans=not brief)
     rollout = replay.rollout
     entities, scenery = bodies(rollout, pipeline.source.bodies), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
@@ -41,13 +48,13 @@ def playbacks(
     checked = constraints_in_words(pipeline.source.constraints)
     found = []
     for k, (name, evaluation, files) in enumerate(kept):
-        concrete = pipeline.concrete(rows.X[evaluation])
+        concrete = pipeline.concrete(rows.X[evaluation]) if not brief else None
         motion = {name: getattr(rollout, name)[k] for name in "xyhva"}
         if rollout.present.size:  # who is not there has no place and no speed
             motion |= {name: np.where(rollout.present[k], motion[name], np.nan) for name in "xyva"}
         road = scenery.road(rows.X[evaluation])
         picture = None
-        if concrete.individuals is not None:
+        if concrete is not None and concrete.individuals is not None:
             whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
             picture = paint(whole, (), checked)
         found.append(
@@ -79,8 +86,9 @@ def playbacks(
 
 
 def _course(replay: Replay, row: int) -> Course | None:
-    meant, ways = replay.intentions, replay.ways[row]
-    if not ways:
+    meant = replay.intentions
+    ways = replay.ways[row] if meant else None
+    if not meant or not ways:
         return None
     number = np.full(max(ways) + 2, -1)  # -1 stays -1
     number[list(ways)] = range(len(ways))

@@ -1,0 +1,167 @@
+"""What the page holds deflated: motions and files, as many as there is room for, and read again."""
+
+import json
+import zlib
+from base64 import b64decode
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.report import packed
+from bridgegen.report.data import Column, Evaluations
+from bridgegen.report.page import report_page, write_report
+from bridgegen.report.payload import payload
+from bridgegen.report.playback_payload import playback_payload, road_payload
+
+LIMIT = 15_000_000
+
+
+def chunks(told):
+    return [json.loads(zlib.decompress(b64decode(text))) for text in told["texts"]]
+
+
+@pytest.fixture(scope="module")
+def more(report):
+    """The report with two of its kept scenarios not handed over."""
+    last = [
+        replace(p, name=f"evaluation {p.evaluation + 1}", rank=1, files=()) for p in report.kept[2:]
+    ]
+    return replace(report, kept=report.kept[:2], more=tuple(last))
+
+
+def test_motions_are_as_in_the_page_s_own_data(more):
+    told = payload(more)["packed"]
+    (chunk,) = chunks(told)
+    assert told["evaluations"] == [p.evaluation for p in more.more]
+    want = [playback_payload(p, 0, None) for p in more.more]  # on the road that the page has
+    assert chunk == {"playbacks": json.loads(json.dumps(want)), "roads": []}
+
+
+def test_a_road_that_the_page_has_not_got_comes_once_a_chunk(more):
+    road = more.kept[0].lanes
+    moved = tuple(replace(one, points=one.points + 1.0) for one in road)
+    some = [replace(more.more[0], lanes=lanes) for lanes in (moved, road, moved)]
+    told = packed.packed_motions(some, {packed.road_key(more.kept[0]): 0})
+    (chunk,) = chunks(told)
+    assert [one["road"] for one in chunk["playbacks"]] == [-1, 0, -1]
+    assert chunk["roads"] == [road_payload(some[0])]
+
+
+def test_there_is_room_for_the_first_only(more, monkeypatch):
+    some = [more.more[0]] * 50
+    whole = packed.packed_motions(some, {})
+    assert [len(chunk["playbacks"]) for chunk in chunks(whole)] == [20, 20, 10]
+    monkeypatch.setattr(packed, "MOST_MOTION", len(whole["texts"][0]) + 10)
+    told = packed.packed_motions(some, {})
+    assert len(told["evaluations"]) == 20
+    assert len(told["texts"]) == 1
+    monkeypatch.setattr(packed, "MOST_FILES", 30)
+    files = {"a": b"x" * 100, "b": bytes(range(100)), "c": b""}
+    assert list(packed.packed_files(files)) == ["a"]
+
+
+@pytest.fixture(scope="module")
+def long(report):
+    """10,000 evaluations in numbers that do not compress, nearly all critical; packed full."""
+    rng, n = np.random.default_rng(0), 10_000
+    names = [c.name for c in report.evaluations.parameters] + [f"p{k}" for k in range(16)]
+    parameters = tuple(Column(name, "m", rng.random(n) * 100.0, searched=True) for name in names)
+    metrics = tuple(
+        Column(name, "m", np.abs(rng.normal(2.0, 1.0, n)))
+        for name in ("d_min", "v_d", "n_collision", "ttc", "l_offset", "a_change", "n_brake")
+    )
+    evaluations = Evaluations(
+        iteration=np.arange(n) // 40, parameters=parameters, metrics=metrics,
+        objectives=(Column("F", "1", rng.normal(0.0, 1.0, n)),), critical=rng.random(n) < 0.98,
+        status=np.zeros(n, dtype=np.int64), cause=rng.integers(1, 5, n).astype(np.int8),
+    )  # fmt: skip
+    p = report.kept[0]
+    noisy = [
+        replace(
+            p,
+            name=f"evaluation {k + 1}",
+            evaluation=k,
+            x=p.x + rng.normal(0, 1, p.x.shape),
+            v=p.v + rng.random(p.v.shape),
+        )
+        for k in range(300, 500)
+    ]
+    files = {f"critical/{k:04d}.owl": rng.bytes(100_000) for k in range(20)}
+    return replace(report, evaluations=evaluations, more=tuple(noisy), files=files)
+
+
+def test_a_page_of_10_000_rows_is_not_too_large(long, monkeypatch):
+    told = payload(long)
+    room = packed.MOST_MOTION - sum(map(len, told["packed"]["texts"]))
+    # The motions that are left out for want of room would not have fit; so with the files.
+    assert 0 < len(told["files"]) < 20
+    size = sum(map(len, report_page(long))) + max(0, room)
+    assert size <= LIMIT
+
+
+@pytest.mark.browser
+def test_a_page_of_10_000_rows_has_only_those_in_sight_and_plays_any_it_holds(
+    browser, long, tmp_path
+):
+    write_report(tmp_path / "report.html", long)
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    complaints = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_selector("#list-body tr[data-i]")
+    n = int(long.evaluations.critical.sum())
+    assert page.inner_text("#list-note") == f"{n:,} critical scenarios"
+    for place in (0, 100_000, 10**9):
+        page.evaluate(f"document.getElementById('list-scroll').scrollTop = {place}")
+        page.evaluate("new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(r)))")
+        assert 5 < page.locator("#list-body tr[data-i]").count() < 60
+    last = page.locator("#list-body tr[data-i]").last
+    assert int(last.get_attribute("aria-rowindex")) >= n + 1
+
+    p = long.more[7]
+    page.evaluate(f"bridgegen.open({p.evaluation})")
+    page.wait_for_function(f"bridgegen.state().scenario === '{p.name}'")
+    for share in (0.1, 0.5, 0.9):
+        k = round(share * (p.n_steps - 1))
+        page.evaluate(f"bridgegen.seek({k})")
+        drawn = page.evaluate("bridgegen.state().entities")
+        assert [e["x"] for e in drawn] == pytest.approx(p.x[:, k].tolist(), abs=5.01e-4)
+        assert [e["v"] for e in drawn] == pytest.approx(p.v[:, k].tolist(), abs=5.01e-4)
+    assert complaints == []
+    page.close()
+
+
+@pytest.mark.browser
+def test_files_are_saved_from_the_page_itself_or_linked(browser, more, tmp_path):
+    name = more.kept[0].files[0]
+    data = replace(more, files={name: "<x>≤</x>".encode() * 1000})
+    write_report(tmp_path / "report.html", data)
+    page = browser.new_page(accept_downloads=True)
+    page.goto((tmp_path / "report.html").as_uri())
+    with page.expect_download() as download:
+        page.locator("#details .files a").first.click()
+    assert download.value.suggested_filename == Path(name).name
+    assert Path(download.value.path()).read_bytes() == data.files[name]
+    other = page.locator("#details .files a").nth(1)
+    assert other.get_attribute("href") == f"./{more.kept[0].files[1]}"
+    page.close()
+
+
+@pytest.mark.browser
+def test_what_it_does_not_hold_it_names_the_command_for(browser, more, tmp_path):
+    shown = replace(more, summary=replace(more.summary, view="bridgegen view 'my runs/s4'"))
+    write_report(tmp_path / "report.html", shown)
+    page = browser.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    there = {p.evaluation for p in (*more.kept, *more.more)}
+    other = next(i for i in np.flatnonzero(more.evaluations.critical).tolist() if i not in there)
+    page.evaluate(f"bridgegen.open({other})")
+    page.wait_for_selector("#no-motion")
+    command = f"bridgegen view 'my runs/s4' --evaluation {other + 1}"
+    assert page.inner_text("#no-motion-command") == command
+    assert page.inner_text("#measures h3") == f"Evaluation {other + 1}"
+    page.evaluate(f"bridgegen.open({more.more[0].evaluation})")
+    page.wait_for_selector("#no-motion", state="hidden")
+    page.close()
