@@ -72,7 +72,7 @@ def test_it_is_well_formed(written):
     ids = parsed.values("id")
     assert len(set(ids)) == len(ids)
     for attribute in ("for", "aria-labelledby", "aria-describedby"):
-        assert set(parsed.values(attribute)) <= set(ids)
+        assert {one for told in parsed.values(attribute) for one in told.split()} <= set(ids)
     assert {link[1:] for link in parsed.values("href") if link.startswith("#")} <= set(ids)
     assert ("html", {"lang": "en"}) in parsed.elements
     assert sum(tag == "h1" for tag, _ in parsed.elements) == 1
