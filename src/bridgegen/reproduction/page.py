@@ -73,7 +73,8 @@ def _block(block: Block) -> str:
         case Picture():
             caption, path = escape(block.caption), f"{FIGURES}/{escape(block.name)}"
             return (
-                f'<figure class="card" id="{escape(block.name)}"><div class="shot" tabindex="0"><picture>'
+                f'<figure class="card" id="{escape(block.name)}">'
+                '<div class="shot" tabindex="0"><picture>'
                 f'<source media="(prefers-color-scheme: dark)" srcset="{_data(block.dark)}">'
                 f'<img alt="{caption}" src="{_data(block.light)}"></picture></div>'
                 f'<figcaption>{caption} Files: <a href="{path}.png">png</a>, '
