@@ -15,6 +15,8 @@ function fitCanvas(canvas, options) {
 
 const FONT = '600 12px system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
 
+const ABOVE = 46, BELOW = 38; // pixels that the clock and the scale bar take
+
 // Where the middle of the canvas lies in the world [m], and how many pixels a metre has.
 class View {
   constructor(canvas, changed) {
@@ -40,10 +42,11 @@ class View {
     if (!points.length || !width) return;
     const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
     const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-    const scale = Math.min(width / (x1 - x0 + 2 * margin), (height - 30) / (y1 - y0 + 2 * margin));
+    const scale = Math.min(width / (x1 - x0 + 2 * margin), (height - ABOVE - BELOW) / (y1 - y0 + 2 * margin));
     this.x = (x0 + x1) / 2;
     this.y = (y0 + y1) / 2;
     this.scale = Math.min(24, Math.max(0.5, scale));
+    this.y += (ABOVE - BELOW) / 2 / this.scale;
   }
 
   // Keeps the world's point at the pixel `at` in its place.
