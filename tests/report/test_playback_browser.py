@@ -25,13 +25,14 @@ SHARES = (0.2, 0.5, 0.9)
 class Case:
     """Some rows of a scenario, rolled out, and the page that plays them."""
 
-    def __init__(self, name: str, fixed: dict[str, float], n: int = 2) -> None:
-        logical = load(name)
+    def __init__(self, name: str, fixed: dict[str, float], ego: str = "reference") -> None:
+        n, logical = 2, load(name)
         space = logical.space(fixed=fixed)
-        self.pipeline = Pipeline(logical, space, ego="reference")
+        self.pipeline = Pipeline(logical, space, ego=ego)
         self.X = space.decode(np.random.default_rng(5).random((n, space.n_var)))
         self.rollout = self.pipeline.rollout(self.X)
-        self.counts = perceived(self.rollout).counts
+        if self.rollout.detections.size:
+            self.counts = perceived(self.rollout).counts
         self.ttc = ttc_over_time(self.rollout)
         rows: Any = SimpleNamespace(
             X=self.X, metrics=np.zeros((n, len(self.pipeline.metrics))),
@@ -324,4 +325,17 @@ def test_who_wants_no_motion_gets_none(show, fog):
     page = show(fog, reduced_motion="reduce")
     page.evaluate("bridgegen.select(1)")
     assert not state(page)["playing"]
+    assert page.complaints == []
+
+
+def test_a_driver_that_does_not_tell_its_plan_is_said_to_have_none(show):
+    case = Case("crossroads-s4", {}, ego="route-follower")
+    page = show(case)
+    assert page.inner_text("#course-button") == "Way ahead"
+    assert not page.is_visible("#legend [data-layer='sensed']")
+    k = case.steps(0)[0]
+    (now,) = states(page, 0, [k])
+    assert now["intention"]["planned"] is None
+    assert now["intention"]["a"] == pytest.approx(case.rollout.a[0, 0, k], abs=0.006)
+    assert "plans" not in now["told"]
     assert page.complaints == []

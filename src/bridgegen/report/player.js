@@ -84,6 +84,11 @@ class Player {
       item.hidden = !has[item.dataset.layer] || (!button && !shown);
       button?.setAttribute("aria-pressed", shown);
     }
+    if (this.kept.course) {
+      const tells = this.kept.course.acceleration.some((a) => a !== null);
+      $("course-button").textContent = tells ? "Planned path" : "Way ahead";
+      $("course-means").textContent = `in 1, 2, 3 s${tells ? "" : " if it goes on like this"}; a thick bar: it stands`;
+    }
     if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
   }
 
