@@ -36,6 +36,7 @@ def test_it_grows_with_its_run_and_says_so(opened, growing):
     page.locator("#scatter").scroll_into_view_if_needed()
     page.wait_for_function("document.getElementById('scatter').data")
     page.fill("#list-low", "0")  # a filter stays
+    page.locator("#scatter").scroll_into_view_if_needed()  # it is drawn where it is seen
     before = page.evaluate("bridgegen.state().position")
     growing.grow(40)
     page.wait_for_function("bridgegen.data.rows.n === 100")

@@ -194,19 +194,16 @@ function drawScatter() {
   plot.on("plotly_click", ({ points: [point] }) => { if (point.data.mode === "markers+text") window.bridgegen.select(point.customdata); });
 }
 
-// Each chart is drawn when it comes near the screen, and again when the colour scheme changes.
 function drawCharts() {
   const charts = new Map(trendPlots());
-  const drawn = new Set();
-  const redraw = (plot) => { charts.get(plot)(); window.bridgegen.chartsDrawn += 1; };
+  let parallel = null;
   if (rows.critical.length) {
     fillAxes();
     charts.set($("scatter"), drawScatter);
     $("parallel-card").hidden = !rows.telling.length;
     if (rows.telling.length) {
-      const parallel = new Parallel($("parallel"));
+      parallel = new Parallel($("parallel"), () => near.again($("parallel")));
       charts.set($("parallel"), () => parallel.draw());
-      window.bridgegen.grown = () => { parallel.rescale(); drawn.forEach((plot) => charts.get(plot)()); };
     }
     for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", drawScatter);
     connectFront(drawScatter);
@@ -215,21 +212,15 @@ function drawCharts() {
       drawScatter();
     });
   } else $("space").hidden = $("iterations").hidden = true;
-  const watch = new IntersectionObserver((entries) => {
-    for (const { isIntersecting, target } of entries) {
-      if (!isIntersecting || drawn.has(target)) continue;
-      drawn.add(target);
-      redraw(target);
-    }
-  }, { rootMargin: "500px" });
-  for (const plot of charts.keys()) watch.observe(plot);
   window.bridgegen.charts = charts.size;
-  darkScheme.addEventListener("change", () => drawn.forEach(redraw));
+  const near = new NearScreen(charts, () => { window.bridgegen.chartsDrawn += 1; });
+  window.bridgegen.grown = () => { parallel?.rescale(); near.all(); };
+  darkScheme.addEventListener("change", () => near.all());
   let waiting = null;
   const again = (after) => () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => { if (drawn.has($("scatter"))) drawScatter(); }, after);
+    waiting = setTimeout(() => near.again($("scatter")), after);
   };
-  document.addEventListener("filters", again(60)); // dragging must not wait for the scatter plot
+  document.addEventListener("filters", again(200)); // dragging must not wait for the scatter plot
   document.addEventListener("shown", again(0));
 }

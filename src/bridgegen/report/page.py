@@ -18,8 +18,8 @@ SCRIPTS = (
     "downloads.js", "playbacks.js",
     "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
     "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "scene.js",
-    "strip.js", "curves.js", "picture.js", "player.js", "parallel.js", "front.js", "charts.js",
-    "coverage.js", "coverage_pairs.js",
+    "strip.js", "curves.js", "picture.js", "player.js", "parallel.js", "front.js", "near.js",
+    "charts.js", "coverage.js", "coverage_pairs.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
 

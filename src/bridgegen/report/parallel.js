@@ -1,12 +1,14 @@
 // Parallel coordinates on a canvas: one line per evaluation, a filter on any axis.
 
-const MOST_LINES = 1500;
+const MOST_LINES = 1500, QUICK_LINES = 400; // the latter while a filter is on its way
 
 const least = (values) => values.reduce((a, b) => Math.min(a, b), Infinity);
 
 class Parallel {
-  constructor(canvas) {
+  // redraw(): has it drawn again, when that is worth while.
+  constructor(canvas, redraw) {
     this.canvas = canvas;
+    this.redraw = redraw;
     const chosen = rows.columns.filter((c) => rows.telling.includes(c.name) || c.name in data.batches.trends);
     this.names = chosen.map((column) => column.name);
     this.rescale();
@@ -38,7 +40,10 @@ class Parallel {
   changed() {
     this.showNumbers();
     this.note();
-    this.drawing ??= requestAnimationFrame(() => { this.drawing = null; this.draw(); });
+    this.quick = true;
+    this.drawing ??= requestAnimationFrame(() => { this.drawing = null; this.redraw(); });
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => { this.quick = false; this.redraw(); }, 300);
   }
 
   showNumbers() {
@@ -78,7 +83,7 @@ class Parallel {
     const { context: c, width, height } = fitCanvas(this.canvas, { willReadFrequently: true });
     const { x } = this.frame();
     c.clearRect(0, 0, width, height);
-    const { hits, others } = subsample(MOST_LINES);
+    const { hits, others } = subsample(this.quick ? QUICK_LINES : MOST_LINES);
     const lines = (list, colour, thick, density) => {
       c.strokeStyle = colour;
       c.lineWidth = thick;
