@@ -211,6 +211,16 @@ def test_the_strip_tells_when_who_was_seen(opened):
     assert state(page)["index"] == pytest.approx(0.5 * (len(told) - 1), abs=1)
 
 
+def test_a_scenario_that_is_chosen_again_keeps_its_curves(opened):
+    _, page = opened
+    page.evaluate("bridgegen.select(1)")
+    shots = []
+    for _ in range(2):
+        page.evaluate("bridgegen.select(0); bridgegen.seek(30)")
+        shots.append(page.evaluate(PIXELS.replace('"scene"', '"curves"')))
+    assert shots[0] == shots[1]
+
+
 def test_each_kind_of_detection_is_drawn_and_told(show, fog):
     """An instant for each kind; hiding them changes the picture. Who has a label is told, too."""
     found = {

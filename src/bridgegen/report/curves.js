@@ -30,6 +30,7 @@ class Curves {
 
   show(kept) {
     this.kept = kept;
+    this.still = null;
     this.strip = new Strip(kept);
     this.canvas.style.setProperty("--strip", `${this.strip.height}px`);
     const players = playersOf(kept), critical = data.summary.critical_distance;
