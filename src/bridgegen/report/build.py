@@ -28,10 +28,11 @@ from bridgegen.store.summary import Summary
 SAMPLE = 50_000
 """Random scenarios that tell what is feasible: fewer than `bridgegen coverage` draws, for speed."""
 
-MOTIONS, MOTIONS_ON_OWN_ROADS = 200, 20
+MOTIONS, MOTIONS_OF_THEIR_OWN = 200, 20
 """Scenarios whose motion the page holds besides those of the kept: half a second's work. Of a long
-run as many as a tenth of its rows; a road of its own takes ten times as long to draw. None where a
-driver of the user's drives, who may take his time."""
+run as many as a tenth of its rows. Fewer where each has a road, or an adversary's course, of its
+own, which take ten times as long; none where a driver of the user's drives, who may take his
+time."""
 
 AT_A_TIME = 40
 """Scenarios that are rolled out together for it: long ones with many others take 2 MB."""
@@ -184,8 +185,9 @@ def _more(pipeline: Pipeline, rows: Rows, kept: set[int]) -> tuple[Playback, ...
     """Return the playbacks of the most critical scenarios besides those that were kept."""
     critical = np.flatnonzero(rows.critical & (rows.status == 0))
     order = [i for i in critical[by_merit(rows.F[critical])].tolist() if i not in kept]
-    own_roads = {*pipeline.source.static_names} & {*pipeline.space.variables}
-    most = MOTIONS_ON_OWN_ROADS if own_roads else max(MOTIONS, len(rows) // 10)
+    space = pipeline.space
+    own = space.decisions or {*pipeline.source.static_names} & {*space.variables}
+    most = MOTIONS_OF_THEIR_OWN if own else max(MOTIONS, len(rows) // 10)
     order = [] if pipeline.driver.is_own else order[:most]
     found: list[Playback] = []
     for start in range(0, len(order), AT_A_TIME):
