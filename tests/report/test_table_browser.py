@@ -111,5 +111,16 @@ def test_a_handed_over_one_plays(page, report):
     page.uncheck("#only-kept")
 
 
+def test_what_is_shown_from_elsewhere_is_brought_into_sight(page):
+    page.evaluate("document.getElementById('list-scroll').style.height = '150px'")
+    ranks = page.evaluate("bridgegen.data.rows.rank")
+    for rank in (max(ranks), 1):
+        page.evaluate(f"bridgegen.open({ranks.index(rank)})")
+        current = page.locator("#list-body tr[aria-current]")
+        box, frame = current.bounding_box(), page.locator("#list-scroll").bounding_box()
+        assert frame["y"] < box["y"] < frame["y"] + frame["height"] - 20
+        assert current.locator("button").get_attribute("aria-label").endswith(f", rank {rank}")
+
+
 def test_nothing_complained_so_far(page):
     assert page.complaints == []

@@ -132,8 +132,10 @@ class Table {
     if (focus) this.buttonOf(this.order[place])?.focus({ preventScroll: true });
   }
 
+  // Marks the one in the player, and brings it into sight.
   mark(evaluation) {
     this.shown = evaluation;
+    this.reveal(this.order.findIndex((i) => rows.evaluation[i] === evaluation));
     for (const row of this.body.querySelectorAll("tr[data-i]")) {
       if (rows.evaluation[row.dataset.i] === evaluation) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
