@@ -152,8 +152,8 @@ def test_the_architecture_has_a_paragraph_for_each_folder():
 
 
 def test_ci_names_every_figure_and_status():
-    from bridgegen.campaign.verdict import FIGURES
     from bridgegen.cli.app import FAILED
+    from bridgegen.verdict.of_run import FIGURES
 
     text = (DOCS / "ci.md").read_text("utf-8")
     assert [name for name in FIGURES if f"`{name}`" not in text] == []
@@ -183,7 +183,7 @@ def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):
 
 
 def test_the_sections_of_a_report_are_called_as_the_page_calls_them():
-    page = (DOCS.parent / "src/bridgegen/report/page.html").read_text("utf-8")
+    page = (DOCS.parent / "src/bridgegen/report/web/page.html").read_text("utf-8")
     headings = re.findall(r"<h[23][^>]*>([^<]+)</h[23]>", page)
     text = (DOCS / "read-a-report.md").read_text("utf-8")
     told = [name.rstrip(".") for name in re.findall(r"^\*\*([^*]+)\*\*", text, re.MULTILINE)]

@@ -125,7 +125,11 @@ def test_no_name_is_declared_by_two_scripts():
 
 
 def test_every_file_of_ours_is_used():
-    ours = {f.name for f in files("bridgegen.report").iterdir() if f.name.endswith((".js", ".css"))}
+    ours = {
+        f.name
+        for f in files("bridgegen.report").joinpath("web").iterdir()
+        if f.name.endswith((".js", ".css"))
+    }
     assert ours == {*page.SCRIPTS, *page.SERVED, *show.SCRIPTS, *STYLES}
 
 

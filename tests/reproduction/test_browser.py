@@ -1,9 +1,5 @@
 """The page in a real browser: it asks nobody for anything, and fits a phone."""
 
-import shutil
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
 
 from bridgegen.comparison.drawing import DARK, LIGHT, blank, png
@@ -14,21 +10,9 @@ from bridgegen.reproduction.table import Table
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = shutil.which("chromium")
-    if path is None:
-        pytest.skip("chromium is not installed")
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield started
-        started.close()
-
-
 @pytest.mark.parametrize(("width", "height"), [(1280, 720), (400, 800)])
 def test_it_loads_and_nothing_but_tables_and_figures_is_wider_than_the_screen(
-    chromium, tmp_path, width, height
+    browser, tmp_path, width, height
 ):
     head = tuple(f"a long name of a column {k}" for k in range(12))
     table = Table("table-6", "Table VI", head, (head,) * 3, ("a note",))
@@ -43,7 +27,7 @@ def test_it_loads_and_nothing_but_tables_and_figures_is_wider_than_the_screen(
     )  # fmt: skip
     path = tmp_path / "index.html"
     path.write_text(html(document), "utf-8")
-    page = chromium.new_page(viewport={"width": width, "height": height})
+    page = browser.new_page(viewport={"width": width, "height": height})
     complaints, requests = [], []
     page.on("console", lambda message: complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))

@@ -13,7 +13,7 @@ from bridgegen.cli.app import FAILED, app
 from bridgegen.ego import split
 
 if TYPE_CHECKING:
-    from bridgegen.report.criteria import Outcome
+    from bridgegen.verdict.criteria import Outcome
 
 
 @app.command()
@@ -62,8 +62,8 @@ def search(
 ) -> None:
     """Search a logical scenario for its critical concrete ones."""
     from bridgegen import campaign
-    from bridgegen.campaign.verdict import Gate
     from bridgegen.screen.search import SearchScreen, print_summary
+    from bridgegen.verdict.of_run import Gate
 
     gate = Gate.read(fail_if or (), junit, causes=causes)
     with SearchScreen(budget) as screen:
@@ -123,8 +123,8 @@ def resume(
 ) -> None:
     """Go on with a run that was interrupted; the result is as if it had not been."""
     from bridgegen import campaign
-    from bridgegen.campaign.verdict import Gate
     from bridgegen.screen.search import SearchScreen, print_summary
+    from bridgegen.verdict.of_run import Gate
 
     gate = Gate.of_run(fail_if or (), junit, folder)
     with SearchScreen() as screen:
@@ -234,10 +234,10 @@ def simulate(
     as_json: options.Json = False,
 ) -> None:
     """Run one scenario file and print its metrics."""
-    from bridgegen.report.file_verdict import FileGate
     from bridgegen.screen.files import print_file_result
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
+    from bridgegen.verdict.of_file import FileGate
 
     gate = FileGate.read(fail_if or (), junit)
     stages = None if ideal is None else split(ideal)

@@ -92,11 +92,11 @@ def filled(
     """Return a page in parts; what is put in is never searched for placeholders again.
 
     Args:
-        template: file of this folder.
-        scripts: files of this folder.
+        template: a file of ``web``.
+        scripts: files of ``web``.
         title: plain text.
         data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
-        styles: files of this folder.
+        styles: files of ``web``.
         more: of the template's other placeholders.
     """
     fill = {
@@ -112,7 +112,7 @@ def filled(
 
 @cache
 def _own(name: str) -> bytes:
-    return files("bridgegen.report").joinpath(name).read_bytes()
+    return files("bridgegen.report").joinpath("web", name).read_bytes()
 
 
 @cache

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError
-from bridgegen.report.criteria import Comparison, read_criteria
+from bridgegen.verdict.criteria import Comparison, read_criteria
 
 KNOWN = ("r_critic", "d_min", "v_d", "map", "and_x")
 SIGNS = {

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridgegen.metrics import METRICS
-from bridgegen.report.criteria import Criterion, Outcome, read_criteria
-from bridgegen.report.junit import Suite, case_of, refuse_junit, write_junit
 from bridgegen.simulate import FileResult
+from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
+from bridgegen.verdict.junit import Suite, case_of, refuse_junit, write_junit
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.verdict import FIGURES, Gate, figures_of
 from bridgegen.cause import CAUSES
 from bridgegen.cli import main
 from bridgegen.errors import InputError
 from bridgegen.store.summary import Summary
+from bridgegen.verdict.of_run import FIGURES, Gate, figures_of
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ from bridgegen.campaign.settings import Settings
 from bridgegen.cause import CAUSES
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError
-from bridgegen.report.criteria import Criterion, Outcome, read_criteria
-from bridgegen.report.junit import Case, Suite, case_of, refuse_junit, write_junit
 from bridgegen.store import Store
+from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
+from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
 
 _CAUSES = {one.label: "critical scenarios of this cause" for one in CAUSES}
 
