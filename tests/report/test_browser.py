@@ -68,6 +68,15 @@ def opened(show, report) -> Iterator[Opened]:
     opened.page.close()
 
 
+def test_what_is_printed_has_every_chart(show, report):
+    opened = show(report)
+    assert opened.page.evaluate("bridgegen.chartsDrawn < bridgegen.charts")
+    assert opened.page.pdf().startswith(b"%PDF")
+    assert opened.page.evaluate("bridgegen.chartsDrawn >= bridgegen.charts")
+    assert opened.complaints == []
+    opened.page.close()
+
+
 def scrub(page: Any, step: int) -> None:
     page.locator("#scrub").evaluate(
         "(e, k) => { e.value = k; e.dispatchEvent(new Event('input')); }", step

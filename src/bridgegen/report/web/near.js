@@ -14,6 +14,9 @@ class NearScreen {
       }
     }, { rootMargin: "500px" });
     for (const plot of charts.keys()) watch.observe(plot);
+    addEventListener("beforeprint", () => {
+      for (const plot of [...this.stale]) this.draw(plot); // paper shows what no screen has shown
+    });
   }
 
   draw(plot) {
