@@ -10,21 +10,6 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.cli import main
-
-
-@pytest.fixture
-def cli(monkeypatch, capsys):
-    """Run a command line; return (exit status, standard output, standard error)."""
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        out, err = capsys.readouterr()
-        return int(end.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture(scope="session")

@@ -1,13 +1,11 @@
 import json
 import sqlite3
-import sys
 
 import numpy as np
 import pytest
 
 import bridgegen as bg
 from bridgegen.campaign.regions import regions_of
-from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.within import in_box
 from bridgegen.ontology.files import load
@@ -30,18 +28,6 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(folder):
     return regions_of(folder, samples=100)
-
-
-@pytest.fixture
-def cli(monkeypatch, capsys):
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        out, err = capsys.readouterr()
-        return int(end.value.code or 0), out, err
-
-    return run
 
 
 def copied(folder, place, **changes):

@@ -1,7 +1,6 @@
 """Runs and files held against criteria, from the command line to the XML."""
 
 import json
-import sys
 from dataclasses import fields
 from xml.etree import ElementTree
 
@@ -9,22 +8,9 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.cause import CAUSES
-from bridgegen.cli import main
 from bridgegen.errors import InputError
 from bridgegen.store.summary import Summary
 from bridgegen.verdict.of_run import FIGURES, Gate, figures_of
-
-
-@pytest.fixture
-def cli(monkeypatch, capsys):
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        out, err = capsys.readouterr()
-        return int(end.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture(scope="module")
