@@ -216,8 +216,8 @@ def _itself(array: Any) -> Any:
     return array
 
 
-def _call(address: int, arrays: tuple[np.ndarray, ...]) -> None:
-    """Do in Python what ``_called_at`` does in a kernel."""
+def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
+    """Do in Python what ``call_at`` does in a kernel."""
     kinds = [ctypes.c_void_p, ctypes.c_ssize_t] * len(arrays)
     given = (one for array in arrays for one in (array.ctypes.data, len(array)))
     ctypes.CFUNCTYPE(None, *kinds)(address)(*given)
@@ -225,6 +225,6 @@ def _call(address: int, arrays: tuple[np.ndarray, ...]) -> None:
 
 if numba.config.DISABLE_JIT:
     borrowed = bundled = _itself
-    call_at = _call
+    call_at = call_from_python
 else:
     borrowed, bundled, call_at = map(numba.extending.intrinsic, (_borrowed, _bundled, _called_at))

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,9 +24,8 @@ from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.intentions import Intentions
-from bridgegen.simulation.embedded.network import Network
-from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
 from bridgegen.simulation.simulator import Simulator
 
@@ -126,6 +125,7 @@ class Pipeline:
         also: Sequence[str] = (),
         seek_causes: bool = False,
         cause: Cause | None = None,
+        simulator: SimulatorChoice = EMBEDDED,
         threads: int | None = None,
     ) -> None:
         """Prepare a scenario.
@@ -142,11 +142,13 @@ class Pipeline:
             also: the names of metrics to record besides, by default.
             seek_causes: whether to find the cause of each critical scenario.
             cause: of harm; a critical scenario of another one does not count.
+            simulator: which one runs the scenarios.
             threads: to evaluate with, one for each core by default; no result depends on it.
 
         Raises:
             UnknownNameError: no such driver or metric.
-            InputError: a metric, or harm by the cause, does not exist with this driver.
+            InputError: a metric, or harm by the cause, does not exist with this driver; or the
+                simulator is not where it should be.
         """
         self.scenario = scenario
         self.space = space
@@ -157,9 +159,10 @@ class Pipeline:
         self.source = _source(scenario, driver, road_map, space)
         self.cause, self.seeks_causes = cause, seek_causes or cause is not None
         nominal = self.concrete(space.row({}))
-        simulator = EmbeddedSimulator(nominal.storyboard, scenario.name, driver=driver)
-        self.simulator: Simulator[Network] = simulator
-        self.driver = simulator.program.driver
+        self.simulator: Simulator[Any] = simulator.simulator(
+            nominal.storyboard, scenario.name, driver
+        )
+        self.driver = self.simulator.embedded.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
             self.source = _source(scenario, self.driver, road_map, space)
         if cause is not None:
@@ -167,7 +170,7 @@ class Pipeline:
         recorded = metrics_of(scenario, self.driver, also) if metrics is None else metrics
         self.metrics = tuple(recorded)
         _refuse_fixed(scenario, space, self.simulator.fixed)
-        self._roads: Network | None = None
+        self._roads: Any = None
         if not {*self._road_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
         self._threads = ThreadPoolExecutor(threads or os.cpu_count() or 1, "rollout")
@@ -177,12 +180,16 @@ class Pipeline:
 
         Raises:
             InputError: there is no adversary, or the ego's driver cannot be asked instant by
-                instant.
+                instant; or another simulator than the embedded one is to run it.
         """
         if not isinstance(self.source, AdversarySource):
             raise InputError(f"{self.scenario.place}: no adversary drives anybody")
-        assert isinstance(self.simulator, EmbeddedSimulator)
-        return Arena(self.source, self.simulator, self.space)
+        if self.simulator is not self.simulator.embedded:
+            raise InputError(
+                f"{self.scenario.place}: an agent drives in closed loop in the embedded simulator "
+                "alone; search there, and confirm elsewhere what it finds"
+            )
+        return Arena(self.source, self.simulator.embedded, self.space)
 
     def choose_objective(
         self,
@@ -278,24 +285,25 @@ class Pipeline:
 
         Args:
             X: ``(N, len(space.names))`` float64.
-            plans: whether to find out what the egos meant to do, which takes many times as long.
+            plans: whether to find out what the egos meant to do, which takes many times as long;
+                only the embedded simulator can.
         """
-        assert isinstance(self.simulator, EmbeddedSimulator)
+        embedded = self.simulator.embedded
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         intentions, ways = None, []
-        if plans:
-            intentions = self.simulator.intentions(roads, rows, columns, rollout)
+        if plans and self.simulator is embedded:
+            intentions = embedded.intentions(roads, rows, columns, rollout)
             ways = [
                 {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}
                 for p, named in zip(rows.tolist(), intentions.way, strict=True)
             ]
-        weathers = [self.simulator.weathers(columns, rollout, i) for i in range(len(X))]
+        weathers = [embedded.weathers(columns, rollout, i) for i in range(len(X))]
         return Replay(rollout, intentions, ways, weathers)
 
     def _run(
-        self, roads: Network, rows: Int, X: Float, replay: Counterfactual | None = None
+        self, roads: Any, rows: Int, X: Float, replay: Counterfactual | None = None
     ) -> Rollout:
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         if replay is None:
@@ -322,7 +330,7 @@ class Pipeline:
     def _measure(self, X: Float) -> Float:
         return measures.evaluate(self.rollout(X), self.metrics)
 
-    def _roads_of(self, X: Float) -> tuple[Network, Int]:
+    def _roads_of(self, X: Float) -> tuple[Any, Int]:
         """Return the compiled road networks of some rows, and which row has which."""
         if self._roads is not None:
             return self._roads, np.zeros(len(X), dtype=np.int64)

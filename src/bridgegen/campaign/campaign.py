@@ -19,6 +19,7 @@ from bridgegen.errors import InputError, Interrupted
 from bridgegen.odd.adversary import adversarial
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.algorithm import Problem, Value, resolve
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store import Store, refuse_used
 
 MAX_BUDGET = 10_000_000
@@ -64,6 +65,7 @@ def run_search(
     causes: bool = True,
     cause: str | None = None,
     adversary: str | None = None,
+    simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     threads: int | None = None,
     watch: Watch | None = None,
@@ -101,6 +103,7 @@ def run_search(
             cause does not count.
         adversary: the participant that an adversary drives, see `bridgegen.odd.adversary`; with an
             algorithm that is one, the first vehicle by default.
+        simulator: which one runs the scenarios; the embedded one by default.
         deliver: whether to write the critical scenarios and the report; ``resume`` does it later.
         threads: to evaluate with, one for each core by default; the results do not depend on it.
         watch: told how it is getting on.
@@ -113,7 +116,7 @@ def run_search(
         StorageError: the folder exists or cannot be written.
         Interrupted: Ctrl-C; ``resume`` goes on.
     """
-    watch = watch or Watch()
+    watch, simulates = watch or Watch(), simulator or EMBEDDED
     catalogue = load(scenario, distribution)
     budget = catalogue.budget if budget is None else budget
     seed = catalogue.seed if seed is None else seed
@@ -146,6 +149,7 @@ def run_search(
         also=metrics,
         seek_causes=causes,
         cause=None if cause is None else Cause.named(cause),
+        simulator=simulates,
         threads=threads,
     )
     watch.stage("compile")
@@ -171,6 +175,8 @@ def run_search(
         causes=causes,
         cause=cause,
         adversary=driven,
+        simulator=simulates.name,
+        simulator_settings=dict(simulates.settings),
         objective=chosen.to_dict(),
         chosen={
             "objective": objective,
@@ -192,6 +198,7 @@ def resume(
     folder: Path | str,
     *,
     ego: str | None = None,
+    simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     threads: int | None = None,
     watch: Watch | None = None,
@@ -204,6 +211,7 @@ def resume(
         folder: of the run.
         ego: where a driver of your own drives, that same driver: what a folder names is never
             imported by itself.
+        simulator: the run's, with where it is on this machine; the run's by default.
         deliver: as for ``run_search``.
         threads: likewise.
         watch: told how it is getting on.
@@ -216,7 +224,9 @@ def resume(
     watch = watch or Watch()
     with Store.open(folder, write=True) as store:
         settings = Settings.from_dict(store.settings, store.folder)
-        pipeline = pipeline_of(settings, store.metrics, store.folder, ego=ego, threads=threads)
+        pipeline = pipeline_of(
+            settings, store.metrics, store.folder, ego=ego, simulator=simulator, threads=threads
+        )
         watch.stage("compile")
         pipeline.warm_up()
         searcher = _algorithm(pipeline, settings)

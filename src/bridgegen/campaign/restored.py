@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from bridgegen.campaign.scenarios import load
@@ -16,6 +17,7 @@ from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.choice import SimulatorChoice
 
 
 def pipeline_of(
@@ -26,6 +28,7 @@ def pipeline_of(
     ego: str | None = None,
     command: str = "resume",
     causes: bool | None = None,
+    simulator: SimulatorChoice | None = None,
     threads: int | None = None,
 ) -> Pipeline:
     """Return the pipeline that a run was made with, its objective included.
@@ -38,11 +41,13 @@ def pipeline_of(
         command: who asks, for messages.
         causes: whether to find causes, as the run did by default; where only one counts, they are
             found all the same.
+        simulator: the run's, with where it is on this machine; the run's by default.
         threads: to evaluate with, one for each core by default.
 
     Raises:
         StorageError: the scenario or the map is not what it was.
-        InputError: the scenario or the map is missing; or the ego is another, or must be named.
+        InputError: the scenario or the map is missing; or the ego or the simulator is another, or
+            must be named.
     """
     _check_driver(settings, ego, folder, command)
     space, roads = searched(settings, folder)
@@ -56,6 +61,7 @@ def pipeline_of(
         metrics=metrics,
         seek_causes=settings.causes if causes is None else causes,
         cause=Cause.named(settings.cause) if settings.cause else None,
+        simulator=_simulator(settings, simulator, folder),
         threads=threads,
     )
     pipeline.choose_objective(Objective.from_dict(settings.objective))
@@ -65,6 +71,22 @@ def pipeline_of(
 def _ego(settings: Settings) -> str | None:
     """Return the driver to ask for; None where the file's own actions move the ego."""
     return None if settings.ego == STORYBOARD.name else settings.ego
+
+
+def _simulator(settings: Settings, given: SimulatorChoice | None, folder: Path) -> SimulatorChoice:
+    """Return the run's simulator, where it is said to be.
+
+    Raises:
+        InputError: another one is given.
+    """
+    made_with = SimulatorChoice(settings.simulator, settings.simulator_settings)
+    if given is None:
+        return made_with
+    if given.name != made_with.name:
+        raise InputError(
+            f"{folder}: the simulator of this run must be {made_with.name}, got {given.name}"
+        )
+    return replace(made_with, access=given.access)
 
 
 def _check_driver(settings: Settings, ego: str | None, folder: Path, command: str) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import StorageError
+from bridgegen.simulation.choice import EMBEDDED
 
 SINCE: Mapping[str, Any] = {
     "distribution": None,
@@ -16,6 +17,8 @@ SINCE: Mapping[str, Any] = {
     "causes": False,
     "cause": None,
     "adversary": None,
+    "simulator": "embedded",
+    "simulator_settings": {},
 }
 """What a run of an earlier version, which could not say it, was made with."""
 
@@ -44,6 +47,8 @@ class Settings:
         causes: whether the causes of critical scenarios are sought.
         cause: the only one that counts, or None.
         adversary: the participant that an adversary drives, or None.
+        simulator: which one runs the scenarios.
+        simulator_settings: what was chosen of how it does.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
         chosen: what the user chose of the objective instead of the scenario's: metrics with
             weights, way of weighting, scale, one or many; None each where nothing; and the metrics
@@ -69,6 +74,8 @@ class Settings:
     causes: bool
     cause: str | None
     adversary: str | None
+    simulator: str
+    simulator_settings: Mapping[str, Any]
     objective: Mapping[str, Any]
     chosen: Mapping[str, Any]
 
@@ -108,6 +115,10 @@ class Settings:
             words += ["--cause", self.cause]
         if self.adversary:
             words += ["--adversary", self.adversary]
+        if self.simulator != EMBEDDED.name:
+            words += ["--simulator", self.simulator]
+        for name, value in self.simulator_settings.items():
+            words += ["--simulator-set", f"{name}={json.dumps(value)}"]
         if self.distribution:
             words += ["--distribution", self.distribution]
         for name, value in self.algorithm_settings.items():

@@ -43,6 +43,22 @@ def list_drivers(as_json: options.Json = False) -> None:
     print_table(("driver", "description", "can be ideal"), rows, as_json=as_json)
 
 
+@listing.command("simulators")
+def list_simulators(as_json: options.Json = False) -> None:
+    """The simulators that can run the scenarios."""
+    from bridgegen.screen.tables import print_table
+    from bridgegen.simulation.choice import SIMULATORS
+
+    rows = [
+        (
+            one.name, one.description, ", ".join(one.access),
+            "; ".join(f"{name}: {what}" for name, what in one.settings.items()),
+        )
+        for one in SIMULATORS.values()
+    ]  # fmt: skip
+    print_table(("simulator", "description", "options", "settings"), rows, as_json=as_json)
+
+
 @listing.command("metrics")
 def list_metrics(as_json: options.Json = False) -> None:
     """The criticality metrics."""

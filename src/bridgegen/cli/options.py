@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from bridgegen.errors import InputError
+from bridgegen.simulation.choice import SimulatorChoice
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
@@ -88,6 +89,16 @@ Adversary = Annotated[
         show_default="none; with ppo-adversary the first",
     ),
 ]
+Simulator = Annotated[
+    str | None,
+    typer.Option(help="Who simulates: see 'bridgegen list simulators'.", show_default="embedded"),
+]
+SimulatorSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--simulator-set", help="A setting of the simulator, NAME=VALUE; may be repeated."
+    ),
+]
 RoadMap = Annotated[
     Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
 ]
@@ -146,15 +157,36 @@ def read_terms(text: str | None) -> dict[str, float | None] | None:
     return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
 
 
-def read_settings(pairs: list[str] | None) -> dict[str, Setting]:
+def read_settings(pairs: list[str] | None, option: str = "--set") -> dict[str, Setting]:
     """Read ``name=value`` pairs; a value is a number, true, false, or a text."""
     values: dict[str, Setting] = {}
     for pair in pairs or ():
         name, equals, text = pair.partition("=")
         if not equals:
-            raise InputError(f"--set must read NAME=VALUE, got '{pair}'")
+            raise InputError(f"{option} must read NAME=VALUE, got '{pair}'")
         values[name] = _value(text)
     return values
+
+
+def read_simulator(
+    name: str | None, settings: list[str] | None = None, **access: Setting | None
+) -> SimulatorChoice | None:
+    """Read the choice of a simulator; nothing is the run's own.
+
+    Args:
+        name: of it.
+        settings: ``name=value`` pairs.
+        access: where it is on this machine, by the name of the option; None is not said.
+    """
+    said = {
+        f"--{one.replace('_', '-')}": value for one, value in access.items() if value is not None
+    }
+    if name is None:
+        if settings or said:
+            what = ", ".join([*said, *(["--simulator-set"] if settings else [])])
+            raise InputError(f"{what}: name the simulator that it is for (--simulator)")
+        return None
+    return SimulatorChoice(name, read_settings(settings, "--simulator-set"), said)
 
 
 def read_algorithm_settings(pairs: list[str] | None) -> dict[str, dict[str, Setting]]:

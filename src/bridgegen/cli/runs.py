@@ -53,6 +53,8 @@ def search(
     causes: options.Causes = True,
     cause: options.Cause = None,
     adversary: options.Adversary = None,
+    simulator: options.Simulator = None,
+    simulator_set: options.SimulatorSettings = None,
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
@@ -91,6 +93,7 @@ def search(
             causes=causes,
             cause=cause,
             adversary=adversary,
+            simulator=options.read_simulator(simulator, simulator_set),
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)

@@ -1,7 +1,7 @@
 """What every simulator does: take a storyboard and roads once, then rows by the thousand."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy.typing as npt
 
@@ -10,11 +10,18 @@ from bridgegen.ego import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.rollout import Rollout
 
+if TYPE_CHECKING:
+    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
 Roads = TypeVar("Roads")
 
 
 class Simulator(Protocol[Roads]):
     """A simulator that holds one storyboard; its rollouts depend on nothing else."""
+
+    @property
+    def embedded(self) -> "EmbeddedSimulator":
+        """The embedded one of the same storyboard and driver; itself, if it is that."""
 
     @property
     def driver(self) -> str:

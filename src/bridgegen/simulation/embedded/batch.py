@@ -17,11 +17,12 @@ from bridgegen.ego.detections import DETECTION
 from bridgegen.ego.interface import ROUTE_POINTS
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import InputError
+from bridgegen.simulation.embedded import _imposed_kernels as imposed_kernels
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
 from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
 from bridgegen.simulation.embedded._observation_kernels import observe_rows
-from bridgegen.simulation.embedded._own_driver_kernels import ANSWER, TOLD
+from bridgegen.simulation.embedded._own_driver_kernels import ANSWER, TOLD, tell_rows
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
@@ -156,6 +157,24 @@ class Batch:
             k, self._plan, self._roads.tables, self._rows, self.state, self.record,
             step, route, tracks, stop, light,
         )  # fmt: skip
+
+    def impose(self, k: int, bodies: Int, states: Float) -> None:
+        """Put bodies ``(B,)`` of the rows that run where ``(N, B, 4)`` says; see `CoSimulation`."""
+        imposed_kernels.impose_rows(
+            k, bodies, states, self._plan, self._roads.tables, self._rows, self.state, self.record
+        )
+
+    def egos_are_through(self) -> Bool:
+        """Return ``(N,)``: whether a driven ego is at the end of its route, or of the road."""
+        through = np.zeros(len(self._rows), dtype=np.bool_)
+        imposed_kernels.egos_are_through(
+            self._plan, self._roads.tables, self._rows, self.state, through
+        )
+        return through
+
+    def tell(self, k: int) -> None:
+        """Fill what a compiled driver of the user's own is told of the rows that run."""
+        tell_rows(k, self._plan, self._roads.tables, self._rows, self.state, self.record)
 
     def fail(self, status: int, message: str) -> None:
         """End all rows that run, where they are, with a status and what else there is to say."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Float, Int
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego.driver_process import DriverError, DriverProcess
 from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
@@ -65,29 +65,50 @@ def _together(program: Program, batch: Batch, driver: DriverProcess) -> None:
         DriverError: the driver failed; the batch stands where it did.
     """
     batch.start()
-    n, m = len(batch.running), len(program.names) - 1
     if not batch.running.any():
         return
-    driver.reset(n, _scene(program))
-    route, tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
-    stop, light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
+    wheel = Wheel(program, batch, driver)
     for k in range(program.n_steps):
         if not batch.running.any():
             return
         batch.before_driver(k)
-        batch.observe(k, ROUTE_STEP, route, tracks, stop, light)
+        batch.after_driver(k, *wheel.demand(k))
+
+
+class Wheel:
+    """A driver in Python at the wheel of a batch that has started.
+
+    Raises:
+        DriverError: the driver failed.
+    """
+
+    def __init__(self, program: Program, batch: Batch, driver: DriverProcess) -> None:
+        n, m = len(batch.running), len(program.names) - 1
+        self._time_step, self._batch, self._driver = program.time_step, batch, driver
+        self._route, self._tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
+        self._stop, self._light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
+        driver.reset(n, _scene(program))
+
+    def demand(self, k: int) -> tuple[Float, Float]:
+        """Return what it demands at instant k: ``(N,)`` [m/s²] and ``(N,)`` [1/m].
+
+        Raises:
+            DriverError: it failed.
+        """
+        batch, route, tracks = self._batch, self._route, self._tracks
+        batch.observe(k, ROUTE_STEP, route, tracks, self._stop, self._light)
         record, state = batch.record, batch.state
         x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
         observation = Observation(
-            time=k * program.time_step,
+            time=k * self._time_step,
             running=batch.running,
             x=x, y=y, h=h, v=v,
-            a=record.a[:, 0, k - 1] if k else np.zeros(n),
+            a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
             target_speed=state.command[:, 0],
             offset=record.offset[:, 0, k],
-            route=route, tracks=tracks, stop_distance=stop, light=light,
+            route=route, tracks=tracks, stop_distance=self._stop, light=self._light,
         )  # fmt: skip
-        batch.after_driver(k, *driver.act(observation))
+        return self._driver.act(observation)
 
 
 def _scene(program: Program) -> Scene:

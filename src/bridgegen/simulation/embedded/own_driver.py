@@ -8,12 +8,14 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Float, Int
+from bridgegen.compiled import call_from_python
 from bridgegen.ego import Driver
 from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -26,10 +28,16 @@ from bridgegen.simulation.embedded._memory_kernels import (
     Roads,
     State,
 )
-from bridgegen.simulation.embedded._own_driver_kernels import ACCELERATION, CURVATURE
+from bridgegen.simulation.embedded._own_driver_kernels import (
+    ACCELERATION,
+    ANSWER,
+    CURVATURE,
+    EGO,
+    RETURNED,
+)
 from bridgegen.simulation.embedded._rollout_kernels import simulate_rows
 from bridgegen.simulation.embedded.batch import Batch
-from bridgegen.simulation.embedded.lock_step import drive_in_lock_step
+from bridgegen.simulation.embedded.lock_step import Wheel, drive_in_lock_step
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.shared_arrays import Layout, SharedArrays, seen
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
@@ -89,6 +97,17 @@ class OwnDriver:
         finally:
             with self._lock:
                 self._idle.append(seat)
+
+    def wheel(self, program: Program, batch: Batch) -> Callable[[int], tuple[Float, Float]]:
+        """Return what asks the driver at an instant of a batch of one row that has started.
+
+        Raises:
+            InputError: the driver cannot be made.
+            DriverError: it failed as it began, or when it is asked.
+        """
+        if self.memory is None:
+            return Wheel(program, batch, self._first.process).demand
+        return partial(_ask, self._first.process, batch)
 
     def stop(self) -> None:
         """End the processes: what is being driven ends in a `DriverError`, and nothing follows."""
@@ -179,6 +198,33 @@ def _drive(
     return parts[0][1] if len(parts) == 1 else joined(parts)
 
 
+def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
+    """Ask a compiled driver at one instant of one row.
+
+    Raises:
+        DriverError: it failed.
+    """
+    batch.tell(k)
+    state = batch.state
+    answer, memory, raised = process.call(
+        _answer, state.told[0], state.ahead[0], state.others[0], state.mind[0]
+    )
+    if answer[RETURNED] == 0.0:
+        raise DriverError("raised", raised)
+    if problem := _not_finite(answer):
+        raise DriverError("answered nonsense", problem)
+    state.mind[0] = memory
+    return answer[[ACCELERATION]], answer[[CURVATURE]]
+
+
+def _not_finite(answer: Float) -> str | None:
+    """Say what is wrong with an answer."""
+    for name, column in (("acceleration", ACCELERATION), ("curvature", CURVATURE)):
+        if not np.isfinite(answer[column]):
+            return f"{name} must be finite, got {answer[column]}"
+    return None
+
+
 # --- In the other process -------------------------------------------------------------------------
 
 _roads: list[Roads] = []
@@ -202,12 +248,23 @@ def _simulate(
     status = state.ending[:, STATUS]
     messages = dict(zip(np.flatnonzero(status == RAISED).tolist(), raised, strict=False))
     for row in np.flatnonzero(status == NO_CONTROL).tolist():
-        for name, column in (("acceleration", ACCELERATION), ("curvature", CURVATURE)):
-            value = state.answer[row, column]
-            if not np.isfinite(value):
-                messages[row] = f"{name} must be finite, got {value}"
-                break
+        if problem := _not_finite(state.answer[row]):
+            messages[row] = problem
     return messages
+
+
+def _answer(
+    address: int, told: Float, ahead: Float, others: Float, memory: Float
+) -> tuple[Float, Float, str]:
+    """Ask the driver; return its answer, what it keeps, and what it raised."""
+    answer = np.zeros(ANSWER)
+    raised: list[str] = []
+    sys.unraisablehook = lambda error: raised.append(_told(error))
+    try:
+        call_from_python(address, (told[EGO:], told[:EGO], ahead, others, memory, answer))
+    finally:
+        sys.unraisablehook = sys.__unraisablehook__
+    return answer, memory, "".join(raised)
 
 
 def _told(unraisable: Any) -> str:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
+    from bridgegen.simulation.embedded.co_simulation import CoSimulation
     from bridgegen.simulation.embedded.own_driver import OwnDriver
 
 
@@ -66,6 +67,11 @@ class EmbeddedSimulator:
         self.program = compile_storyboard(
             storyboard, place, driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
         )
+
+    @property
+    def embedded(self) -> "EmbeddedSimulator":
+        """See `Simulator`: itself."""
+        return self
 
     @property
     def driver(self) -> str:
@@ -142,6 +148,39 @@ class EmbeddedSimulator:
             return self.batch(roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory)
 
         return own.drive(chosen.changed(dry=dry), some, len(rows))
+
+    def co_simulation(
+        self,
+        roads: Network,
+        row: int,
+        values: Mapping[str, float],
+        *,
+        driver: Driver | None = None,
+        dry: bool = False,
+    ) -> "CoSimulation":
+        """Return one row, to be run together with another simulator.
+
+        Args:
+            roads: P road networks, made ready by this simulator.
+            row: in 0..P-1, its road network.
+            values: per parameter; see `Simulator.run`, as for the other arguments.
+            driver: likewise.
+            dry: likewise.
+
+        Raises:
+            InputError: see `run`.
+            DriverError: a driver of the user's own failed as it began.
+        """
+        from bridgegen.simulation.embedded.co_simulation import CoSimulation
+
+        program = self.program.changed(driver=driver)
+        own = self._own if program.driver.is_own else None
+        batch = self.batch(
+            roads, np.array([row]), values, driver=driver, dry=dry,
+            own_memory=own.memory if own else None,
+        )  # fmt: skip
+        wheel = partial(own.wheel, program.changed(dry=dry)) if own else None
+        return CoSimulation(batch, program.names, program.time_step, program.n_steps, wheel)
 
     def stop(self) -> None:
         """See `Simulator`."""

@@ -1,0 +1,120 @@
+"""Which simulator runs a scenario, and how; what is asked for on the command line."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from bridgegen.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:  # it is part of the command line, which starts fast
+    from bridgegen.ego import Driver
+    from bridgegen.openx.openscenario.model import OpenScenario
+    from bridgegen.simulation.simulator import Simulator
+
+Value = bool | int | float | str
+"""Of a setting."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A simulator that can be chosen.
+
+    Attributes:
+        name: of it.
+        description: one sentence.
+        settings: what changes its results, by name: what it means, with its unit.
+        access: what says where it is on this machine, by the name of the option for it.
+        make: of a storyboard, its name, the ego's driver (None: what the file says), the chosen
+            settings and the access.
+    """
+
+    name: str
+    description: str
+    make: "Make"
+    settings: Mapping[str, str] = field(default_factory=dict)
+    access: Mapping[str, str] = field(default_factory=dict)
+
+
+Make = Callable[
+    ["OpenScenario", str, "Driver | None", Mapping[str, Value], Mapping[str, Value]],
+    "Simulator[Any]",
+]
+
+
+def _embedded(
+    storyboard: "OpenScenario",
+    place: str,
+    driver: "Driver | None",
+    settings: Mapping[str, Value],
+    access: Mapping[str, Value],
+) -> "Simulator[Any]":
+    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
+    return EmbeddedSimulator(storyboard, place, driver=driver)
+
+
+SIMULATORS: Mapping[str, Kind] = {
+    one.name: one
+    for one in (
+        Kind(
+            "embedded",
+            "Ours, compiled to machine code: thousands of scenarios a second.",
+            _embedded,
+        ),
+    )
+}
+
+
+@dataclass(frozen=True)
+class SimulatorChoice:
+    """A simulator, how it is to work, and where it is.
+
+    Attributes:
+        name: of `SIMULATORS`.
+        settings: what changes its results; recorded with a run.
+        access: where it is on this machine. Never recorded: what a run's folder names is not
+            started, loaded or connected to by itself.
+
+    Raises:
+        UnknownNameError: no such simulator, or it has no such setting.
+        InputError: it is not reached in this way.
+    """
+
+    name: str = "embedded"
+    settings: Mapping[str, Value] = field(default_factory=dict)
+    access: Mapping[str, Value] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.name not in SIMULATORS:
+            raise UnknownNameError("simulator", self.name, SIMULATORS)
+        kind = SIMULATORS[self.name]
+        for name in self.settings:
+            if name not in kind.settings:
+                raise UnknownNameError(f"setting of the simulator {self.name}", name, kind.settings)
+        for name in self.access:
+            if name not in kind.access:
+                owners = [one.name for one in SIMULATORS.values() if name in one.access]
+                raise InputError(
+                    f"{name} is for the simulator {' or '.join(owners) or '(none)'}, got it for "
+                    f"{self.name}"
+                )
+
+    def simulator(
+        self, storyboard: "OpenScenario", place: str, driver: "Driver | None" = None
+    ) -> "Simulator[Any]":
+        """Return the simulator, with a storyboard.
+
+        Args:
+            storyboard: the scenario file, validated.
+            place: its name, for messages.
+            driver: who drives the ego; what the file says by default.
+
+        Raises:
+            UnsupportedError: what it cannot run, by name and line, all of it at once.
+            InputError: a setting out of range; or it is not where it should be.
+        """
+        kind = SIMULATORS[self.name]
+        return kind.make(storyboard, place, driver, self.settings, self.access)
+
+
+EMBEDDED = SimulatorChoice()

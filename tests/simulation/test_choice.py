@@ -1,0 +1,35 @@
+"""The choice of a simulator."""
+
+import pytest
+
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.reader import load
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.choice import EMBEDDED, SIMULATORS, SimulatorChoice
+
+
+def test_the_embedded_one_is_the_default():
+    logical = load("crossroads-s1")
+    pipeline = Pipeline(logical, logical.space())
+    assert EMBEDDED.name == "embedded"
+    assert pipeline.simulator is pipeline.simulator.embedded
+
+
+@pytest.mark.parametrize("name", SIMULATORS)
+def test_every_simulator_says_what_it_is(name):
+    kind = SIMULATORS[name]
+    assert kind.name == name
+    assert kind.description.endswith(".")
+    assert all(option.startswith("--") for option in kind.access)
+
+
+def test_there_is_no_other():
+    with pytest.raises(UnknownNameError, match="unknown simulator 'embeded'; did you mean 'emb"):
+        SimulatorChoice("embeded")
+
+
+def test_it_takes_its_own_settings_and_options_alone():
+    with pytest.raises(UnknownNameError, match="unknown setting of the simulator embedded 'town'"):
+        SimulatorChoice(settings={"town": "Town05"})
+    with pytest.raises(InputError, match="--where is for the simulator"):
+        SimulatorChoice(access={"--where": 1})
