@@ -11,7 +11,8 @@ import gc
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
@@ -56,6 +57,19 @@ def cache_folder() -> Path:
 def is_compiled() -> bool:
     """Whether an earlier run has left compiled kernels, so that this one starts at once."""
     return any(cache_folder().rglob("*.nbi"))
+
+
+@contextmanager
+def compiling_alone() -> Iterator[None]:
+    """Let one process of this machine compile, and the others wait for what it has compiled."""
+    try:
+        import fcntl
+    except ImportError:  # not on this system: each compiles for itself
+        yield
+        return
+    with (cache_folder() / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH if is_compiled() else fcntl.LOCK_EX)
+        yield
 
 
 class _Unhurried(event.Listener):  # type: ignore[misc]

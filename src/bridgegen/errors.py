@@ -8,6 +8,7 @@
      │    ├── OntologyError       individuals that lack what a scenario needs, or contradict it
      │    └── UnsupportedError    valid, but outside what this version can do
      ├── StorageError             a run folder that exists, is read-only, is full, is not a run
+     ├── WorkersError             workers cannot be had, or are lost; the run can be gone on with
      └── Interrupted              Ctrl-C; what is done is kept, and the run can be gone on with
 
 Every message states the rule, the value with its unit and the place; ``problems`` holds all that
@@ -17,6 +18,7 @@ were found at once.
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 
 class BridgeGenError(Exception):
@@ -29,6 +31,16 @@ class BridgeGenError(Exception):
     def __init__(self, *problems: str) -> None:
         super().__init__("\n".join(problems))
         self.problems = problems
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (type(self), self.problems), self.__dict__
+
+
+def _again(kind: type[BridgeGenError], problems: tuple[str, ...]) -> BridgeGenError:
+    """Return an error that was pickled, whatever its own arguments were: a worker raised it."""
+    error = kind.__new__(kind)
+    BridgeGenError.__init__(error, *problems)
+    return error
 
 
 class InputError(BridgeGenError):
@@ -69,6 +81,10 @@ class UnsupportedError(InputError):
 
 class StorageError(BridgeGenError):
     """A run folder that exists already, cannot be written, is full, or is not a run."""
+
+
+class WorkersError(BridgeGenError):
+    """Workers cannot be had, or are lost."""
 
 
 class Interrupted(BridgeGenError):

@@ -1,14 +1,13 @@
 """The job in one file: rows of X → scenarios → rollouts → metrics → objectives → causes.
 
-Read this first. `Pipeline._evaluate_chunk` is the whole path of a batch, one line per stage;
+Read this first. `Pipeline.evaluate_rows` is the whole path of a batch, one line per stage;
 everything else here prepares it.
 """
 
-import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,7 @@ from bridgegen import metrics as measures
 from bridgegen.adversary import AdversarySource, Arena
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause, Counterfactual, causes, require
+from bridgegen.compiled import compiling_alone
 from bridgegen.errors import InputError
 from bridgegen.objective import CLASSIFYING, Objective, Objectives, Thresholds, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
@@ -26,10 +26,9 @@ from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.intentions import Intentions
-from bridgegen.simulation.rollout import Rollout
+from bridgegen.simulation.rollout import WORKER_ENDED, Rollout
 from bridgegen.simulation.simulator import Simulator
-
-T = TypeVar("T")
+from bridgegen.workers import Lost, Part, Recipe, Threads, Workers
 
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
@@ -126,7 +125,7 @@ class Pipeline:
         seek_causes: bool = False,
         cause: Cause | None = None,
         simulator: SimulatorChoice = EMBEDDED,
-        threads: int | None = None,
+        workers: Workers | None = None,
     ) -> None:
         """Prepare a scenario.
 
@@ -143,7 +142,7 @@ class Pipeline:
             seek_causes: whether to find the cause of each critical scenario.
             cause: of harm; a critical scenario of another one does not count.
             simulator: which one runs the scenarios.
-            threads: to evaluate with, one for each core by default; no result depends on it.
+            workers: who evaluates; threads by default, one for each core. No result depends on it.
 
         Raises:
             UnknownNameError: no such driver or metric.
@@ -152,6 +151,11 @@ class Pipeline:
         """
         self.scenario = scenario
         self.space = space
+        self._made_with = {
+            "scenario": scenario, "space": space, "ego": ego, "ideal": tuple(ideal),
+            "time_limit": time_limit, "road_map": road_map, "seek_causes": seek_causes,
+            "cause": cause, "simulator": simulator,
+        }  # fmt: skip
         name = ego or scenario.driver
         if name is None and tuple(ideal):
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
@@ -173,7 +177,22 @@ class Pipeline:
         self._roads: Any = None
         if not {*self._road_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
-        self._threads = ThreadPoolExecutor(threads or os.cpu_count() or 1, "rollout")
+        self._workers = workers or Threads()
+
+    @cached_property
+    def recipe(self) -> Recipe:
+        """Makes this pipeline in a worker, but for the objective, which is given with the rows."""
+        return Recipe.of(_remade, metrics=self.metrics, **self._made_with)
+
+    @property
+    def rows_at_once(self) -> int:
+        """How many rows a worker had best be given; see `Simulator`."""
+        return self.simulator.rows_at_once
+
+    @property
+    def runs_at_once(self) -> int:
+        """How many threads had best work on rows; see `Simulator`."""
+        return self.simulator.runs_at_once
 
     def arena(self) -> Arena:
         """Return where an agent drives the adversary's participant in closed loop.
@@ -212,8 +231,10 @@ class Pipeline:
             if needs_sample(spec.weights, spec.scale, objectives):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
-                parts = self._in_chunks(self._measure, self.space.decode(U))
-                sample = (np.concatenate(parts), self.metrics)
+                parts = self._share_out("measure_rows", self.space.decode(U))
+                lost = np.full((1, len(self.metrics)), np.nan)
+                rows = [lost if isinstance(one.came, Lost) else one.came for one in parts]
+                sample = (np.concatenate(rows), self.metrics)
             limits = spec.critical
             objective = Objective.build(
                 [(term.metric, term.weight) for term in spec.terms],
@@ -231,9 +252,13 @@ class Pipeline:
     def warm_up(self) -> None:
         """Roll out the nominal row once, so that the kernels are compiled before time counts.
 
-        In this thread: Ctrl-C ends a compilation at once.
+        In this thread, if it is here that rows are simulated: Ctrl-C ends a compilation at once.
         """
-        self._measure(self.space.row({})[np.newaxis])
+        nominal = self.space.row({})[np.newaxis]
+        if self._workers.are_here:
+            self.measure_rows(nominal)
+        else:
+            self._share_out("measure_rows", nominal)
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
@@ -241,19 +266,23 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
         """
-        return Evaluation.join(self._in_chunks(self._evaluate_chunk, X))
+        parts = self._share_out("evaluate_rows", X, self.objective)
+        return Evaluation.join(
+            [self._lost(one) if isinstance(one.came, Lost) else one.came for one in parts]
+        )
 
-    def _evaluate_chunk(self, X: Float) -> Evaluation:
+    def evaluate_rows(self, X: Float, objective: Objective) -> Evaluation:
+        """Evaluate N rows at once, in this thread; ``evaluate`` has it done by many."""
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
         metrics = measures.evaluate(rollout, self.metrics)
-        F, ok = self.objective.F(metrics, self.metrics)
-        critical = self.objective.critical(metrics, self.metrics) & ok
+        F, ok = objective.F(metrics, self.metrics)
+        critical = objective.critical(metrics, self.metrics) & ok
         if not self.seeks_causes:
             return Evaluation(metrics, F, critical, rollout.status, rollout.messages)
 
         def harmless(at: Int, replay: Counterfactual) -> Bool:
-            return self._harmless(self._run(roads, rows[at], X[at], replay))
+            return _harmless(self._run(roads, rows[at], X[at], replay), objective)
 
         cause = causes(self.driver, critical, harmless)
         counts = critical if self.cause is None else cause == self.cause
@@ -310,25 +339,25 @@ class Pipeline:
             return self.simulator.run(roads, rows, columns)
         return self.simulator.run(roads, rows, columns, driver=replay.driver, dry=replay.dry)
 
-    def _harmless(self, rollout: Rollout) -> Bool:
-        """Return which rows succeed and are not critical."""
-        metrics = measures.evaluate(rollout, CLASSIFYING)
-        harmless: Bool = (rollout.status == 0) & ~self.objective.critical(metrics, CLASSIFYING)
-        return harmless
+    def measure_rows(self, X: Float) -> Float:
+        """Return the metrics of N rows, ``(N, M)``, in this thread."""
+        return measures.evaluate(self.rollout(X), self.metrics)
 
-    def _in_chunks(self, work: Callable[[Float], T], X: Float) -> list[T]:
-        """Do chunk by chunk of the rows, on all cores; the kernels run without the GIL."""
-        each = -(-len(X) // self.simulator.runs_at_once)
-        size = max(1, min(self.simulator.rows_at_once, each))
-        chunks = [X[i : i + size] for i in range(0, len(X), size)] or [X]
+    def _share_out(self, work: str, X: Float, *given: Any) -> list[Part]:
+        """Have the workers do this pipeline's work on rows; return what came of them, in order."""
         try:
-            return list(self._threads.map(work, chunks))
+            return self._workers.map(self, work, X, *given)
         except KeyboardInterrupt:
             self.simulator.stop()
             raise
 
-    def _measure(self, X: Float) -> Float:
-        return measures.evaluate(self.rollout(X), self.metrics)
+    def _lost(self, part: Part) -> Evaluation:
+        """Return what a row came to that nobody could evaluate."""
+        metrics = np.full((part.rows, len(self.metrics)), np.nan)
+        F, critical = self.objective.F(metrics, self.metrics)
+        status = np.full(part.rows, WORKER_ENDED, np.int8)
+        cause = np.full(part.rows, Cause.NONE, np.int8) if self.seeks_causes else None
+        return Evaluation(metrics, F, critical, status, {0: part.came.reason}, cause)
 
     def _roads_of(self, X: Float) -> tuple[Any, Int]:
         """Return the compiled road networks of some rows, and which row has which."""
@@ -347,6 +376,21 @@ class Pipeline:
     def _road_names(self) -> tuple[str, ...]:
         """The parameters that a row's road network, and the courses on it, depend on."""
         return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
+
+
+def _remade(**arguments: Any) -> Pipeline:
+    """Return a pipeline for a worker, which is one thread; its kernels are compiled by then."""
+    pipeline = Pipeline(**arguments, workers=Threads(1))
+    with compiling_alone():
+        pipeline.warm_up()
+    return pipeline
+
+
+def _harmless(rollout: Rollout, objective: Objective) -> Bool:
+    """Return which rows succeed and are not critical."""
+    metrics = measures.evaluate(rollout, CLASSIFYING)
+    harmless: Bool = (rollout.status == 0) & ~objective.critical(metrics, CLASSIFYING)
+    return harmless
 
 
 def _source(

@@ -107,13 +107,13 @@ def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):
 
 def test_a_search_that_does_not_deliver_is_delivered_by_resuming(tmp_path):
     run = bg.run_search(
-        "crossroads-s4", budget=80, keep=2, out=tmp_path / "run", deliver=False, threads=1
+        "crossroads-s4", budget=80, keep=2, out=tmp_path / "run", deliver=False, workers=1
     )
     assert run.finished
     assert (run.scenarios, run.report.exists()) == ((), False)
-    whole = bg.run_search("crossroads-s4", budget=80, keep=2, out=tmp_path / "whole", threads=2)
+    whole = bg.run_search("crossroads-s4", budget=80, keep=2, out=tmp_path / "whole", workers=2)
     assert same(rows_of(run.folder), rows_of(whole.folder))
-    again = bg.resume(run.folder, threads=1)
+    again = bg.resume(run.folder, workers=1)
     assert len(again.scenarios) == 2
     assert again.report.exists()
     assert same(rows_of(run.folder), rows_of(whole.folder))

@@ -97,7 +97,7 @@ def test_the_files_say_what_was_found(folder, found):
 
 def test_one_seed_gives_one_result_however_many_threads(folder, found, tmp_path):
     place = copied(folder, tmp_path / "run")
-    again = regions_of(place, samples=100, seed=1, threads=1)
+    again = regions_of(place, samples=100, seed=1, workers=1)
     assert again.record | {"run": ""} == found.record | {"run": ""}
     for name in ("regions.json", "regions.owl"):
         mine, theirs = ((one / name).read_bytes() for one in (place, folder))

@@ -15,12 +15,13 @@ from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
-from bridgegen.errors import InputError, Interrupted
+from bridgegen.errors import InputError, Interrupted, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store import Store, refuse_used
+from bridgegen.workers import Choice, Workers, open_workers
 
 MAX_BUDGET = 10_000_000
 
@@ -31,11 +32,13 @@ class Watch:
 
     Attributes:
         stage: told what begins: "compile", "search", "hand over", "report".
+        workers: told who evaluates, before anything is.
         batch: told after each batch.
         written: told how many scenarios are handed over.
     """
 
     stage: Callable[[str], None] = lambda stage: None
+    workers: Callable[[Workers], None] = lambda workers: None
     batch: Callable[[Progress], None] = lambda progress: None
     written: Callable[[int], None] = lambda count: None
 
@@ -67,7 +70,7 @@ def run_search(
     adversary: str | None = None,
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
-    threads: int | None = None,
+    workers: Choice = None,
     watch: Watch | None = None,
 ) -> Run:
     """Search a logical scenario for its critical concrete ones, and hand them over.
@@ -105,7 +108,8 @@ def run_search(
             algorithm that is one, the first vehicle by default.
         simulator: which one runs the scenarios; the embedded one by default.
         deliver: whether to write the critical scenarios and the report; ``resume`` does it later.
-        threads: to evaluate with, one for each core by default; the results do not depend on it.
+        workers: who evaluates: so many processes, or ``"ray"``, ``"ray://HOST:PORT"``; threads of
+            this process by default, one for each core. The results do not depend on it.
         watch: told how it is getting on.
 
     Returns:
@@ -114,7 +118,8 @@ def run_search(
     Raises:
         InputError: anything that the arguments or files say wrongly.
         StorageError: the folder exists or cannot be written.
-        Interrupted: Ctrl-C; ``resume`` goes on.
+        WorkersError: there are no workers, or they are lost; ``resume`` goes on.
+        Interrupted: Ctrl-C; likewise.
     """
     watch, simulates = watch or Watch(), simulator or EMBEDDED
     catalogue = load(scenario, distribution)
@@ -139,59 +144,61 @@ def run_search(
     refuse_used(folder)
     if cause is not None and not causes:
         raise InputError(f"to search for the cause '{cause}', causes must be sought")
-    pipeline = Pipeline(
-        logical,
-        space,
-        ego=ego,
-        ideal=ideal,
-        time_limit=time_limit,
-        road_map=roads,
-        also=metrics,
-        seek_causes=causes,
-        cause=None if cause is None else Cause.named(cause),
-        simulator=simulates,
-        threads=threads,
-    )
-    watch.stage("compile")
-    pipeline.warm_up()
-    chosen = pipeline.choose_objective(objectives=columns, seed=seed)
-    made_with = Settings(
-        scenario=str(Path(scenario).resolve()) if is_file(scenario) else str(scenario),
-        distribution=str(Path(distribution).resolve()) if distribution is not None else None,
-        fingerprint=catalogue.fingerprint,
-        algorithm=method.name,
-        algorithm_settings=values,
-        budget=budget,
-        seed=seed,
-        ego=pipeline.driver.name,
-        ideal=tuple(sorted(pipeline.driver.ideal)),
-        time_limit=time_limit,
-        axes=tuple(str(axis) for axis in space.axes),
-        fixed=dict(fixed or {}),
-        map=str(roads.path.resolve()) if roads else None,
-        map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
-        junction=roads.site.junction_id if roads else None,
-        keep=keep,
-        causes=causes,
-        cause=cause,
-        adversary=driven,
-        simulator=simulates.name,
-        simulator_settings=dict(simulates.settings),
-        objective=chosen.to_dict(),
-        chosen={
-            "objective": objective,
-            "weights": weights,
-            "scale": scale,
-            "objectives": objectives,
-            "metrics": list(metrics),
-        },
-    )
-    searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
-    with Store.create(
-        folder, made_with.to_dict(), space.names, pipeline.metrics,
-        n_var=space.n_var, n_obj=chosen.n_obj,
-    ) as store:  # fmt: skip
-        return _go(pipeline, searcher, store, made_with, watch, deliver)
+    with open_workers(workers) as crew:
+        watch.workers(crew)
+        pipeline = Pipeline(
+            logical,
+            space,
+            ego=ego,
+            ideal=ideal,
+            time_limit=time_limit,
+            road_map=roads,
+            also=metrics,
+            seek_causes=causes,
+            cause=None if cause is None else Cause.named(cause),
+            simulator=simulates,
+            workers=crew,
+        )
+        watch.stage("compile")
+        pipeline.warm_up()
+        chosen = pipeline.choose_objective(objectives=columns, seed=seed)
+        made_with = Settings(
+            scenario=str(Path(scenario).resolve()) if is_file(scenario) else str(scenario),
+            distribution=str(Path(distribution).resolve()) if distribution is not None else None,
+            fingerprint=catalogue.fingerprint,
+            algorithm=method.name,
+            algorithm_settings=values,
+            budget=budget,
+            seed=seed,
+            ego=pipeline.driver.name,
+            ideal=tuple(sorted(pipeline.driver.ideal)),
+            time_limit=time_limit,
+            axes=tuple(str(axis) for axis in space.axes),
+            fixed=dict(fixed or {}),
+            map=str(roads.path.resolve()) if roads else None,
+            map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
+            junction=roads.site.junction_id if roads else None,
+            keep=keep,
+            causes=causes,
+            cause=cause,
+            adversary=driven,
+            simulator=simulates.name,
+            simulator_settings=dict(simulates.settings),
+            objective=chosen.to_dict(),
+            chosen={
+                "objective": objective,
+                "weights": weights,
+                "scale": scale,
+                "objectives": objectives,
+                "metrics": list(metrics),
+            },
+        )
+        searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
+        with Store.create(
+            folder, made_with.to_dict(), space.names, pipeline.metrics,
+            n_var=space.n_var, n_obj=chosen.n_obj,
+        ) as store:  # fmt: skip
+            return _go(pipeline, searcher, store, made_with, watch, deliver)
 
 
 def resume(
@@ -200,7 +207,7 @@ def resume(
     ego: str | None = None,
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
-    threads: int | None = None,
+    workers: Choice = None,
     watch: Watch | None = None,
 ) -> Run:
     """Go on with a run that was interrupted or killed; a finished one gets its files again.
@@ -213,19 +220,21 @@ def resume(
             imported by itself.
         simulator: the run's, with where it is on this machine; the run's by default.
         deliver: as for ``run_search``.
-        threads: likewise.
+        workers: likewise.
         watch: told how it is getting on.
 
     Raises:
         StorageError: not a run, in use, made by another version, or not writable.
         InputError: the scenario or the map is missing, or not what it was.
+        WorkersError: there are no workers, or they are lost.
         Interrupted: Ctrl-C.
     """
     watch = watch or Watch()
-    with Store.open(folder, write=True) as store:
+    with Store.open(folder, write=True) as store, open_workers(workers) as crew:
+        watch.workers(crew)
         settings = Settings.from_dict(store.settings, store.folder)
         pipeline = pipeline_of(
-            settings, store.metrics, store.folder, ego=ego, simulator=simulator, threads=threads
+            settings, store.metrics, store.folder, ego=ego, simulator=simulator, workers=crew
         )
         watch.stage("compile")
         pipeline.warm_up()
@@ -254,9 +263,13 @@ def _go(
 ) -> Run:
     """Search up to the budget, then hand over and report if that is wanted."""
     watch.stage("search")
-    result = run_loop(
-        algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, watch.batch
-    )
+    try:
+        result = run_loop(
+            algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, watch.batch
+        )
+    except WorkersError as error:
+        problem = f"{error}; {len(store)} evaluations are kept"
+        raise WorkersError(f"{problem}, go on with 'bridgegen resume {store.folder}'") from error
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
     if not deliver:

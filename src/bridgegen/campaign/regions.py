@@ -22,6 +22,7 @@ from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find
 from bridgegen.regions.owl import carriers, classes, statable
 from bridgegen.regions.record import JSON_FILE, to_json
 from bridgegen.store import Store
+from bridgegen.workers import Choice, open_workers
 
 OWL_FILE = "regions.owl"
 MAX_SEED = 2**32 - 1
@@ -56,7 +57,7 @@ def regions_of(
     samples: int = SAMPLES,
     at_least: float = AT_LEAST,
     seed: int | None = None,
-    threads: int | None = None,
+    workers: Choice = None,
     stage: Callable[[str], None] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> RunRegions:
@@ -71,12 +72,13 @@ def regions_of(
         samples: fresh scenarios to simulate in each region.
         at_least: the share of critical scenarios that makes a region critical.
         seed: of the fresh scenarios; the run's by default.
-        threads: to simulate with, one for each core by default; the results do not depend on it.
+        workers: who simulates, see ``run_search``; the results do not depend on it.
         stage: told what begins: "compile", "regions", "report".
         progress: told how many fresh scenarios are simulated, of how many.
 
     Raises:
         StorageError: not a run, its scenario or map is not what it was, or not writable.
+        WorkersError: there are no workers, or they are lost.
         InputError: a number out of range, no critical row, the scenario or the map is missing, or
             the ego has to be named.
     """
@@ -87,19 +89,20 @@ def regions_of(
         settings = Settings.from_dict(store.settings, store.folder)
         rows = store.read()
         metrics, finished, place = store.metrics, store.finished is not None, store.folder
-    pipeline = pipeline_of(
-        settings, metrics, place, ego=ego, command="regions", causes=False, threads=threads
-    )
-    space, ok = pipeline.space, rows.status == 0
-    check(space, rows.critical[ok], samples, at_least)
-    stage("compile")
-    pipeline.warm_up()
-    stage("regions")
-    seed = settings.seed if seed is None else seed
-    found = find_regions(
-        space, pipeline.evaluate, rows.X[ok], rows.critical[ok],
-        samples=samples, at_least=at_least, seed=seed, progress=progress,
-    )  # fmt: skip
+    with open_workers(workers) as crew:
+        pipeline = pipeline_of(
+            settings, metrics, place, ego=ego, command="regions", causes=False, workers=crew
+        )
+        space, ok = pipeline.space, rows.status == 0
+        check(space, rows.critical[ok], samples, at_least)
+        stage("compile")
+        pipeline.warm_up()
+        stage("regions")
+        seed = settings.seed if seed is None else seed
+        found = find_regions(
+            space, pipeline.evaluate, rows.X[ok], rows.critical[ok],
+            samples=samples, at_least=at_least, seed=seed, progress=progress,
+        )  # fmt: skip
     driver = pipeline.driver.label
     record = {
         "run": str(place),

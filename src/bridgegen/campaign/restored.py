@@ -18,6 +18,7 @@ from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.workers import Workers
 
 
 def pipeline_of(
@@ -29,7 +30,7 @@ def pipeline_of(
     command: str = "resume",
     causes: bool | None = None,
     simulator: SimulatorChoice | None = None,
-    threads: int | None = None,
+    workers: Workers | None = None,
 ) -> Pipeline:
     """Return the pipeline that a run was made with, its objective included.
 
@@ -42,7 +43,7 @@ def pipeline_of(
         causes: whether to find causes, as the run did by default; where only one counts, they are
             found all the same.
         simulator: the run's, with where it is on this machine; the run's by default.
-        threads: to evaluate with, one for each core by default.
+        workers: who evaluates; threads by default, one for each core.
 
     Raises:
         StorageError: the scenario or the map is not what it was.
@@ -62,7 +63,7 @@ def pipeline_of(
         seek_causes=settings.causes if causes is None else causes,
         cause=Cause.named(settings.cause) if settings.cause else None,
         simulator=_simulator(settings, simulator, folder),
-        threads=threads,
+        workers=workers,
     )
     pipeline.choose_objective(Objective.from_dict(settings.objective))
     return pipeline

@@ -103,6 +103,14 @@ RoadMap = Annotated[
     Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
 ]
 Junction = Annotated[str | None, typer.Option(help="Which junction of the map.")]
+Workers = Annotated[
+    str | None,
+    typer.Option(
+        help="Who simulates: so many processes of this machine, each one thread. No result depends "
+        "on it.",
+        show_default="threads, one for each core",
+    ),
+]
 FailIf = Annotated[
     list[str] | None,
     typer.Option(

@@ -58,6 +58,7 @@ def search(
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
+    workers: options.Workers = None,
     out: Annotated[Path | None, typer.Option(help="The run's folder, new.")] = None,
     fail_if: options.FailIf = None,
     junit: options.Junit = None,
@@ -94,6 +95,7 @@ def search(
             cause=cause,
             adversary=adversary,
             simulator=options.read_simulator(simulator, simulator_set),
+            workers=workers,
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)
@@ -121,6 +123,7 @@ def new(
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
     ego: options.OwnEgo = None,
+    workers: options.Workers = None,
     fail_if: options.FailIf = None,
     junit: options.Junit = None,
 ) -> None:
@@ -131,7 +134,7 @@ def resume(
 
     gate = Gate.of_run(fail_if or (), junit, folder)
     with SearchScreen() as screen:
-        run = campaign.resume(folder, ego=ego, watch=screen.watch)
+        run = campaign.resume(folder, ego=ego, workers=workers, watch=screen.watch)
     print_summary(run, screen.seconds)
     _end(gate.judge(run))
 
@@ -193,6 +196,7 @@ def regions(
         typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
     ] = None,
     ego: options.OwnEgo = None,
+    workers: options.Workers = None,
     as_json: options.Json = False,
 ) -> None:
     """Find where scenarios are critical: readable rules, each verified by fresh scenarios."""
@@ -206,6 +210,7 @@ def regions(
             samples=samples,
             at_least=at_least,
             seed=seed,
+            workers=workers,
             stage=screen.stage,
             progress=screen.progress,
         )

@@ -10,6 +10,7 @@ from bridgegen.campaign.loop import Progress
 from bridgegen.errors import BridgeGenError, InputError, Interrupted
 from bridgegen.store import Store
 from bridgegen.store.run_file import FILE
+from bridgegen.workers import Threads
 
 
 @dataclass(frozen=True)
@@ -74,13 +75,14 @@ def attempt(task: Task, batch: Callable[[int], None], stage: Callable[[str], Non
         batch(progress.evaluations)
 
     watch = Watch(stage=stage, batch=told)
+    one = Threads(1)
     begun = (task.folder / FILE).exists()
     try:
         if begun:
             ego = task.arguments.get("ego")
-            resume(task.folder, ego=ego, deliver=False, threads=1, watch=watch)
+            resume(task.folder, ego=ego, deliver=False, workers=one, watch=watch)
         else:
-            run_search(**task.arguments, out=task.folder, deliver=False, threads=1, watch=watch)
+            run_search(**task.arguments, out=task.folder, deliver=False, workers=one, watch=watch)
     except Interrupted:
         raise KeyboardInterrupt from None
     except InputError as error:

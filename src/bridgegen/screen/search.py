@@ -8,6 +8,7 @@ from bridgegen.screen.live import Live
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, Watch
     from bridgegen.campaign.loop import Progress
+    from bridgegen.workers import Workers
 
 _STAGES = {
     "compile": "compiling",
@@ -30,18 +31,31 @@ class SearchScreen(Live):
     def __init__(self, budget: int | None = None) -> None:
         super().__init__(budget)
         self._critical, self._best = 0, float("inf")
+        self._workers: Workers | None = None
 
     @property
     def watch(self) -> "Watch":
         """The callbacks for a campaign."""
         from bridgegen.campaign import Watch
 
-        return Watch(stage=self._stage, batch=self._batch)
+        return Watch(stage=self._stage, workers=self._meet, batch=self._batch)
+
+    def _meet(self, workers: "Workers") -> None:
+        self._workers = workers
 
     def _stage(self, stage: str) -> None:
         if stage == "compile":
             self.say_compiling()
         self.show(what=_STAGES[stage])
+
+    def _by(self) -> str:
+        """Return who does it, where somebody else does: the cluster's workers may come and go."""
+        from bridgegen.workers import Threads
+
+        who = self._workers
+        if who is None or isinstance(who, Threads):
+            return ""
+        return f" by {who.count} worker" + "s" * (who.count != 1)
 
     def _batch(self, progress: "Progress") -> None:
         column = progress.result.metrics[:, progress.metrics.index("d_min")]
@@ -52,7 +66,8 @@ class SearchScreen(Live):
         self.show(
             done=progress.evaluations,
             total=progress.budget,
-            facts=f"{self._critical} critical · best d_min {self._best:.2f} m · {rate:.0f}/s",
+            facts=f"{self._critical} critical · best d_min {self._best:.2f} m · {rate:.0f}/s"
+            f"{self._by()}",
         )
 
 

@@ -23,10 +23,14 @@ STATUS_MESSAGES = {
     5: "no lane leads from where an entity is to its route",
     6: "a position that counts from an entity which is not there",
     7: "the ego's driver is on no lane",
+    30: "the worker's process ended",
 }
 
 FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}
 """The status of a row whose driver failed, by `DriverError.kind`."""
+
+WORKER_ENDED = 30
+"""The status of a row that took whoever simulated it with it, twice."""
 
 
 @dataclass(frozen=True)

@@ -26,25 +26,21 @@ class RunView:
     Args:
         folder: of the run.
         ego: where a driver of your own drives, that same driver.
-        threads: to simulate with, one for each core by default.
 
     Raises:
         StorageError: not a run, or its scenario or map is not what it was.
         InputError: the scenario or the map is missing, or the ego has to be named.
     """
 
-    def __init__(
-        self, folder: Path | str, *, ego: str | None = None, threads: int | None = None
-    ) -> None:
+    def __init__(self, folder: Path | str, *, ego: str | None = None) -> None:
         self.folder = Path(folder)
         with Store.open(folder) as store:
             self.settings = Settings.from_dict(store.settings, store.folder)
             self._rows = store.read()
             metrics = store.metrics
         self._pipeline = pipeline_of(
-            self.settings, metrics, self.folder,
-            ego=ego, command="view", causes=False, threads=threads,
-        )  # fmt: skip
+            self.settings, metrics, self.folder, ego=ego, command="view", causes=False
+        )
         self._lock = threading.Lock()
 
     def fragment(self, evaluation: int) -> str:

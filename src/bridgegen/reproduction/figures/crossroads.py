@@ -66,7 +66,7 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
     """
     with Store.open(folder) as store:
         settings = Settings.from_dict(store.settings, folder)
-        pipeline = pipeline_of(settings, store.metrics, folder, causes=False, threads=1)
+        pipeline = pipeline_of(settings, store.metrics, folder, causes=False)
     scenario = pipeline.scenario
     assert isinstance(scenario, LogicalScenario)
     X = np.concatenate([run.X[run.collision] for run in runs])

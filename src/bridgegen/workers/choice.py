@@ -1,0 +1,55 @@
+"""Which workers a user asks for."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from bridgegen.errors import InputError
+from bridgegen.workers.threads import Threads
+from bridgegen.workers.workers import Workers
+
+MOST = 1024
+"""Processes of one machine: more is a slip of the finger."""
+
+Choice = int | str | Workers | None
+"""A number of processes; ``"ray"`` or ``"ray://HOST:PORT"``; somebody's own; nothing: threads."""
+
+
+def read_choice(given: int | str | None) -> int | str | None:
+    """Return what a user says, checked.
+
+    Args:
+        given: how many processes, in digits if it is a text.
+
+    Raises:
+        InputError: it is neither a number in range, nor one of Ray's.
+    """
+    if given is None:
+        return None
+    text = str(given)
+    if text.isdecimal() and 1 <= int(text) <= MOST:
+        return int(text)
+    raise InputError(f"workers must be a number of processes, 1 to {MOST}, got {given}")
+
+
+@contextmanager
+def open_workers(choice: Choice) -> Iterator[Workers]:
+    """Have workers; in the end they are let go, but for those that the caller brought.
+
+    Raises:
+        InputError: see `read_choice`.
+    """
+    if choice is not None and not isinstance(choice, int | str):
+        yield choice
+        return
+    number = read_choice(choice)
+    workers: Workers
+    if number is None:
+        workers = Threads()
+    else:
+        from bridgegen.workers.processes import Processes
+
+        workers = Processes(int(number))
+    try:
+        yield workers
+    finally:
+        workers.close()

@@ -1,0 +1,152 @@
+"""A search by several processes: the same bits, whoever is killed; and nobody is left over."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign import Watch
+from bridgegen.errors import UnknownNameError
+from bridgegen.odd.reader import load
+from bridgegen.simulation.rollout import WORKER_ENDED
+from bridgegen.store import Store
+from bridgegen.workers.processes import Processes
+
+DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
+DOUBLES = Path(__file__).parents[1] / "workers" / "doubles"
+SEARCH = {
+    "scenario": "crossroads-s4", "algorithm": "pso", "budget": 160, "seed": 5, "keep": 0,
+    "ego": "reference", "weights": "entropy", "objective": {"d_min": None, "v_d": None},
+}  # fmt: skip
+
+
+def rows_of(folder: Path):
+    with Store.open(folder) as store:
+        return store.read()
+
+
+def same(a, b) -> bool:
+    return all(
+        getattr(a, name).tobytes() == getattr(b, name).tobytes()
+        for name in ("id", "U", "X", "metrics", "F", "status", "critical", "cause")
+    )
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_processes_find_what_threads_find_whoever_is_killed(undisturbed, tmp_path, count):
+    crew, killed = Processes(count), []
+
+    def kill(progress) -> None:
+        if progress.evaluations in (40, 120):
+            os.kill(crew.pids[-1], signal.SIGKILL)
+            killed.append(crew.pids[-1])
+
+    run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=crew, watch=Watch(batch=kill))
+    crew.close()
+    assert len(set(killed)) == 2
+    assert same(rows_of(run.folder), rows_of(undisturbed.folder))
+    assert run.settings == undisturbed.settings
+    assert not crew.pids
+
+
+def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOUBLES))
+    from poisoned import Poisoned
+
+    scenario = load("crossroads-s4")
+    space = scenario.space()
+    X = space.decode(np.random.default_rng(0).random((12, space.n_var)))
+    crew = Processes(2)
+    pipeline = Poisoned(scenario, space, seek_causes=True, workers=crew)
+    pipeline.choose_objective()
+    pipeline.poison = X[3]
+    found = pipeline.evaluate(X)
+    crew.close()
+    assert found.status.tolist() == [0] * 3 + [WORKER_ENDED] + [0] * 8
+    assert found.messages == {3: "by SIGSEGV"}
+    assert np.isnan(found.metrics[3]).all()
+    assert not found.critical[3]
+    others = np.delete(np.arange(12), 3)
+    calm = bg.pipeline.Pipeline(scenario, space, seek_causes=True)
+    calm.choose_objective()
+    expected = calm.evaluate(X[others])
+    for name in ("metrics", "F", "critical", "cause"):
+        assert getattr(found, name)[others].tobytes() == getattr(expected, name).tobytes()
+    assert np.isfinite(found.F).all()
+
+
+def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path):
+    search = {"scenario": "crossroads-s1", "algorithm": "random", "budget": 16, "keep": 0}
+    ego = f"{DRIVERS}:FailsFast"
+    one = bg.run_search(**search, ego=ego, out=tmp_path / "one")
+    two = bg.run_search(**search, ego=ego, out=tmp_path / "two", workers=2)
+    assert one.summary.failed == two.summary.failed > 0
+    assert same(rows_of(one.folder), rows_of(two.folder))
+    assert one.failures == two.failures
+
+
+def test_a_wrong_name_is_told_as_ever(tmp_path):
+    with pytest.raises(UnknownNameError, match="unknown metric 'd_mim'"):
+        bg.run_search(**SEARCH, metrics=["d_mim"], out=tmp_path / "run", workers=2)
+
+
+def start(folder: Path, *more: str) -> subprocess.Popen[str]:
+    code = "import sys; from bridgegen.cli import main; sys.exit(main())"
+    words = ["search", "crossroads-s4", "--budget", "200000", "--workers", "2"]
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *words, "--algorithm", "random", "--out", str(folder), *more],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def children(pid: int) -> set[int]:
+    """Return the numbers of a process's children."""
+    found = set()
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        found |= {int(one) for one in (task / "children").read_text().split()}
+    return found
+
+
+def workers_of(process: subprocess.Popen[str], folder: Path) -> set[int]:
+    """Wait until a search is under way; return its processes."""
+    end = time.monotonic() + 120.0
+    while time.monotonic() < end and process.poll() is None:
+        if (folder / "run.sqlite").exists() and len(rows_of(folder)) >= 100:
+            return children(process.pid)
+        time.sleep(0.05)
+    raise AssertionError(f"no rows in time: {process.stderr and process.stderr.read()}")
+
+
+def gone(pids: set[int], seconds: float) -> bool:
+    end = time.monotonic() + seconds
+    while any(Path(f"/proc/{pid}").exists() for pid in pids):
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_processes_end_with_the_search_however_it_ends(tmp_path, how):
+    process = start(tmp_path / "run")
+    workers = workers_of(process, tmp_path / "run")
+    assert len(workers) == 2
+    os.kill(process.pid, how)
+    _, errors = process.communicate(timeout=30)
+    assert gone(workers, 10.0)
+    assert len(rows_of(tmp_path / "run")) >= 100
+    if how is signal.SIGINT:
+        assert process.returncode == 130
+        assert f"bridgegen resume {tmp_path / 'run'}" in errors
+        assert "Traceback" not in errors

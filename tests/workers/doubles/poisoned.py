@@ -1,0 +1,30 @@
+"""A pipeline in which one row takes down whoever evaluates it."""
+
+import os
+import signal
+
+import numpy as np
+
+from bridgegen.pipeline import Pipeline
+from bridgegen.workers import Recipe, Threads
+
+
+class Poisoned(Pipeline):
+    """A pipeline in which one row takes down whoever evaluates it."""
+
+    poison: np.ndarray
+
+    @property
+    def recipe(self) -> Recipe:
+        return Recipe.of(_poisoned, self.poison, metrics=self.metrics, **self._made_with)
+
+    def evaluate_rows(self, X, objective):
+        if (self.poison == X).all(axis=1).any():
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return super().evaluate_rows(X, objective)
+
+
+def _poisoned(poison: np.ndarray, **arguments) -> Poisoned:
+    pipeline = Poisoned(**arguments, workers=Threads(1))
+    pipeline.poison = poison
+    return pipeline

@@ -1,0 +1,64 @@
+"""What workers work with in tests: imported by them by its name."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.errors import UnknownNameError
+from bridgegen.workers import Recipe
+
+
+class Doubler:
+    """Doubles numbers."""
+
+    runs_at_once = 8
+
+    def __init__(self, rows_at_once: int = 4) -> None:
+        self.rows_at_once = rows_at_once
+
+    @property
+    def recipe(self) -> Recipe:
+        return Recipe.of(Doubler, self.rows_at_once)
+
+    def double(self, X: np.ndarray) -> np.ndarray:
+        return 2.0 * X
+
+    def double_but(self, X: np.ndarray, poison: tuple[float, ...]) -> np.ndarray:
+        if np.isin(X, poison).any():
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return 2.0 * X
+
+    def double_once_killed(self, X: np.ndarray, folder: Path) -> np.ndarray:
+        """Who is first at a row of 7 is gone."""
+        if 7.0 in X:
+            try:
+                (folder / "was here").touch(exist_ok=False)
+            except FileExistsError:
+                return 2.0 * X
+            os._exit(3)
+        return 2.0 * X
+
+    def slowly(self, X: np.ndarray, folder: Path) -> np.ndarray:
+        (folder / str(os.getpid())).touch()
+        time.sleep(60.0)
+        return X
+
+    def refuse(self, X: np.ndarray) -> np.ndarray:
+        raise UnknownNameError("number", "seven", ["one", "two"])
+
+    def fail(self, X: np.ndarray) -> np.ndarray:
+        raise ZeroDivisionError("by nobody")
+
+    def who(self, X: np.ndarray) -> int:
+        return os.getpid()
+
+
+class Unmakeable(Doubler):
+    """Takes with it whoever makes it."""
+
+    @property
+    def recipe(self) -> Recipe:
+        return Recipe.of(os._exit, 9)

@@ -1,0 +1,115 @@
+"""Processes of this machine: they die, refuse and are interrupted, and nothing is left of them."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import InputError, UnknownNameError, WorkersError
+from bridgegen.workers import Lost, Part, Threads, open_workers, read_choice
+from bridgegen.workers.processes import Processes, ending
+
+
+@pytest.fixture
+def doubles(doubles_can_be_imported):
+    import worker_doubles
+
+    return worker_doubles
+
+
+@pytest.fixture
+def crew() -> Iterator[Processes]:
+    with open_workers(2) as workers:
+        assert isinstance(workers, Processes)
+        yield workers
+
+
+X = np.arange(20.0)
+
+
+def joined(parts: list[Part]) -> np.ndarray:
+    return np.concatenate([part.came for part in parts])
+
+
+def test_rows_come_back_in_order_from_several_processes(crew, doubles):
+    doubler = doubles.Doubler()
+    assert (joined(crew.map(doubler, "double", X)) == 2.0 * X).all()
+    pids = {part.came for part in crew.map(doubler, "who", X)}
+    assert 1 <= len(pids) <= 2
+    assert os.getpid() not in pids
+    again = {part.came for part in crew.map(doubler, "who", X)}
+    assert len(pids | again) <= 2  # they stay
+    assert [part.rows for part in crew.map(doubler, "double", X[:0])] == [0]
+
+
+def test_a_killed_process_costs_nothing(crew, doubles, tmp_path):
+    parts = crew.map(doubles.Doubler(), "double_once_killed", X, tmp_path)
+    assert (joined(parts) == 2.0 * X).all()
+    assert (tmp_path / "was here").exists()
+
+
+def test_rows_that_kill_are_lost_alone(crew, doubles):
+    parts = crew.map(doubles.Doubler(), "double_but", X, (6.0, 17.0))
+    found = [x for part in parts for x in ([None] if isinstance(part.came, Lost) else part.came)]
+    assert found == [None if x in (6.0, 17.0) else 2.0 * x for x in X]
+    lost = [part for part in parts if isinstance(part.came, Lost)]
+    assert [(one.rows, one.came.reason) for one in lost] == [(1, "by SIGSEGV")] * 2
+
+
+def test_what_is_raised_arrives_as_it_was(crew, doubles):
+    with pytest.raises(UnknownNameError, match="unknown number 'seven'; known: one, two") as error:
+        crew.map(doubles.Doubler(), "refuse", X)
+    assert error.value.problems == ("unknown number 'seven'; known: one, two",)
+    with pytest.raises(ZeroDivisionError, match="by nobody") as mistake:
+        crew.map(doubles.Doubler(), "fail", X)
+    assert "worker_doubles.py" in mistake.value.__notes__[0]  # where it was
+    assert (joined(crew.map(doubles.Doubler(), "double", X)) == 2.0 * X).all()
+
+
+def test_what_cannot_be_made_is_no_endless_loop(crew, doubles):
+    with pytest.raises(WorkersError, match="ended before they were ready: with exit status 9"):
+        crew.map(doubles.Unmakeable(), "double", X)
+
+
+def test_ctrl_c_ends_them_at_once(doubles, tmp_path):
+    def interrupt() -> None:
+        end = time.monotonic() + 60.0
+        while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < end:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    crew, thread = Processes(2), threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        crew.map(doubles.Doubler(), "slowly", X, tmp_path)
+    thread.join()
+    pids = [int(path.name) for path in tmp_path.iterdir()]
+    assert len(pids) == 2
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
+
+
+@pytest.mark.parametrize("choice", [0, -1, 2000, "0", "two", "", "1.5", "raye"])
+def test_what_is_no_choice_of_workers(choice):
+    with pytest.raises(InputError, match="workers must be a number of processes, 1 to 1024"):
+        read_choice(choice)
+
+
+def test_choices():
+    assert (read_choice("3"), read_choice(3), read_choice(None)) == (3, 3, None)
+    with open_workers(None) as workers:
+        assert isinstance(workers, Threads)
+    mine = Threads(1)
+    with open_workers(mine) as workers:
+        assert workers is mine
+    assert workers.map  # it is the caller's, and not closed
+
+
+def test_endings():
+    assert [ending(one) for one in (0, 7, -9, -11, -250)] == [
+        "with exit status 0", "with exit status 7", "by SIGKILL", "by SIGSEGV", "by signal 250",
+    ]  # fmt: skip
