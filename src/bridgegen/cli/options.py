@@ -99,6 +99,13 @@ SimulatorSettings = Annotated[
         "--simulator-set", help="A setting of the simulator, NAME=VALUE; may be repeated."
     ),
 ]
+EsminiLibrary = Annotated[
+    Path | None,
+    typer.Option(
+        help="esmini's library, libesminiLib.so, for --simulator esmini.",
+        show_default="ESMINI_LIB of the environment",
+    ),
+]
 RoadMap = Annotated[
     Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
 ]
@@ -177,7 +184,7 @@ def read_settings(pairs: list[str] | None, option: str = "--set") -> dict[str, S
 
 
 def read_simulator(
-    name: str | None, settings: list[str] | None = None, **access: Setting | None
+    name: str | None, settings: list[str] | None = None, **access: Setting | Path | None
 ) -> SimulatorChoice | None:
     """Read the choice of a simulator; nothing is the run's own.
 
@@ -187,7 +194,9 @@ def read_simulator(
         access: where it is on this machine, by the name of the option; None is not said.
     """
     said = {
-        f"--{one.replace('_', '-')}": value for one, value in access.items() if value is not None
+        f"--{one.replace('_', '-')}": str(value) if isinstance(value, Path) else value
+        for one, value in access.items()
+        if value is not None
     }
     if name is None:
         if settings or said:

@@ -55,6 +55,7 @@ def search(
     adversary: options.Adversary = None,
     simulator: options.Simulator = None,
     simulator_set: options.SimulatorSettings = None,
+    esmini_lib: options.EsminiLibrary = None,
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
@@ -94,7 +95,7 @@ def search(
             causes=causes,
             cause=cause,
             adversary=adversary,
-            simulator=options.read_simulator(simulator, simulator_set),
+            simulator=options.read_simulator(simulator, simulator_set, esmini_lib=esmini_lib),
             workers=workers,
             watch=screen.watch,
         )

@@ -4,23 +4,15 @@ A driver that raises, that takes too long or that takes its process down with it
 it was driving, and nothing else: the process is ended, and another is begun for the next batch.
 """
 
-import contextlib
 import importlib
 import importlib.util
-import os
-import pickle
-import queue
-import signal
-import struct
-import subprocess
 import sys
-import threading
 import traceback
-import weakref
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,21 +21,18 @@ from bridgegen.ego.compiled import CompiledDriver
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
 from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
 from bridgegen.errors import InputError
+from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
 START_SECONDS = 120.0
 """A driver may take so long to be imported and made: a network to be loaded, say."""
 
 
-class DriverError(Exception):
+class DriverError(CallError):
     """A driver did not answer, or answered nonsense.
 
     Attributes:
         kind: "raised", "timed out", "died" or "answered nonsense".
     """
-
-    def __init__(self, kind: str, message: str) -> None:
-        super().__init__(message)
-        self.kind = kind
 
 
 class DriverProcess:
@@ -70,8 +59,7 @@ class DriverProcess:
             )
         self.spec = spec
         self.time_limit = time_limit
-        self._process: subprocess.Popen[bytes] | None = None
-        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
         """Begin the process, if it is not running, and make the driver in it.
@@ -79,24 +67,11 @@ class DriverProcess:
         Raises:
             InputError: there is no such module or class, or it cannot be made.
         """
-        if self._process is not None:
+        if self._process.runs:
             return
-        process = self._process = subprocess.Popen(
-            [sys.executable, "-m", "bridgegen.ego.driver_process", self.spec],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(["", *sys.path])},
-        )  # fmt: skip
-        assert process.stdout is not None
-        self._answers = queue.SimpleQueue()
-        reader = threading.Thread(
-            target=_forward, args=(process.stdout, self._answers), daemon=True
-        )
-        reader.start()
-        self._end = weakref.finalize(self, _end, process, reader)
         try:
-            self.memory = self._answer(START_SECONDS)
+            self.memory = self._process.start(START_SECONDS)
         except DriverError as error:
-            self.close()
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
 
     def reset(self, n: int, scene: Scene) -> None:
@@ -107,7 +82,7 @@ class DriverProcess:
             InputError: it cannot be made.
         """
         self.start()
-        self._ask("reset", n, scene)
+        self._process.ask("reset", n, scene, seconds=self.time_limit)
 
     def act(self, observation: Observation) -> tuple[Float, Float]:
         """Return what it demands, ``(N,)`` acceleration [m/s²] and curvature [1/m].
@@ -116,7 +91,9 @@ class DriverProcess:
             DriverError: it raised, timed out, died, or answered nonsense: another shape, NaN or an
                 infinite value for a scenario that is running.
         """
-        demanded: tuple[Float, Float] = self._ask("act", observation)
+        demanded: tuple[Float, Float] = self._process.ask(
+            "act", observation, seconds=self.time_limit
+        )
         return demanded
 
     def call(
@@ -139,88 +116,16 @@ class DriverProcess:
             InputError: the driver cannot be made.
         """
         self.start()
-        return self._ask("call", function, *arguments, progress=progress, seconds=seconds)
+        limit = seconds or self.time_limit
+        return self._process.ask("call", function, *arguments, progress=progress, seconds=limit)
 
     def kill(self) -> None:
         """End the process from another thread: who waits for it gets a `DriverError`."""
-        process = self._process
-        if process is not None:
-            process.kill()
+        self._process.kill()
 
     def close(self) -> None:
         """End the process, if it is running; so does this object's end."""
-        if self._process is not None:
-            self._end()
-        self._process = None
-
-    def _ask(
-        self,
-        *request: Any,
-        progress: Callable[[], int] | None = None,
-        seconds: float | None = None,
-    ) -> Any:
-        process = self._process
-        assert process is not None
-        assert process.stdin is not None
-        try:
-            _write(process.stdin, request)
-        except OSError:
-            self.close()
-            raise DriverError("died", "its process has ended") from None
-        return self._answer(seconds or self.time_limit, progress)
-
-    def _answer(self, seconds: float, progress: Callable[[], int] | None = None) -> Any:
-        so_far = progress() if progress else 0
-        while True:
-            try:
-                kind, *rest = self._answers.get(timeout=seconds)
-                break
-            except queue.Empty:
-                before, so_far = so_far, progress() if progress else so_far
-                if so_far == before:
-                    self.close()
-                    raise DriverError("timed out", f"no answer within {seconds:g} s") from None
-        if kind == "answer":
-            return rest[0]
-        if kind == "died":
-            status = self._process.wait() if self._process else None
-            self.close()
-            raise DriverError("died", f"its process ended with status {status}")
-        raise DriverError(kind, rest[0])
-
-
-def _end(process: subprocess.Popen[bytes], reader: threading.Thread) -> None:
-    process.kill()
-    process.wait()
-    reader.join()  # the pipe has ended
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with contextlib.suppress(OSError):
-                pipe.close()
-
-
-def _forward(pipe: IO[bytes], answers: "queue.SimpleQueue[Any]") -> None:
-    """Put what comes out of a pipe into a queue: only that can be waited for with a limit."""
-    try:
-        while True:
-            answers.put(_read(pipe))
-    except (EOFError, OSError, ValueError, pickle.UnpicklingError):
-        answers.put(("died",))
-
-
-def _write(pipe: IO[bytes], message: Any) -> None:
-    data = pickle.dumps(message, protocol=5)
-    pipe.write(struct.pack("<q", len(data)))
-    pipe.write(data)
-    pipe.flush()
-
-
-def _read(pipe: IO[bytes]) -> Any:
-    """Return the next message; both ends are ours, and the driver's own process is trusted."""
-    head = pipe.read(8)
-    if len(head) < 8:
-        raise EOFError
-    return pickle.loads(pipe.read(struct.unpack("<q", head)[0]))
+        self._process.close()
 
 
 # --- In the other process -------------------------------------------------------------------------
@@ -295,34 +200,24 @@ def checked(control: Any, running: Any) -> tuple[Float, Float]:
     return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
 
 
-def serve(spec: str, requests: IO[bytes], answers: IO[bytes]) -> None:
-    """Make a driver and answer requests until there are no more."""
-    try:
-        driver = make(spec)
-    except Exception as error:
-        _write(answers, ("raised", _told(error)))
-        return
-    _write(answers, ("answer", driver.memory if isinstance(driver, CompiledDriver) else None))
-    while True:
-        try:
-            what, *rest = _read(requests)
-        except EOFError:
-            return
-        try:
-            message: tuple[str, Any]
-            if isinstance(driver, CompiledDriver):
-                function, *arguments = rest
-                message = ("answer", function(driver.address, *arguments))
-            elif what == "reset":
-                driver.reset(*rest)
-                message = ("answer", None)
-            else:
-                message = ("answer", checked(driver.act(*rest), rest[0].running))
-        except DriverError as error:
-            message = (error.kind, str(error))
-        except Exception as error:
-            message = ("raised", _told(error))
-        _write(answers, message)
+def answering(spec: str) -> tuple[int | None, Answer]:
+    """Make a driver; return how many numbers it keeps, if it is a compiled one, and its answers."""
+    driver = make(spec)
+    if isinstance(driver, CompiledDriver):
+        address = driver.address
+
+        def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
+            return function(address, *arguments)
+
+        return driver.memory, call
+
+    def answer(what: str, *rest: Any) -> Any:
+        if what == "reset":
+            driver.reset(*rest)
+            return None
+        return checked(driver.act(*rest), rest[0].running)
+
+    return None, answer
 
 
 def _told(error: Exception) -> str:
@@ -333,13 +228,5 @@ def _told(error: Exception) -> str:
     return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
 
 
-def main() -> None:
-    """Serve the driver that the command line names."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the search itself ends us
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the driver prints must not get between our answers
-    serve(sys.argv[1], sys.stdin.buffer, answers)
-
-
 if __name__ == "__main__":
-    main()
+    serve(partial(answering, sys.argv[1]), _told)

@@ -53,6 +53,21 @@ def _embedded(
     return EmbeddedSimulator(storyboard, place, driver=driver)
 
 
+def _esmini(
+    storyboard: "OpenScenario",
+    place: str,
+    driver: "Driver | None",
+    settings: Mapping[str, Value],
+    access: Mapping[str, Value],
+) -> "Simulator[Any]":
+    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+    from bridgegen.simulation.esmini.simulator import EsminiSimulator, library_of, steps_of
+
+    library, steps = library_of(access), steps_of(settings)
+    embedded = EmbeddedSimulator(storyboard, place, driver=driver)
+    return EsminiSimulator(embedded, storyboard, library, steps=steps)
+
+
 SIMULATORS: Mapping[str, Kind] = {
     one.name: one
     for one in (
@@ -60,6 +75,13 @@ SIMULATORS: Mapping[str, Kind] = {
             "embedded",
             "Ours, compiled to machine code: thousands of scenarios a second.",
             _embedded,
+        ),
+        Kind(
+            "esmini",
+            "esmini 3, by its library: it runs the storyboard, and our driver the ego in it.",
+            _esmini,
+            settings={"steps": "how many steps of esmini's make one of the scenario's, 1 to 100"},
+            access={"--esmini-lib": "esmini's library, libesminiLib.so; or set ESMINI_LIB"},
         ),
     )
 }

@@ -24,10 +24,16 @@ STATUS_MESSAGES = {
     6: "a position that counts from an entity which is not there",
     7: "the ego's driver is on no lane",
     30: "the worker's process ended",
+    40: "the simulator reported an error",
+    41: "the simulator's process ended",
+    42: "the simulator did not answer in time",
 }
 
 FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}
 """The status of a row whose driver failed, by `DriverError.kind`."""
+
+SIMULATOR_FAILURES = {"raised": 40, "died": 41, "timed out": 42}
+"""The status of a row whose simulator failed, by `CallError.kind`."""
 
 WORKER_ENDED = 30
 """The status of a row that took whoever simulated it with it, twice."""

@@ -123,6 +123,18 @@ class CoSimulation:
         imposed = np.asarray(states, dtype=np.float64).reshape(1, len(bodies), 4)
         self._batch.impose(k, np.asarray(bodies, dtype=np.int64), imposed)
 
+    def impose_presence(self, k: int, present: Sequence[bool]) -> None:
+        """Say who is there at instant k, before ``decide``; nothing where everybody always is.
+
+        Args:
+            k: the instant that is reached.
+            present: ``(E,)``.
+        """
+        record = self._batch.record
+        if record.present.size:
+            self._batch.state.present[0] = present
+            record.present[0, :, k] = present
+
     def impose_lights(self, k: int, states: npt.ArrayLike) -> None:
         """Set all traffic lights at instant k, after ``decide``.
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,14 @@ class Network:
         pairs = zip(models, self._ways, strict=True)
         self.scene = stacked([_scene(program, model, ways) for model, ways in pairs])
         self.tables = self._tables()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process has the same ways, and plans more of them by itself."""
+        with self._lock:
+            return {name: one for name, one in vars(self).items() if name != "_lock"}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        vars(self).update(state, _lock=Lock())
 
     @property
     def n_networks(self) -> int:

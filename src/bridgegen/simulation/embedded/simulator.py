@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +67,10 @@ class EmbeddedSimulator:
         self.program = compile_storyboard(
             storyboard, place, driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process has the same storyboard, and processes of its own for a user's driver."""
+        return {"program": self.program}
 
     @property
     def embedded(self) -> "EmbeddedSimulator":
@@ -181,6 +185,23 @@ class EmbeddedSimulator:
         )  # fmt: skip
         wheel = partial(own.wheel, program.changed(dry=dry)) if own else None
         return CoSimulation(batch, program.names, program.time_step, program.n_steps, wheel)
+
+    def failed(
+        self, roads: Network, row: int, values: Mapping[str, float], status: int, message: str
+    ) -> Rollout:
+        """Return the rollout of a row that something went wrong with, N = 1.
+
+        Args:
+            roads: P road networks, made ready by this simulator.
+            row: in 0..P-1, its road network.
+            values: per parameter; see `Simulator.run`.
+            status: of `STATUS_MESSAGES`.
+            message: what else there is to say.
+        """
+        batch = self.batch(roads, np.array([row]), values)
+        batch.start()
+        batch.fail(status, message)
+        return batch.rollout()
 
     def stop(self) -> None:
         """See `Simulator`."""

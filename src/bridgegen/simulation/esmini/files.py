@@ -1,0 +1,225 @@
+"""What esmini reads: the scenario as it is handed over, with the values of a row written into it.
+
+An ego that a driver of ours drives has esmini's ExternalController there, from the start on: it
+stays where it is told that it is. No other entity has a controller, for esmini does not know
+those that our files name. Expressions are worked out here: esmini keeps six digits of theirs.
+"""
+
+import tempfile
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from shutil import rmtree
+
+import numpy as np
+from lxml import etree
+
+from bridgegen.arrays import Float
+from bridgegen.disk import write_whole
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.write import to_xml as road_xml
+from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.values import Expr, Kind, parse_value
+from bridgegen.openx.openscenario.write import to_xml
+
+Node = etree._Element
+
+_EXTERNAL = "ExternalController"
+
+
+class Folder:
+    """A folder for files that nobody needs once this object is gone.
+
+    Attributes:
+        path: of it.
+    """
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="bridgegen-esmini-"))
+        weakref.finalize(self, rmtree, self.path, ignore_errors=True)
+
+
+class RoadFiles:
+    """The road networks that scenarios take place on, each in a file.
+
+    Args:
+        models: P road networks.
+        courses: see `Simulator.roads`.
+
+    Attributes:
+        paths: of the P files.
+        courses: P of them, or none.
+    """
+
+    def __init__(
+        self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
+    ) -> None:
+        self._folder = Folder()
+        self.courses = tuple(courses)
+        written: dict[int, Path] = {}
+        paths = []
+        for p, model in enumerate(models):
+            if id(model) not in written:  # courses may differ on the same roads
+                written[id(model)] = self._folder.path / f"{p:04d}.xodr"
+                write_whole(written[id(model)], [road_xml(model)])
+            paths.append(written[id(model)])
+        self.paths = tuple(paths)
+
+
+class ScenarioFile:
+    """A storyboard as esmini is to run it.
+
+    Args:
+        storyboard: as it is handed over.
+        ego: the name of the ego, if a driver of ours drives it; else None.
+    """
+
+    def __init__(self, storyboard: OpenScenario, ego: str | None) -> None:
+        self._data = to_xml(storyboard)
+        root = etree.fromstring(self._data)
+        for controller in [*root.iterfind("./Entities/ScenarioObject/ObjectController")]:
+            _remove(controller)
+        if ego is not None:
+            _drive_from_outside(root, ego)
+        self._data = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+
+    def event_paths(self) -> list[str]:
+        """Return what esmini calls each event, in the order of the file."""
+        root = etree.fromstring(self._data)
+        return [
+            "::".join(str(one.get("name")) for one in reversed(_named(event)))
+            for event in root.iter("Event")
+        ]
+
+    def on(self, roads: Path, course: Mapping[str, Float]) -> "Template":
+        """Return the scenario on a road network.
+
+        Args:
+            roads: the file of it.
+            course: who is where when on it, see `Simulator.roads`.
+        """
+        root = etree.fromstring(self._data)
+        for network in root.iterfind("./RoadNetwork/LogicFile"):
+            network.set("filepath", str(roads))
+        for name, vertices in course.items():
+            _follow(root, name, vertices)
+        return Template(root)
+
+
+class Template:
+    """A scenario on a road network, to be filled with the values of rows.
+
+    Args:
+        root: the document.
+    """
+
+    def __init__(self, root: Node) -> None:
+        self._root = root
+        self._declared = {
+            str(one.get("name")): one
+            for one in root.iterfind("./ParameterDeclarations/ParameterDeclaration")
+        }
+        self._expressions = [
+            (node, str(name), expression)
+            for node in root.iter(etree.Element)
+            for name, text in node.attrib.items()
+            if str(text).startswith("${")
+            and isinstance(expression := parse_value(Kind.DOUBLE, str(text)), Expr)
+        ]
+
+    def write(self, path: Path, values: Mapping[str, float]) -> None:
+        """Write the scenario of a row.
+
+        Args:
+            path: a file that is replaced.
+            values: of the file's numeric parameters, all of them.
+
+        Raises:
+            StorageError: it cannot be written.
+        """
+        for name, value in values.items():
+            if name in self._declared:
+                declared = self._declared[name]
+                is_whole = declared.get("parameterType") != "double"
+                declared.set("value", str(int(value)) if is_whole else repr(float(value)))
+        for node, attribute, expression in self._expressions:
+            if expression.names <= values.keys():
+                with np.errstate(all="ignore"):
+                    found = np.asarray(expression.resolve(dict(values)))
+                if np.isfinite(found):
+                    is_truth = found.dtype == np.bool_
+                    node.set(
+                        attribute, str(bool(found)).lower() if is_truth else repr(float(found))
+                    )
+        data = etree.tostring(self._root, xml_declaration=True, encoding="UTF-8")
+        path.write_bytes(data)
+
+
+def _remove(node: Node) -> None:
+    parent = node.getparent()
+    assert parent is not None
+    parent.remove(node)
+
+
+def _named(event: Node) -> list[Node]:
+    """Return an event and what it is part of, up to its story."""
+    return [
+        event,
+        *(one for one in event.iterancestors("Maneuver", "ManeuverGroup", "Act", "Story")),
+    ]
+
+
+def _drive_from_outside(root: Node, ego: str) -> None:
+    """Give the ego the controller that waits to be told, whatever else the file does to its own."""
+    for private in root.iterfind("./Storyboard/Init/Actions/Private"):
+        if private.get("entityRef") == ego:
+            for action in [*private.iterfind("./PrivateAction/ControllerAction")]:
+                parent = action.getparent()
+                assert parent is not None
+                _remove(parent)
+            place = 1 if len(private) else 0
+            private.insert(place, _assigned())
+    for group in _groups_of(root, ego):
+        for action in [*group.iter("ControllerAction")]:
+            for below in [*action]:
+                action.remove(below)
+            etree.SubElement(
+                action, "ActivateControllerAction", lateral="true", longitudinal="true"
+            )
+
+
+def _assigned() -> Node:
+    private = etree.Element("PrivateAction")
+    assign = etree.SubElement(
+        etree.SubElement(private, "ControllerAction"), "AssignControllerAction",
+        activateLateral="true", activateLongitudinal="true",
+    )  # fmt: skip
+    controller = etree.SubElement(assign, "Controller", name="driver")
+    properties = etree.SubElement(controller, "Properties")
+    etree.SubElement(properties, "Property", name="esminiController", value=_EXTERNAL)
+    return private
+
+
+def _groups_of(root: Node, name: str) -> Iterator[Node]:
+    """Yield the maneuver groups in which an entity acts."""
+    for group in root.iter("ManeuverGroup"):
+        if any(one.get("entityRef") == name for one in group.iterfind("./Actors/EntityRef")):
+            yield group
+
+
+def _follow(root: Node, name: str, course: Float) -> None:
+    """Write a course in the place of the timed trajectory that an entity follows."""
+    for group in _groups_of(root, name):
+        for line in group.iter("Polyline"):
+            vertex = deepcopy(line[0])
+            for old in [*line]:
+                line.remove(old)
+            for time, x, y, h in course.tolist():
+                new = deepcopy(vertex)
+                new.set("time", repr(time))
+                place = new.find("./Position/WorldPosition")
+                assert place is not None
+                for coordinate, value in (("x", x), ("y", y), ("h", h)):
+                    place.set(coordinate, repr(value))
+                line.append(new)

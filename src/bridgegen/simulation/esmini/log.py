@@ -1,0 +1,22 @@
+"""What esmini writes about a scenario: it may fail, and say so nowhere else."""
+
+from pathlib import Path
+
+_MARK = "[error] "
+_LONGEST = 300
+
+
+def error_in(log: Path) -> str | None:
+    """Return the first error that a log tells of; None if there is none, or no log.
+
+    A warning is none: esmini warns of missing 3D models, say.
+    """
+    try:
+        text = log.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    for line in text.splitlines():
+        _, mark, said = line.partition(_MARK)
+        if mark:
+            return said.strip()[:_LONGEST]
+    return None

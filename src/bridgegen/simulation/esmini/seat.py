@@ -1,0 +1,225 @@
+"""A process in which esmini runs scenarios, one after the other, with our driver beside it.
+
+esmini keeps what it holds in variables of the whole process, and may hang, crash or end it.
+"""
+
+import sys
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from bridgegen.errors import InputError
+from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
+from bridgegen.simulation.esmini.library import Library
+from bridgegen.simulation.esmini.log import error_in
+
+if TYPE_CHECKING:  # the process greets as soon as it has the library
+    from bridgegen.ego import Driver
+    from bridgegen.simulation.embedded.network import Network
+    from bridgegen.simulation.embedded.shared_arrays import Layout
+    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+    from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
+    from bridgegen.simulation.rollout import Rollout
+
+START_SECONDS = 60.0
+"""The library may take so long to be loaded."""
+
+LOG, SCENARIO = "esmini.log", "row.xosc"
+"""Files in a seat's folder: of the row that runs."""
+
+
+class Job(NamedTuple):
+    """What the rows of a simulator have in common.
+
+    Attributes:
+        embedded: the storyboard and the driver, as ours.
+        scenario: the storyboard, as esmini's.
+        drives: whether our driver drives the ego.
+        steps: of esmini's that make one of ours.
+    """
+
+    embedded: "EmbeddedSimulator"
+    scenario: "ScenarioFile"
+    drives: bool
+    steps: int
+
+
+class Row(NamedTuple):
+    """What a row has of its own.
+
+    Attributes:
+        network: the number of its road network.
+        values: its parameters.
+        driver: another driver, or None.
+        dry: whether the road is.
+    """
+
+    network: int
+    values: Mapping[str, float]
+    driver: "Driver | None"
+    dry: bool
+
+
+class Seat:
+    """This process's side.
+
+    Args:
+        library: esmini's.
+        job: what it is to run.
+        seconds: that esmini may take for a step, or to load a scenario.
+
+    Attributes:
+        version: of esmini.
+    """
+
+    def __init__(self, library: Path, job: Job, seconds: float) -> None:
+        from bridgegen.simulation.embedded.shared_arrays import SharedArrays
+        from bridgegen.simulation.esmini.files import Folder
+
+        self._job, self._seconds = job, seconds
+        self._folder = Folder()
+        self._process = IsolatedProcess(
+            "bridgegen.simulation.esmini.seat", [str(library), str(self._folder.path)]
+        )
+        self._shared = SharedArrays()
+        self._roads: object = None  # those that it has been sent
+        self.version = ""
+
+    def start(self) -> None:
+        """Begin the process, if it is not running.
+
+        Raises:
+            InputError: the library is not what it should be.
+        """
+        import numpy as np
+
+        if self._process.runs:
+            return
+        try:
+            self.version = self._process.start(START_SECONDS)
+        except CallError as error:
+            raise InputError(str(error)) from None
+        self._layout, (self._beats,) = self._shared.put([np.zeros(1, dtype=np.int64)])
+        self._roads = None
+        self._process.ask("take", self._job, self._layout, seconds=START_SECONDS)
+
+    def run(self, roads: "tuple[Network, RoadFiles]", row: Row) -> "Rollout":
+        """Return the rollout of a row.
+
+        Raises:
+            InputError: the library, or the driver of the user's own, is not what it should be.
+            CallError: the process died, or did not answer in time.
+        """
+        self.start()
+        sent = None if self._roads is roads else roads
+        self._roads = None  # until it is known to have them
+        try:
+            rollout: Rollout = self._process.ask(
+                "run", sent, row, seconds=self._seconds, progress=lambda: int(self._beats[0])
+            )
+        except CallError as error:
+            if error.kind == REFUSED:
+                raise InputError(str(error)) from None
+            if said := error_in(self._folder.path / LOG):
+                raise type(error)(error.kind, f"{error}; its log: {said}") from None
+            raise
+        self._roads = roads
+        return rollout
+
+    def kill(self) -> None:
+        """End the process from another thread."""
+        self._process.kill()
+
+
+# --- In the other process -------------------------------------------------------------------------
+
+REFUSED = "refused"
+
+
+def answering(path: str, folder: str) -> tuple[str, Answer]:
+    """Load the library; return its version, and the answers."""
+    library = Library(Path(path))
+    return library.version, _Answers(library, Path(folder)).answer
+
+
+class _Answers:
+    def __init__(self, library: Library, folder: Path) -> None:
+        self._library, self._folder = library, folder
+
+    def answer(self, what: str, *rest: Any) -> Any:
+        """Answer a request."""
+        try:
+            return self._take(*rest) if what == "take" else self._run(*rest)
+        except InputError as error:
+            raise CallError(REFUSED, str(error)) from None
+
+    def _take(self, job: Job, layout: "Layout") -> None:
+        from bridgegen.simulation.embedded.shared_arrays import seen
+
+        self._job, (self._beats,) = job, seen(layout)
+        self._events = job.scenario.event_paths()
+
+    def _run(self, roads: "tuple[Network, RoadFiles] | None", row: Row) -> "Rollout":
+        from bridgegen.ego.driver_process import DriverError
+        from bridgegen.simulation.embedded.co_simulation import CoSimulation
+        from bridgegen.simulation.esmini.together import EsminiError, run_together
+        from bridgegen.simulation.rollout import FAILURES, SIMULATOR_FAILURES
+
+        if roads is not None:
+            self._network, files = roads
+            self._template = cache(partial(_template, self._job.scenario, files))
+        job, log, scenario = self._job, self._folder / LOG, self._folder / SCENARIO
+        log.unlink(missing_ok=True)
+        program = job.embedded.program
+        known = {name: value for name, value in row.values.items() if name in program.parameters}
+        self._template(row.network).write(scenario, {**program.parameters, **known})
+        said, joint = None, None
+
+        def begun(driver: "Driver | None") -> CoSimulation:
+            return job.embedded.co_simulation(
+                self._network, row.network, row.values, driver=driver, dry=row.dry
+            )
+
+        try:
+            joint = begun(row.driver)
+            if joint.runs:
+                run_together(
+                    self._library, scenario, log, joint,
+                    drives=job.drives, boxes=program.box, events=self._events,
+                    steps=job.steps, alive=self._alive,
+                )  # fmt: skip
+        except EsminiError as error:
+            said = str(error)
+        except DriverError as error:
+            return _failed(job, self._network, row, FAILURES[error.kind], str(error))
+        logged = error_in(log)
+        if logged or said:
+            message = ": ".join(filter(None, (said, logged)))
+            return _failed(job, self._network, row, SIMULATOR_FAILURES["raised"], message)
+        assert joint is not None
+        return joint.rollout()
+
+    def _alive(self) -> None:
+        self._beats[0] += 1
+
+
+def _template(scenario: "ScenarioFile", files: "RoadFiles", network: int) -> Any:
+    course = files.courses[network] if files.courses else {}
+    return scenario.on(files.paths[network], course)
+
+
+def _failed(job: Job, network: "Network", row: Row, status: int, message: str) -> "Rollout":
+    return job.embedded.failed(network, row.network, row.values, status, message)
+
+
+def main(start: Callable[[str, str], tuple[str, Answer]] = answering) -> None:
+    """Serve the library and the folder that the command line names."""
+    import os
+
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    serve(partial(start, *sys.argv[1:3]), spoken=nowhere)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""One row: esmini runs the storyboard, and a driver of ours drives the ego in it.
+
+At instant k esmini's participants are where they are, and so is the ego. The driver is asked, and
+the ego's next place is known; esmini looks at its conditions at k, ego and all, and moves everybody
+on, in steps that may be finer than ours. In between, the ego is where a line from its place to the
+next one leads.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.simulation.embedded.co_simulation import CoSimulation
+from bridgegen.simulation.esmini.library import Library
+
+SAME = 1e-3
+"""Sizes [m] that differ by less are the same."""
+
+SOON = 1e-6
+"""A share of a step by which a time may be late, for rounding."""
+
+
+class EsminiError(Exception):
+    """What esmini cannot do."""
+
+
+def run_together(
+    library: Library,
+    scenario: Path,
+    log: Path,
+    joint: CoSimulation,
+    *,
+    drives: bool,
+    boxes: Float,
+    events: Sequence[str],
+    steps: int,
+    alive: Callable[[], None],
+) -> None:
+    """Run a row to its end; ``joint`` records it.
+
+    Args:
+        library: holds no scenario.
+        scenario: the row's file.
+        log: to be written.
+        joint: the row, at its first instant.
+        drives: whether our driver drives the ego; else esmini does.
+        boxes: ``(E, 3)`` [m]: length and width of each entity, and more.
+        events: what esmini calls each event.
+        steps: how many of esmini's make one of ours.
+        alive: is called again and again, to say that it gets on.
+
+    Raises:
+        EsminiError: esmini does not take the scenario.
+        DriverError: a driver of the user's own failed.
+    """
+    began: dict[str, float] = {}
+
+    def begins(path: str) -> None:
+        began.setdefault(path, library.time)
+
+    try:
+        if not library.begin(scenario, log, begins):
+            raise EsminiError("esmini did not take the scenario")
+        _Row(library, joint, drives, boxes, steps).run(alive)
+    finally:
+        library.close()
+    last = int(joint.rollout().n_steps[0]) - 1
+    for i, path in enumerate(events):
+        joint.events[i] = -1
+        if path in began:
+            k = math.ceil(began[path] / joint.time_step - SOON)
+            joint.events[i] = min(k, last)
+
+
+class _Row:
+    def __init__(
+        self, library: Library, joint: CoSimulation, drives: bool, boxes: Float, steps: int
+    ) -> None:
+        self._library, self._joint = library, joint
+        self._drives, self._steps = drives, steps
+        self._numbers = [library.number(name) for name in joint.names]
+        self._ego = self._numbers[0]
+        self._own_step = joint.time_step / steps
+        self._before = joint.states(0)[0]
+        for name, number, is_there in zip(
+            joint.names, self._numbers, joint.present(0), strict=True
+        ):
+            if is_there and number < 0:
+                raise EsminiError(f"esmini has no entity '{name}'")
+        if not np.allclose(library.size(self._ego), boxes[0, :2], atol=SAME):
+            raise EsminiError(
+                "the ego's size is not the file's: this is an esmini whose states are others than "
+                "those of version 3"
+            )
+
+    def run(self, alive: Callable[[], None]) -> None:
+        joint, library = self._joint, self._library
+        for k in range(joint.n_steps):
+            if not joint.runs:
+                return
+            alive()
+            self._impose(k)
+            joint.decide(k)
+            is_through = self._drives and joint.is_through
+            joint.go_on()
+            demand = joint.demand(k)
+            if is_through or library.is_over:
+                joint.end()
+            elif k < joint.n_steps - 1:
+                if self._drives:
+                    self._report(joint.states(k)[0])
+                library.step(self._own_step)
+                if library.is_over:
+                    joint.end()
+            joint.move(k, *demand)
+            if joint.runs:
+                self._move_on(k)
+
+    def _impose(self, k: int) -> None:
+        """Tell the driver where esmini's participants are."""
+        bodies, states, present = [], [], []
+        late = k * self._joint.time_step - self._library.time if self._library.is_over else 0.0
+        for e, name in enumerate(self._joint.names):
+            if e == 0 and self._drives:
+                present.append(True)
+                continue
+            state = self._library.state(self._numbers[e]) if self._numbers[e] >= 0 else None
+            if state is None:
+                self._numbers[e] = self._library.number(name)
+                if self._numbers[e] >= 0:
+                    state = self._library.state(self._numbers[e])
+            present.append(state is not None)
+            if state is not None:
+                if not all(map(math.isfinite, state)):
+                    raise EsminiError(f"a state of '{name}' became NaN or infinite")
+                x, y, h, v = state
+                way = v * late  # it stopped between two instants: they go on as they were going
+                bodies.append(e)
+                states.append((x + way * math.cos(h), y + way * math.sin(h), h, max(v, 0.0)))
+        self._joint.impose_presence(k, present)
+        self._joint.impose(k, bodies, states)
+
+    def _move_on(self, k: int) -> None:
+        """Take esmini the rest of the way to the next instant; it has made one step."""
+        here, there = self._joint.states(k)[0], self._joint.states(k + 1)[0]
+        for i in range(1, self._steps):
+            if self._drives:
+                self._report(here + i / self._steps * (there - here))
+            self._library.step(self._own_step)
+            if self._library.is_over:
+                return  # seen at the next instant
+
+    def _report(self, state: Float) -> None:
+        x, y, h, v = state.tolist()
+        *_, before_h, before_v = self._before.tolist()
+        a, turn = (v - before_v) / self._own_step, (h - before_h) / self._own_step
+        self._library.report(self._ego, x, y, h, v, a, turn)
+        self._before = state
