@@ -17,6 +17,7 @@ from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 
@@ -55,6 +56,7 @@ def simulate_file(
     also: Sequence[str] = (),
     time_step: float | None = None,
     skipped: list[str] | None = None,
+    simulator: SimulatorChoice = EMBEDDED,
 ) -> FileResult:
     """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
 
@@ -69,9 +71,11 @@ def simulate_file(
         time_step: [s]; what the file's header says by default.
         skipped: takes a sentence for each thing that is not supported, which is left out then
             instead of refused, with the event, action, entity or condition group around it.
+        simulator: which one runs it.
 
     Raises:
-        InputError: a time step out of range, or a stage that the driver has not.
+        InputError: a time step out of range, a stage that the driver has not, or a simulator that
+            is not where it should be.
         FileFormatError: a file is missing, malformed or inconsistent.
         UnsupportedError: an element that the simulator cannot run, by name and line.
         UnknownNameError: no such driver, stage or metric.
@@ -82,20 +86,21 @@ def simulate_file(
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    simulator = EmbeddedSimulator(
+    embedded = EmbeddedSimulator(
         scenario, str(path), driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
     )
-    held = measures.held_by(simulator.program.driver)
+    runs = simulator.around(embedded, scenario)
+    held = measures.held_by(embedded.program.driver)
     names = measures.existing(tuple(measures.METRICS), held)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
-    names = measures.require(asked, held, f"the driver '{simulator.driver}'")
-    rollout = simulator.run(simulator.roads([roads]), np.zeros(1, dtype=np.int64), {})
+    names = measures.require(asked, held, f"the driver '{embedded.driver}'")
+    rollout = runs.run(runs.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = measures.evaluate(rollout, names)[0]
     return FileResult(
-        driver=simulator.driver,
+        driver=embedded.driver,
         status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
         seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
-        parameters=simulator.parameters,
+        parameters=embedded.parameters,
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
         cause=_stated_cause(scenario) if ego is None and ideal is None else None,

@@ -21,6 +21,7 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
 from bridgegen.regions.owl import carriers, classes, statable
 from bridgegen.regions.record import JSON_FILE, to_json
+from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Store
 from bridgegen.workers import Choice, open_workers
 
@@ -54,6 +55,7 @@ def regions_of(
     folder: Path | str,
     *,
     ego: str | None = None,
+    simulator: SimulatorChoice | None = None,
     samples: int = SAMPLES,
     at_least: float = AT_LEAST,
     seed: int | None = None,
@@ -69,6 +71,7 @@ def regions_of(
     Args:
         folder: of the run.
         ego: where a driver of your own drives, that same driver.
+        simulator: the run's, with where it is on this machine; the run's by default.
         samples: fresh scenarios to simulate in each region.
         at_least: the share of critical scenarios that makes a region critical.
         seed: of the fresh scenarios; the run's by default.
@@ -91,8 +94,9 @@ def regions_of(
         metrics, finished, place = store.metrics, store.finished is not None, store.folder
     with open_workers(workers) as crew:
         pipeline = pipeline_of(
-            settings, metrics, place, ego=ego, command="regions", causes=False, workers=crew
-        )
+            settings, metrics, place, ego=ego, command="regions", causes=False,
+            simulator=simulator, workers=crew,
+        )  # fmt: skip
         space, ok = pipeline.space, rows.status == 0
         check(space, rows.critical[ok], samples, at_least)
         stage("compile")

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bridgegen.errors import InputError
-from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
@@ -204,6 +204,17 @@ def read_simulator(
             raise InputError(f"{what}: name the simulator that it is for (--simulator)")
         return None
     return SimulatorChoice(name, read_settings(settings, "--simulator-set"), said)
+
+
+def read_access(**access: Setting | Path | None) -> SimulatorChoice | None:
+    """Read where a run's simulator is; nothing is where it is by default.
+
+    Args:
+        access: see ``read_simulator``.
+    """
+    said = [f"--{one.replace('_', '-')}" for one, value in access.items() if value is not None]
+    owners = [one.name for one in SIMULATORS.values() if {*said} & one.access.keys()]
+    return read_simulator(owners[0], None, **access) if owners else None
 
 
 def read_algorithm_settings(pairs: list[str] | None) -> dict[str, dict[str, Setting]]:

@@ -124,6 +124,7 @@ def new(
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
     ego: options.OwnEgo = None,
+    esmini_lib: options.EsminiLibrary = None,
     workers: options.Workers = None,
     fail_if: options.FailIf = None,
     junit: options.Junit = None,
@@ -135,7 +136,13 @@ def resume(
 
     gate = Gate.of_run(fail_if or (), junit, folder)
     with SearchScreen() as screen:
-        run = campaign.resume(folder, ego=ego, workers=workers, watch=screen.watch)
+        run = campaign.resume(
+            folder,
+            ego=ego,
+            simulator=options.read_access(esmini_lib=esmini_lib),
+            workers=workers,
+            watch=screen.watch,
+        )
     print_summary(run, screen.seconds)
     _end(gate.judge(run))
 
@@ -149,13 +156,14 @@ def view(
         int | None, typer.Option(help="Show this evaluation's scenario, counted from 1.")
     ] = None,
     ego: options.OwnEgo = None,
+    esmini_lib: options.EsminiLibrary = None,
 ) -> None:
     """Serve a run's report on this machine, live while the search goes on; any scenario plays."""
     from bridgegen.screen.view import serve
     from bridgegen.view.run_view import RunView
     from bridgegen.view.server import Server
 
-    site = RunView(run, ego=ego)
+    site = RunView(run, ego=ego, simulator=options.read_access(esmini_lib=esmini_lib))
     fragment = "" if evaluation is None else site.fragment(evaluation)
     serve(Server(site, port), browser=browser, fragment=fragment)
 
@@ -197,6 +205,7 @@ def regions(
         typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
     ] = None,
     ego: options.OwnEgo = None,
+    esmini_lib: options.EsminiLibrary = None,
     workers: options.Workers = None,
     as_json: options.Json = False,
 ) -> None:
@@ -208,6 +217,7 @@ def regions(
         found = regions_of(
             run,
             ego=ego,
+            simulator=options.read_access(esmini_lib=esmini_lib),
             samples=samples,
             at_least=at_least,
             seed=seed,
@@ -235,6 +245,9 @@ def simulate(
         typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
     ] = None,
     metrics: options.OnlyMetrics = None,
+    simulator: options.Simulator = None,
+    simulator_set: options.SimulatorSettings = None,
+    esmini_lib: options.EsminiLibrary = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
@@ -245,6 +258,7 @@ def simulate(
     """Run one scenario file and print its metrics."""
     from bridgegen.screen.files import print_file_result
     from bridgegen.simulate import simulate_file
+    from bridgegen.simulation.choice import EMBEDDED
     from bridgegen.simulation.trace import write_trace
     from bridgegen.verdict.of_file import FileGate
 
@@ -260,6 +274,8 @@ def simulate(
         also=gate.metrics,
         time_step=dt,
         skipped=skipped,
+        simulator=options.read_simulator(simulator, simulator_set, esmini_lib=esmini_lib)
+        or EMBEDDED,
     )
     for one in skipped or ():
         print(f"bridgegen: warning: left out: {one}", file=sys.stderr)

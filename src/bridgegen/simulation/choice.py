@@ -9,6 +9,7 @@ from bridgegen.errors import InputError, UnknownNameError
 if TYPE_CHECKING:  # it is part of the command line, which starts fast
     from bridgegen.ego import Driver
     from bridgegen.openx.openscenario.model import OpenScenario
+    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
     from bridgegen.simulation.simulator import Simulator
 
 Value = bool | int | float | str
@@ -24,8 +25,8 @@ class Kind:
         description: one sentence.
         settings: what changes its results, by name: what it means, with its unit.
         access: what says where it is on this machine, by the name of the option for it.
-        make: of a storyboard, its name, the ego's driver (None: what the file says), the chosen
-            settings and the access.
+        make: of the embedded simulator of a storyboard, that storyboard, the chosen settings and
+            the access.
     """
 
     name: str
@@ -36,36 +37,29 @@ class Kind:
 
 
 Make = Callable[
-    ["OpenScenario", str, "Driver | None", Mapping[str, Value], Mapping[str, Value]],
+    ["EmbeddedSimulator", "OpenScenario", Mapping[str, Value], Mapping[str, Value]],
     "Simulator[Any]",
 ]
 
 
 def _embedded(
+    embedded: "EmbeddedSimulator",
     storyboard: "OpenScenario",
-    place: str,
-    driver: "Driver | None",
     settings: Mapping[str, Value],
     access: Mapping[str, Value],
 ) -> "Simulator[Any]":
-    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-
-    return EmbeddedSimulator(storyboard, place, driver=driver)
+    return embedded
 
 
 def _esmini(
+    embedded: "EmbeddedSimulator",
     storyboard: "OpenScenario",
-    place: str,
-    driver: "Driver | None",
     settings: Mapping[str, Value],
     access: Mapping[str, Value],
 ) -> "Simulator[Any]":
-    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
     from bridgegen.simulation.esmini.simulator import EsminiSimulator, library_of, steps_of
 
-    library, steps = library_of(access), steps_of(settings)
-    embedded = EmbeddedSimulator(storyboard, place, driver=driver)
-    return EsminiSimulator(embedded, storyboard, library, steps=steps)
+    return EsminiSimulator(embedded, storyboard, library_of(access), steps=steps_of(settings))
 
 
 SIMULATORS: Mapping[str, Kind] = {
@@ -135,8 +129,21 @@ class SimulatorChoice:
             UnsupportedError: what it cannot run, by name and line, all of it at once.
             InputError: a setting out of range; or it is not where it should be.
         """
-        kind = SIMULATORS[self.name]
-        return kind.make(storyboard, place, driver, self.settings, self.access)
+        from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
+        return self.around(EmbeddedSimulator(storyboard, place, driver=driver), storyboard)
+
+    def around(self, embedded: "EmbeddedSimulator", storyboard: "OpenScenario") -> "Simulator[Any]":
+        """Return the simulator, with the storyboard that the embedded one has.
+
+        Args:
+            embedded: it.
+            storyboard: the scenario file that it was made of.
+
+        Raises:
+            InputError: see ``simulator``.
+        """
+        return SIMULATORS[self.name].make(embedded, storyboard, self.settings, self.access)
 
 
 EMBEDDED = SimulatorChoice()

@@ -15,6 +15,7 @@ from bridgegen.regions.record import JSON_FILE
 from bridgegen.report.motion import motion_payload
 from bridgegen.report.page import report_page
 from bridgegen.report.payload import news
+from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Rows, Store
 
 
@@ -26,21 +27,29 @@ class RunView:
     Args:
         folder: of the run.
         ego: where a driver of your own drives, that same driver.
+        simulator: the run's, with where it is on this machine; the run's by default.
 
     Raises:
         StorageError: not a run, or its scenario or map is not what it was.
         InputError: the scenario or the map is missing, or the ego has to be named.
     """
 
-    def __init__(self, folder: Path | str, *, ego: str | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path | str,
+        *,
+        ego: str | None = None,
+        simulator: SimulatorChoice | None = None,
+    ) -> None:
         self.folder = Path(folder)
         with Store.open(folder) as store:
             self.settings = Settings.from_dict(store.settings, store.folder)
             self._rows = store.read()
             metrics = store.metrics
         self._pipeline = pipeline_of(
-            self.settings, metrics, self.folder, ego=ego, command="view", causes=False
-        )
+            self.settings, metrics, self.folder, ego=ego, command="view", causes=False,
+            simulator=simulator,
+        )  # fmt: skip
         self._lock = threading.Lock()
 
     def fragment(self, evaluation: int) -> str:
