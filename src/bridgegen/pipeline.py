@@ -309,6 +309,10 @@ class Pipeline:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         return self._run(*self._roads_of(X), X)
 
+    def rollouts(self, X: Float) -> list[Rollout | Lost]:
+        """Have N rows rolled out by many; return what came of them, a part of the rows in each."""
+        return [one.came for one in self._share_out("rollout", X)]
+
     def replay(self, X: Float, *, plans: bool = True) -> Replay:
         """Roll out N rows as ``evaluate`` does, and find out what went on besides.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from bridgegen.campaign.handover import Kept
 from bridgegen.campaign.run import REPORT
 from bridgegen.campaign.settings import Settings
+from bridgegen.confirmation.record import read_records
 from bridgegen.pipeline import Pipeline
 from bridgegen.regions.record import JSON_FILE, read_record
 from bridgegen.report.build import build_report
@@ -30,7 +31,7 @@ def write_run_report(
 
     Raises:
         StorageError: the page cannot be written.
-        FileFormatError: the regions' file is not one.
+        FileFormatError: the regions' file, or a confirmation's, is not one, or another run's.
     """
     path = store.folder / REPORT
     files = {name: (store.folder / name).read_bytes() for one in kept for name in one.files}
@@ -63,7 +64,7 @@ def run_data(
         more: whether the page holds the motion of more than ``kept``.
 
     Raises:
-        FileFormatError: the regions' file is not one.
+        FileFormatError: the regions' file, or a confirmation's, is not one, or another run's.
     """
     metric = store.metrics.index
     summary = summarise(
@@ -77,7 +78,8 @@ def run_data(
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
         command=settings.command(store.folder), finished=store.finished is not None,
         version=store.version, notes=store.notes, view=view_command(store.folder),
-        regions=read_record(store.folder / JSON_FILE), coverage=coverage,
+        regions=read_record(store.folder / JSON_FILE),
+        confirmations=read_records(store.folder, rows.X, rows.metrics), coverage=coverage,
         hashes=_hashes(settings, rows), files=files, more=more,
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """The command line: parse, call, print; no logic. Commands stand in the order of these imports."""
 
 # ruff: noqa: I001
-from bridgegen.cli import runs, comparisons, reproductions, files, lists
+from bridgegen.cli import runs, confirmations, comparisons, reproductions, files, lists
 from bridgegen.cli.app import app, main
 
-__all__ = ["app", "comparisons", "files", "lists", "main", "reproductions", "runs"]
+__all__ = ["app", "comparisons", "confirmations", "files", "lists", "main", "reproductions", "runs"]

@@ -134,6 +134,14 @@ FileFailIf = Annotated[
         show_default=False,
     ),
 ]
+ConfirmFailIf = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fail-if",
+        help="End with exit status 3 if this holds, e.g. 'confirmed < 0.95'; may be repeated.",
+        show_default=False,
+    ),
+]
 Junit = Annotated[
     Path | None, typer.Option(help="Write the verdict as JUnit XML, for Jenkins, GitLab …")
 ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from bridgegen import metrics as measures
 from bridgegen.cause import Cause
+from bridgegen.confirmation.schema import Record
 from bridgegen.errors import ScenarioError
 from bridgegen.objective import Thresholds
 from bridgegen.odd.coverage import CoverageMap, coverage_map
@@ -59,6 +60,7 @@ def build_report(
     notes: Mapping[str, Any],
     view: str = "",
     regions: Mapping[str, Any] | None = None,
+    confirmations: Sequence[Record] = (),
     hashes: Mapping[str, str] | None = None,
     coverage: bool = True,
     files: Mapping[str, bytes] | None = None,
@@ -81,6 +83,7 @@ def build_report(
         notes: what the algorithm wants kept with the run.
         view: the command line that shows this run with the motion of every scenario, if there is.
         regions: the critical ones, as `regions.record` has them, if they are known.
+        confirmations: of its scenarios in other simulators.
         hashes: of what the run was made from and of what came of it.
         coverage: whether to count what was covered.
         files: those of ``kept``, by their paths relative to the page, if it is to hold them.
@@ -135,6 +138,7 @@ def build_report(
         regions,
         more=_more(pipeline, rows, {evaluation for _, evaluation, _ in kept}) if more else (),
         files=files or {},
+        confirmations=confirmations,
     )
 
 

@@ -4,7 +4,7 @@ Numbers may be NaN or infinite wherever a quantity does not exist (no critical s
 time to collision); the page shows a dash there.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.confirmation.schema import Record
 from bridgegen.odd.coverage import CoverageMap
 from bridgegen.report.notes import NoteTable
 from bridgegen.report.playback import Playback
@@ -165,6 +166,7 @@ class ReportData:
         coverage: which bins and pairs of bins were evaluated, if it is to be shown.
         notes: what the algorithm learnt.
         regions: the critical ones, as `bridgegen.regions.record` has them, if they are known.
+        confirmations: of its scenarios in other simulators, one each.
     """
 
     summary: RunSummary
@@ -175,6 +177,7 @@ class ReportData:
     regions: Mapping[str, Any] | None = None
     more: tuple[Playback, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
+    confirmations: Sequence[Record] = ()
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

@@ -1,0 +1,258 @@
+"""A run's critical scenarios, run again in another simulator; the record lies in its folder."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.campaign.elsewhere import run_elsewhere
+from bridgegen.campaign.handover import handed_over
+from bridgegen.campaign.report import write_run_report
+from bridgegen.campaign.restored import pipeline_of
+from bridgegen.campaign.run import REPORT
+from bridgegen.campaign.settings import Settings
+from bridgegen.confirmation.record import (
+    check_rows,
+    file_name,
+    read_record,
+    write_record,
+)
+from bridgegen.confirmation.schema import Record, Scenario
+from bridgegen.confirmation.summary import Summary, summarise
+from bridgegen.errors import InputError, Interrupted
+from bridgegen.pipeline import Pipeline
+from bridgegen.search.dominance import by_merit
+from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.store import Rows, Store
+from bridgegen.workers import Choice, open_workers
+
+SECONDS = 1.0
+"""How long what has come is kept in memory alone [s]."""
+
+MOST_TRACKS = 100
+"""Scenarios of which it is kept where everybody was: some ten kilobytes each."""
+
+
+@dataclass(frozen=True)
+class RunConfirmation:
+    """What a confirmation came to.
+
+    Attributes:
+        folder: the run's.
+        record: of all that was ever confirmed of the run in that simulator.
+        scenarios: those that were asked for now, most critical first.
+        ran: how many of these were run now; the others had been.
+        files: that were written.
+    """
+
+    folder: Path
+    record: Record
+    scenarios: tuple[Scenario, ...]
+    ran: int
+    files: tuple[Path, ...]
+
+    @property
+    def summary(self) -> Summary:
+        """Of the scenarios that were asked for."""
+        return summarise(self.scenarios)
+
+
+def confirm(
+    folder: Path | str,
+    simulator: SimulatorChoice,
+    *,
+    rows: int | None = None,
+    again: bool = False,
+    ego: str | None = None,
+    workers: Choice = None,
+    stage: Callable[[str], None] | None = None,
+    progress: Callable[[int, int, Summary], None] | None = None,
+) -> RunConfirmation:
+    """Run a run's critical scenarios in another simulator, and compare.
+
+    What comes is written to ``confirmation-SIMULATOR.json`` in the run's folder; what is there
+    already is not run again, unless it failed. A report that is there is written again.
+
+    Args:
+        folder: of the run, finished or not.
+        simulator: the other one.
+        rows: how many of the run's critical scenarios, the most critical ones; those that were
+            handed over by default.
+        again: whether to forget what was confirmed before.
+        ego: where a driver of your own drives, that same driver.
+        workers: who runs the other simulator, see ``run_search``.
+        stage: told what begins: "compile", "confirm", "report".
+        progress: told how many scenarios are done, of how many, and what they come to.
+
+    Raises:
+        WorkersError: there are no workers, or they are lost; the same again goes on.
+        StorageError: not a run, its scenario or map is not what it was, or not writable.
+        FileFormatError: an earlier record is none, or another run's.
+        InputError: nothing to confirm, it is the run's own simulator, it is not where it should be
+            or was another one before; or the ego has to be named.
+        Interrupted: Ctrl-C; the same again goes on.
+    """
+    stage = stage or (lambda name: None)
+    if rows is not None and rows < 1:
+        raise InputError(f"1 <= rows must hold, got {rows}")
+    with Store.open(folder) as store:
+        settings = Settings.from_dict(store.settings, store.folder)
+        every, names, place = store.read(), store.metrics, store.folder
+    if simulator.name == settings.simulator:
+        raise InputError(
+            f"{place}: was searched in the simulator {settings.simulator}; confirm it in another "
+            "one (--simulator)"
+        )
+    handed = {one.evaluation: one.name for one in handed_over(place)}
+    asked = _chosen(place, every, handed, rows)
+    here = pipeline_of(settings, names, place, ego=ego, command="confirm", causes=False)
+    stage("compile")
+    here.warm_up()
+    elsewhere = replace(
+        settings, simulator=simulator.name, simulator_settings=simulator.settings, cause=None
+    )
+    with open_workers(workers) as crew:
+        there = pipeline_of(
+            elsewhere, names, place,
+            ego=ego, command="confirm", causes=False, simulator=simulator, workers=crew,
+        )  # fmt: skip
+        empty = _empty(here, simulator, settings, place)
+        known = {} if again else _known(place, empty, every)
+        todo = [k for k in asked if k not in known or known[k].there is None]
+        book = _Book(place, empty, known, handed, _merit(every))
+        book.write()  # a folder that cannot be written is said before anything is run
+        stage("confirm")
+        try:
+            for one in run_elsewhere(here, there, every, todo):
+                book.add(one)
+                if progress:
+                    progress(len(book.fresh), len(todo), summarise(book.of(book.fresh)))
+        except KeyboardInterrupt:
+            raise _stopped(place, simulator.name, len(book.fresh), len(todo)) from None
+        finally:
+            record = book.write()
+    files = [place / file_name(simulator.name)]
+    if (place / REPORT).is_file():
+        stage("report")
+        try:
+            with Store.open(folder) as store:
+                kept = handed_over(place)
+                files.append(write_run_report(here, store, settings, store.read(), kept))
+        except KeyboardInterrupt:
+            raise _stopped(place, simulator.name, len(todo), len(todo)) from None
+    return RunConfirmation(place, record, tuple(book.of(asked)), len(todo), tuple(files))
+
+
+def _empty(here: Pipeline, simulator: SimulatorChoice, settings: Settings, place: Path) -> Record:
+    """Return the record of a run of which nothing is confirmed yet."""
+    objective = here.objective
+    return Record(
+        simulator=simulator.name,
+        label=simulator.name,
+        settings=dict(simulator.settings),
+        reference=settings.simulator,
+        run=str(place),
+        scenario=here.scenario.name,
+        ego=here.driver.label,
+        thresholds=objective.thresholds,
+        objectives=objective.names if objective.objectives == "many" else ("F",),
+    )
+
+
+class _Book:
+    """A record that grows."""
+
+    def __init__(
+        self,
+        folder: Path,
+        empty: Record,
+        known: dict[int, Scenario],
+        handed: dict[int, str],
+        merit: dict[int, int],
+    ) -> None:
+        self.fresh: list[int] = []
+        self._folder, self._empty = folder, empty
+        self._found, self._handed, self._merit = known, handed, merit
+        self._written = 0.0
+
+    def add(self, one: Scenario) -> None:
+        """Take down what became of a scenario; write it soon."""
+        self._found[one.evaluation] = one
+        self.fresh.append(one.evaluation)
+        if time.monotonic() - self._written >= SECONDS:
+            self.write()
+
+    def of(self, evaluations: Sequence[int]) -> list[Scenario]:
+        """Return what became of some evaluations, under the names of their files."""
+        found = (self._found[k] for k in evaluations)
+        return [one.model_copy(update={"name": self._handed.get(one.evaluation)}) for one in found]
+
+    def write(self) -> Record:
+        """Write all, most critical first."""
+        order = sorted(self._found, key=lambda k: self._merit.get(k, len(self._merit)))
+        scenarios = [
+            one if place < MOST_TRACKS else one.model_copy(update={"tracks": ()})
+            for place, one in enumerate(self.of(order))
+        ]
+        record = self._empty.model_copy(update={"scenarios": tuple(scenarios)})
+        write_record(self._folder, record)
+        self._written = time.monotonic()
+        return record
+
+
+def _chosen(folder: Path, every: Rows, handed: dict[int, str], rows: int | None) -> list[int]:
+    """Return the evaluations to confirm, most critical first.
+
+    Raises:
+        InputError: there is none.
+    """
+    if rows is None:
+        if not handed:
+            raise InputError(
+                f"{folder}: hands no scenario over; choose among its critical ones with --rows N"
+            )
+        if outside := [k for k in handed if not 0 <= k < len(every) or every.status[k] != 0]:
+            raise InputError(f"{folder}: has no result of evaluation {outside[0] + 1}")
+        return list(handed)
+    order = sorted(_merit(every).items(), key=lambda one: one[1])
+    if not order:
+        raise InputError(f"{folder}: none of {len(every)} evaluations is critical")
+    return [k for k, _ in order[:rows]]
+
+
+def _merit(every: Rows) -> dict[int, int]:
+    """Return the places of all critical evaluations, 0 for the most critical."""
+    critical = np.flatnonzero(every.critical & (every.status == 0))
+    order = critical[by_merit(every.F[critical])]
+    return {k: place for place, k in enumerate(order.tolist())}
+
+
+def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
+    """Return what was confirmed before, in the same way.
+
+    Raises:
+        InputError: it was another way.
+        FileFormatError: the record is none, or another run's.
+    """
+    path = folder / file_name(empty.simulator)
+    earlier = read_record(path)
+    if earlier is None:
+        return {}
+    check_rows(path, earlier.scenarios, every.X, every.metrics)
+    for name in ("label", "settings", "ego", "thresholds", "objectives"):
+        was, would = getattr(earlier, name), getattr(empty, name)
+        if was != would:
+            raise InputError(
+                f"{path}: its {'simulator' if name == 'label' else name} is {was}, and now would "
+                f"be {would}; confirm all of it with --again"
+            )
+    return {one.evaluation: one for one in earlier.scenarios}
+
+
+def _stopped(folder: Path, simulator: str, done: int, total: int) -> Interrupted:
+    return Interrupted(
+        folder, done, total, what="scenarios",
+        command=f"bridgegen confirm {folder} --simulator {simulator}",
+    )  # fmt: skip

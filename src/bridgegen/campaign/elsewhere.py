@@ -1,0 +1,131 @@
+"""Scenarios of a run, run again here and in another simulator, and compared one by one."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen import metrics as measures
+from bridgegen.arrays import Float
+from bridgegen.confirmation.compare import compare, tracks
+from bridgegen.confirmation.record import digest_of
+from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Scenario, number
+from bridgegen.confirmation.words import explanation
+from bridgegen.errors import InputError
+from bridgegen.objective import CLASSIFYING
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.rollout import STATUS_MESSAGES, WORKER_ENDED, Rollout
+from bridgegen.store import Rows
+from bridgegen.workers import Lost
+
+AT_A_TIME = 32
+"""Scenarios that are run before what became of them is handed on, at most."""
+
+
+@dataclass(frozen=True)
+class _Ran:
+    """A row of a rollout.
+
+    Attributes:
+        rollout: of several rows.
+        row: which of them.
+        metrics: ``(M,)`` of that row; NaN where it failed.
+    """
+
+    rollout: Rollout
+    row: int
+    metrics: Float
+
+
+def run_elsewhere(
+    here: Pipeline, there: Pipeline, every: Rows, evaluations: Sequence[int]
+) -> Iterator[Scenario]:
+    """Run evaluations here and there, and return what became of each.
+
+    Args:
+        here: what evaluated them.
+        there: the same with another simulator.
+        every: all rows of the run.
+        evaluations: some of these, which succeeded.
+    """
+    size = max(1, min(AT_A_TIME, there.rows_at_once * there.runs_at_once))
+    for start in range(0, len(evaluations), size):
+        some = list(evaluations[start : start + size])
+        X = every.X[some]
+        motion = here.rollout(X)
+        for row, (k, ran) in enumerate(zip(some, _elsewhere(there, X), strict=True)):
+            yield _scenario(here, every, k, motion, row, ran)
+
+
+def _elsewhere(there: Pipeline, X: Float) -> Iterator[_Ran | str]:
+    """Return what became of each row, or why nothing did."""
+    try:
+        found = there.rollouts(X)
+    except InputError as error:
+        if len(X) == 1:
+            yield "; ".join(error.problems)
+            return
+        for x in X:  # which of them is it?
+            yield from _elsewhere(there, x[np.newaxis])
+        return
+    for one in found:
+        if isinstance(one, Lost):
+            yield f"{STATUS_MESSAGES[WORKER_ENDED]}: {one.reason}"
+            continue
+        metrics = measures.evaluate(one, there.metrics)
+        for row in range(one.shape[0]):
+            yield _Ran(one, row, metrics[row])
+
+
+def _scenario(
+    here: Pipeline, every: Rows, k: int, motion: Rollout, row: int, ran: _Ran | str
+) -> Scenario:
+    """Return what became of evaluation k, whose motion here is a row of a rollout."""
+    objective = here.objective
+    known = _outcome(here, every.metrics[k], every.F[k])
+    digest = digest_of(every.X[k], every.metrics[k])
+    if isinstance(ran, str) or ran.rollout.status[ran.row] != 0:
+        failure = _legal(ran if isinstance(ran, str) else _failure(ran))
+        return Scenario(evaluation=k, name=None, row=digest, here=known, failure=failure)
+    F, _ = objective.F(ran.metrics[np.newaxis], here.metrics)
+    found = compare(motion, ran.rollout, row, ran.row)
+    both = (known, _outcome(here, ran.metrics, F[0]))
+    ours, theirs = (
+        one.model_copy(update={"contact": contact, "ends": ends})
+        for one, contact, ends in zip(both, found.contacts, found.ends, strict=True)
+    )
+    differences = Differences.of(found)
+    return Scenario(
+        evaluation=k,
+        name=None,
+        row=digest,
+        here=ours,
+        there=theirs,
+        change=Change.between(ours, theirs),
+        differences=differences,
+        tracks=tuple(Course.of(one) for one in tracks(motion, ran.rollout, row, ran.row)),
+        explanation=explanation(ours, theirs, differences, objective.thresholds),
+    )
+
+
+def _outcome(pipeline: Pipeline, metrics: Float, F: Float) -> Outcome:
+    names = pipeline.metrics
+    n_collision, d_min, v_d = (number(metrics[names.index(name)]) for name in CLASSIFYING)
+    return Outcome(
+        critical=bool(pipeline.objective.critical(metrics[np.newaxis], names)[0]),
+        n_collision=n_collision,
+        d_min=d_min,
+        v_d=v_d,
+        F=tuple(number(one) for one in F),
+    )
+
+
+def _failure(ran: _Ran) -> str:
+    status = int(ran.rollout.status[ran.row])
+    said = STATUS_MESSAGES.get(status, f"status {status}")
+    return ": ".join([said, *filter(None, [ran.rollout.messages.get(ran.row)])])
+
+
+def _legal(text: str) -> str:
+    """Return another program's words without what a terminal would obey."""
+    return "".join(one if one.isprintable() else " " for one in text).strip()

@@ -1,0 +1,55 @@
+"""The command that runs what was found in another simulator."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli import options
+from bridgegen.cli.app import FAILED, app
+
+
+@app.command()
+def confirm(
+    run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
+    simulator: Annotated[str, typer.Option(help="The other one: see 'bridgegen list simulators'.")],
+    simulator_set: options.SimulatorSettings = None,
+    rows: Annotated[
+        int | None,
+        typer.Option(
+            help="So many of the run's critical scenarios, the most critical ones.",
+            show_default="those that were handed over",
+        ),
+    ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Forget what was confirmed before.")
+    ] = False,
+    ego: options.OwnEgo = None,
+    workers: options.Workers = None,
+    fail_if: options.ConfirmFailIf = None,
+    junit: options.Junit = None,
+    as_json: options.Json = False,
+) -> None:
+    """Run a run's critical scenarios in another simulator: are they critical there, too?"""
+    from bridgegen.campaign.confirm import confirm as confirm_run
+    from bridgegen.screen.confirmation import ConfirmationScreen, print_confirmation
+    from bridgegen.screen.verdict import print_outcomes
+    from bridgegen.verdict.of_confirmation import ConfirmationGate
+
+    gate = ConfirmationGate.read(fail_if or (), junit)
+    choice = options.read_simulator(simulator, simulator_set)
+    assert choice is not None
+    with ConfirmationScreen() as screen:
+        found = confirm_run(
+            run,
+            choice,
+            rows=rows,
+            again=again,
+            ego=ego,
+            workers=workers,
+            stage=screen.stage,
+            progress=screen.progress,
+        )
+    print_confirmation(found, as_json=as_json)
+    if not print_outcomes(gate.judge(found)):
+        raise typer.Exit(FAILED)

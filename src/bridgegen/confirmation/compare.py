@@ -1,0 +1,241 @@
+"""Two rollouts of one scenario, by two simulators: where they part, and what differed by then.
+
+The one is *here*, the other *there*; every difference is there − here. Where they record at
+different time steps, the states of the finer one are interpolated at the coarser one's instants.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.confirmation.differences import (
+    PARTED,
+    TRACE,
+    BoxSizes,
+    Comparison,
+    Contact,
+    EventTimes,
+    LightTimes,
+    Parting,
+    Track,
+)
+from bridgegen.simulation.rollout import Rollout
+
+SAME_BOX = 1e-3
+"""Boxes that differ by less are the same [m]."""
+
+_EPSILON = 1e-6  # of times [s]: they are multiples of a step
+
+
+@dataclass(frozen=True)
+class _States:
+    """One entity's, at the K instants that are compared."""
+
+    x: Float
+    y: Float
+    h: Float
+    v: Float
+    present: Bool
+
+
+def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison:
+    """Compare row i of one rollout with row j of another.
+
+    Args:
+        here: what is compared with.
+        there: what is compared; the egos are the first entities, the others are the same if they
+            have the same name.
+        i: of ``here``, not failed.
+        j: of ``there``, not failed.
+    """
+    times = _instants(here, there, i, j)
+    step = max(here.time_step, there.time_step)
+    bodies = _shared(here, there)
+    known, met = {e for e, _ in bodies}, {f for _, f in bodies}
+    partings = [
+        _parting(here.names[e], _states(here, i, e, times), _states(there, j, f, times), times)
+        for e, f in bodies
+    ]
+    return Comparison(
+        step=step,
+        ends=(_end(here, i), _end(there, j)),
+        contacts=(_contact(here, i), _contact(there, j)),
+        partings=tuple(sorted(filter(None, partings), key=lambda one: one.time)),
+        events=_events(here, there, i, j, step),
+        lights=_lights(here, there, i, j, times),
+        boxes=_boxes(here, there, bodies),
+        only_here=tuple(name for e, name in enumerate(here.names) if e not in known),
+        only_there=tuple(name for f, name in enumerate(there.names) if f not in met),
+    )
+
+
+def tracks(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> tuple[Track, ...]:
+    """Return where everybody was there who was ever off by more than TRACE, from then on.
+
+    Args:
+        here: as of ``compare``, and so are those that follow.
+        there: likewise.
+        i: likewise.
+        j: likewise.
+    """
+    n = min(int(here.n_steps[i]), int((_end(there, j) + _EPSILON) / here.time_step) + 1)
+    times = np.arange(n, dtype=np.float64) * here.time_step
+    found = []
+    for e, f in _shared(here, there):
+        a, b = _states(here, i, e, times), _states(there, j, f, times)
+        off = np.flatnonzero(_apart(a, b) | (a.present != b.present))
+        if off.size:
+            k = int(off[0])
+            x, y = (np.where(b.present, one, np.nan)[k:] for one in (b.x, b.y))
+            found.append(Track(here.names[e], k, x, y, b.h[k:]))
+    return tuple(found)
+
+
+def _instants(here: Rollout, there: Rollout, i: int, j: int) -> Float:
+    """Return the instants that both have [s], at the coarser one's steps."""
+    coarse, row = (there, j) if there.time_step > here.time_step else (here, i)
+    end = min(_end(here, i), _end(there, j))
+    n = min(int(coarse.n_steps[row]), int((end + _EPSILON) / coarse.time_step) + 1)
+    times: Float = np.arange(n, dtype=np.float64) * coarse.time_step
+    return times
+
+
+def _end(rollout: Rollout, row: int) -> float:
+    return float((rollout.n_steps[row] - 1) * rollout.time_step)
+
+
+def _shared(here: Rollout, there: Rollout) -> list[tuple[int, int]]:
+    """Return the numbers, here and there, of who is in both; the egos may differ in name."""
+    others = _paired(here.names[1:], there.names[1:])
+    return [(0, 0), *((e + 1, f + 1) for e, f in others)]
+
+
+def _paired(ours: Sequence[str], theirs: Sequence[str]) -> list[tuple[int, int]]:
+    """Return the places of equal names; of several equal ones the first is the first there."""
+    places: dict[str, list[int]] = {}
+    for f, name in enumerate(theirs):
+        places.setdefault(name, []).append(f)
+    return [(e, places[name].pop(0)) for e, name in enumerate(ours) if places.get(name)]
+
+
+def _states(rollout: Rollout, row: int, entity: int, times: Float) -> _States:
+    """Return an entity's states at instants that the rollout has, or lie between two of its."""
+    at = times / rollout.time_step
+    before = np.minimum(np.floor(at + _EPSILON).astype(np.int64), int(rollout.n_steps[row]) - 1)
+    rest = np.where(at - before > _EPSILON, at - before, 0.0)
+    after = np.minimum(before + 1, int(rollout.n_steps[row]) - 1)
+
+    def of(array: Float) -> Float:
+        one = array[row, entity]
+        if not rest.any():
+            exact: Float = one[before]
+            return exact
+        between: Float = one[before] + rest * (one[after] - one[before])
+        return between
+
+    present = np.ones(len(times), dtype=np.bool_)
+    if rollout.present.size:
+        present = rollout.present[row, entity][before]
+    return _States(of(rollout.x), of(rollout.y), of(rollout.h), of(rollout.v), present)
+
+
+def _gap(a: _States, b: _States) -> Float:
+    gap: Float = np.where(a.present & b.present, np.hypot(b.x - a.x, b.y - a.y), 0.0)
+    return gap
+
+
+def _apart(a: _States, b: _States) -> Bool:
+    apart: Bool = _gap(a, b) > TRACE
+    return apart
+
+
+def _lasting(differs: Bool) -> Bool:
+    """Return where something differs that already did an instant before."""
+    lasting: Bool = differs.copy()
+    lasting[0] = False
+    lasting[1:] &= differs[:-1]
+    return lasting
+
+
+def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | None:
+    gap, alone = _gap(a, b), a.present != b.present
+    off = np.flatnonzero((gap > PARTED) | _lasting(alone))
+    if not off.size:
+        return None
+    k = int(off[0])
+    trace = np.flatnonzero(~((gap > TRACE) | alone)[: k + 1])  # where it was not off yet
+    since = float(times[trace[-1] + 1 if trace.size else 0])
+    if alone[k]:
+        only = "here" if a.present[k] else "there"
+        return Parting(entity, float(times[k]), None, None, None, None, since, only)
+    dx, dy = float(b.x[k] - a.x[k]), float(b.y[k] - a.y[k])
+    cos, sin = float(np.cos(a.h[k])), float(np.sin(a.h[k]))
+    return Parting(
+        entity,
+        float(times[k]),
+        gap=float(gap[k]),
+        along=dx * cos + dy * sin,
+        across=dy * cos - dx * sin,
+        speed=float(b.v[k] - a.v[k]),
+        since=since,
+    )
+
+
+def _contact(rollout: Rollout, row: int) -> Contact | None:
+    distance = rollout.distance[row, :, : rollout.n_steps[row]]
+    instants = np.flatnonzero((distance <= 0.0).any(axis=0))
+    if not instants.size:
+        return None
+    k = int(instants[0])
+    return Contact(k * rollout.time_step, rollout.names[int(distance[:, k].argmin())])
+
+
+def _events(here: Rollout, there: Rollout, i: int, j: int, step: float) -> tuple[EventTimes, ...]:
+    end = min(_end(here, i), _end(there, j))
+    found = []
+    for u, w in _paired(here.event_names, there.event_names):
+        a, b = _began(here, i, u), _began(there, j, w)
+        if a is not None and b is not None:
+            differs = abs(b - a) > step + _EPSILON
+        else:  # what began in one after the other had ended says nothing of the other
+            begun = [one for one in (a, b) if one is not None]
+            differs = any(one < end - step - _EPSILON for one in begun)
+        if differs:
+            found.append(EventTimes(here.event_names[u], a, b))
+    return tuple(sorted(found, key=lambda one: one.first))
+
+
+def _began(rollout: Rollout, row: int, event: int) -> float | None:
+    k = int(rollout.began[row, event])
+    return None if k < 0 else k * rollout.time_step
+
+
+def _lights(here: Rollout, there: Rollout, i: int, j: int, times: Float) -> tuple[LightTimes, ...]:
+    found = []
+    for s, w in _paired(here.light_names, there.light_names):
+        a, b = _shown(here, i, s, times), _shown(there, j, w, times)
+        lasting = np.flatnonzero(_lasting(a != b))
+        if lasting.size:
+            k = int(lasting[0]) - 1
+            found.append(LightTimes(here.light_names[s], float(times[k]), int(a[k]), int(b[k])))
+    return tuple(sorted(found, key=lambda one: one.time))
+
+
+def _shown(rollout: Rollout, row: int, light: int, times: Float) -> npt.NDArray[np.int8]:
+    at = np.floor(times / rollout.time_step + _EPSILON).astype(np.int64)
+    states: npt.NDArray[np.int8] = rollout.lights[row, light][at]
+    return states
+
+
+def _boxes(
+    here: Rollout, there: Rollout, bodies: Sequence[tuple[int, int]]
+) -> tuple[BoxSizes, ...]:
+    found = []
+    for e, f in bodies:
+        if np.abs(here.box[e] - there.box[f]).max() > SAME_BOX:
+            (a, b, c), (p, q, r) = here.box[e].tolist(), there.box[f].tolist()
+            found.append(BoxSizes(here.names[e], (a, b, c), (p, q, r)))
+    return tuple(found)

@@ -1,0 +1,111 @@
+"""A confirmation in a run's folder, as JSON: for machines, and to be gone on with."""
+
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from bridgegen.arrays import Float
+from bridgegen.confirmation.schema import Record, Scenario
+from bridgegen.disk import write_whole
+from bridgegen.errors import FileFormatError, InputError, StorageError
+
+PREFIX, SUFFIX = "confirmation-", ".json"
+
+
+def file_name(simulator: str) -> str:
+    """Return the name of a simulator's record in a run's folder."""
+    return f"{PREFIX}{simulator}{SUFFIX}"
+
+
+def digest_of(x: Float, metrics: Float) -> str:
+    """Return what tells an evaluation from every other: of its parameters and its metrics."""
+    digest = sha256()
+    for array in (x, metrics):
+        digest.update(array.astype("<f8").tobytes())
+    return digest.hexdigest()[:16]
+
+
+def write_record(folder: Path, record: Record) -> Path:
+    """Write a record into a run's folder, whole; return its path.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    path = folder / file_name(record.simulator)
+    write_whole(path, [record.model_dump_json(indent=1).encode(), b"\n"])
+    return path
+
+
+def read_record(path: Path) -> Record | None:
+    """Return what `write_record` wrote; None where there is no file.
+
+    Raises:
+        FileFormatError: it is something else.
+        StorageError: it cannot be read.
+    """
+    try:
+        record = Record.model_validate_json(path.read_bytes(), strict=True)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        first = error.errors(include_input=False, include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise _not_ours(path, f"{place}: {first['msg']}" if place else first["msg"]) from None
+    except InputError as error:
+        raise _not_ours(path, "; ".join(error.problems)) from None
+    if file_name(record.simulator) != path.name:
+        raise _not_ours(path, f"simulator is {record.simulator!r}")
+    return record
+
+
+def _not_ours(path: Path, why: str) -> FileFormatError:
+    return FileFormatError(
+        f"{path}: must be what 'bridgegen confirm' writes, and is not: {why}; "
+        "run that with --again, or delete the file"
+    )
+
+
+def read_records(folder: Path, X: Float, metrics: Float) -> tuple[Record, ...]:
+    """Return the records of all simulators in a run's folder, by their names.
+
+    Args:
+        folder: the run's.
+        X: ``(N, n)`` of the run.
+        metrics: ``(N, M)`` of the run.
+
+    Raises:
+        FileFormatError: one is something else, or of another run.
+        StorageError: one cannot be read.
+    """
+    records = []
+    for path in sorted(folder.glob(f"{PREFIX}*{SUFFIX}")):
+        record = read_record(path)
+        if record is not None:
+            check_rows(path, record.scenarios, X, metrics)
+            records.append(record)
+    return tuple(records)
+
+
+def check_rows(path: Path, scenarios: Iterable[Scenario], X: Float, metrics: Float) -> None:
+    """Refuse a record that is not of these evaluations.
+
+    Args:
+        path: of the record, for the message.
+        scenarios: that it has.
+        X: as of ``read_records``.
+        metrics: likewise.
+
+    Raises:
+        FileFormatError: it is another run's.
+    """
+    for one in scenarios:
+        k = one.evaluation
+        if k >= len(X) or one.row != digest_of(X[k], metrics[k]):
+            raise FileFormatError(
+                f"{path}: is of another run: evaluation {k + 1} is not the one that was "
+                "confirmed; confirm it with --again, or delete the file"
+            )

@@ -1,0 +1,214 @@
+"""What a confirmation's record holds; it is written from these models, and checked by them."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from bridgegen.arrays import Float
+from bridgegen.confirmation.differences import (
+    PARTED,
+    TRACE,
+    BoxSizes,
+    Comparison,
+    Contact,
+    EventTimes,
+    LightTimes,
+    Parting,
+    Track,
+)
+from bridgegen.objective import Thresholds
+
+SCALE = {"x": 100, "y": 100, "h": 1000}
+"""Units to 1 m or rad of what a track has as whole numbers."""
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Outcome(_Model):
+    """What a scenario came to in one simulator.
+
+    Attributes:
+        critical: by the run's own thresholds, whatever its cause.
+        d_min: [m]; None is infinite, nobody else is there.
+        v_d: [m/s].
+        n_collision: [count].
+        F: objectives, minimised.
+        contact: the ego's first one, if there is one.
+        ends: when [s]; None where nobody compared.
+    """
+
+    critical: bool
+    d_min: Number | None
+    v_d: Number | None
+    n_collision: Number | None
+    F: tuple[Number | None, ...]
+    contact: Contact | None = None
+    ends: Number | None = None
+
+
+class Change(_Model):
+    """There minus here.
+
+    Attributes:
+        d_min: [m]; None where one of them is infinite.
+        v_d: [m/s].
+        F: objectives.
+        contact: of the time of the first contact [s]; None unless both have one.
+    """
+
+    d_min: Number | None
+    v_d: Number | None
+    F: tuple[Number | None, ...]
+    contact: Number | None
+
+    @classmethod
+    def between(cls, here: Outcome, there: Outcome) -> "Change":
+        """Return what changed from here to there."""
+        a, b = here.contact, there.contact
+        return cls(
+            d_min=_minus(there.d_min, here.d_min),
+            v_d=_minus(there.v_d, here.v_d),
+            F=tuple(_minus(q, p) for p, q in zip(here.F, there.F, strict=True)),
+            contact=b.time - a.time if a and b else None,
+        )
+
+
+class Course(_Model):
+    """Where somebody was there who was off: whole numbers, see SCALE, at here's instants.
+
+    Attributes:
+        entity: who.
+        first: the instant of the first value.
+        x: of the reference point; None where it is not there.
+        y: likewise.
+        h: heading.
+    """
+
+    entity: str
+    first: Count
+    x: tuple[int | None, ...]
+    y: tuple[int | None, ...]
+    h: tuple[int | None, ...]
+
+    @model_validator(mode="after")
+    def _even(self) -> "Course":
+        if not len(self.x) == len(self.y) == len(self.h):
+            raise ValueError("x, y and h must be as many")
+        return self
+
+    @classmethod
+    def of(cls, track: Track) -> "Course":
+        """Return a track, rounded."""
+        return cls(
+            entity=track.entity, first=track.first,
+            **{name: _units(getattr(track, name) * scale) for name, scale in SCALE.items()},
+        )  # fmt: skip
+
+
+class Differences(_Model):
+    """How the two rollouts differ, see `differences`."""
+
+    partings: tuple[Parting, ...] = ()
+    events: tuple[EventTimes, ...] = ()
+    lights: tuple[LightTimes, ...] = ()
+    boxes: tuple[BoxSizes, ...] = ()
+    only_here: tuple[str, ...] = ()
+    only_there: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, found: Comparison) -> "Differences":
+        """Return those of a comparison."""
+        return cls(**{name: getattr(found, name) for name in cls.model_fields})
+
+
+class Scenario(_Model):
+    """One scenario, here and there.
+
+    Attributes:
+        evaluation: its row in the store, from 0.
+        name: of its files, if it was handed over.
+        row: digest of that row, see `record.digest_of`.
+        here: what it came to in the run.
+        there: what it came to in the other simulator; None if that failed.
+        failure: why it failed.
+        change: of the figures; None if it failed, and so all that follow.
+        differences: of the rollouts.
+        tracks: where those were there who were off; of the first scenarios only.
+        explanation: the same in words.
+    """
+
+    evaluation: Count
+    name: str | None
+    row: str
+    here: Outcome
+    there: Outcome | None = None
+    failure: str = ""
+    change: Change | None = None
+    differences: Differences | None = None
+    tracks: tuple[Course, ...] = ()
+    explanation: str = ""
+
+    @model_validator(mode="after")
+    def _whole(self) -> "Scenario":
+        if len({one is None for one in (self.there, self.change, self.differences)}) > 1:
+            raise ValueError("there, change and differences must be together")
+        return self
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether it is critical there, too; None if it did not run there."""
+        return None if self.there is None else self.there.critical
+
+
+class Record(_Model):
+    """A run's confirmation in one other simulator.
+
+    Attributes:
+        simulator: its name.
+        label: the same with its version.
+        settings: of it, that were chosen.
+        reference: the run's own simulator.
+        run: the run's folder.
+        scenario: the logical scenario.
+        ego: who drives.
+        thresholds: when a scenario is critical.
+        objectives: the names of F's columns.
+        parted_at: see `differences.PARTED`.
+        trace: see `differences.TRACE`.
+        scale: see SCALE.
+        scenarios: most critical first.
+    """
+
+    simulator: str
+    label: str
+    settings: dict[str, bool | int | float | str]
+    reference: str
+    run: str
+    scenario: str
+    ego: str
+    thresholds: Thresholds
+    objectives: tuple[str, ...]
+    parted_at: Number = PARTED
+    trace: Number = TRACE
+    scale: dict[str, int] = SCALE
+    scenarios: tuple[Scenario, ...] = ()
+
+
+def number(value: float) -> float | None:
+    """Return a number as JSON has it; None for what is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _minus(a: float | None, b: float | None) -> float | None:
+    return None if a is None or b is None else a - b
+
+
+def _units(values: Float) -> tuple[int | None, ...]:
+    return tuple(int(one) if math.isfinite(one) else None for one in np.round(values).tolist())

@@ -1,0 +1,65 @@
+"""What a confirmation comes to, in sentences."""
+
+from collections.abc import Sequence
+
+from bridgegen.confirmation.differences import PARTED
+from bridgegen.confirmation.schema import Scenario
+from bridgegen.confirmation.summary import Spread, Summary, summarise
+
+NAMED = 10
+"""Scenarios that are named at most."""
+
+
+def name_of(one: Scenario) -> str:
+    """Return what people call a scenario: as its files, or by its evaluation, counted from 1."""
+    return one.name or f"evaluation {one.evaluation + 1}"
+
+
+def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
+    """Return what a confirmation comes to: how many are confirmed, then by how much they differ.
+
+    Args:
+        label: the other simulator.
+        scenarios: that were run there.
+    """
+    s = summarise(scenarios)
+    if not s.ran:
+        return [f"None of {s.scenarios} scenarios ran in {label}."]
+    low, high = (f"{100.0 * end:.0f}" for end in s.interval)
+    line = f"{s.confirmed} of {s.ran} confirmed in {label} (95 %: {low}–{high} %)"
+    lost = [name_of(one) for one in scenarios if one.confirmed is False]
+    if lost:
+        more = ", …" if len(lost) > NAMED else ""
+        line += f"; {len(lost)} not: {', '.join(lost[:NAMED])}{more}"
+    if s.not_run:
+        line += f"; {s.not_run} not run, which says nothing of them"
+    return [f"{line}.", *_differences(s)]
+
+
+def _differences(s: Summary) -> list[str]:
+    told = filter(
+        None,
+        [
+            _spread("d_min", s.d_min, "m"),
+            _spread("v_d", s.v_d, "m/s"),
+            _spread("first contact", s.contact, "s"),
+        ],
+    )
+    lines = [f"Differences, median (largest): {', '.join(told)}."]
+    if s.parted.median is None:
+        lines.append(f"Nobody ever is more than {PARTED:g} m elsewhere.")
+    else:
+        lines.append(
+            f"In {s.parted.n} of {s.ran} somebody is more than {PARTED:g} m elsewhere at some "
+            f"time, first at {s.parted.median:.2f} s (median)."
+        )
+    both, here, there = s.contacts
+    if here or there:
+        lines.append(f"Contacts: {both} in both, {here} here alone, {there} there alone.")
+    return lines
+
+
+def _spread(name: str, one: Spread, unit: str) -> str:
+    if one.median is None or one.max is None:
+        return ""
+    return f"{name} {one.median:.3g} ({one.max:.3g}) {unit}"

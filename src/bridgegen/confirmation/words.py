@@ -1,0 +1,130 @@
+"""Where and why two rollouts part, in sentences."""
+
+from bridgegen.confirmation.differences import (
+    PARTED,
+    BoxSizes,
+    EventTimes,
+    LightTimes,
+    Parting,
+)
+from bridgegen.confirmation.schema import Differences, Outcome
+from bridgegen.objective import Thresholds
+
+NARROW = (0.25, 0.25)
+"""A scenario that misses a threshold by no more than this, on d_min [m] or v_d [m/s], misses it
+narrowly."""
+
+LIGHTS = ("off", "red", "red and yellow", "yellow", "green")
+
+
+def explanation(here: Outcome, there: Outcome, found: Differences, limits: Thresholds) -> str:
+    """Return what is known of why a scenario is, or is not, critical there.
+
+    Args:
+        here: what it came to here.
+        there: what it came to there.
+        found: how the rollouts differ.
+        limits: when a scenario is critical.
+    """
+    said = [] if there.critical else [_miss(there, limits)]
+    return " ".join([*said, *_contacts(here, there), *_story(found)])
+
+
+def _miss(there: Outcome, limits: Thresholds) -> str:
+    """Return by how much a scenario is not critical."""
+    if there.d_min is None:
+        return "The ego is alone there."
+    far = there.d_min - limits.d_min_below
+    if far >= 0.0:
+        narrowly = _narrowly(far, NARROW[0])
+        return f"d_min is {there.d_min:.2f} m there: {narrowly}{far:.2f} m above the threshold."
+    v_d = there.v_d or 0.0
+    slow = limits.v_d_at_least - v_d
+    narrowly = _narrowly(slow, NARROW[1])
+    return (
+        f"It comes as close as {there.d_min:.2f} m there, but v_d is {v_d:.2f} m/s: "
+        f"{narrowly}{slow:.2f} m/s below the threshold."
+    )
+
+
+def _narrowly(by: float, limit: float) -> str:
+    return "narrowly, " if by <= limit else ""
+
+
+def _contacts(here: Outcome, there: Outcome) -> list[str]:
+    a, b = here.contact, there.contact
+    if a and not b:
+        return [f"No contact there; here with {a.entity} at {a.time:.2f} s."]
+    if b and not a:
+        return [f"A contact with {b.entity} at {b.time:.2f} s there, none here."]
+    if a and b and a.entity != b.entity:
+        return [f"The first contact is with {b.entity} there, with {a.entity} here."]
+    return []
+
+
+def _story(found: Differences) -> list[str]:
+    """Return what differed, in the order in which it did, up to the first who parted."""
+    said = [f"{name} is not there." for name in found.only_here]
+    said += [f"{name} is there alone." for name in found.only_there]
+    said += [_box(one) for one in found.boxes]
+    if not found.partings:
+        return [*said, f"Nobody ever is more than {PARTED:g} m from where it is here."]
+    first = found.partings[0]
+    before: list[tuple[float, str]] = []
+    before += [(one.first, _event(one)) for one in found.events if one.first <= first.time]
+    before += [(one.time, _light(one)) for one in found.lights if one.time <= first.time]
+    said += [text for _, text in sorted(before)]
+    if not before:
+        said.append("No event and no light differs before anybody parts.")
+    said.append(_parting(first))
+    if first.entity != found.partings[-1].entity:
+        later = [f"{one.entity} at {one.time:.2f} s" for one in found.partings[1:]]
+        said.append(f"Then {', '.join(later)}.")
+    return said
+
+
+def _box(one: BoxSizes) -> str:
+    (a, b, c), (p, q, r) = one.here, one.there
+    return (
+        f"{one.entity} is a box of {p:.2f} m × {q:.2f} m, centre {r:.2f} m ahead, there; "
+        f"{a:.2f} m × {b:.2f} m, {c:.2f} m here."
+    )
+
+
+def _event(one: EventTimes) -> str:
+    if one.there is None:
+        return f"{one.name} began at {one.here:.2f} s here and never there."
+    if one.here is None:
+        return f"{one.name} began at {one.there:.2f} s there and never here."
+    late = one.there - one.here
+    return (
+        f"{one.name} began {abs(late):.2f} s {'later' if late > 0.0 else 'earlier'} there, "
+        f"at {one.there:.2f} s."
+    )
+
+
+def _light(one: LightTimes) -> str:
+    here, there = (
+        LIGHTS[state] if 0 <= state < len(LIGHTS) else f"state {state}"
+        for state in (one.here, one.there)
+    )
+    return f"The light {one.name} is {there} there and {here} here from {one.time:.2f} s on."
+
+
+def _parting(one: Parting) -> str:
+    if one.only is not None:
+        return f"{one.entity} parts first: at {one.time:.2f} s it is {one.only} alone."
+    assert one.gap is not None
+    assert one.along is not None
+    assert one.across is not None
+    assert one.speed is not None
+    along = abs(one.along) >= abs(one.across)
+    side = ("ahead", "behind") if along else ("to the left", "to the right")
+    where = side[(one.along if along else one.across) < 0.0]
+    pace = f"{abs(one.speed):.2f} m/s {'faster' if one.speed > 0.0 else 'slower'}"
+    if abs(one.speed) < 0.05:
+        pace = "as fast"
+    return (
+        f"{one.entity} parts first: at {one.time:.2f} s it is {one.gap:.2f} m apart there, "
+        f"{where}, and {pace}; on its way since {one.since:.2f} s."
+    )

@@ -1,0 +1,105 @@
+"""A run confirmed in another simulator: the bar meanwhile, then the table and what it comes to."""
+
+import json
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from bridgegen.screen.live import Live
+
+if TYPE_CHECKING:
+    from bridgegen.campaign.confirm import RunConfirmation
+    from bridgegen.confirmation.schema import Outcome
+    from bridgegen.confirmation.summary import Summary
+
+
+class ConfirmationScreen(Live):
+    """The live progress of scenarios that are run elsewhere."""
+
+    def stage(self, stage: str) -> None:
+        """Take down what begins."""
+        if stage == "compile":
+            self.say_compiling()
+            self.show(what="compiling")
+        if stage == "confirm":
+            self.show(what="confirming")
+        if stage == "report":
+            self.show(what="writing the report", facts="")
+
+    def progress(self, done: int, total: int, summary: "Summary") -> None:
+        """Take down how many are done, of how many, and what they come to."""
+        facts = f"{summary.confirmed} confirmed, {summary.lost} not, {summary.not_run} not run"
+        self.show(done=done, total=total, facts=facts)
+
+
+def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
+    """Print what became of each scenario, why some are not confirmed, and what it comes to."""
+    from bridgegen.confirmation.summary import to_json
+    from bridgegen.confirmation.verdict import name_of, sentences
+
+    record = found.record
+    if as_json:
+        facts: dict[str, Any] = record.model_dump(mode="json", exclude={"scenarios"})
+        facts["summary"] = to_json(found.summary)
+        facts["scenarios"] = [
+            {"confirmed": one.confirmed, **one.model_dump(mode="json", exclude={"tracks"})}
+            for one in found.scenarios
+        ]
+        facts["files"] = [str(path) for path in found.files]
+        print(json.dumps(facts, indent=2))
+        return
+    print(f"{found.folder}: {record.scenario}, ego {record.ego}, in {record.label}\n")
+    console = Console(markup=False, emoji=False, highlight=False)
+    console.print(_table(found))
+    for one in found.scenarios:
+        if one.confirmed is False:
+            console.print(f"\n{name_of(one)} is not confirmed. {one.explanation}")
+    failures = Counter(one.failure for one in found.scenarios if one.there is None)
+    if failures:
+        console.print("\nNot run, which says nothing of them:")
+        for why, count in failures.most_common():
+            console.print(f"  {count} x {why}")
+    console.print("\n" + "\n".join(sentences(record.label, found.scenarios)))
+    if earlier := len(found.scenarios) - found.ran:
+        console.print(f"{earlier} of them had been confirmed before (--again runs them anew).")
+    console.print(", ".join(map(str, found.files)))
+
+
+def _table(found: "RunConfirmation") -> Table:
+    from bridgegen.confirmation.verdict import name_of
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
+    table.add_column("scenario", no_wrap=True)
+    table.add_column("critical there")
+    for name in ("d_min [m]", "v_d [m/s]", "contact [s]", "parts [s]"):
+        table.add_column(name, justify="right")
+    table.add_column("first", overflow="fold")
+    words = {True: "yes", False: "NO", None: "not run"}
+    for one in found.scenarios:
+        here, there = one.here, one.there
+        if there is None or one.differences is None:
+            table.add_row(name_of(one), words[one.confirmed])
+            continue
+        parting = next(iter(one.differences.partings), None)
+        table.add_row(
+            name_of(one),
+            words[one.confirmed],
+            _change(here.d_min, there.d_min),
+            _change(here.v_d, there.v_d),
+            _change(_touch(here), _touch(there), none="–"),
+            f"{parting.time:.2f}" if parting else "never",
+            parting.entity if parting else "",
+        )
+    return table
+
+
+def _touch(one: "Outcome") -> float | None:
+    return None if one.contact is None else one.contact.time
+
+
+def _change(here: float | None, there: float | None, *, none: str = "∞") -> str:
+    """Return a value here and there; once, where nobody would see a difference."""
+    a, b = (none if one is None else f"{one:.2f}" for one in (here, there))
+    return a if a == b else f"{a} → {b}"

@@ -1,0 +1,346 @@
+"""A run's scenarios in another simulator: the embedded one stands in for it, disturbed."""
+
+import json
+import re
+import shutil
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.confirm import confirm
+from bridgegen.campaign.handover import handed_over
+from bridgegen.campaign.settings import Settings
+from bridgegen.errors import FileFormatError, InputError, Interrupted
+from bridgegen.simulation import choice
+from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+from bridgegen.store import Store
+
+
+class Double:
+    """The embedded simulator, whose rollouts are given to somebody first."""
+
+    rows_at_once = runs_at_once = 1
+
+    def __init__(self, embedded, disturb):
+        self.embedded, self._disturb = embedded, disturb
+
+    def __getattr__(self, name):
+        return getattr(self.embedded, name)
+
+    def run(self, roads, rows, values, **more):
+        return self._disturb(self.embedded.run(roads, rows, values, **more))
+
+
+@pytest.fixture
+def double(monkeypatch):
+    """Register a double; return what sets how it disturbs, and counts the rows it ran."""
+
+    class Hands:
+        ran = 0
+        disturb = staticmethod(lambda rollout: rollout)
+
+        def run(self, rollout):
+            self.ran += rollout.shape[0]
+            return self.disturb(rollout)
+
+    hands = Hands()
+
+    def make(storyboard, place, driver, settings, access):
+        return Double(EmbeddedSimulator(storyboard, place, driver=driver), hands.run)
+
+    kind = choice.Kind("double", "Ours, disturbed.", make, settings={"noise": "none [m]"})
+    monkeypatch.setitem(choice.SIMULATORS, "double", kind)
+    return hands
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    place = tmp_path_factory.mktemp("runs") / "s4"
+    bg.run_search(
+        "crossroads-s4", budget=150, ego="route-follower", keep=4, causes=False, out=place
+    )
+    return place
+
+
+@pytest.fixture
+def folder(finished, tmp_path):
+    """The run without a report, which would take most of the time."""
+    away = shutil.ignore_patterns("report.html")
+    return shutil.copytree(finished, tmp_path / "s4", ignore=away)
+
+
+def elsewhere(**settings):
+    return SimulatorChoice("double", settings)
+
+
+def shifted(by, *, entity=1, after=0):
+    def disturb(rollout):
+        x = rollout.x.copy()
+        x[:, entity, after:] += by
+        return replace(rollout, x=x)
+
+    return disturb
+
+
+def record_of(folder):
+    return json.loads((folder / "confirmation-double.json").read_text("utf-8"))
+
+
+def test_the_same_simulator_confirms_everything_and_nobody_parts(folder, double):
+    found = confirm(folder, elsewhere())
+    kept = handed_over(folder)
+    assert [(one.name, one.evaluation) for one in found.scenarios] == [
+        (one.name, one.evaluation) for one in kept
+    ]
+    with Store.open(folder) as store:
+        rows, names = store.read(), list(store.metrics)
+    for one in found.scenarios:
+        assert one.confirmed is True
+        assert one.differences.partings == one.differences.events == one.tracks == ()
+        assert (one.change.d_min, one.change.v_d, one.change.F) == (0.0, 0.0, (0.0,))
+        measured = rows.metrics[one.evaluation]
+        assert one.here.d_min == one.there.d_min == measured[names.index("d_min")]
+        assert tuple(rows.F[one.evaluation]) == one.here.F
+        hit = measured[names.index("n_collision")] > 0
+        assert (one.here.contact is not None) == hit
+    assert (found.summary.share, double.ran) == (1.0, 4)
+    assert json.loads(found.record.model_dump_json()) == record_of(folder)
+
+
+def test_what_is_elsewhere_there_is_found(folder, double):
+    """The other car 60 m ahead from instant 40 on: 2 s."""
+    double.disturb = shifted(60.0, after=40)
+    found = confirm(folder, elsewhere())
+    for one in found.scenarios:
+        first = one.differences.partings[0]
+        assert (one.confirmed, first.entity, first.time) == (False, "bv", pytest.approx(2.0))
+        assert first.gap == pytest.approx(60.0)
+        assert one.there.d_min > 2.0
+        assert f"d_min is {one.there.d_min:.2f} m there" in one.explanation
+        assert "bv parts first: at 2.00 s" in one.explanation
+        (track,) = one.tracks
+        assert (track.entity, track.first) == ("bv", 40)
+    assert (found.summary.confirmed, found.summary.lost) == (0, 4)
+
+
+def test_a_failed_row_is_not_run_and_never_confirmed(folder, double):
+    def disturb(rollout):
+        if double.ran != 2:
+            return rollout
+        return replace(
+            rollout, status=np.full(1, 4, np.int8), messages={0: "no <b>road</b>\x1b[0m"}
+        )
+
+    double.disturb = disturb
+    found = confirm(folder, elsewhere())
+    failed = found.scenarios[1]
+    assert (failed.confirmed, failed.there, failed.differences) == (None, None, None)
+    assert failed.failure == "a position that is not on the road network: no <b>road</b> [0m"
+    s = found.summary
+    assert (s.scenarios, s.ran, s.confirmed, s.not_run) == (4, 3, 3, 1)
+    assert double.ran == 4
+    again = confirm(folder, elsewhere())  # what failed is tried once more, and nothing else
+    assert (double.ran, again.ran, again.summary.confirmed) == (5, 1, 4)
+
+
+def test_a_row_that_is_refused_does_not_take_others_with_it(folder, double, monkeypatch):
+    monkeypatch.setattr(Double, "rows_at_once", 64)
+
+    def disturb(rollout):
+        if rollout.shape[0] > 1 or double.ran == 4 + 3:
+            raise InputError("this road is not for me")
+        return rollout
+
+    double.disturb = disturb
+    found = confirm(folder, elsewhere())
+    assert [one.failure for one in found.scenarios] == ["", "", "this road is not for me", ""]
+    assert found.summary.confirmed == 3
+
+
+def test_rows_are_the_most_critical_ones_and_earlier_ones_are_kept(folder, double):
+    confirm(folder, elsewhere())
+    found = confirm(folder, elsewhere(), rows=20)
+    with Store.open(folder) as store:
+        rows = store.read()
+    best = np.flatnonzero(rows.critical)[np.argsort(rows.F[rows.critical, 0], kind="stable")]
+    assert [one.evaluation for one in found.scenarios] == best[:20].tolist()
+    kept = {one.evaluation: one.name for one in handed_over(folder)}
+    assert [one.name for one in found.scenarios] == [kept.get(k) for k in best[:20]]
+    new = len([k for k in best[:20] if k not in kept])
+    assert (found.ran, double.ran) == (new, 4 + new)
+    assert len(found.record.scenarios) == len({*best[:20], *kept})
+    places = {k: place for place, k in enumerate(best.tolist())}
+    order = [places[one.evaluation] for one in found.record.scenarios]
+    assert order == sorted(order)
+    every = confirm(folder, elsewhere(), rows=10_000)
+    assert len(every.scenarios) == int(rows.critical.sum())
+
+
+def test_again_forgets(folder, double):
+    confirm(folder, elsewhere(), rows=6)
+    double.disturb = shifted(60.0)
+    assert confirm(folder, elsewhere()).summary.lost < 4  # those that are known are not run
+    found = confirm(folder, elsewhere(), again=True)
+    assert (found.summary.lost, len(found.record.scenarios)) == (4, 4)
+
+
+def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(folder, double):
+    undisturbed = confirm(folder, elsewhere(), rows=9)
+    (folder / "confirmation-double.json").unlink()
+    double.ran = 0
+
+    def disturb(rollout):
+        if double.ran == 4:
+            raise KeyboardInterrupt
+        return rollout
+
+    double.disturb = disturb
+    seen = []
+    with pytest.raises(Interrupted) as stop:
+        confirm(folder, elsewhere(), rows=9, progress=lambda done, *_: seen.append(done))
+    assert "stopped after 3 of 9 scenarios" in str(stop.value)
+    assert f"bridgegen confirm {folder} --simulator double" in str(stop.value)
+    assert (seen, len(record_of(folder)["scenarios"])) == ([1, 2, 3], 3)
+    double.ran, double.disturb = 100, lambda rollout: rollout
+    found = confirm(folder, elsewhere(), rows=9)
+    assert (found.ran, double.ran) == (6, 106)
+    assert found.record == undisturbed.record
+
+
+def test_what_is_killed_keeps_what_it_had_written(folder, double, monkeypatch):
+    """A process that ends without a word: nothing after the last whole file is there."""
+    monkeypatch.setattr("bridgegen.campaign.confirm.SECONDS", 0.0)
+    written = threading.Event()
+
+    def disturb(rollout):
+        if double.ran == 3:
+            written.set()
+            shutil.copy(folder / "confirmation-double.json", folder / "then.json")
+        return rollout
+
+    double.disturb = disturb
+    confirm(folder, elsewhere())
+    assert written.is_set()
+    shutil.move(folder / "then.json", folder / "confirmation-double.json")
+    double.ran = 0
+    assert (confirm(folder, elsewhere()).ran, double.ran) == (2, 2)
+
+
+def test_other_settings_are_not_mixed(folder, double):
+    confirm(folder, elsewhere(noise=1))
+    with pytest.raises(InputError, match=r"settings is \{'noise': 1\}, and now would be .*--again"):
+        confirm(folder, elsewhere(noise=2))
+    confirm(folder, elsewhere(noise=2), again=True)
+
+
+def test_the_command_says_it_in_a_table_and_in_a_line(folder, double, cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    moves = shifted(60.0, after=40)
+    double.disturb = lambda rollout: moves(rollout) if double.ran == 2 else rollout
+    code, out, err = cli("confirm", folder, "--simulator", "double")
+    assert (code, err.strip()) == (0, "")
+    assert "crossroads-s4, ego route-follower, in double" in out
+    assert re.search(r"^0001 +yes ", out, re.M)
+    assert re.search(r"^0002 +NO .* → .* 2\.00 +bv *$", out, re.M)
+    assert "0002 is not confirmed. d_min is" in out
+    assert "3 of 4 confirmed in double (95 %: 30–95 %); 1 not: 0002." in out
+    code, out, _ = cli("confirm", folder, "--simulator", "double", "--json")
+    facts = json.loads(out)
+    assert (code, facts["summary"]["confirmed"], facts["summary"]["lost"]) == (0, 3, 1)
+    assert [one["confirmed"] for one in facts["scenarios"]] == [True, False, True, True]
+    assert double.ran == 4  # nothing was missing the second time
+
+
+def test_a_build_can_fail_for_it(folder, double, cli, tmp_path):
+    moves = shifted(60.0)
+    double.disturb = lambda rollout: moves(rollout) if double.ran == 2 else rollout
+    words = ("confirm", folder, "--simulator", "double", "--junit", tmp_path / "j.xml")
+    code, _, err = cli(*words, "--fail-if", "confirmed < 0.95")
+    assert code == 3
+    assert "FAILED: not confirmed < 0.95 (confirmed = 0.75)" in err
+    text = (tmp_path / "j.xml").read_text("utf-8")
+    assert text.count("<failure ") == 2  # the criterion, and the one to blame
+    assert cli(*words, "--fail-if", "confirmed < 0.5")[0] == 0
+    assert "<failure " not in (tmp_path / "j.xml").read_text("utf-8")
+
+
+def test_ctrl_c_ends_with_the_status_for_it(folder, double, cli):
+    def disturb(rollout):
+        raise KeyboardInterrupt
+
+    double.disturb = disturb
+    code, out, err = cli("confirm", folder, "--simulator", "double")
+    assert (code, out) == (130, "")
+    assert "stopped after 0 of 4 scenarios; go on with 'bridgegen confirm" in err
+
+
+def test_every_mistake_is_one_clear_error(folder, double, cli, tmp_path):
+    def refused(*words):
+        code, _, err = cli("confirm", *words)
+        assert (code, "Traceback" in err) == (2, False), err
+        return err
+
+    there = ("--simulator", "double")
+    assert "nowhere" in refused(tmp_path / "nowhere", *there)
+    assert "unknown simulator 'dubble'; did you mean" in refused(folder, "--simulator", "dubble")
+    assert "was searched in the simulator embedded; confirm it in another one" in refused(
+        folder, "--simulator", "embedded"
+    )
+    assert "1 <= rows must hold, got 0" in refused(folder, *there, "--rows", 0)
+    assert "the ego of this run must be route-follower" in refused(folder, *there, "--ego", "fsm")
+    assert "unknown figure of --fail-if 'r_critic'" in refused(
+        folder, *there, "--fail-if", "r_critic > 1"
+    )
+    (folder / "confirmation-double.json").write_text("[]")
+    assert "must be what 'bridgegen confirm' writes" in refused(folder, *there)
+    assert cli("confirm", folder, *there, "--again")[0] == 0
+    shutil.rmtree(folder / "critical")
+    assert "hands no scenario over; choose among its critical ones with --rows" in refused(
+        folder, *there
+    )
+
+
+def test_a_record_of_another_run_is_refused(folder, double):
+    confirm(folder, elsewhere())
+    path = folder / "confirmation-double.json"
+    path.write_text(path.read_text("utf-8").replace('"row": "', '"row": "0'), "utf-8")
+    with pytest.raises(FileFormatError, match="is of another run"):
+        confirm(folder, elsewhere())
+    assert confirm(folder, elsewhere(), again=True).summary.confirmed == 4
+
+
+def test_harm_counts_by_the_thresholds_whatever_its_cause(tmp_path, double):
+    place = tmp_path / "run"
+    bg.run_search(
+        "crossroads-s2", algorithm="random", budget=60, seed=2, ego="route-follower", keep=2,
+        cause="planning", out=place,
+    )  # fmt: skip
+    found = confirm(place, elsewhere())
+    assert (found.summary.scenarios, found.summary.confirmed) == (2, 2)
+    with Store.open(place) as store:
+        assert Settings.from_dict(store.settings, place).cause == "planning"
+
+
+def test_a_run_with_several_objectives_has_a_difference_for_each(tmp_path, double):
+    place = tmp_path / "run"
+    bg.run_search(
+        "crossroads-s2", algorithm="random", objectives="many", budget=60, seed=2, keep=2,
+        ego="route-follower", causes=False, out=place,
+    )  # fmt: skip
+    found = confirm(place, elsewhere())
+    assert found.record.objectives == ("d_min", "v_d")
+    assert all(one.change.F == (0.0, 0.0) for one in found.scenarios)
+
+
+def test_where_nothing_ran_nothing_passes(folder, double, cli):
+    double.disturb = lambda rollout: replace(rollout, status=np.full(1, 1, np.int8))
+    code, out, err = cli("confirm", folder, "--simulator", "double", "--fail-if", "confirmed < 0.5")
+    assert code == 3
+    assert "None of 4 scenarios ran in double." in out
+    assert "4 x a state became NaN or infinite" in out
+    assert "FAILED, cannot be judged: scenarios run in double" in err
+    assert "not confirmed < 0.5 (confirmed cannot be told)" in err

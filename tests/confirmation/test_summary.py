@@ -1,0 +1,72 @@
+"""What several scenarios come to."""
+
+import pytest
+
+from bridgegen.confirmation.differences import Contact, Parting
+from bridgegen.confirmation.schema import Change, Differences, Outcome, Scenario
+from bridgegen.confirmation.summary import summarise, to_json
+from bridgegen.confirmation.verdict import sentences
+from bridgegen.regions.evidence import wilson
+
+
+def outcome(critical=True, d_min=1.0, v_d=5.0, touch=None):
+    contact = None if touch is None else Contact(touch, "bv")
+    return Outcome(critical=critical, d_min=d_min, v_d=v_d, n_collision=float(contact is not None),
+                   F=(d_min,), contact=contact)  # fmt: skip
+
+
+def scenario(k, here=None, there=None, parted=None, failure=""):
+    here = here or outcome()
+    if there is None:
+        return Scenario(evaluation=k, name=f"{k:04d}", row="", here=here, failure=failure)
+    partings = () if parted is None else (Parting("bv", parted, 0.6, 0.6, 0.0, 0.0, parted),)
+    return Scenario(
+        evaluation=k, name=f"{k:04d}", row="", here=here, there=there,
+        change=Change.between(here, there), differences=Differences(partings=partings),
+    )  # fmt: skip
+
+
+THREE = [
+    scenario(1, outcome(touch=2.0), outcome(d_min=1.25, v_d=4.0, touch=2.5), parted=3.0),
+    scenario(2, outcome(), outcome(False, d_min=3.0, touch=None), parted=1.0),
+    scenario(3, outcome(touch=4.0), outcome()),
+    scenario(4, failure="the library said no"),
+]
+
+
+def test_failed_ones_count_neither_way():
+    s = summarise(THREE)
+    assert (s.scenarios, s.ran, s.confirmed, s.lost, s.not_run) == (4, 3, 2, 1, 1)
+    assert s.share == pytest.approx(2 / 3)
+    assert s.interval == wilson(2, 3)
+    assert s.contacts == (1, 1, 0)
+    assert (s.d_min.n, s.d_min.median, s.d_min.max) == (3, 0.25, 2.0)
+    assert (s.v_d.median, s.v_d.max) == (0.0, 1.0)
+    assert (s.contact.n, s.contact.max) == (1, 0.5)
+    assert (s.parted.n, s.parted.median) == (2, 2.0)
+
+
+def test_the_sentences_are_for_people():
+    line, *rest = sentences("esmini 3.6", THREE)
+    assert line == (
+        "2 of 3 confirmed in esmini 3.6 (95 %: 21–94 %); 1 not: 0002; 1 not run, which says "
+        "nothing of them."
+    )
+    assert rest == [
+        "Differences, median (largest): d_min 0.25 (2) m, v_d 0 (1) m/s, first contact 0.5 "
+        "(0.5) s.",
+        "In 2 of 3 somebody is more than 0.5 m elsewhere at some time, first at 2.00 s (median).",
+        "Contacts: 1 in both, 1 here alone, 0 there alone.",
+    ]
+
+
+def test_where_nothing_ran_nothing_is_claimed():
+    s = summarise(THREE[3:])
+    assert (s.share, s.interval, s.d_min.median) == (None, (0.0, 1.0), None)
+    assert to_json(s)["share"] is None
+    assert sentences("esmini 3.6", THREE[3:]) == ["None of 1 scenarios ran in esmini 3.6."]
+
+
+def test_where_all_is_the_same_that_is_said():
+    (*_, last) = sentences("x", [scenario(1, outcome(), outcome())])
+    assert last == "Nobody ever is more than 0.5 m elsewhere."

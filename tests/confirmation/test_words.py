@@ -1,0 +1,104 @@
+"""What is said of two rollouts that part."""
+
+import pytest
+
+from bridgegen.confirmation.differences import BoxSizes, Contact, EventTimes, LightTimes, Parting
+from bridgegen.confirmation.schema import Differences, Outcome
+from bridgegen.confirmation.words import explanation
+from bridgegen.objective import Thresholds
+
+LIMITS = Thresholds()
+
+
+def came_to(critical, d_min, v_d, contact=None):
+    return Outcome(
+        critical=critical, d_min=d_min, v_d=v_d, n_collision=float(contact is not None), F=(0.0,),
+        contact=contact,
+    )  # fmt: skip
+
+
+NEAR = came_to(True, 1.0, 5.0)
+
+
+def said(there, here=NEAR, **differences):
+    return explanation(here, there, Differences(**differences), LIMITS)
+
+
+def test_a_miss_says_by_how_much():
+    assert said(came_to(False, 2.04, 5.0)).startswith(
+        "d_min is 2.04 m there: narrowly, 0.04 m above the threshold."
+    )
+    assert said(came_to(False, 3.5, 5.0)).startswith(
+        "d_min is 3.50 m there: 1.50 m above the threshold."
+    )
+    assert said(came_to(False, 1.5, 0.2)).startswith(
+        "It comes as close as 1.50 m there, but v_d is 0.20 m/s: 0.80 m/s below the threshold."
+    )
+    assert said(came_to(False, None, 0.0)).startswith("The ego is alone there.")
+    assert "threshold" not in said(came_to(True, 1.1, 5.0))
+
+
+def test_the_first_who_parts_is_told_with_what_came_before():
+    parts = Parting("bv", 3.2, 0.52, -0.51, 0.1, -0.4, 2.6)
+    ego = Parting("ego", 4.1, 0.6, 0.0, 0.6, 0.0, 4.0)
+    text = said(
+        came_to(False, 3.0, 5.0),
+        partings=(parts, ego),
+        events=(EventTimes("bv_changes_lanes", 2.5, 2.65), EventTimes("late", 5.0, 6.0)),
+        lights=(LightTimes("s1", 1.0, 1, 4),),
+    )
+    order = [
+        "The light s1 is green there and red here from 1.00 s on.",
+        "bv_changes_lanes began 0.15 s later there, at 2.65 s.",
+        "bv parts first: at 3.20 s it is 0.52 m apart there, behind, and 0.40 m/s slower; on its "
+        "way since 2.60 s.",
+        "Then ego at 4.10 s.",
+    ]
+    assert " ".join(order) in text
+    assert "late began" not in text  # after they had parted: a consequence
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (EventTimes("go", 1.0, None), "go began at 1.00 s here and never there."),
+        (EventTimes("go", None, 1.0), "go began at 1.00 s there and never here."),
+        (EventTimes("go", 1.0, 0.5), "go began 0.50 s earlier there, at 0.50 s."),
+    ],
+)
+def test_events_are_told(event, words):
+    parts = Parting("bv", 3.2, 0.6, 0.0, -0.6, 0.0, 3.0)
+    text = said(came_to(True, 1.0, 5.0), partings=(parts,), events=(event,))
+    assert words in text
+    assert "to the right, and as fast" in text
+
+
+def test_what_else_differs_is_told():
+    text = said(
+        came_to(True, 1.0, 5.0, Contact(3.0, "van")),
+        here=came_to(True, 0.0, 5.0, Contact(2.0, "bv")),
+        partings=(Parting("bv", 1.0, None, None, None, None, 0.9, "there"),),
+        boxes=(BoxSizes("bv", (4.0, 2.0, 1.0), (4.5, 1.8, 1.2)),),
+        only_here=("cone",),
+        only_there=("walker",),
+    )
+    for part in (
+        "The first contact is with van there, with bv here.",
+        "cone is not there.",
+        "walker is there alone.",
+        "bv is a box of 4.50 m × 1.80 m, centre 1.20 m ahead, there; 4.00 m × 2.00 m, 1.00 m here.",
+        "No event and no light differs before anybody parts.",
+        "bv parts first: at 1.00 s it is there alone.",
+    ):
+        assert part in text
+
+
+def test_contacts_are_told_where_only_one_has_them():
+    touch, none = came_to(True, 0.0, 5.0, Contact(2.0, "bv")), came_to(True, 0.5, 5.0)
+    assert "No contact there; here with bv at 2.00 s." in said(none, here=touch)
+    assert "A contact with bv at 2.00 s there, none here." in said(touch, here=none)
+    assert "contact" not in said(touch, here=touch)
+
+
+def test_where_nobody_parts_that_is_said():
+    assert said(came_to(True, 1.0, 5.0)) == "Nobody ever is more than 0.5 m from where it is here."
