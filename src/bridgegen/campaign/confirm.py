@@ -118,7 +118,7 @@ def confirm(
             elsewhere, names, place,
             ego=ego, command="confirm", causes=False, simulator=simulator, workers=crew,
         )  # fmt: skip
-        empty = _empty(here, simulator, settings, place)
+        empty = _empty(here, there, simulator, settings, place)
         known = {} if again else _known(place, empty, every)
         todo = [k for k in asked if k not in known or known[k].there is None]
         book = _Book(place, empty, known, handed, _merit(every))
@@ -145,12 +145,19 @@ def confirm(
     return RunConfirmation(place, record, tuple(book.of(asked)), len(todo), tuple(files))
 
 
-def _empty(here: Pipeline, simulator: SimulatorChoice, settings: Settings, place: Path) -> Record:
+def _empty(
+    here: Pipeline,
+    there: Pipeline,
+    simulator: SimulatorChoice,
+    settings: Settings,
+    place: Path,
+) -> Record:
     """Return the record of a run of which nothing is confirmed yet."""
     objective = here.objective
+    version = getattr(there.simulator, "version", "")
     return Record(
         simulator=simulator.name,
-        label=simulator.name,
+        label=f"{simulator.name} {version}".strip(),
         settings=dict(simulator.settings),
         reference=settings.simulator,
         run=str(place),

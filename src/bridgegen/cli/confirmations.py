@@ -14,6 +14,7 @@ def confirm(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
     simulator: Annotated[str, typer.Option(help="The other one: see 'bridgegen list simulators'.")],
     simulator_set: options.SimulatorSettings = None,
+    esmini_lib: options.EsminiLibrary = None,
     rows: Annotated[
         int | None,
         typer.Option(
@@ -37,7 +38,7 @@ def confirm(
     from bridgegen.verdict.of_confirmation import ConfirmationGate
 
     gate = ConfirmationGate.read(fail_if or (), junit)
-    choice = options.read_simulator(simulator, simulator_set)
+    choice = options.read_simulator(simulator, simulator_set, esmini_lib=esmini_lib)
     assert choice is not None
     with ConfirmationScreen() as screen:
         found = confirm_run(
