@@ -131,7 +131,23 @@ def test_export_prints_what_it_wrote(cli, finished, flavour):
     assert before["v_d"] == pytest.approx(after["v_d"], abs=1e-6)
 
 
+def test_export_for_scenario_runner_names_its_controller(cli, finished, tmp_path):
+    words = ("export", finished.folder, "--flavour", "carla", "--out", tmp_path)
+    code, out, _ = cli(*words, "--scenario", "0001")
+    assert code == 0
+    names = [Path(line).name for line in out.splitlines()]
+    assert names == ["0001.xosc", "0001.xodr", "bridgegen_control.py"]
+    code, out, _ = cli(*words, "--scenario", "0001", "--town", "Town05")
+    assert code == 0
+    assert [Path(line).name for line in out.splitlines()] == ["0001.xosc", "bridgegen_control.py"]
+    assert '<LogicFile filepath="Town05"/>' in (tmp_path / "0001.xosc").read_text()
+
+
 def test_export_refuses(cli, finished, tmp_path):
+    refused(
+        cli("export", finished.folder, "--flavour", "1.2", "--town", "Town05"),
+        "for the flavour 'carla' only",
+    )
     refused(cli("export", finished.folder, "--flavour", "record"), "did you mean 'recorded'")
     refused(cli("export", tmp_path / "no", "--flavour", "1.3"), "there is no such folder")
     refused(

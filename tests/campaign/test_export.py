@@ -19,7 +19,13 @@ from bridgegen.openx.openscenario.element import references, walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.pipeline import Pipeline
 
-SCHEMAS = {"1.2": "1.2.0", "1.3": "1.3.0", "resolved": "1.2.0", "recorded": "1.2.0"}
+SCHEMAS = {
+    "1.2": "1.2.0",
+    "1.3": "1.3.0",
+    "resolved": "1.2.0",
+    "recorded": "1.2.0",
+    "carla": "1.0.0",
+}
 
 
 @pytest.fixture(scope="module")
@@ -293,7 +299,9 @@ z="1"/><Dimensions width="1" length="1" height="2"/></BoundingBox></Pedestrian><
 </Condition></ConditionGroup></StopTrigger></Storyboard></OpenSCENARIO>"""
     source = tmp_path / "plain.xosc"
     source.write_text(text)
-    for flavour in FLAVOURS:
+    with pytest.raises(UnsupportedError, match="the ego ego must be a vehicle"):
+        export(source, "carla")
+    for flavour in FLAVOURS.keys() - {"carla"}:
         (only,) = export(source, flavour, out=tmp_path / flavour)
         (there,) = (one for one in walk(read(only)) if isinstance(one, osc.TeleportAction))
         assert (there.position.position.x, there.position.position.y) == (1.0, 2.0)

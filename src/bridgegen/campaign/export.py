@@ -1,12 +1,15 @@
 """Handed-over scenarios in other flavours, each with its map: what other tools ask for."""
 
 import os
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib.resources import files as resources
 from pathlib import Path
 
 from bridgegen.campaign.handover import FOLDER
+from bridgegen.campaign.settings import Settings
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import FileFormatError, InputError, StorageError, UnknownNameError
 from bridgegen.openx.logic_file import logic_file, roads_of
@@ -17,6 +20,7 @@ from bridgegen.openx.openscenario.parameters import numbers
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.recorded import Recording, recorded
 from bridgegen.openx.openscenario.resolve import resolved
+from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_scenario_runner
 from bridgegen.openx.openscenario.versions import VERSIONS, to_version
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.xml import read_bytes
@@ -29,7 +33,12 @@ Flavour = Callable[[osc.OpenScenario, Path], osc.OpenScenario]
 
 
 def export(
-    source: Path, flavour: str, *, scenarios: Sequence[str] = (), out: Path | None = None
+    source: Path,
+    flavour: str,
+    *,
+    scenarios: Sequence[str] = (),
+    out: Path | None = None,
+    town: str | None = None,
 ) -> list[Path]:
     """Write scenarios in another flavour, each beside a copy of its map.
 
@@ -41,24 +50,43 @@ def export(
         flavour: one of `FLAVOURS`.
         scenarios: names of a run's scenarios ("0001"); all by default.
         out: the folder to write to; ``export/FLAVOUR`` in the run's or the file's by default.
+        town: for the flavour "carla", CARLA's own map to run on, which is then named instead of
+            a file; that of a run on a map called ``TownNN.xodr`` by default.
 
     Returns:
-        The files written, an ``.xosc`` and its ``.xodr`` each.
+        The files written: an ``.xosc`` and its ``.xodr`` each, and what the flavour needs besides.
 
     Raises:
         UnknownNameError: no such flavour, or no such scenario in the run.
         InputError: a run that kept no scenario; scenarios chosen of a file; a scenario that cannot
-            be recorded because its simulation fails.
+            be recorded because its simulation fails; a town that is not asked for.
         FileFormatError: a scenario or its map is missing, malformed or inconsistent.
         UnsupportedError: what the reader, the version or the simulator cannot do, by name and line.
         StorageError: not a run, or the files cannot be written.
     """
     if flavour not in FLAVOURS:
         raise UnknownNameError("flavour", flavour, FLAVOURS)
+    if town is not None and flavour != CARLA:
+        raise InputError(f"a town is for the flavour '{CARLA}' only, got '{town}' for '{flavour}'")
+    if town is not None and not _LEVEL.fullmatch(town):
+        raise InputError(f"a town must be the name of one of CARLA's maps, got '{town}'")
     paths = _chosen(source, scenarios)
+    if flavour == CARLA and town is None and source.suffix.lower() != ".xosc":
+        town = _town_of(source)
     base = source.parent if source.suffix.lower() == ".xosc" else source
     folder = out or base / EXPORT / flavour
-    return [file for path in paths for file in _export(path, FLAVOURS[flavour], folder)]
+    found = [file for path in paths for file in _export(path, FLAVOURS[flavour], folder, town)]
+    beside = {folder / name: data() for name, data in _BESIDE.get(flavour, {}).items()}
+    _write(beside, folder, ())
+    return [*found, *beside]
+
+
+def _town_of(run: Path) -> str | None:
+    """Return the town that a run was made on; None if it was made on another map."""
+    with Store.open(run) as store:
+        made_on = Settings.from_dict(store.settings, run).map
+    stem = Path(made_on).stem if made_on else ""
+    return stem if _TOWN.fullmatch(stem) else None
 
 
 def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
@@ -80,28 +108,37 @@ def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
     return [path for name, path in kept.items() if not scenarios or name in scenarios]
 
 
-def _export(path: Path, flavour: Flavour, folder: Path) -> list[Path]:
+def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> list[Path]:
     scenario = read(path)
     roads = roads_of(scenario, path)
     if problems := validate.problems(scenario, roads):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     made, maps = flavour(scenario, path), []
-    if scenario.road_network.logic_file is not None:
+    if scenario.road_network.logic_file is not None and town is None:
         maps = [path.parent / logic_file(scenario, path)]
     made = _moved(made, path, [one.name for one in maps], folder)
+    if town is not None:
+        made = replace(made, road_network=osc.RoadNetwork(osc.File(town)))
+    if flavour is _carla and made.road_network.logic_file is None:
+        raise InputError(f"{path}: a map, or a town, must be named for ScenarioRunner")
     files = {folder / path.name: to_xml(made)} | {
         folder / one.name: read_bytes(one) for one in maps
     }
+    _write(files, folder, (path, *maps))
+    return list(files)
+
+
+def _write(files: Mapping[Path, bytes], folder: Path, sources: Sequence[Path]) -> None:
+    """Write files, but over none of the sources."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for target in files:
-            if target.exists() and any(target.samefile(one) for one in (path, *maps)):
+            if target.exists() and any(target.samefile(one) for one in sources):
                 raise StorageError(f"{target}: is what is exported, and is not overwritten")
         for target, data in files.items():
             target.write_bytes(data)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
-    return list(files)
 
 
 def _moved(
@@ -147,27 +184,58 @@ def _keyed(scenario: osc.OpenScenario) -> osc.OpenScenario:
 
 def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
     """Return a scenario as its own ego drives it in the embedded simulator."""
+    return recorded(_resolved(scenario, path), _recording(path))
+
+
+def _recording(path: Path) -> Recording:
+    """Return what the embedded simulator records of a file until it stops."""
     result = simulate_file(path)
     if result.status != "ok":
         raise InputError(f"{path}: its simulation must succeed to be recorded: {result.status}")
     rollout = result.rollout
-    x, y, h, v = (
-        array[0, :, : rollout.n_steps[0]] for array in (rollout.x, rollout.y, rollout.h, rollout.v)
+    n = rollout.n_steps[0]
+    x, y, h, v = (array[0, :, :n] for array in (rollout.x, rollout.y, rollout.h, rollout.v))
+    return Recording(
+        names=rollout.names,
+        time_step=rollout.time_step,
+        x=x,
+        y=y,
+        h=h,
+        v=v,
+        began=rollout.began[0].tolist(),
+        present=rollout.present[0, :, :n] if rollout.present.size else None,
+        light_names=rollout.light_names,
+        lights=rollout.lights[0, :, :n],
     )
-    began = rollout.began[0].tolist()
-    present = rollout.present[0, :, : rollout.n_steps[0]] if rollout.present.size else None
-    recording = Recording(rollout.names, rollout.time_step, x, y, h, v, began, present)
-    return recorded(_resolved(scenario, path), recording)
 
 
 def _in_version(version: str, scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
     return to_version(scenario, version, str(path))
 
 
+def _carla(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    """Return a scenario for CARLA's ScenarioRunner, which all but its ego go through again."""
+    plain = _resolved(scenario, path)
+    name = f"{plain.file_header.description}-{path.stem}"
+    return for_scenario_runner(plain, _recording(path), roads_of(scenario, path), name)
+
+
+def _control() -> bytes:
+    package = "bridgegen.openx.openscenario.scenario_runner"
+    return (resources(package) / CONTROL).read_bytes()
+
+
+CARLA = "carla"
+_BESIDE: Mapping[str, Mapping[str, Callable[[], bytes]]] = {CARLA: {CONTROL: _control}}
+"""What a flavour needs beside its files."""
+_LEVEL = re.compile(r"\w+")
+_TOWN = re.compile(r"Town\d\d(HD)?(_Opt)?")
+
 FLAVOURS: dict[str, Flavour] = {
     **{version: partial(_in_version, version) for version in VERSIONS},
     "resolved": _resolved,
     "recorded": _recorded,
+    CARLA: _carla,
 }
-"""What can be written: a version of the standard with parameters; 1.2 without; or the motion as
-the embedded simulator recorded it, in 1.2."""
+"""What can be written: a version of the standard with parameters; 1.2 without; the motion as the
+embedded simulator recorded it, in 1.2; or 1.0 for CARLA's ScenarioRunner."""

@@ -19,7 +19,8 @@ def export(
     flavour: Annotated[
         str,
         typer.Option(
-            help="1.2 or 1.3: with parameters; resolved: without; recorded: moves by the clock."
+            help="1.2 or 1.3: with parameters; resolved: without; recorded: moves by the clock; "
+            "carla: 1.0 for ScenarioRunner, all but the ego by the clock."
         ),
     ],
     scenario: Annotated[
@@ -29,11 +30,18 @@ def export(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the files; SOURCE/export/FLAVOUR by default.")
     ] = None,
+    town: Annotated[
+        str | None,
+        typer.Option(
+            help="For carla: run on CARLA's own map of this name, not on the file's; by default "
+            "where the run was made on TownNN.xodr."
+        ),
+    ] = None,
 ) -> None:
     """Write handed-over scenarios as other tools want them, each with its map."""
     from bridgegen.campaign.export import export as export_scenarios
 
-    for path in export_scenarios(source, flavour, scenarios=scenario or (), out=out):
+    for path in export_scenarios(source, flavour, scenarios=scenario or (), out=out, town=town):
         print(path)
 
 

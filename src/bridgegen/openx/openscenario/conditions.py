@@ -7,8 +7,11 @@ from bridgegen.openx.openscenario.element import AtLeast, Element, Range
 from bridgegen.openx.openscenario.entities import TriggeringEntities
 from bridgegen.openx.openscenario.entity_conditions import EntityCondition
 from bridgegen.openx.openscenario.enumerations import ConditionEdge
-from bridgegen.openx.openscenario.value_conditions import ByValueCondition
+from bridgegen.openx.openscenario.value_conditions import ByValueCondition, ParameterCondition
 from bridgegen.openx.openscenario.values import Double, ParameterRef, String
+
+CRITERIA = "criteria_"
+"""What the names of ScenarioRunner's criteria begin with."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,16 @@ class Condition(Element):
     delay: Annotated[Double, Range(0.0)]
     condition_edge: ConditionEdge | ParameterRef
     condition: ByEntityCondition | ByValueCondition
+
+    @property
+    def is_criterion(self) -> bool:
+        """Whether it is one of ScenarioRunner's: what a run is judged by, no reason to stop."""
+        return (
+            isinstance(self.name, str)
+            and self.name.startswith(CRITERIA)
+            and isinstance(self.condition, ByValueCondition)
+            and isinstance(self.condition.condition, ParameterCondition)
+        )
 
 
 @dataclass(frozen=True)

@@ -277,6 +277,12 @@ def children_of(element: Element) -> Iterator[tuple[str, Element]]:
             yield child.tags[type(one)], one
 
 
+def is_wrapper(element: Element, child: Element) -> bool:
+    """Return whether what a child of an element holds may stand there without the child."""
+    wrappers = (one.wrapper for one in declaration(type(element)).children)
+    return any(one is not None and isinstance(child, one) for one in wrappers)
+
+
 def walk(element: Element) -> Iterator[Element]:
     """Yield an element and all below it, parents first."""
     yield element

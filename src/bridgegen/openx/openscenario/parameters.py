@@ -14,6 +14,7 @@ from typing import Any
 from bridgegen.errors import FileFormatError
 from bridgegen.odd.parameters import slack
 from bridgegen.openx.openscenario import expression_types
+from bridgegen.openx.openscenario.conditions import Condition
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
 from bridgegen.openx.openscenario.element import (
     Attribute,
@@ -92,8 +93,16 @@ def problems(scenario: OpenScenario) -> list[str]:
         Meaning.VARIABLE: _names(scenario.variable_declarations, "variables"),
         Meaning.MONITOR: _names(scenario.monitor_declarations, "monitors"),
     }
+    judged = {
+        id(below)
+        for one in walk(scenario)
+        if isinstance(one, Condition) and one.is_criterion
+        for below in walk(one)
+    }
     for element in walk(scenario):
         for attribute, value in values_of(element):
+            if id(element) in judged and attribute.means is Meaning.PARAMETER:
+                continue  # no parameter, but an argument of ScenarioRunner's criterion
             if attribute.means in known and value not in known[attribute.means]:
                 what = f"must name a declared {attribute.means.name.lower()}, got '{value}'"
                 tag = type(element).__name__

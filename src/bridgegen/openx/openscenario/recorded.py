@@ -8,9 +8,10 @@ a smallest distance that moves by a rounding can move a first contact by a step.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.openx.openscenario import model as osc
@@ -37,6 +38,8 @@ class Recording:
         v: ``(E, K)`` [m/s], ≥ 0.
         began: per event, in the order of the file, the instant at which it began; -1 if never.
         present: ``(E, K)`` bool, who is there; None where everybody always is.
+        light_names: ids of the S traffic lights that change.
+        lights: ``(S, K)`` int8, their states, as `bridgegen.simulation.rollout.Rollout` has them.
     """
 
     names: Sequence[str]
@@ -47,6 +50,8 @@ class Recording:
     v: Float
     began: Sequence[int]
     present: Bool | None = None
+    light_names: Sequence[str] = ()
+    lights: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0), np.int8))
 
     def stays(self, e: int) -> list[tuple[int, int]]:
         """Return the first and the last instant of each time in which an entity is there."""

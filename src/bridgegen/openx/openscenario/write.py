@@ -10,6 +10,7 @@ from bridgegen.openx.openscenario.element import (
     Element,
     children_of,
     declaration,
+    is_wrapper,
     values_of,
 )
 from bridgegen.openx.openscenario.storyboard import OpenScenario
@@ -19,14 +20,15 @@ from bridgegen.openx.openscenario.values import ParameterRef, format_value
 def to_xml(scenario: OpenScenario) -> bytes:
     """Return the file: UTF-8, indented, the same bytes for the same model.
 
-    Numbers are written so that reading gives the same double back.
+    Numbers are written so that reading gives the same double back. A file of version 1.0 has what
+    later versions wrap (a trajectory, in a ``TrajectoryRef``) bare.
 
     Raises:
         TypeError: a value of another type than its attribute's.
         ValueError: NaN, a text that XML or the standard cannot hold, or too few children.
     """
     root = etree.Element("OpenSCENARIO")
-    _fill(root, "OpenSCENARIO", scenario)
+    _fill(root, "OpenSCENARIO", scenario, bare=scenario.file_header.rev_minor == 0)
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
 
@@ -41,7 +43,7 @@ def _text(attribute: Attribute, value: Any) -> str:
     return text
 
 
-def _fill(node: etree._Element, tag: str, element: Element) -> None:
+def _fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> None:
     declared = declaration(type(element))
     try:
         for attribute, value in values_of(element):
@@ -55,4 +57,6 @@ def _fill(node: etree._Element, tag: str, element: Element) -> None:
             names = " or ".join(child.options)
             raise ValueError(f"{tag} must have at least {child.at_least} {names}")
     for name, below in children_of(element):
-        _fill(etree.SubElement(node, name), name, below)
+        wrapped = bare and is_wrapper(element, below)
+        for each, one in children_of(below) if wrapped else ((name, below),):
+            _fill(etree.SubElement(node, each), each, one, bare=bare)

@@ -92,7 +92,7 @@ class Triggers:
             delay = max(math.ceil(seconds / self._time_step - SAME_STEP), 0)
         kind, quantity = condition.condition, codes.ANY
         if isinstance(kind, osc.ByValueCondition):
-            probes = self.looks.by_value(kind.condition)
+            probes = [] if condition.is_criterion else self.looks.by_value(kind.condition)
             if isinstance(kind.condition, osc.SimulationTimeCondition):
                 self._note_end(kind.condition, delay)
         else:

@@ -1,0 +1,1 @@
+"""OpenSCENARIO 1.0 as CARLA's ScenarioRunner runs it."""

@@ -1,0 +1,200 @@
+"""A recorded scenario for CARLA's ScenarioRunner: OpenSCENARIO 1.0, with its idioms.
+
+The ego starts where and as fast as it did, and is left to whoever drives ``hero``. All others are
+where they were when, by a controller of ours that lies beside the file (`CONTROL`): of
+ScenarioRunner's own, that for vehicles drives along lanes' centres, and that for pedestrians has no
+clock.
+
+Source: ScenarioRunner 0.9.15 and 0.9.16; what each part relies on is said where it is.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from bridgegen.errors import UnsupportedError
+from bridgegen.openx.opendrive.lanes import lane_pose
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import walk
+from bridgegen.openx.openscenario.recorded import Recording
+from bridgegen.openx.openscenario.scenario_runner import story
+from bridgegen.openx.openscenario.scenario_runner.blueprints import blueprint
+from bridgegen.openx.openscenario.scenario_runner.environment import (
+    CLEAR,
+    carla_fields,
+    environment,
+)
+from bridgegen.openx.openscenario.scenario_runner.motion import Body, Course, centred, course
+
+CONTROL = "bridgegen_control.py"
+"""The controller's module, beside the file; in this package, as ScenarioRunner loads it."""
+
+HERO = story.HERO
+
+_EGO = osc.Property("type", "ego_vehicle")
+
+
+def for_scenario_runner(
+    scenario: osc.OpenScenario, recording: Recording, roads: OpenDrive, name: str
+) -> osc.OpenScenario:
+    """Return a scenario that ScenarioRunner runs as it was recorded, whoever drives the ego.
+
+    Args:
+        scenario: without parameters (`resolve.resolved`), of version 1.2.
+        recording: its own; entity 0 is the ego.
+        roads: its map.
+        name: of the scenario: ScenarioRunner's results are called by it.
+
+    Raises:
+        UnsupportedError: what ScenarioRunner or CARLA cannot do, by name, all of it at once.
+    """
+    by_name = {str(one.name): one.entity_object for one in scenario.entities.scenario_objects}
+    bodies = [by_name[one] for one in recording.names]
+    if wrong := list(_impossible(recording, bodies)):
+        raise UnsupportedError(*wrong)
+    names = (HERO, *recording.names[1:])
+    courses = {
+        names[e]: course(recording, e, body)
+        for e, body in enumerate(bodies)
+        if not isinstance(body, osc.ExternalObjectReference)
+    }
+    weather = story.changes(scenario, recording, _weather(scenario))
+    moved = {
+        one: courses[one]
+        for one, body in zip(names, bodies, strict=True)
+        if one != HERO and (courses[one].moves or not isinstance(body, osc.MiscObject))
+    }
+    controllers = {one: _controller(one, {"duration": c.duration}) for one, c in moved.items()}
+    controllers[HERO] = _controller(
+        HERO,
+        {
+            **({"traffic_lights": "stand"} if recording.light_names else {}),
+            **{f"weather.{field}": x for field, x in carla_fields(weather[0][1]).items()},
+        },
+    )
+    privates = tuple(
+        osc.Private(one, tuple(_start(one, float(recording.v[e, 0]), courses, controllers)))
+        for e, one in enumerate(names)
+    )
+    end = story.end(recording, _arrival(scenario, recording.names[0], bodies[0], roads))
+    act = story.act(moved, recording, weather, roads, end)
+    start = osc.GlobalAction(osc.EnvironmentAction(weather[0][1]))
+    header = scenario.file_header
+    return osc.OpenScenario(
+        osc.FileHeader(1, 0, header.date, _file_name(name), header.author),
+        osc.RoadNetwork(scenario.road_network.logic_file),
+        osc.Entities(tuple(map(_entity, names, bodies))),
+        osc.Storyboard(
+            osc.Init(osc.InitActions((start,), privates=privates)),
+            (osc.Story("story", (act,)),),
+            osc.Trigger((story.criteria(roads), end.condition_groups[0])),
+        ),
+    )
+
+
+def _impossible(recording: Recording, bodies: list[Any]) -> Iterator[str]:
+    """Yield why the scenario cannot be handed to ScenarioRunner."""
+    last = recording.x.shape[1] - 1
+    for e, (name, body) in enumerate(zip(recording.names, bodies, strict=True)):
+        if e and name == HERO:
+            yield f"the entity {name} must have another name: ScenarioRunner's ego has this one"
+        if recording.stays(e) != [(0, last)]:
+            yield (
+                f"the entity {name} must be there from start to end, and it comes or goes: "
+                "ScenarioRunner has no controller for who is added later"
+            )
+        if isinstance(body, osc.ExternalObjectReference):
+            yield f"the entity {name} must have a body in the file, got a reference to {body.name}"
+        elif e == 0 and not isinstance(body, osc.Vehicle):
+            yield f"the ego {name} must be a vehicle for ScenarioRunner's hero"
+        elif isinstance(body, osc.Vehicle) and body.trailer is not None:
+            yield f"the entity {name} must have no trailer: CARLA has none (line {body.line})"
+        elif blueprint(body) is None:
+            yield f"the entity {name} must be of a kind that CARLA has, got {_kind(body)}"
+
+
+def _kind(body: Body) -> str:
+    if isinstance(body, osc.Vehicle):
+        return f"vehicleCategory {body.vehicle_category}"
+    if isinstance(body, osc.Pedestrian):
+        return f"pedestrianCategory {body.pedestrian_category}"
+    return f"miscObjectCategory {body.misc_object_category}"
+
+
+def _file_name(name: str) -> str:
+    """Return a name that results may have; one that began with CARLA: would turn the map over."""
+    return re.sub(r"[^\w.-]+", "-", name).strip("-") or "scenario"
+
+
+def _entity(name: str, body: Any) -> osc.ScenarioObject:
+    made = centred(body, blueprint(body) or "")
+    if name == HERO:
+        made = replace(made, properties=osc.Properties((_EGO,)))
+    return osc.ScenarioObject(name, made)
+
+
+def _weather(scenario: osc.OpenScenario) -> osc.Environment:
+    """Return the environment at the start."""
+    now = CLEAR
+    for one in scenario.storyboard.init.actions.global_actions:
+        if isinstance(one.action, osc.EnvironmentAction):
+            now = environment(one.action.environment, now)
+    return now
+
+
+def _start(
+    name: str,
+    speed: float,
+    courses: Mapping[str, Course],
+    controllers: Mapping[str, osc.ControllerAction],
+) -> Iterator[osc.PrivateAction]:
+    """Yield where somebody starts, how fast, and who moves them."""
+    yield osc.PrivateAction(osc.TeleportAction(courses[name].position(0)))
+    if name not in controllers:
+        return
+    at_once = osc.TransitionDynamics(osc.DynamicsShape.STEP, osc.DynamicsDimension.TIME, 0.0)
+    target = osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(speed))
+    yield osc.PrivateAction(osc.LongitudinalAction(osc.SpeedAction(at_once, target)))
+    yield osc.PrivateAction(controllers[name])
+
+
+def _controller(name: str, properties: Mapping[str, str | float]) -> osc.ControllerAction:
+    said = {"module": CONTROL, **properties}
+    held = osc.Properties(tuple(osc.Property(one, str(value)) for one, value in said.items()))
+    return osc.ControllerAction(
+        osc.AssignControllerAction(osc.Controller(f"{name}_control", held)),
+        osc.OverrideControllerValueAction(  # 1.0 must have it, ScenarioRunner takes no active one
+            osc.OverrideThrottleAction(False, 0.0),
+            osc.OverrideBrakeAction(False, value=0.0),
+            osc.OverrideClutchAction(False, 0.0),
+            osc.OverrideBrakeAction(False, value=0.0),
+            osc.OverrideSteeringWheelAction(False, 0.0),
+            osc.OverrideGearAction(False, number=0.0),
+        ),
+    )
+
+
+def _arrival(
+    scenario: osc.OpenScenario, ego: str, body: Any, roads: OpenDrive
+) -> osc.ReachPositionCondition | None:
+    """Return where the scenario ends when the ego gets there; None if it does not say so."""
+    stop = scenario.storyboard.stop_trigger
+    for group in stop.condition_groups if stop else ():
+        reached = [one for one in walk(group) if isinstance(one, osc.ReachPositionCondition)]
+        whose = {str(one.entity_ref) for one in walk(group) if isinstance(one, osc.EntityRef)}
+        if len(group.conditions) != 1 or not reached or whose != {ego}:
+            continue
+        place: Any = reached[0].position.position
+        if isinstance(place, osc.LanePosition) and not place.offset:
+            where: Any = place
+            pose = lane_pose(roads.road(str(place.road_id)), int(str(place.lane_id)), where.s)
+            place = osc.WorldPosition(pose.x, pose.y)
+        if isinstance(place, osc.WorldPosition):
+            # so much farther off may the middle of the box be than the reference point
+            aside = abs(body.bounding_box.center.x)
+            tolerance: Any = reached[0].tolerance
+            flat = osc.WorldPosition(place.x, place.y)
+            return osc.ReachPositionCondition(tolerance + aside, osc.Position(flat))
+    return None

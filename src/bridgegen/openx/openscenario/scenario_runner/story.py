@@ -1,0 +1,200 @@
+"""What happens when, and what the ego is judged by, in the parts that ScenarioRunner knows.
+
+What begins at time 0 begins in the first tick. What ScenarioRunner stops at is an act's end; of the
+storyboard's own stop trigger it reads the criteria.
+
+Source: ScenarioRunner 0.9.16, srunner/scenarios/open_scenario.py and
+srunner/tools/openscenario_parser.py; atomic_criteria.py for what the criteria take.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from bridgegen.errors import UnsupportedError
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.outline_furniture import Light, lights
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import walk
+from bridgegen.openx.openscenario.recorded import Recording, recorded
+from bridgegen.openx.openscenario.scenario_runner.environment import environment
+from bridgegen.openx.openscenario.scenario_runner.motion import Course
+
+HERO = "hero"
+"""The ego's name, which CARLA's agents look for."""
+
+STATES = ("off", "red", "red", "yellow", "green")
+"""What a light's state is to CARLA, which has no red with yellow: by `Rollout.lights`' number."""
+
+LIGHT_REACH = 2.0
+"""A light is the first that stands nearer than this to its ``pos=x,y`` [m]."""
+
+_STOP_SIGN = "206"  # VzKat; CARLA makes a traffic.stop of it
+
+
+def act(
+    courses: Mapping[str, Course],
+    recording: Recording,
+    changes: Sequence[tuple[float, osc.Environment]],
+    roads: OpenDrive,
+    stop: osc.Trigger,
+) -> osc.Act:
+    """Return the one act: everybody's course, the lights and the weather.
+
+    Args:
+        courses: of those who have one, by name; not the ego's.
+        recording: for its lights.
+        changes: of the environment, each with its time [s]; the first is the start's.
+        roads: the map, for where its lights are.
+        stop: when it ends.
+
+    Raises:
+        UnsupportedError: a light that ScenarioRunner cannot find or set.
+    """
+    start = _at(0.0, recording.time_step, "start")
+    groups = [
+        _group(name, name, [_event(f"{name}_moves", start, [_follow(name, one)])])
+        for name, one in courses.items()
+    ]
+    if events := list(_light_events(recording, roads)):
+        groups.append(_group("lights", HERO, events))
+    later = list(changes[1:])
+    if not courses:  # nobody keeps the act alive to its end: the weather, stated again, does
+        later.append((_duration(recording), changes[-1][1]))
+    if events := [
+        _event(
+            f"weather_{i}",
+            _at(time, recording.time_step, f"weather_{i}_at"),
+            [osc.GlobalAction(osc.EnvironmentAction(one))],
+        )
+        for i, (time, one) in enumerate(later, 1)
+    ]:
+        groups.append(_group("weather", HERO, events))
+    return osc.Act("act", tuple(groups), start, stop)
+
+
+def changes(
+    scenario: osc.OpenScenario, recording: Recording, start: osc.Environment
+) -> list[tuple[float, osc.Environment]]:
+    """Return the environment at the start and after each change, with their times [s]."""
+    found = [(0.0, start)]
+    for one in walk(recorded(scenario, recording).storyboard):
+        if isinstance(one, osc.Event):
+            (time,) = (c for c in walk(one) if isinstance(c, osc.SimulationTimeCondition))
+            for below in walk(one):
+                if isinstance(below, osc.EnvironmentAction):
+                    found.append((float(time.value), below.environment))  # type: ignore[arg-type]
+    found[1:] = sorted(found[1:], key=lambda change: change[0])
+    for i, (seconds, new) in enumerate(found[1:], 1):
+        found[i] = seconds, environment(new, found[i - 1][1])
+    return found
+
+
+def end(recording: Recording, arrival: osc.ReachPositionCondition | None) -> osc.Trigger:
+    """Return when it is over: after the recorded time, or when the ego arrives."""
+    over = _at(_duration(recording), recording.time_step, "duration")
+    if arrival is None:
+        return over
+    who = osc.TriggeringEntities(osc.TriggeringEntitiesRule.ANY, (osc.EntityRef(HERO),))
+    arrives = osc.ByEntityCondition(who, osc.EntityCondition(arrival))
+    condition = osc.Condition("ego_arrives", 0.0, osc.ConditionEdge.NONE, arrives)
+    return osc.Trigger((*over.condition_groups, osc.ConditionGroup((condition,))))
+
+
+def criteria(roads: OpenDrive) -> osc.ConditionGroup:
+    """Return what the ego is judged by: collisions, leaving the road; lights and stop signs."""
+    names = ["CollisionTest", "OffRoadTest"]
+    if lights(roads):
+        names.append("RunningRedLightTest")
+    if any(one.type == _STOP_SIGN for road in roads.roads for one in road.signals):
+        names.append("RunningStopTest")
+    return osc.ConditionGroup(tuple(_criterion(name) for name in names))
+
+
+def _criterion(name: str) -> osc.Condition:
+    nothing = osc.ParameterCondition("", "", osc.Rule.LESS_THAN)  # the criterion's own defaults
+    condition = osc.ByValueCondition(nothing)
+    return osc.Condition(f"{osc.CRITERIA}{name}", 0.0, osc.ConditionEdge.NONE, condition)
+
+
+def _follow(name: str, course: Course) -> osc.PrivateAction:
+    return osc.PrivateAction(osc.RoutingAction(course.trajectory(f"{name}_course")))
+
+
+def _group(name: str, actor: str, events: Sequence[osc.Event]) -> osc.ManeuverGroup:
+    actors = osc.Actors(False, (osc.EntityRef(actor),))
+    maneuver = osc.Maneuver(f"{name}_maneuver", tuple(events))
+    return osc.ManeuverGroup(f"{name}_group", 1, actors, (maneuver,))
+
+
+def _duration(recording: Recording) -> float:
+    return float((recording.x.shape[1] - 1) * recording.time_step)
+
+
+def _at(seconds: float, time_step: float, name: str) -> osc.Trigger:
+    """Return a trigger that fires in the tick of a time [s].
+
+    Version 1.0 has no ``greaterOrEqual``: it fires after half a step before. At the start that is
+    no time, but time is less than a step.
+    """
+    clock = osc.SimulationTimeCondition(seconds - 0.5 * time_step, osc.Rule.GREATER_THAN)
+    if seconds == 0.0:
+        clock = osc.SimulationTimeCondition(time_step, osc.Rule.LESS_THAN)
+    condition = osc.Condition(name, 0.0, osc.ConditionEdge.NONE, osc.ByValueCondition(clock))
+    return osc.Trigger((osc.ConditionGroup((condition,)),))
+
+
+def _event(
+    name: str, start: osc.Trigger, parts: Sequence[osc.GlobalAction | osc.PrivateAction]
+) -> osc.Event:
+    actions = tuple(osc.Action(f"{name}_{i}", part) for i, part in enumerate(parts, 1))
+    return osc.Event(name, osc.Priority.PARALLEL, actions, start, 1)
+
+
+def _light_events(recording: Recording, roads: OpenDrive) -> Iterator[osc.Event]:
+    """Yield an event for each instant at which lights change, the first for the start."""
+    known = {one.id: one for one in lights(roads)}
+    wrong = list(_misplaced(recording, known))
+    if wrong:
+        raise UnsupportedError(*wrong)
+    now: dict[str, str] = {}
+    for k in range(recording.lights.shape[1]):
+        parts = []
+        for name, state in zip(recording.light_names, recording.lights[:, k].tolist(), strict=True):
+            if now.get(name) != STATES[state]:
+                now[name] = STATES[state]
+                parts.append(_light_action(known[name], STATES[state]))
+        if parts:
+            step = recording.time_step
+            yield _event(f"lights_{k}", _at(k * step, step, f"lights_{k}_at"), parts)
+
+
+def _light_action(light: Light, state: str) -> osc.GlobalAction:
+    named = osc.TrafficSignalStateAction(carla_name(light), state)
+    return osc.GlobalAction(osc.InfrastructureAction(osc.TrafficSignalAction(named)))
+
+
+def carla_name(light: Light) -> str:
+    """Return what a light is called by: its place in CARLA's frame [m]."""
+    return f"pos={light.x:.3f},{0.0 - light.y:.3f}"
+
+
+def _misplaced(recording: Recording, known: Mapping[str, Light]) -> Iterator[str]:
+    """Yield why lights cannot be set."""
+    for s, name in enumerate(recording.light_names):
+        one: Any = known.get(name)
+        if one is None:
+            yield f"the traffic light {name} must be on the map, for it is found by its place"
+            continue
+        near = [
+            other.id
+            for other in known.values()
+            if other.id != name and math.hypot(other.x - one.x, other.y - one.y) < LIGHT_REACH
+        ]
+        if near:
+            yield (
+                f"the traffic light {name} must stand {LIGHT_REACH:g} m or more from all others, "
+                f"got {', '.join(near)} nearer: ScenarioRunner could not tell them apart"
+            )
+        if (recording.lights[s] >= len(STATES)).any():
+            yield f"the traffic light {name} takes up a state that CARLA has not"
