@@ -16,7 +16,6 @@ from bridgegen.campaign.settings import Settings
 from bridgegen.errors import FileFormatError, InputError, Interrupted
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.store import Store
 
 
@@ -49,8 +48,8 @@ def double(monkeypatch):
 
     hands = Hands()
 
-    def make(storyboard, place, driver, settings, access):
-        return Double(EmbeddedSimulator(storyboard, place, driver=driver), hands.run)
+    def make(embedded, storyboard, settings, access):
+        return Double(embedded, hands.run)
 
     kind = choice.Kind("double", "Ours, disturbed.", make, settings={"noise": "none [m]"})
     monkeypatch.setitem(choice.SIMULATORS, "double", kind)
