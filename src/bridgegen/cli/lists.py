@@ -35,11 +35,11 @@ def list_algorithms(as_json: options.Json = False) -> None:
 @listing.command("drivers")
 def list_drivers(as_json: options.Json = False) -> None:
     """The drivers that an ego can have."""
-    from bridgegen.ego import DRIVERS
+    from bridgegen.ego import DRIVERS, GUESTS
     from bridgegen.ego.drivers import join
     from bridgegen.screen.tables import print_table
 
-    rows = [(one.name, one.description, join(one.stages)) for one in DRIVERS.values()]
+    rows = [(one.name, one.description, join(one.stages)) for one in (DRIVERS | GUESTS).values()]
     print_table(("driver", "description", "can be ideal"), rows, as_json=as_json)
 
 

@@ -106,6 +106,21 @@ EsminiLibrary = Annotated[
         show_default="ESMINI_LIB of the environment",
     ),
 ]
+Host = Annotated[
+    str | None,
+    typer.Option(help="The server's machine, for --simulator carla.", show_default="localhost"),
+]
+Port = Annotated[
+    int | None, typer.Option(help="The server's port, for --simulator carla.", show_default="2000")
+]
+CarlaCommand = Annotated[
+    str | None,
+    typer.Option(help="Starts a CARLA server, and again when it has ended.", show_default="none"),
+]
+CarlaTimeout = Annotated[
+    float | None,
+    typer.Option(help="Seconds that an answer of CARLA's may take.", show_default="20"),
+]
 RoadMap = Annotated[
     Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
 ]

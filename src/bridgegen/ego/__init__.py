@@ -1,5 +1,25 @@
 """Systems under test: the drivers that an ego can have, by name."""
 
-from bridgegen.ego.drivers import DRIVERS, STAGES, STORYBOARD, Driver, get, is_spec, join, split
+from bridgegen.ego.drivers import (
+    DRIVERS,
+    GUESTS,
+    STAGES,
+    STORYBOARD,
+    Driver,
+    get,
+    is_spec,
+    join,
+    split,
+)
 
-__all__ = ["DRIVERS", "STAGES", "STORYBOARD", "Driver", "get", "is_spec", "join", "split"]
+__all__ = [
+    "DRIVERS",
+    "GUESTS",
+    "STAGES",
+    "STORYBOARD",
+    "Driver",
+    "get",
+    "is_spec",
+    "join",
+    "split",
+]

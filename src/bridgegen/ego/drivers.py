@@ -14,6 +14,8 @@ OWN = -1
 """The code of the user's own drivers, which are no branch of the compiled rollout."""
 NOBODY = -2
 """The code where the storyboard moves the ego."""
+GUEST = -3
+"""The code of drivers that live in another simulator than the embedded one."""
 
 TIME_LIMIT = 10.0
 """Seconds that one call of a user's driver may take, where the user says nothing else."""
@@ -25,11 +27,12 @@ class Driver:
 
     Attributes:
         name: as given to ``--ego`` and written to the file's Controller.
-        code: which branch of the compiled rollout it is; or ``OWN``, or ``NOBODY``.
+        code: which branch of the compiled rollout it is; or ``OWN``, ``NOBODY`` or ``GUEST``.
         description: one sentence.
         stages: those of `STAGES` that it has, and that can be made ideal.
         ideal: those that are.
         time_limit: [s] that one call of a user's own may take.
+        home: the only simulator that it drives in; empty: it drives in all.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Driver:
     stages: frozenset[str] = frozenset()
     ideal: frozenset[str] = frozenset()
     time_limit: float = TIME_LIMIT
+    home: str = ""
 
     @property
     def is_own(self) -> bool:
@@ -101,6 +105,31 @@ STORYBOARD = Driver("storyboard", NOBODY, "Nobody: the file's own actions move t
 
 DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE, UN_R157, FSM)}
 
+GUESTS = {
+    driver.name: driver
+    for driver in (
+        Driver(
+            "carla-autopilot",
+            GUEST,
+            "CARLA's own, its Traffic Manager, along the route (with --simulator carla alone).",
+            home="carla",
+        ),
+        Driver(
+            "carla-agent",
+            GUEST,
+            "An agent of your CARLA's Python package 'agents' (with --simulator carla alone).",
+            home="carla",
+        ),
+        Driver(
+            "carla-external",
+            GUEST,
+            "A client of yours that takes over the actor 'hero' (with --simulator carla alone).",
+            home="carla",
+        ),
+    )
+}
+"""Drivers that live in another simulator, by name."""
+
 
 def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -> Driver:
     """Return a driver by name, with some of its stages ideal.
@@ -126,7 +155,7 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         own = Driver(name, OWN, what, stages=sees, time_limit=time_limit or TIME_LIMIT)
         return own.idealised(ideal)
     try:
-        driver = DRIVERS[name]
+        driver = DRIVERS[name] if name in DRIVERS else GUESTS[name]
     except KeyError:
         raise UnknownNameError("ego driver", name, DRIVERS) from None
     return driver.idealised(ideal)

@@ -5,6 +5,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.simulation.carla.settings import MEANINGS as CARLA_SETTINGS
+from bridgegen.simulation.carla.settings import OPTIONS as CARLA_OPTIONS
+from bridgegen.simulation.carla.settings import Access as CarlaAccess
+from bridgegen.simulation.carla.settings import CarlaSettings
 
 if TYPE_CHECKING:  # it is part of the command line, which starts fast
     from bridgegen.ego import Driver
@@ -62,6 +66,18 @@ def _esmini(
     return EsminiSimulator(embedded, storyboard, library_of(access), steps=steps_of(settings))
 
 
+def _carla(
+    embedded: "EmbeddedSimulator",
+    storyboard: "OpenScenario",
+    settings: Mapping[str, Value],
+    access: Mapping[str, Value],
+) -> "Simulator[Any]":
+    from bridgegen.simulation.carla.simulator import CarlaSimulator
+
+    chosen, where = CarlaSettings.of(settings), CarlaAccess.of(access)
+    return CarlaSimulator(embedded, storyboard, settings=chosen, access=where)
+
+
 SIMULATORS: Mapping[str, Kind] = {
     one.name: one
     for one in (
@@ -76,6 +92,13 @@ SIMULATORS: Mapping[str, Kind] = {
             _esmini,
             settings={"steps": "how many steps of esmini's make one of the scenario's, 1 to 100"},
             access={"--esmini-lib": "esmini's library, libesminiLib.so; or set ESMINI_LIB"},
+        ),
+        Kind(
+            "carla",
+            "A CARLA server, 0.9.13 to 0.9.16: its physics, light and weather (docs/carla.md).",
+            _carla,
+            settings=CARLA_SETTINGS,
+            access=CARLA_OPTIONS,
         ),
     )
 }
@@ -141,8 +164,14 @@ class SimulatorChoice:
             storyboard: the scenario file that it was made of.
 
         Raises:
-            InputError: see ``simulator``.
+            InputError: see ``simulator``; or the ego's driver lives in another simulator.
         """
+        driver = embedded.program.driver
+        if driver.home not in ("", self.name):
+            raise InputError(
+                f"{embedded.program.place}: the driver '{driver.name}' drives in the simulator "
+                f"{driver.home} alone (--simulator {driver.home}), got {self.name}"
+            )
         return SIMULATORS[self.name].make(embedded, storyboard, self.settings, self.access)
 
 

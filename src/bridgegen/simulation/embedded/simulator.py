@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import Driver
+from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard
@@ -139,9 +140,14 @@ class EmbeddedSimulator:
         """See `Simulator`; runs without the GIL.
 
         Raises:
-            InputError: see `Simulator`; or a user's driver that cannot be made.
+            InputError: see `Simulator`; or a user's driver that cannot be made, or a driver that
+                lives in another simulator.
         """
         chosen = self.program.changed(driver=driver)
+        if chosen.driver.home:
+            raise InputError(
+                f"the driver '{chosen.driver.name}' drives in {chosen.driver.home} alone"
+            )
         if not chosen.driver.is_own:
             return self.batch(roads, rows, values, driver=driver, dry=dry).run()
         own, memory = self._own, self._own.memory

@@ -1,6 +1,6 @@
 """What a file's properties declare: the time step, the ego's driver, the key of its noise."""
 
-from bridgegen.ego import DRIVERS, STORYBOARD, Driver, is_spec, split
+from bridgegen.ego import DRIVERS, GUESTS, STORYBOARD, Driver, is_spec, split
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -49,14 +49,15 @@ def driver(controllers: Controllers, place: str) -> Driver:
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "
                     f"which is code; to run it, name it: --ego {name}"
                 )
-            if str(name) not in DRIVERS:
+            known = DRIVERS | GUESTS
+            if str(name) not in known:
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: unknown ego driver '{name}'; "
                     f"known: {', '.join(DRIVERS)} (choose one with --ego)"
                 )
             stages = split(str(properties.get(IDEAL) or "")) if properties else ()
             try:
-                return DRIVERS[str(name)].idealised(stages)
+                return known[str(name)].idealised(stages)
             except InputError as error:
                 raise InputError(
                     f"{place}, line {controller.line}: property {IDEAL}: {error}"

@@ -1,0 +1,264 @@
+"""CARLA as a simulator: our storyboard and our drivers in its world."""
+
+import threading
+import weakref
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Float, Int
+from bridgegen.ego import STORYBOARD, Driver
+from bridgegen.ego.driver_process import DriverError
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.simulation.carla.guests import GUESTS
+from bridgegen.simulation.carla.lights import Lights
+from bridgegen.simulation.carla.pedals import Car
+from bridgegen.simulation.carla.row import AtTheWheel, Ours, Row, Stopped
+from bridgegen.simulation.carla.server import ERROR, Server, ServerError
+from bridgegen.simulation.carla.settings import TIME_STEP, Access, CarlaSettings
+from bridgegen.simulation.carla.stage import Stage
+from bridgegen.simulation.carla.weather import Weather
+from bridgegen.simulation.carla.worlds import Generated, Town, check, loader
+from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+from bridgegen.simulation.rollout import FAILURES, Rollout, joined
+
+if TYPE_CHECKING:
+    import carla
+
+    from bridgegen.simulation.embedded.co_simulation import CoSimulation
+
+ROWS = 8
+"""Rows between which the server is left stepping, and the measures of which come together."""
+
+TRIES = 2
+"""How often a row is tried that the server fails."""
+
+
+@dataclass(frozen=True)
+class CarlaRoads:
+    """P road networks, ready for one storyboard.
+
+    Attributes:
+        network: for the storyboard.
+        models: them.
+        worlds: what loads each of them in CARLA.
+    """
+
+    network: Network
+    models: tuple[OpenDrive, ...]
+    worlds: tuple[Town | Generated, ...]
+
+
+class CarlaSimulator:
+    """A `Simulator` that a CARLA server runs, one row at a time.
+
+    The storyboard moves the participants, as in the embedded simulator; our driver drives the ego,
+    which CARLA's physics moves.
+
+    Args:
+        embedded: the embedded one of the same storyboard and driver.
+        storyboard: the scenario file, validated.
+        settings: how it works.
+        access: where it is.
+
+    Raises:
+        InputError: another time step than CARLA's; or no server answers.
+    """
+
+    def __init__(
+        self,
+        embedded: EmbeddedSimulator,
+        storyboard: OpenScenario,
+        *,
+        settings: CarlaSettings | None = None,
+        access: Access | None = None,
+    ) -> None:
+        self.embedded = embedded
+        if self.embedded.time_step != TIME_STEP:
+            raise InputError(
+                f"{embedded.program.place}: time_step = {TIME_STEP:g} s must hold in carla, whose "
+                f"physics needs it, got {self.embedded.time_step:g} s"
+            )
+        self._storyboard, self._settings = storyboard, settings or CarlaSettings()
+        self._server = Server(access or Access())
+        weakref.finalize(self, self._server.close)
+        self._turn = threading.Lock()
+        self._is_stopped = threading.Event()
+
+    @property
+    def driver(self) -> str:
+        """See `Simulator`."""
+        return self.embedded.driver
+
+    @property
+    def rows_at_once(self) -> int:
+        """See `Simulator`."""
+        return ROWS
+
+    @property
+    def runs_at_once(self) -> int:
+        """See `Simulator`: there is one server."""
+        return 1
+
+    @property
+    def time_step(self) -> float:
+        """See `Simulator`."""
+        return self.embedded.time_step
+
+    @property
+    def duration(self) -> float:
+        """See `Simulator`."""
+        return self.embedded.duration
+
+    @property
+    def fixed(self) -> Mapping[str, str]:
+        """See `Simulator`."""
+        return self.embedded.fixed
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """See `Simulator`."""
+        return self.embedded.parameters
+
+    def roads(
+        self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
+    ) -> CarlaRoads:
+        """See `Simulator`; nothing is loaded yet."""
+        network = self.embedded.roads(models, courses)
+        file = self._storyboard.road_network.logic_file
+        name = str(file.filepath) if file else ""
+        wanted = self._settings.map
+        worlds = tuple(loader(one, name, wanted, self._server.maps) for one in models)
+        return CarlaRoads(network, tuple(models), worlds)
+
+    def run(
+        self,
+        roads: CarlaRoads,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        *,
+        driver: Driver | None = None,
+        dry: bool = False,
+    ) -> Rollout:
+        """See `Simulator`; one row after the other.
+
+        A row that the server fails is tried once more, when the server is there again; then it has
+        failed, with status 40, 41 or 42 and what CARLA said.
+
+        Raises:
+            InputError: see `Simulator`; or the server has no such map, light or model.
+        """
+        if not len(rows):
+            return self.embedded.run(roads.network, rows, values, driver=driver, dry=dry)
+        columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
+        with self._turn:
+            parts = []
+            for i, p in enumerate(rows.tolist()):
+                row = {name: float(column[i]) for name, column in columns.items()}
+                parts.append((np.array([i]), self._row(roads, p, row, driver, dry)))
+        return joined(parts)
+
+    def stop(self) -> None:
+        """See `Simulator`."""
+        self._is_stopped.set()
+        self.embedded.stop()
+
+    def _row(
+        self,
+        roads: CarlaRoads,
+        p: int,
+        values: Mapping[str, float],
+        driver: Driver | None,
+        dry: bool,
+    ) -> Rollout:
+        for left in reversed(range(TRIES)):
+            joint = self.embedded.co_simulation(roads.network, p, values, driver=driver, dry=dry)
+            try:
+                if joint.runs:
+                    self._attempt(roads, p, values, joint, driver)
+                break
+            except DriverError as error:
+                joint.fail(FAILURES[error.kind], str(error))
+                break
+            except Stopped:
+                joint.fail(ERROR, "it was stopped")
+                break
+            except (RuntimeError, ServerError) as error:
+                problem = self._server.diagnosis(error)
+            try:
+                self._server.reconnect()
+            except ServerError as error:
+                problem, left = error, 0
+            if not left:
+                joint.fail(problem.status, str(problem))
+                break
+        return joint.rollout()
+
+    def _attempt(
+        self,
+        roads: CarlaRoads,
+        p: int,
+        values: Mapping[str, float],
+        joint: "CoSimulation",
+        driver: Driver | None,
+    ) -> None:
+        """Run one row.
+
+        Raises:
+            RuntimeError: as CARLA raises them.
+            ServerError: the server has failed.
+            DriverError: a driver of the user's own has.
+            Stopped: it was to stop.
+            InputError: the server has no such light or model, or another map.
+        """
+        server, program = self._server, self.embedded.program.changed(driver=driver)
+        world, model, way = roads.worlds[p], roads.models[p], roads.network.way(p, 0)
+        server.load(world, world.key)
+        check(server.worlds.map, way, str(getattr(world, "name", "our roads")))
+        lights = Lights(server.world, model, program.lights)
+        with ExitStack() as stack:
+            stack.enter_context(server.stepped())
+            lights.begin()
+            stage = stack.enter_context(
+                Stage(
+                    server, program, self._storyboard, ego_model=self._settings.ego_model,
+                    ego_is_moved=self._moves_ego(program.driver),
+                )
+            )  # fmt: skip
+            wheel = self._wheel(program.driver, stage, joint, way)
+            if wheel is not None:
+                stack.callback(_end, wheel)
+            Row(
+                joint, stage, Weather(self._storyboard, program, values), lights, wheel,
+                _ignore, self._is_stopped.is_set,
+            ).run(server)  # fmt: skip
+
+    def _moves_ego(self, driver: Driver) -> bool:
+        """Say whether the ego is moved as the embedded simulator moves it."""
+        return driver is STORYBOARD or (not driver.home and self._settings.ego == "kinematic")
+
+    def _wheel(
+        self, driver: Driver, stage: Stage, joint: "CoSimulation", way: Float
+    ) -> AtTheWheel | None:
+        if driver.home:
+            guest: AtTheWheel = GUESTS[driver.name](self._server, stage, joint, way, self._settings)
+            return guest
+        if self._moves_ego(driver):
+            return None
+        return Ours(joint, Car.of(stage.ego.get_physics_control()))
+
+
+def _end(wheel: AtTheWheel) -> None:
+    with suppress(RuntimeError):
+        wheel.end()
+
+
+def _ignore(k: int, snapshot: "carla.WorldSnapshot") -> None:
+    """Watch nothing."""

@@ -1,0 +1,206 @@
+"""CARLA's fourteen weather parameters, from what the storyboard says.
+
+Our own files say eleven of them as they are, in the properties of their road condition; they came
+from the ontology, with the paper's couplings. Of other files, the physical quantities are turned
+back by the inverse of what wrote them (``openx.openscenario.from_owl.weather``), and what
+OpenSCENARIO has no word for (puddles, where fog begins) follows from the same couplings. Three that
+the paper does not have, of how light scatters, are CARLA's own presets'; and there is no dust.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.ego._weather_columns import (
+    CLOUD,
+    FRICTION_SCALE,
+    RAIN,
+    SUN_AZIMUTH,
+    SUN_ELEVATION,
+    VISUAL_RANGE,
+)
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element, walk
+from bridgegen.openx.openscenario.values import Expr
+from bridgegen.simulation.embedded._codes import (
+    EVENT,
+    EVENT_NUMBER,
+    FIRST,
+    KIND,
+    LAST,
+    WEATHER_CHANGE,
+)
+from bridgegen.simulation.embedded.program import Program
+
+if TYPE_CHECKING:
+    import carla
+
+RANGES: Mapping[str, tuple[float, float]] = {
+    "cloudiness": (0.0, 100.0),
+    "precipitation": (0.0, 100.0),
+    "precipitation_deposits": (0.0, 100.0),
+    "wind_intensity": (0.0, 100.0),
+    "sun_azimuth_angle": (0.0, 360.0),
+    "sun_altitude_angle": (-90.0, 90.0),
+    "fog_density": (0.0, 100.0),
+    "fog_distance": (0.0, math.inf),
+    "fog_falloff": (0.0, math.inf),
+    "wetness": (0.0, 100.0),
+    "scattering_intensity": (0.0, 100.0),
+    "mie_scattering_scale": (0.0, 5.0),
+    "rayleigh_scattering_scale": (0.0, 2.0),
+    "dust_storm": (0.0, 100.0),
+}
+"""What each may be. CARLA's client passes on whatever it is given."""
+
+PRESET = {
+    "scattering_intensity": 1.0, "mie_scattering_scale": 0.03,
+    "rayleigh_scattering_scale": 0.0331, "dust_storm": 0.0, "wind_intensity": 10.0,
+}  # fmt: skip
+"""Of CARLA's own ClearNoon, where nobody says anything."""
+
+_CLEAR, _THICK = 1e4, 200.0  # m: visibility without fog; and how many times less at 100 %
+_DRIZZLE, _CLOUDBURST = 0.1, 500.0  # mm/h: just above 0 %; and how many times more at 100 %
+_ACTION_KIND, _WEATHER_ROW = 1, 6  # columns of ``Program.actions``
+
+
+@dataclass(frozen=True)
+class Sky:
+    """What CARLA is told at an instant.
+
+    Attributes:
+        fields: the fourteen parameters, in their ranges.
+        friction: factor on that of the dry road.
+    """
+
+    fields: Mapping[str, float]
+    friction: float
+
+    def parameters(self) -> "carla.WeatherParameters":
+        """Return it as CARLA's."""
+        import carla
+
+        return carla.WeatherParameters(**self.fields)
+
+
+class Weather:
+    """The weather of one row as its storyboard makes it.
+
+    Args:
+        storyboard: the file.
+        program: compiled from it.
+        values: the row's, by parameter.
+    """
+
+    def __init__(
+        self, storyboard: osc.OpenScenario, program: Program, values: Mapping[str, float]
+    ) -> None:
+        self._values = {**program.parameters, **values}
+        found = _environments(storyboard)
+        self._said = self._properties(found[0])
+        self._later = [self._properties(one) for one in found[1:]]
+        self._changes = _changes(program)
+
+    def at(self, k: int, physical: Float, events: Int) -> Sky:
+        """Return the weather at an instant.
+
+        Args:
+            k: the instant.
+            physical: ``(WEATHER,)`` as the embedded simulator has it, see `CoSimulation.weather`.
+            events: ``(V,)``, see `CoSimulation.events`.
+        """
+        for event, row in self._changes:
+            if events[event] == k:
+                new = self._later[row - 1]
+                self._said = {**self._said, **new} if new else {}
+        return Sky(
+            clamped({**of_quantities(physical), **self._said}), float(physical[FRICTION_SCALE])
+        )
+
+    def _properties(self, environments: list[osc.Environment]) -> dict[str, float]:
+        """Return those of the parameters that environments say as CARLA has them."""
+        said: dict[str, float] = {}
+        for environment in environments:
+            road = environment.road_condition
+            for one in road.properties.properties if road and road.properties else ():
+                name = str(one.name)
+                if name in RANGES and (value := self._number(one.value)) is not None:
+                    said[name] = value
+        return said
+
+    def _number(self, value: object) -> float | None:
+        if isinstance(value, osc.ParameterRef | Expr):
+            known = value.names <= self._values.keys()
+            return float(value.resolve(self._values)) if known else None
+        return _float(str(value))
+
+
+def of_quantities(physical: Float) -> dict[str, float]:
+    """Return the parameters that physical quantities come to.
+
+    Args:
+        physical: ``(STATED,)`` or more, see ``bridgegen.ego._weather_columns``.
+    """
+    sees, rain = float(physical[VISUAL_RANGE]), float(physical[RAIN])
+    fog = 100.0 * math.log(_CLEAR / max(sees, 1e-3)) / math.log(_THICK)
+    precipitation = 0.0
+    if rain > 0.0:
+        precipitation = 100.0 * math.log(rain / _DRIZZLE) / math.log(_CLOUDBURST)
+    fog, precipitation = (min(max(one, 0.0), 100.0) for one in (fog, precipitation))
+    deposits = max(min(5 / 3 * precipitation, 50 + 4 / 7 * (precipitation - 30)), 0.0)
+    return {
+        **PRESET,
+        "cloudiness": 100.0 * float(physical[CLOUD]),
+        "precipitation": precipitation,
+        "precipitation_deposits": deposits,
+        "wetness": 100.0 * (1.0 - (1.0 - deposits / 100.0) ** 2),
+        "fog_density": fog,
+        "fog_distance": 100.0 - fog,
+        "fog_falloff": 0.05 * fog,
+        "sun_altitude_angle": math.degrees(float(physical[SUN_ELEVATION])),
+        "sun_azimuth_angle": math.degrees(float(physical[SUN_AZIMUTH])),
+    }
+
+
+def clamped(fields: Mapping[str, float]) -> dict[str, float]:
+    """Return parameters within their ranges; an azimuth goes round."""
+    result = {}
+    for name, (low, high) in RANGES.items():
+        value = fields[name]
+        if name == "sun_azimuth_angle":
+            value %= 360.0
+        result[name] = float(np.clip(value, low, high))
+    return result
+
+
+def _environments(storyboard: osc.OpenScenario) -> list[list[osc.Environment]]:
+    """Return the start's environments, then that of each event's action, in the file's order."""
+    board = storyboard.storyboard
+
+    def brought(part: Element) -> list[osc.Environment]:
+        return [one.environment for one in walk(part) if isinstance(one, osc.EnvironmentAction)]
+
+    later = [[one] for story in board.stories for one in brought(story)]
+    return [brought(board.init.actions), *later]
+
+
+def _changes(program: Program) -> list[tuple[int, int]]:
+    """Return the events that change the weather, and the row of ``weathers`` that each brings."""
+    return [
+        (int(element[EVENT_NUMBER]), int(program.actions[j, _WEATHER_ROW]))
+        for element in program.elements.tolist()
+        if element[KIND] == EVENT
+        for j in range(element[FIRST], element[LAST])
+        if program.actions[j, _ACTION_KIND] == WEATHER_CHANGE
+    ]
+
+
+def _float(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,87 @@
+"""What the command line says where there is no server, or no package."""
+
+import builtins
+import socket
+
+import pytest
+
+
+@pytest.fixture
+def nowhere():
+    """A port at which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def test_no_server(cli, nowhere, tmp_path):
+    status, _, err = cli(
+        "search", "crossroads-s1", "--simulator", "carla", "--port", nowhere,
+        "--out", tmp_path / "r",
+    )  # fmt: skip
+    assert status != 0
+    text = " ".join(err.split())
+    assert f"carla: no server answers at localhost:{nowhere}; start one, or give --host" in text
+    assert "--port; --carla-command starts it" in text
+    assert "Traceback" not in err
+
+
+def test_no_package(cli, monkeypatch, nowhere, tmp_path):
+    real = builtins.__import__
+
+    def without(name, *rest, **named):
+        if name == "carla":
+            raise ImportError("No module named 'carla'")
+        return real(name, *rest, **named)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    status, _, err = cli("search", "crossroads-s1", "--simulator", "carla", "--out", tmp_path / "r")
+    assert status != 0
+    assert "the package 'carla' must be installed" in " ".join(err.split())
+
+
+def test_its_options_are_for_it_alone(cli, tmp_path):
+    status, _, err = cli("search", "crossroads-s1", "--port", 2000, "--out", tmp_path / "r")
+    assert status != 0
+    assert "--port: name the simulator that it is for" in " ".join(err.split())
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "text"),
+    [("--port", 70000, "0 < port < 65534"), ("--carla-timeout", 0, "0 < timeout must hold")],
+)
+def test_options_out_of_range(cli, tmp_path, option, value, text):
+    status, _, err = cli(
+        "search", "crossroads-s1", "--simulator", "carla", option, value, "--out", tmp_path / "r"
+    )
+    assert status != 0
+    assert text in " ".join(err.split())
+
+
+def test_a_command_that_fails_says_so(cli, nowhere, tmp_path):
+    status, _, err = cli(
+        "search", "crossroads-s1", "--simulator", "carla", "--port", nowhere,
+        "--carla-command", "exit 7", "--out", tmp_path / "r",
+    )  # fmt: skip
+    assert status != 0
+    assert "'exit 7' (--carla-command) ended with status 7" in " ".join(err.split())
+
+
+def test_a_search_in_carla(cli, machine, tmp_path):
+    """From the command line to the report, and the settings are recorded, the server is not."""
+    import json
+    import sqlite3
+
+    status, _, err = cli(
+        "search", "crossroads-s1", "--simulator", "carla", "--port", machine.port,
+        "--simulator-set", "ego=kinematic", "--budget", 4, "--algorithm", "random", "--no-causes",
+        "--out", tmp_path / "r",
+    )  # fmt: skip
+    assert status == 0, err
+    assert (tmp_path / "r" / "report.html").exists()
+    with sqlite3.connect(tmp_path / "r" / "run.sqlite") as store:
+        dump = "\n".join(store.iterdump())
+    assert '"simulator": "carla"' in dump
+    assert json.dumps({"ego": "kinematic"}) in dump
+    assert str(machine.port) not in dump
+    store.close()
