@@ -63,10 +63,11 @@ class Batch:
             raise InputError(f"rows must name one of {roads.n_networks} road networks")
         self._program, self._roads, self._rows = program, roads, rows
         self._plan = _plan(program)
+        slots = program.fill(values, n)
         key = np.full(n, program.noise_key or 0, dtype=np.uint64)
         if program.noise_key is None:
             key = noise_key({**program.parameters, **_known(program, values)}, n)
-        self.state = _state(program, roads, rows, program.fill(values, n), key, own_memory)
+        self.state = _state(program, roads, rows, slots, key, own_memory)
         self.record = _record(program, n)
         self._messages: dict[int, str] = {}
 

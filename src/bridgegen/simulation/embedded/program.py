@@ -351,7 +351,7 @@ class Program:
             n_rows: N.
 
         Raises:
-            InputError: an expression that has no finite value, or a value for a parameter that
+            InputError: a value or an expression that is not finite, or a value for a parameter that
                 rows may not vary.
         """
         columns: dict[str, Float] = {}
@@ -363,6 +363,8 @@ class Program:
                 )
         for name, declared in self.parameters.items():
             given = np.asarray(values.get(name, declared), dtype=np.float64)
+            if not np.isfinite(given).all():
+                raise InputError(f"{self.place}: parameter '{name}' must be finite")
             columns[name] = np.ascontiguousarray(np.broadcast_to(given, n_rows))
         filled = np.empty((n_rows, len(self.slots)))
         for i, slot in enumerate(self.slots):

@@ -22,8 +22,14 @@ if TYPE_CHECKING:  # the process greets as soon as it has the library
     from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
     from bridgegen.simulation.rollout import Rollout
 
+PROGRAM = "bridgegen.simulation.esmini.seat"
+"""What the process runs: this module."""
+
 START_SECONDS = 60.0
 """The library may take so long to be loaded."""
+
+WARM_SECONDS = 900.0
+"""Our part may take so long to be compiled, where that has not been done before."""
 
 LOG, SCENARIO = "esmini.log", "row.xosc"
 """Files in a seat's folder: of the row that runs."""
@@ -79,11 +85,10 @@ class Seat:
 
         self._job, self._seconds = job, seconds
         self._folder = Folder()
-        self._process = IsolatedProcess(
-            "bridgegen.simulation.esmini.seat", [str(library), str(self._folder.path)]
-        )
+        self._process = IsolatedProcess(PROGRAM, [str(library), str(self._folder.path)])
         self._shared = SharedArrays()
         self._roads: object = None  # those that it has been sent
+        self._is_warm = False
         self.version = ""
 
     def start(self) -> None:
@@ -101,7 +106,7 @@ class Seat:
         except CallError as error:
             raise InputError(str(error)) from None
         self._layout, (self._beats,) = self._shared.put([np.zeros(1, dtype=np.int64)])
-        self._roads = None
+        self._roads, self._is_warm = None, False
         self._process.ask("take", self._job, self._layout, seconds=START_SECONDS)
 
     def run(self, roads: "tuple[Network, RoadFiles]", row: Row) -> "Rollout":
@@ -115,6 +120,9 @@ class Seat:
         sent = None if self._roads is roads else roads
         self._roads = None  # until it is known to have them
         try:
+            if not self._is_warm:
+                self._process.ask("warm", sent, row.network, seconds=WARM_SECONDS)
+                sent, self._is_warm = None, True
             rollout: Rollout = self._process.ask(
                 "run", sent, row, seconds=self._seconds, progress=lambda: int(self._beats[0])
             )
@@ -140,17 +148,25 @@ REFUSED = "refused"
 def answering(path: str, folder: str) -> tuple[str, Answer]:
     """Load the library; return its version, and the answers."""
     library = Library(Path(path))
-    return library.version, _Answers(library, Path(folder)).answer
+    return library.version, Answers(library, Path(folder)).answer
 
 
-class _Answers:
+class Answers:
+    """What the process answers.
+
+    Args:
+        library: esmini's.
+        folder: for its files.
+    """
+
     def __init__(self, library: Library, folder: Path) -> None:
         self._library, self._folder = library, folder
 
     def answer(self, what: str, *rest: Any) -> Any:
-        """Answer a request."""
+        """Answer a request: to take a job, to warm up for it, to run a row of it."""
+        answers: dict[str, Answer] = {"take": self._take, "warm": self._warm, "run": self._run}
         try:
-            return self._take(*rest) if what == "take" else self._run(*rest)
+            return answers[what](*rest)
         except InputError as error:
             raise CallError(REFUSED, str(error)) from None
 
@@ -160,29 +176,42 @@ class _Answers:
         self._job, (self._beats,) = job, seen(layout)
         self._events = job.scenario.event_paths()
 
-    def _run(self, roads: "tuple[Network, RoadFiles] | None", row: Row) -> "Rollout":
-        from bridgegen.ego.driver_process import DriverError
-        from bridgegen.simulation.embedded.co_simulation import CoSimulation
-        from bridgegen.simulation.esmini.together import EsminiError, run_together
-        from bridgegen.simulation.rollout import FAILURES, SIMULATOR_FAILURES
-
+    def _hold(self, roads: "tuple[Network, RoadFiles] | None") -> None:
         if roads is not None:
             self._network, files = roads
             self._template = cache(partial(_template, self._job.scenario, files))
+
+    def _warm(self, roads: "tuple[Network, RoadFiles] | None", network: int) -> None:
+        """Have compiled, or loaded, what a row needs of ours: that is not esmini's time."""
+        from bridgegen.ego import DRIVERS
+
+        self._hold(roads)
+        embedded = self._job.embedded
+        driver = DRIVERS["route-follower"] if embedded.program.driver.is_own else None
+        joint = embedded.co_simulation(self._network, network, {}, driver=driver)
+        for k in range(2):
+            joint.impose(k, [0], joint.states(k)[:1])
+            joint.decide(k)
+            if joint.is_through or not joint.runs:
+                return
+            joint.move(k, *joint.demand(k))
+
+    def _run(self, roads: "tuple[Network, RoadFiles] | None", row: Row) -> "Rollout":
+        from bridgegen.ego.driver_process import DriverError
+        from bridgegen.simulation.esmini.together import EsminiError, run_together
+        from bridgegen.simulation.rollout import FAILURES, SIMULATOR_FAILURES
+
+        self._hold(roads)
         job, log, scenario = self._job, self._folder / LOG, self._folder / SCENARIO
         log.unlink(missing_ok=True)
         program = job.embedded.program
         known = {name: value for name, value in row.values.items() if name in program.parameters}
         self._template(row.network).write(scenario, {**program.parameters, **known})
         said, joint = None, None
-
-        def begun(driver: "Driver | None") -> CoSimulation:
-            return job.embedded.co_simulation(
-                self._network, row.network, row.values, driver=driver, dry=row.dry
-            )
-
         try:
-            joint = begun(row.driver)
+            joint = job.embedded.co_simulation(
+                self._network, row.network, row.values, driver=row.driver, dry=row.dry
+            )
             if joint.runs:
                 run_together(
                     self._library, scenario, log, joint,

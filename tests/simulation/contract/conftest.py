@@ -1,0 +1,117 @@
+"""The simulators that the contract holds, how each is made, and how exact it is.
+
+A simulator more is one line of `CONTENDERS`.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from bridgegen import ego as egos
+from bridgegen.ego.drivers import is_spec
+from bridgegen.openx.openscenario.read import read
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
+from ..embedded.storyboards import crossroads
+
+
+def esmini() -> SimulatorChoice:
+    if not os.environ.get("ESMINI_LIB"):
+        pytest.skip("ESMINI_LIB names no library of esmini's")
+    return SimulatorChoice("esmini")
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A simulator, and how far it may be from what is worked out by hand.
+
+    Attributes:
+        name: of it.
+        choose: returns the choice; skips the test where there is none.
+        place: [m] where everything is constant.
+        per_change: [m] for each m/s by which a speed changes: half a step, where one moves by the
+            speed at a step's end and not by the mean.
+        speed: [m/s].
+        heading: [rad].
+        instants: by which an event may begin earlier or later.
+        marks: of its tests.
+    """
+
+    name: str
+    choose: Callable[[], SimulatorChoice]
+    place: float = 1e-6
+    per_change: float = 1e-9
+    speed: float = 1e-9
+    heading: float = 1e-6
+    instants: int = 0
+    marks: tuple[pytest.MarkDecorator, ...] = ()
+
+    def made(self, text, driver="route-follower"):
+        """Return the simulator of a storyboard's text."""
+        storyboard = read(text.encode(), "test.xosc")
+        limit = 5.0 if driver and is_spec(driver) else None
+        ego = egos.get(driver, time_limit=limit) if driver else None
+        embedded = EmbeddedSimulator(storyboard, "test.xosc", driver=ego)
+        return self.choose().around(embedded, storyboard)
+
+    def run(self, text, driver="route-follower", roads=None, replay=None, **values):
+        """Return the rollout of a storyboard's text on the crossroads, of sound form."""
+        simulator = self.made(text, driver)
+        n = len(next(iter(values.values()))) if values else 1
+        ready = simulator.roads([roads or crossroads()])
+        rollout = simulator.run(ready, np.zeros(n, dtype=np.int64), values, **(replay or {}))
+        is_sound(rollout, simulator, n)
+        return rollout
+
+
+CONTENDERS = (
+    Contender("embedded", lambda: EMBEDDED),
+    Contender(
+        "esmini",
+        esmini,
+        place=1e-3,
+        per_change=0.026,
+        speed=1e-4,
+        heading=1e-3,
+        instants=1,
+        marks=(pytest.mark.esmini,),
+    ),
+)
+
+
+@pytest.fixture(params=[pytest.param(one, id=one.name, marks=one.marks) for one in CONTENDERS])
+def contender(request):
+    return request.param
+
+
+def is_sound(rollout, simulator, n):
+    """Assert that a rollout is as `Rollout` says, whatever happened in it."""
+    names = simulator.embedded.program.names
+    e, t = len(names), round(simulator.duration / simulator.time_step) + 1
+    assert rollout.names == names
+    assert rollout.time_step == simulator.time_step
+    for name in ("x", "y", "h", "v", "a", "offset"):
+        array = getattr(rollout, name)
+        assert array.shape == (n, e, t), name
+        assert array.dtype == np.float64, name
+        assert np.isfinite(array).all(), name
+    assert (rollout.v >= 0.0).all()
+    assert rollout.n_steps.shape == rollout.status.shape == (n,)
+    assert rollout.n_steps.dtype == np.int64
+    assert rollout.status.dtype == np.int8
+    assert ((rollout.n_steps >= 1) & (rollout.n_steps <= t)).all()
+    assert rollout.box.shape == (e, 3)
+    assert rollout.began.shape == (n, len(rollout.event_names))
+    assert (rollout.began < rollout.n_steps[:, np.newaxis]).all()
+    assert rollout.lights.shape == (n, len(rollout.light_names), t)
+    assert rollout.lights.dtype == np.int8
+    assert set(rollout.messages) <= set(np.flatnonzero(rollout.status).tolist())
+    for i, steps in enumerate(rollout.n_steps.tolist()):
+        for name in ("x", "y", "h", "v", "offset"):
+            last = getattr(rollout, name)[i, :, steps - 1 :]
+            assert (last == last[:, :1]).all(), f"{name} after the end"
+        assert np.abs(np.diff(rollout.h[i, :, :steps], axis=1)).max(initial=0.0) < np.pi

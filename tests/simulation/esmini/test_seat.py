@@ -1,0 +1,101 @@
+"""Processes in which a stand-in of esmini runs rows: what goes wrong costs the row, and no more."""
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.ego import DRIVERS
+from bridgegen.errors import InputError
+from bridgegen.isolated import CallError
+from bridgegen.openx.openscenario.read import read
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+from bridgegen.simulation.esmini import seat
+from bridgegen.simulation.esmini.simulator import EsminiSimulator
+
+from ..embedded.storyboards import (
+    crossroads,
+    event,
+    lane,
+    near,
+    reaches,
+    scenario,
+    speed_action,
+    start,
+)
+
+LOGS, REFUSES, HANGS, DIES, NAN, HANGS_AT_ONCE = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # see the stand-in
+TEXT = scenario(
+    ("ego", "bv"),
+    start("ego", lane(3, 1, 40.0), "$v", lane(3, 1, 40.0), lane(4, -1, 90.0))
+    + start("bv", lane(2, 1, 50.0), 0.0, lane(2, 1, 50.0), lane(4, -1, 90.0)),
+    event("bv", speed_action("${$v / 2}", "linear rate 2"), near("bv", "ego", 60.0)),
+    stop=(reaches("ego", lane(4, -1, 30.0), 5.0),),
+    parameters="".join(
+        f'<ParameterDeclaration name="{name}" parameterType="double" value="{value}"/>'
+        for name, value in (("v", 8), ("fault", 0))
+    ),
+)
+
+
+def made(library, steps=1, seconds=30.0):
+    storyboard = read(TEXT.encode(), "test.xosc")
+    embedded = EmbeddedSimulator(storyboard, "test.xosc", driver=DRIVERS["route-follower"])
+    return EsminiSimulator(embedded, storyboard, library, steps=steps, seconds=seconds)
+
+
+@pytest.fixture
+def library(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.setattr(seat, "PROGRAM", "stand_in_esmini")
+    return tmp_path / "stand-in.so"
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_what_it_plays_is_what_is_recorded(library, steps):
+    """Its participants, the ego that is driven here, events and the end: as in the embedded one."""
+    simulator = made(library, steps)
+    assert simulator.version == "stand-in 3.0"
+    roads, rows = simulator.roads([crossroads()] * 2), np.array([0, 1, 0])
+    values = {"v": [8.0, 6.0, 10.0]}
+    out = simulator.run(roads, rows, values)
+    expected = simulator.embedded.run(roads.network, rows, values)
+    assert out.status.tolist() == [0, 0, 0], out.messages
+    for name in ("n_steps", "began"):
+        np.testing.assert_array_equal(getattr(out, name), getattr(expected, name), name)
+    for name in ("x", "y", "h", "v", "a", "offset"):
+        np.testing.assert_allclose(
+            getattr(out, name), getattr(expected, name), atol=1e-6, err_msg=name
+        )
+
+
+def test_what_goes_wrong_costs_the_row(library):
+    simulator = made(library, seconds=2.0)
+    roads = simulator.roads([crossroads()])
+    faults = [0.0, LOGS, 0.0, REFUSES, DIES, NAN, HANGS, 0.0]
+    out = simulator.run(roads, np.zeros(len(faults), dtype=np.int64), {"fault": faults})
+    assert out.status.tolist() == [0, 40, 0, 40, 41, 40, 42, 0]
+    assert out.messages == {
+        1: "Unexpected",
+        3: "esmini did not take the scenario: Failed to load OpenDRIVE file",
+        4: "its process ended with status 7",
+        5: "a state of 'bv' became NaN or infinite",
+        6: "no answer within 2 s",
+    }
+    for i in (2, 7):
+        np.testing.assert_array_equal(out.x[i], out.x[0])
+    assert np.isfinite(out.x).all()
+
+
+def test_who_stops_it_waits_no_longer(library):
+    simulator = made(library)
+    roads = simulator.roads([crossroads()])
+    threading.Timer(1.0, simulator.stop).start()
+    with pytest.raises(CallError, match="ended"):
+        simulator.run(roads, np.zeros(1, dtype=np.int64), {"fault": [HANGS_AT_ONCE]})
+
+
+def test_a_library_that_is_none_is_refused_before_any_row(library):
+    with pytest.raises(InputError, match="is not the stand-in"):
+        made(library.with_name("other.so"))
