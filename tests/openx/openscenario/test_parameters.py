@@ -160,3 +160,21 @@ def test_references_that_fit(s4, old, new):
     )
     assert old in data
     read(data.replace(old, new, 1))
+
+
+def judged(s4: bytes, name: str, parameter: str) -> bytes:
+    """The file with another condition in its stop trigger."""
+    condition = (
+        f'<ConditionGroup><Condition name="{name}" delay="0" conditionEdge="rising">'
+        f'<ByValueCondition><ParameterCondition parameterRef="{parameter}" value="" '
+        'rule="lessThan"/></ByValueCondition></Condition></ConditionGroup></StopTrigger>'
+    )
+    before, after = s4.rsplit(b"</StopTrigger>", 1)
+    return before + condition.encode() + after
+
+
+@pytest.mark.parametrize("parameter", ["", "distance_success"])
+def test_scenario_runner_s_criteria_need_no_parameter(s4, parameter):
+    assert not parameters.problems(read(judged(s4, "criteria_DrivenDistanceTest", parameter)))
+    with pytest.raises(FileFormatError, match=f"must name a declared parameter, got '{parameter}'"):
+        read(judged(s4, "arrives", parameter))

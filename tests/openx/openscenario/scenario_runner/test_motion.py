@@ -50,3 +50,4 @@ def test_a_walker_s_place_is_its_middle_and_a_car_s_the_ground():
     assert course(still, 0, walker).position(0).position.z == 0.9
     assert centred(walker, "b").bounding_box.center.z == 0.0
     assert course(still, 0, CAR).position(0).position.z == 0.0
+    assert course(still, 0, CAR, ground=12.5).position(0).position.z == 12.5

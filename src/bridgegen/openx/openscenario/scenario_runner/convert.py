@@ -13,8 +13,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from bridgegen.errors import UnsupportedError
-from bridgegen.openx.opendrive.lanes import lane_pose
+from bridgegen.openx.opendrive.lanes import lane_pose, values
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
@@ -56,7 +58,7 @@ def for_scenario_runner(
         raise UnsupportedError(*wrong)
     names = (HERO, *recording.names[1:])
     courses = {
-        names[e]: course(recording, e, body)
+        names[e]: course(recording, e, body, _ground(scenario, recording.names[e], roads))
         for e, body in enumerate(bodies)
         if not isinstance(body, osc.ExternalObjectReference)
     }
@@ -142,6 +144,19 @@ def _weather(scenario: osc.OpenScenario) -> osc.Environment:
         if isinstance(one.action, osc.EnvironmentAction):
             now = environment(one.action.environment, now)
     return now
+
+
+def _ground(scenario: osc.OpenScenario, name: str, roads: OpenDrive) -> float:
+    """Return how high the road is where an entity starts [m], as far as its start says so."""
+    for private in scenario.storyboard.init.actions.privates:
+        for one in walk(private) if private.entity_ref == name else ():
+            place: Any = one.position.position if isinstance(one, osc.TeleportAction) else None
+            if isinstance(place, osc.LanePosition | osc.RoadPosition):
+                road = roads.road(str(place.road_id))
+                return float(values(road.elevations, np.array([place.s]))[0])
+            if place is not None:
+                return float(getattr(place, "z", None) or 0.0)
+    return 0.0
 
 
 def _start(

@@ -27,7 +27,7 @@ class Course:
     Attributes:
         x: ``(K,)`` [m].
         y: ``(K,)`` [m].
-        z: of CARLA's reference point above the ground [m].
+        z: of CARLA's reference point [m], as at the start.
         h: ``(K,)`` [rad], continuous.
         time_step: between two instants [s].
     """
@@ -68,13 +68,14 @@ class Course:
             yield osc.Vertex(self.position(k), k * self.time_step)
 
 
-def course(recording: Recording, e: int, body: Body) -> Course:
+def course(recording: Recording, e: int, body: Body, ground: float = 0.0) -> Course:
     """Return an entity's course: the one place where reference points become boxes' middles.
 
     Args:
         recording: of reference points.
         e: which entity.
         body: its own, without references to parameters.
+        ground: how high its start lies [m]; recordings are flat.
     """
     centre: Any = body.bounding_box.center
     x, y, h = recording.x[e], recording.y[e], recording.h[e]
@@ -82,7 +83,7 @@ def course(recording: Recording, e: int, body: Body) -> Course:
     return Course(
         x + centre.x * cos - centre.y * sin,
         y + centre.x * sin + centre.y * cos,
-        float(centre.z) if isinstance(body, osc.Pedestrian) else 0.0,
+        ground + (float(centre.z) if isinstance(body, osc.Pedestrian) else 0.0),
         h,
         recording.time_step,
     )
