@@ -343,3 +343,15 @@ def test_where_nothing_ran_nothing_passes(folder, double, cli):
     assert "4 x a state became NaN or infinite" in out
     assert "FAILED, cannot be judged: scenarios run in double" in err
     assert "not confirmed < 0.5 (confirmed cannot be told)" in err
+
+
+def test_a_report_that_is_there_is_written_again(finished, tmp_path, double):
+    folder = shutil.copytree(finished, tmp_path / "s4")
+    double.disturb = shifted(60.0)
+    found = confirm(folder, elsewhere())
+    assert found.files == (folder / "confirmation-double.json", folder / "report.html")
+    text = (folder / "report.html").read_text("utf-8")
+    assert json.dumps(found.scenarios[0].explanation)[1:-1] in text
+    (folder / "confirmation-double.json").write_text("{}")  # and nobody takes it for what it is not
+    with pytest.raises(FileFormatError, match="confirmation-double"):
+        bg.resume(folder)

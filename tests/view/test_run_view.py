@@ -96,7 +96,7 @@ def test_news_are_the_rows_that_the_page_lacks(growing):
     growing.grow(70)
     view = RunView(growing.folder)
     assert data_of(view.page())["rows"]["n"] == 70
-    assert view.news(70) == {"finished": False, "kept": 0}
+    assert view.news(70) == {"finished": False, "kept": 0, "elsewhere": 0}
     growing.grow(30)
     told, rows = view.news(70), growing.rows
     assert told["rows"]["evaluation"] == list(range(70, 100))
@@ -116,7 +116,7 @@ def test_news_are_the_rows_that_the_page_lacks(growing):
     json.dumps(told, allow_nan=False)
     growing.grow(20)
     growing.end()
-    assert view.news(120) == {"finished": True, "kept": 2}
+    assert view.news(120) == {"finished": True, "kept": 2, "elsewhere": 0}
     assert view.motion(119)["playback"]["evaluation"] == 119
 
 
@@ -175,7 +175,7 @@ def test_the_command_serves_until_ctrl_c(finished):
         url = server.stdout.readline().split()[0]
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", url)
         with urllib.request.urlopen(f"{url}news?after=120", timeout=60) as reply:
-            assert json.load(reply) == {"finished": True, "kept": 2}
+            assert json.load(reply) == {"finished": True, "kept": 2, "elsewhere": 0}
         server.send_signal(signal.SIGINT)
         out, error = server.communicate(timeout=60)
     finally:

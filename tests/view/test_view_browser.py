@@ -1,7 +1,11 @@
 """The served page in a real browser: it grows with its run, and plays any scenario."""
 
+import numpy as np
 import pytest
 
+from bridgegen.confirmation.record import digest_of, write_record
+from bridgegen.confirmation.schema import Outcome, Record, Scenario
+from bridgegen.objective import Thresholds
 from bridgegen.view.run_view import RunView
 from bridgegen.view.server import Server
 
@@ -104,3 +108,27 @@ def test_a_run_without_a_row_is_shown_once_there_are_some(browser, growing):
     page.close()
     server.shutdown()
     server.server_close()
+
+
+def test_what_is_confirmed_meanwhile_is_offered(opened, growing):
+    page, _ = opened
+    rows = growing.rows
+    k = int(np.flatnonzero(rows.critical[:60])[0])
+    here = Outcome(critical=True, d_min=0.0, v_d=1.0, n_collision=1.0, F=(0.0,))
+    failed = Scenario(
+        evaluation=k, name=None, row=digest_of(rows.X[k], rows.metrics[k]), here=here, failure="no"
+    )
+    write_record(
+        growing.folder,
+        Record(
+            simulator="esmini", label="esmini 3.6", settings={}, reference="embedded", run="",
+            scenario="crossroads-s4", ego="", thresholds=Thresholds(), objectives=("F",),
+            scenarios=(failed,),
+        ),
+    )  # fmt: skip
+    page.wait_for_selector("#live-reload")
+    assert page.inner_text("#live-reload") == "Show what other simulators confirmed"
+    page.click("#live-reload")
+    page.wait_for_function("bridgegen.data.confirmations.length === 1")
+    assert "None of 1 scenarios ran in esmini 3.6." in page.inner_text("#elsewhere")
+    assert page.complaints == []

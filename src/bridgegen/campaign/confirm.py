@@ -155,9 +155,10 @@ def _empty(
     """Return the record of a run of which nothing is confirmed yet."""
     objective = here.objective
     version = getattr(there.simulator, "version", "")
+    known = any(letter.isdigit() for letter in version)  # esmini may not know its own
     return Record(
         simulator=simulator.name,
-        label=f"{simulator.name} {version}".strip(),
+        label=f"{simulator.name} {version}" if known else simulator.name,
         settings=dict(simulator.settings),
         reference=settings.simulator,
         run=str(place),

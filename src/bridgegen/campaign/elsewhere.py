@@ -7,7 +7,7 @@ import numpy as np
 
 from bridgegen import metrics as measures
 from bridgegen.arrays import Float
-from bridgegen.confirmation.compare import compare, tracks
+from bridgegen.confirmation.compare import compare, first_contact, tracks
 from bridgegen.confirmation.record import digest_of
 from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Scenario, number
 from bridgegen.confirmation.words import explanation
@@ -86,7 +86,8 @@ def _scenario(
     digest = digest_of(every.X[k], every.metrics[k])
     if isinstance(ran, str) or ran.rollout.status[ran.row] != 0:
         failure = _legal(ran if isinstance(ran, str) else _failure(ran))
-        return Scenario(evaluation=k, name=None, row=digest, here=known, failure=failure)
+        ours = known.model_copy(update={"contact": first_contact(motion, row)})
+        return Scenario(evaluation=k, name=None, row=digest, here=ours, failure=failure)
     F, _ = objective.F(ran.metrics[np.newaxis], here.metrics)
     found = compare(motion, ran.rollout, row, ran.row)
     both = (known, _outcome(here, ran.metrics, F[0]))

@@ -62,7 +62,7 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison
     return Comparison(
         step=step,
         ends=(_end(here, i), _end(there, j)),
-        contacts=(_contact(here, i), _contact(there, j)),
+        contacts=(first_contact(here, i), first_contact(there, j)),
         partings=tuple(sorted(filter(None, partings), key=lambda one: one.time)),
         events=_events(here, there, i, j, step),
         lights=_lights(here, there, i, j, times),
@@ -184,7 +184,8 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
     )
 
 
-def _contact(rollout: Rollout, row: int) -> Contact | None:
+def first_contact(rollout: Rollout, row: int) -> Contact | None:
+    """Return the ego's first contact in a row that has not failed; None if there is none."""
     distance = rollout.distance[row, :, : rollout.n_steps[row]]
     instants = np.flatnonzero((distance <= 0.0).any(axis=0))
     if not instants.size:

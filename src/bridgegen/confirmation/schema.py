@@ -24,7 +24,8 @@ SCALE = {"x": 100, "y": 100, "h": 1000}
 """Units to 1 m or rad of what a track has as whole numbers."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=0, le=10**8)]
+Units = Annotated[int, Field(ge=-(10**9), le=10**9)]
 
 
 class _Model(BaseModel):
@@ -92,10 +93,10 @@ class Course(_Model):
     """
 
     entity: str
-    first: Count
-    x: tuple[int | None, ...]
-    y: tuple[int | None, ...]
-    h: tuple[int | None, ...]
+    first: Annotated[int, Field(ge=0, le=10**6)]
+    x: tuple[Units | None, ...]
+    y: tuple[Units | None, ...]
+    h: tuple[Units | None, ...]
 
     @model_validator(mode="after")
     def _even(self) -> "Course":

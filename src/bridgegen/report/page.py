@@ -14,8 +14,8 @@ from bridgegen.report.data import ReportData
 from bridgegen.report.payload import to_json
 
 SCRIPTS = (
-    "common.js", "page.js", "regions.js", "filters.js", "causes.js", "notes.js", "inflate.js",
-    "downloads.js", "playbacks.js",
+    "common.js", "page.js", "regions.js", "elsewhere.js", "filters.js", "causes.js", "notes.js",
+    "inflate.js", "downloads.js", "playbacks.js",
     "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
     "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "scene.js",
     "strip.js", "curves.js", "picture.js", "player.js", "parallel.js", "front.js", "near.js",
@@ -34,6 +34,7 @@ STYLES = (
     "notes.css",
     "table.css",
     "regions.css",
+    "elsewhere.css",
     "playback.css",
     "live.css",
 )

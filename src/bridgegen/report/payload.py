@@ -13,6 +13,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float
 from bridgegen.cause import CAUSES, Cause
 from bridgegen.report import convergence, sentences
+from bridgegen.report.confirmation_payload import confirmations_payload
 from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, ReportData
 from bridgegen.report.packed import packed_files, packed_motions, road_key
@@ -59,7 +60,10 @@ def script_json(value: Any) -> str:
 
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
-    shown = _shown(data.evaluations, [p.evaluation for p in (*data.kept, *data.more)])
+    elsewhere = confirmations_payload(data.confirmations)
+    wanted = [one.evaluation for one in (*data.kept, *data.more)]
+    wanted += [one["evaluation"] for each in elsewhere for one in each["scenarios"]]
+    shown = _shown(data.evaluations, wanted)
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
@@ -76,6 +80,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         "summary": _summary(data),
         "rows": _rows(data.evaluations, shown),
         "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,
+        "confirmations": elsewhere,
         "batches": _batches(data.evaluations),
         "causes": _causes(data.evaluations),
         "scale": {**SCALE, "road": ROAD_SCALE},
@@ -109,6 +114,7 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
         "batches": _batches(e),
         "causes": _causes(e),
         "regions": regions_payload(data.regions, e, shown) if data.regions else None,
+        "confirmations": confirmations_payload(data.confirmations),
     }
 
 

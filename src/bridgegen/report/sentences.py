@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from bridgegen.cause import CAUSES, Cause
+from bridgegen.confirmation.verdict import sentences as verdicts
 from bridgegen.regions.evidence import wilson
 from bridgegen.report.data import ReportData, RunSummary
 
@@ -19,7 +20,7 @@ AVOIDED = {
 
 
 def sentences(data: ReportData) -> list[str]:
-    """Return two or three sentences: what was searched, what was found, how bad the worst is."""
+    """Return a few sentences: what was searched, what was found, how bad, is it so elsewhere."""
     s = data.summary
     if s.n_evaluations == 0:
         return [f"No scenario of “{s.title}” has been simulated yet."]
@@ -40,7 +41,8 @@ def sentences(data: ReportData) -> list[str]:
         if s.fiftieth_critical is not None:
             found += f", the 50th at {s.fiftieth_critical:,}"
     words.append(found + ".")
-    return [*words, *filter(None, (_causes(data), _worst(data)))]
+    confirmed = [verdicts(one.label, one.scenarios)[0] for one in data.confirmations]
+    return [*words, *filter(None, (_causes(data), _worst(data))), *confirmed]
 
 
 def summary_table(s: RunSummary) -> list[tuple[str, str]]:

@@ -10,12 +10,14 @@ from bridgegen.campaign.regions import OWL_FILE
 from bridgegen.campaign.report import run_data
 from bridgegen.campaign.restored import pipeline_of
 from bridgegen.campaign.settings import Settings
+from bridgegen.confirmation.record import file_name, read_records
+from bridgegen.confirmation.schema import Record
 from bridgegen.errors import InputError
 from bridgegen.regions.record import JSON_FILE
 from bridgegen.report.motion import motion_payload
 from bridgegen.report.page import report_page
 from bridgegen.report.payload import news
-from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice
 from bridgegen.store import Rows, Store
 
 
@@ -76,7 +78,11 @@ class RunView:
         """Return what is new since the page knew of so many evaluations."""
         with self._lock, Store.open(self.folder) as store:
             rows = self._read(store)
-            state = {"finished": store.finished is not None, "kept": len(self._kept())}
+            state = {
+                "finished": store.finished is not None,
+                "kept": len(self._kept()),
+                "elsewhere": sum(len(one.scenarios) for one in self._elsewhere(rows)),
+            }
             if len(rows) == after:
                 return state
             data = run_data(self._pipeline, store, self.settings, rows, (), coverage=False)
@@ -94,8 +100,9 @@ class RunView:
             return motion_payload(self._pipeline, self._rows, evaluation, known.get(evaluation))
 
     def file(self, name: str) -> bytes | None:
-        """Return a handed-over file, or one that tells the regions; None of any other name."""
+        """Return a handed-over file, or a record of what came later; None of any other name."""
         names = {name for one in self._kept() for name in one.files} | {JSON_FILE, OWL_FILE}
+        names |= {file_name(name) for name in SIMULATORS}
         try:
             return (self.folder / name).read_bytes() if name in names else None
         except FileNotFoundError:
@@ -103,6 +110,9 @@ class RunView:
 
     def _kept(self) -> tuple[Kept, ...]:
         return handed_over(self.folder)
+
+    def _elsewhere(self, rows: Rows) -> tuple[Record, ...]:
+        return read_records(self.folder, rows.X, rows.metrics)
 
     def _read(self, store: Store) -> Rows:
         """Return all rows; only those are read that are new."""

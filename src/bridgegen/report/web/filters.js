@@ -9,7 +9,7 @@ class Filters {
   // Of a column: numbers of the rows, null where there is none.
   values(name) {
     if (name === "cause") return rows.cause;
-    return name === "critical" ? rows.critical : columns.get(name)?.values;
+    return name === "critical" ? rows.critical : (columns.get(name) ?? elsewhereBy(name))?.values;
   }
 
   get any() {

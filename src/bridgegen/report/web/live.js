@@ -34,14 +34,22 @@ class Live {
       if (told.rows) this.take(told);
       const done = `${number(rows.n)} of ${number(data.summary.budget)} evaluations`;
       this.say(this.finished ? `The search has ended: ${done}` : `Live: ${done}`);
-      $("live-reload").hidden = told.kept <= data.kept.length;
+      this.offer(told);
     } catch (error) {
       this.say(error instanceof TypeError ? "No longer served: this is what was known last" : `Cannot be read: ${error.message}`, "lost");
     }
   }
 
+  // What only a page that is loaded anew can show.
+  offer({ kept, elsewhere: confirmed }) {
+    const known = data.confirmations.reduce((sum, one) => sum + one.scenarios.length, 0);
+    const what = kept > data.kept.length ? "the files that were handed over" : confirmed > known ? "what other simulators confirmed" : "";
+    $("live-reload").hidden = !what;
+    if (what) $("live-reload").textContent = `Show ${what}`;
+  }
+
   take(told) {
-    const shape = () => [rows.critical.includes(1), rows.cause === null, data.regions === null].join();
+    const shape = () => [rows.critical.includes(1), rows.cause === null, data.regions === null, data.confirmations.map(({ simulator }) => simulator)].join();
     const before = shape();
     if (told.whole) ["evaluation", "iteration", "critical", "cause"].forEach((name) => { if (rows[name]) rows[name].length = 0; });
     for (const name of ["evaluation", "iteration", "critical"]) append(rows[name], told.rows[name]);
@@ -55,7 +63,7 @@ class Live {
     }
     const { n, n_failed, n_critical, rank, front } = told.rows;
     Object.assign(rows, { n, n_failed, n_critical, rank, front });
-    Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions });
+    Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions, confirmations: told.confirmations });
     if (shape() !== before) location.reload(); // there is something that the page has no place for yet
     else this.grown();
   }

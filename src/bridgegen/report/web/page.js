@@ -146,6 +146,7 @@ function start() {
   hook.filter = (name, low, high) => filters.set(name, low, high);
   const causes = data.causes ? new Causes(data.causes, hook) : null;
   if (data.regions) new Regions(data.regions);
+  const others = new Elsewhere((evaluation, seconds) => hook.show?.(evaluation, seconds));
   darkScheme.addEventListener("change", readPalette);
   let table = null;
   if (rows.critical.includes(1) || data.kept.length) {
@@ -165,6 +166,8 @@ function start() {
     fillSummary();
     causes?.fill(data.causes);
     takeRegions();
+    takeElsewhere();
+    others.fill();
     table?.refill();
     hook.grown?.();
     document.dispatchEvent(new CustomEvent("filters", { detail: filters.ranges }));

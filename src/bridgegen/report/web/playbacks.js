@@ -45,6 +45,7 @@ class Opener {
     this.wanted = null;
     hook.select = (k) => this.kept(k);
     hook.open = (evaluation) => this.row(rows.evaluation.indexOf(evaluation));
+    hook.show = (evaluation, seconds) => this.moment(evaluation, seconds);
   }
 
   get player() {
@@ -91,6 +92,13 @@ class Opener {
     fillDetails(one);
     showPicture(one);
     document.dispatchEvent(new CustomEvent("shown", { detail: one.evaluation }));
+  }
+
+  // A scenario at a time [s], brought into sight.
+  async moment(evaluation, seconds) {
+    await this.row(rows.evaluation.indexOf(evaluation));
+    if (seconds !== null && this.made?.kept.evaluation === evaluation) this.player.seek(Math.round(seconds / this.player.kept.time_step));
+    $("player").scrollIntoView({ block: "nearest" });
   }
 
   // What the page's address names, or the most critical.

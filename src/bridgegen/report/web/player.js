@@ -78,7 +78,7 @@ class Player {
   }
 
   showLegend() {
-    const has = { motion: true, sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length };
+    const has = { motion: true, sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
     for (const item of $("legend").children) {
       const shown = this.scene.layers[item.dataset.layer], button = item.querySelector("button");
       item.hidden = !has[item.dataset.layer] || (!button && !shown);
@@ -89,6 +89,7 @@ class Player {
       $("course-button").textContent = tells ? "Planned path" : "Way ahead";
       $("course-means").textContent = `in 1, 2, 3 s${tells ? "" : " if it goes on like this"}; a thick bar: it stands`;
     }
+    if (has.elsewhere) $("elsewhere-means").textContent = `where ${[...new Set(ghostsOf(this.kept).map(({ label }) => label))].join(", ")} has them`;
     if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
   }
 
@@ -147,7 +148,7 @@ class Player {
       scale: this.scene.view.scale,
       lights: this.kept.lamps.map((lamp) => lightAt(lamp, state.index)),
       detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
-      intention: intentionAt(this.kept, state), weather,
+      intention: intentionAt(this.kept, state), weather, elsewhere: this.scene.layers.elsewhere ? ghostsAt(this.kept, state) : [],
     };
   }
 
@@ -224,6 +225,7 @@ class Player {
     const actions = {
       " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
       ",": () => this.step(-1), ".": () => this.step(1), s: () => this.toggleLayer("sensed"), p: () => this.toggleLayer("course"), w: () => this.toggleLayer("weather"),
+      g: () => this.toggleLayer("elsewhere"),
       l: () => this.copyLink(), e: () => this.follow(), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.fit(),
       d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.kept.contacts.length) this.jump(this.kept.contacts[0]); },
       "+": () => this.scene.view.zoom(1.4), "=": () => this.scene.view.zoom(1.4), "-": () => this.scene.view.zoom(1 / 1.4),

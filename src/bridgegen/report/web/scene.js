@@ -15,7 +15,7 @@ class Scene {
     this.canvas = canvas;
     this.view = new View(canvas, changed);
     this.atmosphere = new Atmosphere();
-    this.layers = { motion: true, sensed: true, course: true, weather: true }; // the first cannot be hidden
+    this.layers = { motion: true, sensed: true, course: true, weather: true, elsewhere: true }; // the first cannot be hidden
   }
 
   show(kept) {
@@ -76,6 +76,7 @@ class Scene {
     for (const e of playersOf(this.kept)) this.drawTrail(c, e, state.index, scale);
     this.drawGhosts(c, state, scale);
     state.entities.forEach((s, e) => { if (isPlaced(s)) drawBody(c, this.kept.entities[e], s, colourOf(this.kept, e), scale); });
+    if (this.layers.elsewhere) drawElsewhere(c, this.kept, state, scale);
     if (this.layers.sensed) drawDetections(c, this.kept, state, scale);
     pixels();
     this.drawContacts(c, state);
@@ -92,7 +93,8 @@ class Scene {
     return state.entities.map((s, e) => {
       if (!players.includes(e)) return null;
       const seen = this.layers.sensed && e > 0 ? detectionWords(detectionAt(this.kept, e, state.index)) : "";
-      return `${s.name}  ${measured(s.v, "m/s", 2)} m/s${seen && seen !== "seen" ? `  ${seen}` : ""}`;
+      const off = this.layers.elsewhere ? elsewhereWords(this.kept, state, e) : "";
+      return `${s.name}  ${measured(s.v, "m/s", 2)} m/s${seen && seen !== "seen" ? `  ${seen}` : ""}${off ? `  ${off}` : ""}`;
     });
   }
 

@@ -25,19 +25,19 @@ class Table {
     const listed = LISTED.filter((name) => metrics.includes(name));
     const chosen = listed.length ? listed : metrics.slice(0, 4);
     if (this.only && !chosen.includes(this.only)) chosen.push(this.only);
-    return ["rank", ...chosen, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : [])];
+    return ["rank", ...chosen, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : []), ...elsewhere.map(({ column }) => column)];
   }
 
   value(name, i) {
     if (name === "rank") return rows.rank[i] || null;
     if (name === "cause") return rows.cause[i];
-    return name === "region" ? regionOf(i) : columns.get(name).values[i];
+    return name === "region" ? regionOf(i) : (columns.get(name) ?? elsewhereBy(name)).values[i];
   }
 
   fillHead() {
     const cells = this.columns.map((name) => {
       const unit = unitText(columns.get(name)?.unit ?? "");
-      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? name, element("small", {}, unit || "\u00a0"));
+      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? elsewhereBy(name)?.simulator ?? name, element("small", {}, unit || "\u00a0"));
       button.addEventListener("click", () => {
         this.sorting = { by: name, down: this.sorting.by === name && !this.sorting.down };
         this.refill();
@@ -113,6 +113,7 @@ class Table {
     const value = this.value(name, i);
     if (name === "cause") return element("td", {}, value ? data.causes.labels[value] : "–");
     if (name === "region") return element("td", {}, value === null ? "–" : `${value}`);
+    if (elsewhereBy(name)) return verdictCell(value);
     const cell = element("td", {}, measured(value, columns.get(name)?.unit, 3));
     if (name === "n_collision" && value > 0) cell.className = "hit";
     return cell;

@@ -9,12 +9,14 @@ class TableTools {
     if (first) $("list-metric").value = first;
     this.choices($("list-cause"), data.causes?.labels.slice(1).map((label, k) => [k + 1, label]));
     this.choices($("list-region"), data.regions?.regions.map((region, k) => [k, `${region.number}: ${region.rule}`]));
+    this.choices($("list-elsewhere"), elsewhere.length ? elsewhere.flatMap(({ column }, k) => Object.entries(VERDICTS).map(([value, [, words]]) => [`${k}:${value}`, `${words} ${column}`])) : null);
     $("list-metric").addEventListener("change", () => { this.column(); this.show(); });
     for (const id of ["list-low", "list-high"]) $(id).addEventListener("input", () => this.metric());
     $("list-cause").addEventListener("change", ({ target: { value } }) => {
       if (value === "") filters.set("cause");
       else filters.set("cause", value - 0.3, Number(value) + 0.3);
     });
+    $("list-elsewhere").addEventListener("change", ({ target: { value } }) => this.verdict(value));
     $("list-region").addEventListener("change", ({ target: { value } }) => filters.inRegion(value === "" ? null : Number(value)));
     document.addEventListener("filters", () => this.show());
   }
@@ -27,6 +29,13 @@ class TableTools {
   metric() {
     const ends = [$("list-low"), $("list-high")].map((field) => (field.value === "" ? null : Number(field.value)));
     filters.set($("list-metric").value, ...ends);
+  }
+
+  verdict(value) {
+    const [k, which] = value.split(":").map(Number);
+    elsewhere.forEach(({ column }) => filters.ranges.delete(column));
+    if (value === "") filters.tell();
+    else filters.set(elsewhere[k].column, which - 0.3, which + 0.3);
   }
 
   // A metric that is filtered by is to be seen.
@@ -44,6 +53,8 @@ class TableTools {
       if (document.activeElement !== $(id)) $(id).value = Number.isFinite(range[k]) ? Number(range[k].toPrecision(4)) : "";
     });
     $("list-cause").value = cause && cause[1] - cause[0] < 1 ? Math.round((cause[0] + cause[1]) / 2) : "";
+    const k = elsewhere.findIndex(({ column }) => filters.ranges.has(column));
+    $("list-elsewhere").value = k < 0 ? "" : `${k}:${Math.round(filters.ranges.get(elsewhere[k].column)[0])}`;
     $("list-region").value = filters.region ?? "";
   }
 }

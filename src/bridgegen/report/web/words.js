@@ -44,6 +44,10 @@ function stateWords(kept, state) {
     const seen = detectionWords(detectionAt(kept, e, state.index));
     told.push(`${s.name} ${value(s.v, "m/s", 1)}${seen ? `, ${seen}` : ""}`);
   }
+  state.entities.forEach((s, e) => {
+    const off = elsewhereWords(kept, state, e);
+    if (off) told.push(`${s.name} ${off}`);
+  });
   for (const lamp of kept.lamps) told.push(`light ${lamp.name} ${SIGNALS[lightAt(lamp, state.index)] ?? "other"}`);
   const weather = weatherAt(kept, state.index);
   if (weather) told.push(weatherWords(weather));
