@@ -53,8 +53,8 @@ def test_the_sentences_are_for_people():
         "nothing of them."
     )
     assert rest == [
-        "Differences, median (largest): d_min 0.25 (2) m, v_d 0 (1) m/s, first contact 0.5 "
-        "(0.5) s.",
+        "Differences, median (largest): d_min 0.250 (2.000) m, v_d 0.000 (1.000) m/s, first "
+        "contact 0.500 (0.500) s.",
         "In 2 of 3 somebody is more than 0.5 m elsewhere at some time, first at 2.00 s (median).",
         "Contacts: 1 in both, 1 here alone, 0 there alone.",
     ]

@@ -15,6 +15,10 @@ def confirm(
     simulator: Annotated[str, typer.Option(help="The other one: see 'bridgegen list simulators'.")],
     simulator_set: options.SimulatorSettings = None,
     esmini_lib: options.EsminiLibrary = None,
+    host: options.Host = None,
+    port: options.Port = None,
+    carla_command: options.CarlaCommand = None,
+    carla_timeout: options.CarlaTimeout = None,
     rows: Annotated[
         int | None,
         typer.Option(
@@ -38,7 +42,15 @@ def confirm(
     from bridgegen.verdict.of_confirmation import ConfirmationGate
 
     gate = ConfirmationGate.read(fail_if or (), junit)
-    choice = options.read_simulator(simulator, simulator_set, esmini_lib=esmini_lib)
+    choice = options.read_simulator(
+        simulator,
+        simulator_set,
+        esmini_lib=esmini_lib,
+        host=host,
+        port=port,
+        carla_command=carla_command,
+        carla_timeout=carla_timeout,
+    )
     assert choice is not None
     with ConfirmationScreen() as screen:
         found = confirm_run(

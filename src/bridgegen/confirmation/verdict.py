@@ -62,4 +62,4 @@ def _differences(s: Summary) -> list[str]:
 def _spread(name: str, one: Spread, unit: str) -> str:
     if one.median is None or one.max is None:
         return ""
-    return f"{name} {one.median:.3g} ({one.max:.3g}) {unit}"
+    return f"{name} {one.median:.3f} ({one.max:.3f}) {unit}"
