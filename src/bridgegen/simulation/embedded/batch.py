@@ -67,7 +67,8 @@ class Batch:
         key = np.full(n, program.noise_key or 0, dtype=np.uint64)
         if program.noise_key is None:
             key = noise_key({**program.parameters, **_known(program, values)}, n)
-        self.state = _state(program, roads, rows, slots, key, own_memory)
+        state = _state(program, roads, rows, slots, key, own_memory)
+        self._block, self.state = _packed(state)
         self.record = _record(program, n)
         self._messages: dict[int, str] = {}
 
@@ -119,7 +120,7 @@ class Batch:
 
     def _do(self, kernel: Callable[..., Any], *arguments: int | Float) -> None:
         """Call a kernel; rows for which a way is not planned yet do the same again when it is."""
-        before = _copied(self.state), self.record.began.copy()
+        before = self._block.copy(), self.record.began.copy()
         messages = kernel(
             *arguments, self._plan, self._roads.tables, self._rows, self.state, self.record
         )
@@ -129,7 +130,7 @@ class Batch:
         ).size:
             wanted = np.column_stack((self._rows[again], self.state.wanted[again]))
             self._roads.plan(tuple(one) for one in wanted.tolist())
-            state = _taken(before[0], again)
+            state = _taken(_seen(before[0], self.state), again)
             record = _taken(self.record, again)
             record.began[:] = before[1][again]
             mine = (one[again] if isinstance(one, np.ndarray) else one for one in arguments)
@@ -213,6 +214,8 @@ class Batch:
         )  # fmt: skip
 
 
+ALIGNED = 64  # bytes, a line of the processor's cache
+
 NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 
 
@@ -277,9 +280,29 @@ def _scene(program: Program) -> Float:
 Rows = TypeVar("Rows", memory.State, memory.Record)
 
 
-def _copied(rows: Rows) -> Rows:
-    arrays: Any = (array.copy() for array in rows)
-    return type(rows)(*arrays)
+def _packed(state: memory.State) -> tuple[npt.NDArray[np.uint8], memory.State]:
+    """Return the bytes of all arrays of a state, and these in there: one copy copies them all."""
+    ends = np.cumsum([_room(array) for array in state])
+    block = np.empty(int(ends[-1]), dtype=np.uint8)
+    packed = _seen(block, state)
+    for view, array in zip(packed, state, strict=True):
+        view[...] = array
+    return block, packed
+
+
+def _seen(block: npt.NDArray[np.uint8], like: memory.State) -> memory.State:
+    """Return the arrays of a state that lie in a block, one after the other."""
+    views: list[Any] = []
+    at = 0
+    for array in like:
+        views.append(np.ndarray(array.shape, array.dtype, block.data, at))
+        at += _room(array)
+    return memory.State(*views)
+
+
+def _room(array: np.ndarray) -> int:
+    """Return the bytes that an array takes, so that the next one is aligned."""
+    return -(-array.nbytes // ALIGNED) * ALIGNED
 
 
 def _taken(rows: Rows, some: Int) -> Rows:

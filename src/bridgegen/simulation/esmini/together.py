@@ -104,7 +104,7 @@ class _Row:
             alive()
             self._impose(k)
             joint.decide(k)
-            is_through = self._drives and joint.is_through
+            is_through = self._drives and joint.stops and joint.is_through
             joint.go_on()
             demand = joint.demand(k)
             if is_through or library.is_over:
