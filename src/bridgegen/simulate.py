@@ -19,7 +19,7 @@ from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,11 @@ class FileResult:
     metrics: Mapping[str, float]
     rollout: Rollout
     cause: str | None = None
+
+    @property
+    def incidents(self) -> tuple[Incident, ...]:
+        """What the simulator noticed by itself."""
+        return self.rollout.incidents.get(0, ())
 
 
 def simulate_file(

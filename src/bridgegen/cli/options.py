@@ -113,6 +113,10 @@ Host = Annotated[
 Port = Annotated[
     int | None, typer.Option(help="The server's port, for --simulator carla.", show_default="2000")
 ]
+CarlaPort = Annotated[
+    int | None,
+    typer.Option(help="The server's port, of a run in CARLA.", show_default="2000"),
+]
 CarlaCommand = Annotated[
     str | None,
     typer.Option(help="Starts a CARLA server, and again when it has ended.", show_default="none"),

@@ -137,6 +137,10 @@ def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
     ego: options.OwnEgo = None,
     esmini_lib: options.EsminiLibrary = None,
+    host: options.Host = None,
+    port: options.Port = None,
+    carla_command: options.CarlaCommand = None,
+    carla_timeout: options.CarlaTimeout = None,
     workers: options.Workers = None,
     fail_if: options.FailIf = None,
     junit: options.Junit = None,
@@ -151,7 +155,13 @@ def resume(
         run = campaign.resume(
             folder,
             ego=ego,
-            simulator=options.read_access(esmini_lib=esmini_lib),
+            simulator=options.read_access(
+                esmini_lib=esmini_lib,
+                host=host,
+                port=port,
+                carla_command=carla_command,
+                carla_timeout=carla_timeout,
+            ),
             workers=workers,
             watch=screen.watch,
         )
@@ -169,13 +179,23 @@ def view(
     ] = None,
     ego: options.OwnEgo = None,
     esmini_lib: options.EsminiLibrary = None,
+    host: options.Host = None,
+    carla_port: options.CarlaPort = None,
 ) -> None:
     """Serve a run's report on this machine, live while the search goes on; any scenario plays."""
     from bridgegen.screen.view import serve
     from bridgegen.view.run_view import RunView
     from bridgegen.view.server import Server
 
-    site = RunView(run, ego=ego, simulator=options.read_access(esmini_lib=esmini_lib))
+    site = RunView(
+        run,
+        ego=ego,
+        simulator=options.read_access(
+            esmini_lib=esmini_lib,
+            host=host,
+            port=carla_port,
+        ),
+    )
     fragment = "" if evaluation is None else site.fragment(evaluation)
     serve(Server(site, port), browser=browser, fragment=fragment)
 
@@ -218,6 +238,10 @@ def regions(
     ] = None,
     ego: options.OwnEgo = None,
     esmini_lib: options.EsminiLibrary = None,
+    host: options.Host = None,
+    port: options.Port = None,
+    carla_command: options.CarlaCommand = None,
+    carla_timeout: options.CarlaTimeout = None,
     workers: options.Workers = None,
     as_json: options.Json = False,
 ) -> None:
@@ -229,7 +253,13 @@ def regions(
         found = regions_of(
             run,
             ego=ego,
-            simulator=options.read_access(esmini_lib=esmini_lib),
+            simulator=options.read_access(
+                esmini_lib=esmini_lib,
+                host=host,
+                port=port,
+                carla_command=carla_command,
+                carla_timeout=carla_timeout,
+            ),
             samples=samples,
             at_least=at_least,
             seed=seed,
@@ -260,6 +290,10 @@ def simulate(
     simulator: options.Simulator = None,
     simulator_set: options.SimulatorSettings = None,
     esmini_lib: options.EsminiLibrary = None,
+    host: options.Host = None,
+    port: options.Port = None,
+    carla_command: options.CarlaCommand = None,
+    carla_timeout: options.CarlaTimeout = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
@@ -286,7 +320,15 @@ def simulate(
         also=gate.metrics,
         time_step=dt,
         skipped=skipped,
-        simulator=options.read_simulator(simulator, simulator_set, esmini_lib=esmini_lib)
+        simulator=options.read_simulator(
+            simulator,
+            simulator_set,
+            esmini_lib=esmini_lib,
+            host=host,
+            port=port,
+            carla_command=carla_command,
+            carla_timeout=carla_timeout,
+        )
         or EMBEDDED,
     )
     for one in skipped or ():
@@ -301,6 +343,12 @@ def simulate(
         }
         values = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
         facts |= {"cause": result.cause, "parameters": result.parameters, "metrics": values}
+        if result.incidents:
+            step = result.rollout.time_step
+            facts["incidents"] = [
+                {"time": one.step * step, "kind": one.kind, "what": one.what}
+                for one in result.incidents
+            ]
         print(json.dumps(facts, indent=2))
     else:
         print_file_result(file, result)

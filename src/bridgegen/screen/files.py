@@ -20,6 +20,8 @@ def print_file_result(file: Path, result: "FileResult") -> None:
         print(f"failed: {result.status}")
     if result.cause is not None:
         print(f"cause of its harm, as it was found: {result.cause}")
+    for one in result.incidents:
+        print(f"at {one.step * result.rollout.time_step:.2f} s: {one.kind}: {one.what}")
     _print_metrics(result.metrics)
 
 

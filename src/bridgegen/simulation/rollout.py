@@ -40,6 +40,21 @@ WORKER_ENDED = 30
 
 
 @dataclass(frozen=True)
+class Incident:
+    """Something that the simulator itself noticed.
+
+    Attributes:
+        step: the instant.
+        kind: "collision", "lane invasion" or "red light".
+        what: with whom, over which marking, which light.
+    """
+
+    step: int
+    kind: str
+    what: str
+
+
+@dataclass(frozen=True)
 class Rollout:
     """N simulated scenarios of E entities over T recorded instants; the ego is entity 0.
 
@@ -77,6 +92,7 @@ class Rollout:
             route crosses the stop line of a traffic light, the heading in travel direction.
         stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
         messages: by row, what else there is to say of its failure.
+        incidents: by row, what the simulator noticed by itself, if it does: metrics know more.
         derived: what several metrics start from, worked out once; see `metrics.metric.shared`.
     """
 
@@ -101,6 +117,7 @@ class Rollout:
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
     stop_lights: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     messages: Mapping[int, str] = field(default_factory=dict)
+    incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -151,4 +168,5 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
         if len(arrays[0]):  # else nobody records it
             whole[name] = np.concatenate(arrays)[order]
     messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}
-    return replace(parts[0][1], **whole, messages=messages)
+    incidents = {int(each[row]): told for each, one in parts for row, told in one.incidents.items()}
+    return replace(parts[0][1], **whole, messages=messages, incidents=incidents)

@@ -1,6 +1,6 @@
 """One row: our storyboard and driver in CARLA's world, instant by instant."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -30,6 +30,16 @@ class AtTheWheel(Protocol):
 
     def control(self, k: int) -> "carla.VehicleControl | None":
         """Return what it does at an instant; None, if CARLA has it from elsewhere."""
+
+
+class Watch(Protocol):
+    """Who is told how a row goes on."""
+
+    def begin(self, frame: int) -> None:
+        """Take note of the frame of CARLA's in which instant 0 is."""
+
+    def reached(self, k: int, snapshot: "carla.WorldSnapshot") -> None:
+        """Take note of an instant that is reached; the scenario has its states."""
 
 
 class Ours:
@@ -66,7 +76,7 @@ class Row:
         weather: its weather.
         lights: its traffic lights.
         wheel: who drives the ego; None: it is moved as the embedded simulator moves it.
-        watch: told of every instant that is reached, and what there was.
+        watches: told how it goes on.
         is_stopped: whether to stop.
     """
 
@@ -75,7 +85,7 @@ class Row:
     weather: Weather
     lights: Lights
     wheel: AtTheWheel | None
-    watch: Callable[[int, "carla.WorldSnapshot"], None]
+    watches: Sequence[Watch]
     is_stopped: Callable[[], bool]
 
     def run(self, server: Server) -> None:
@@ -100,6 +110,8 @@ class Row:
                 stage.settle(joint.states(0), joint.present(0))
                 if self.wheel is not None:
                     self.wheel.begin(server)
+                for watch in self.watches:
+                    watch.begin(server.world.get_snapshot().frame)
             control: Any = None
             if self.wheel is not None:
                 control = self.wheel.control(k)
@@ -115,7 +127,8 @@ class Row:
             stage.check(snapshot)
             if self.wheel is not None:
                 joint.impose(k, [0], stage.ego_state(snapshot))
-            self.watch(k, snapshot)
+            for watch in self.watches:
+                watch.reached(k, snapshot)
 
     def _environment(self, server: Server, k: int, last: Sky | None, dry: list[float]) -> Sky:
         """Show weather and lights of an instant; what has not changed costs nothing."""

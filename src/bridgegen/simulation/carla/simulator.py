@@ -4,7 +4,7 @@ import threading
 import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.carla.guests import GUESTS
+from bridgegen.simulation.carla.incidents import Incidents
 from bridgegen.simulation.carla.lights import Lights
 from bridgegen.simulation.carla.pedals import Car
 from bridgegen.simulation.carla.row import AtTheWheel, Ours, Row, Stopped
@@ -30,8 +31,6 @@ from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
 if TYPE_CHECKING:
-    import carla
-
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
 
 ROWS = 8
@@ -178,11 +177,12 @@ class CarlaSimulator:
         driver: Driver | None,
         dry: bool,
     ) -> Rollout:
+        incidents: Incidents | None = None
         for left in reversed(range(TRIES)):
             joint = self.embedded.co_simulation(roads.network, p, values, driver=driver, dry=dry)
             try:
                 if joint.runs:
-                    self._attempt(roads, p, values, joint, driver)
+                    incidents = self._attempt(roads, p, values, joint, driver)
                 break
             except DriverError as error:
                 joint.fail(FAILURES[error.kind], str(error))
@@ -199,7 +199,10 @@ class CarlaSimulator:
             if not left:
                 joint.fail(problem.status, str(problem))
                 break
-        return joint.rollout()
+        rollout = joint.rollout()
+        if incidents is not None and rollout.status[0] == 0 and (told := incidents.all(rollout)):
+            return replace(rollout, incidents={0: told})
+        return rollout
 
     def _attempt(
         self,
@@ -208,8 +211,8 @@ class CarlaSimulator:
         values: Mapping[str, float],
         joint: "CoSimulation",
         driver: Driver | None,
-    ) -> None:
-        """Run one row.
+    ) -> Incidents:
+        """Run one row; return what CARLA noticed.
 
         Raises:
             RuntimeError: as CARLA raises them.
@@ -235,10 +238,12 @@ class CarlaSimulator:
             wheel = self._wheel(program.driver, stage, joint, way)
             if wheel is not None:
                 stack.callback(_end, wheel)
+            incidents = Incidents(stage, program.names)
             Row(
                 joint, stage, Weather(self._storyboard, program, values), lights, wheel,
-                _ignore, self._is_stopped.is_set,
+                [incidents], self._is_stopped.is_set,
             ).run(server)  # fmt: skip
+        return incidents
 
     def _moves_ego(self, driver: Driver) -> bool:
         """Say whether the ego is moved as the embedded simulator moves it."""
@@ -258,7 +263,3 @@ class CarlaSimulator:
 def _end(wheel: AtTheWheel) -> None:
     with suppress(RuntimeError):
         wheel.end()
-
-
-def _ignore(k: int, snapshot: "carla.WorldSnapshot") -> None:
-    """Watch nothing."""
