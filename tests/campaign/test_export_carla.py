@@ -259,6 +259,37 @@ def test_a_run_on_a_town_names_the_town(catalogue, tmp_path):
     assert alone[1] == tmp_path / "0001.xodr"
 
 
+def test_signs_stand_fast_and_cones_do_not(catalogue):
+    _, path = catalogue["road-works"]
+    fast = {
+        one.name: one.entity_object.properties.get("physics") == "off"
+        for one in read(path).entities.scenario_objects
+        if isinstance(one.entity_object, osc.MiscObject)
+    }
+    assert {name for name, is_fast in fast.items() if is_fast} == {"works_sign"}
+    assert len(fast) > 3
+
+
+def test_an_ego_alone_has_its_time(catalogue, tmp_path):
+    """ScenarioRunner ends with its stories: the weather, stated again, is the last thing done."""
+    source, _ = catalogue["cut-in"]
+    root = etree.parse(source).getroot()
+    for tag in ("ScenarioObject[@name='bv']", "Private[@entityRef='bv']", "Story"):
+        for one in root.findall(f".//{tag}"):
+            one.getparent().remove(one)
+    alone = source.with_name("alone.xosc")
+    alone.write_bytes(etree.tostring(root))
+    path = export(alone, "carla", out=tmp_path)[0]
+    scenario = read(path)
+    (event,) = find(scenario, osc.Event)
+    start, again = find(scenario, osc.Environment)
+    assert again == start
+    (clock,) = find(event.start_trigger, osc.SimulationTimeCondition)
+    rollout = bg.simulate_file(alone).rollout
+    end = (rollout.n_steps[0] - 1) * rollout.time_step
+    assert clock.value == pytest.approx(end - rollout.time_step / 2)
+
+
 def test_refusals(catalogue, tmp_path):
     source, _ = catalogue["crossroads-s3"]
     text = source.read_text()

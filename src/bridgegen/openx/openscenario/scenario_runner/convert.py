@@ -36,6 +36,15 @@ CONTROL = "bridgegen_control.py"
 HERO = story.HERO
 
 _EGO = osc.Property("type", "ego_vehicle")
+_FIXED = osc.Property("physics", "off")
+_IN_THE_GROUND = frozenset(
+    {
+        osc.MiscObjectCategory.BARRIER,
+        osc.MiscObjectCategory.POLE,
+        osc.MiscObjectCategory.RAILING,
+    }
+)
+"""What stands fast: beside a generated map's lanes there is no ground that would hold it."""
 
 
 def for_scenario_runner(
@@ -134,6 +143,8 @@ def _entity(name: str, body: Any) -> osc.ScenarioObject:
     made = centred(body, blueprint(body) or "")
     if name == HERO:
         made = replace(made, properties=osc.Properties((_EGO,)))
+    elif isinstance(body, osc.MiscObject) and body.misc_object_category in _IN_THE_GROUND:
+        made = replace(made, properties=osc.Properties((_FIXED,)))
     return osc.ScenarioObject(name, made)
 
 

@@ -53,11 +53,11 @@ def act(
     """
     start = _at(0.0, recording.time_step, "start")
     groups = [
-        _group(name, name, [_event(f"{name}_moves", start, [_follow(name, one)])])
+        _group(f"{name}_group", name, [_event(f"{name}_moves", start, [_follow(name, one)])])
         for name, one in courses.items()
     ]
     if events := list(_light_events(recording, roads)):
-        groups.append(_group("lights", HERO, events))
+        groups.append(_group("traffic_lights", HERO, events))
     later = list(changes[1:])
     if not courses:  # nobody keeps the act alive to its end: the weather, stated again, does
         later.append((_duration(recording), changes[-1][1]))
@@ -69,7 +69,7 @@ def act(
         )
         for i, (time, one) in enumerate(later, 1)
     ]:
-        groups.append(_group("weather", HERO, events))
+        groups.append(_group("environment", HERO, events))
     return osc.Act("act", tuple(groups), start, stop)
 
 
@@ -122,9 +122,9 @@ def _follow(name: str, course: Course) -> osc.PrivateAction:
 
 
 def _group(name: str, actor: str, events: Sequence[osc.Event]) -> osc.ManeuverGroup:
+    """Return a group; its name must be its own, for ScenarioRunner keeps what is done by it."""
     actors = osc.Actors(False, (osc.EntityRef(actor),))
-    maneuver = osc.Maneuver(f"{name}_maneuver", tuple(events))
-    return osc.ManeuverGroup(f"{name}_group", 1, actors, (maneuver,))
+    return osc.ManeuverGroup(name, 1, actors, (osc.Maneuver("maneuver", tuple(events)),))
 
 
 def _duration(recording: Recording) -> float:
