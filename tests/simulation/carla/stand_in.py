@@ -20,8 +20,6 @@ from .stand_in_actors import (
     Sensor,
     TrafficLight,
     TrafficManager,
-    Vehicle,
-    Walker,
     blueprints,
 )
 
@@ -116,14 +114,6 @@ class Machine:
         for actor in list(self.actors.values()):
             if actor.attributes.get("role_name") == role:
                 del self.actors[actor.id]
-
-    def outlines(self, ignored):
-        """Return the bodies of all but one actor: it, and its shape in CARLA's plane."""
-        return [
-            (one, shape(one))
-            for one in self.actors.values()
-            if isinstance(one, Vehicle | Walker) and one is not ignored
-        ]
 
 
 def shape(actor):

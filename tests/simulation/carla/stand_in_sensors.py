@@ -34,12 +34,19 @@ class CollisionSensor(Sensor):
     def data(self):
         from .stand_in import shape
 
-        mine = shape(self.parent)
+        here = self.parent.transform.location
+        near = [
+            one
+            for one in self._machine.actors.values()
+            if isinstance(one, Vehicle | Walker)
+            and one is not self.parent
+            and here.distance(one.transform.location) < 20.0
+            and abs(one.transform.location.z - here.z) < 3.0
+        ]
         return [
             SensorData(self, actor=self.parent, other_actor=one, normal_impulse=vector(100.0))
-            for one, other in self._machine.outlines(self.parent)
-            if abs(one.transform.location.z - self.parent.transform.location.z) < 3.0
-            and mine.intersects(other)
+            for one in near
+            if shape(self.parent).intersects(shape(one))
         ]
 
 

@@ -4,7 +4,8 @@ A simulator more is one line of `CONTENDERS`.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 from bridgegen import ego as egos
 from bridgegen.ego.drivers import is_spec
+from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
@@ -23,6 +25,33 @@ def esmini() -> SimulatorChoice:
     if not os.environ.get("ESMINI_LIB"):
         pytest.skip("ESMINI_LIB names no library of esmini's")
     return SimulatorChoice("esmini")
+
+
+def carla() -> SimulatorChoice:
+    from ..carla.stand_in import MACHINES
+
+    *_, port = MACHINES
+    return SimulatorChoice("carla", {"ego": "kinematic"}, {"--port": port})
+
+
+@contextmanager
+def carla_stands_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    client = pytest.importorskip("carla", reason="the package 'carla' is not installed")
+    from ..carla.stand_in import DEFAULT_MAP, MACHINES, Client, Machine
+
+    monkeypatch.setattr(client, "Client", Client)
+    machine = Machine({DEFAULT_MAP: to_xml(crossroads()).decode()})
+    monkeypatch.setitem(MACHINES, machine.port, machine)
+    yield
+    machine.die()
+
+
+def live_carla() -> SimulatorChoice:
+    """A server, where the environment names one."""
+    if not (host := os.environ.get("CARLA_HOST")):
+        pytest.skip("CARLA_HOST names no machine with a CARLA server")
+    access = {"--host": host, "--port": int(os.environ.get("CARLA_PORT", "2000"))}
+    return SimulatorChoice("carla", {"ego": "kinematic"}, access)
 
 
 @dataclass(frozen=True)
@@ -39,6 +68,7 @@ class Contender:
         heading: [rad].
         instants: by which an event may begin earlier or later.
         marks: of its tests.
+        prepare: what else a test of it needs.
     """
 
     name: str
@@ -49,6 +79,7 @@ class Contender:
     heading: float = 1e-6
     instants: int = 0
     marks: tuple[pytest.MarkDecorator, ...] = ()
+    prepare: Callable[[pytest.MonkeyPatch], AbstractContextManager[None]] = nullcontext
 
     def made(self, text, driver="route-follower"):
         """Return the simulator of a storyboard's text."""
@@ -80,12 +111,15 @@ CONTENDERS = (
         instants=1,
         marks=(pytest.mark.esmini,),
     ),
+    Contender("carla", carla, prepare=carla_stands_in),
+    Contender("live-carla", live_carla, marks=(pytest.mark.live_carla,)),
 )
 
 
 @pytest.fixture(params=[pytest.param(one, id=one.name, marks=one.marks) for one in CONTENDERS])
-def contender(request):
-    return request.param
+def contender(request, monkeypatch):
+    with request.param.prepare(monkeypatch):
+        yield request.param
 
 
 def is_sound(rollout, simulator, n):

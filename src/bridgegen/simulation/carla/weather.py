@@ -12,13 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bridgegen.arrays import Float, Int
 from bridgegen.ego._weather_columns import (
     CLOUD,
     FRICTION_SCALE,
     RAIN,
+    STATED,
     SUN_AZIMUTH,
     SUN_ELEVATION,
     VISUAL_RANGE,
@@ -104,6 +103,8 @@ class Weather:
         self._said = self._properties(found[0])
         self._later = [self._properties(one) for one in found[1:]]
         self._changes = _changes(program)
+        self._stated: tuple[float, ...] = ()
+        self._sky = Sky({}, 1.0)
 
     def at(self, k: int, physical: Float, events: Int) -> Sky:
         """Return the weather at an instant.
@@ -113,10 +114,17 @@ class Weather:
             physical: ``(WEATHER,)`` as the embedded simulator has it, see `CoSimulation.weather`.
             events: ``(V,)``, see `CoSimulation.events`.
         """
+        changed = False
         for event, row in self._changes:
             if events[event] == k:
-                new = self._later[row - 1]
+                new, changed = self._later[row - 1], True
                 self._said = {**self._said, **new} if new else {}
+        stated = tuple(physical[:STATED].tolist())
+        if changed or stated != self._stated:
+            self._stated, self._sky = stated, self._sky_of(physical)
+        return self._sky
+
+    def _sky_of(self, physical: Float) -> Sky:
         return Sky(
             clamped({**of_quantities(physical), **self._said}), float(physical[FRICTION_SCALE])
         )
@@ -173,7 +181,7 @@ def clamped(fields: Mapping[str, float]) -> dict[str, float]:
         value = fields[name]
         if name == "sun_azimuth_angle":
             value %= 360.0
-        result[name] = float(np.clip(value, low, high))
+        result[name] = float(min(max(value, low), high))
     return result
 
 
