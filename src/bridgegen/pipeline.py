@@ -28,7 +28,7 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.intentions import Intentions
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout
 from bridgegen.simulation.simulator import Simulator
-from bridgegen.workers import Lost, Part, Recipe, Threads, Workers
+from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
 
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
@@ -151,11 +151,12 @@ class Pipeline:
         """
         self.scenario = scenario
         self.space = space
-        self._made_with = {
+        self._made_with: dict[str, Any] = {
             "scenario": scenario, "space": space, "ego": ego, "ideal": tuple(ideal),
             "time_limit": time_limit, "road_map": road_map, "seek_causes": seek_causes,
             "cause": cause, "simulator": simulator,
         }  # fmt: skip
+        self._simulated_by = simulator
         name = ego or scenario.driver
         if name is None and tuple(ideal):
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
@@ -182,7 +183,9 @@ class Pipeline:
     @cached_property
     def recipe(self) -> Recipe:
         """Makes this pipeline in a worker, but for the objective, which is given with the rows."""
-        return Recipe.of(_remade, metrics=self.metrics, **self._made_with)
+        ego = self._made_with["ego"]
+        made_with = self._made_with | {"ego": CarriedDriver.of(ego) if ego else None}
+        return Recipe.of(_remade, metrics=self.metrics, **made_with)
 
     @property
     def rows_at_once(self) -> int:
@@ -193,6 +196,11 @@ class Pipeline:
     def runs_at_once(self) -> int:
         """How many threads had best work on rows; see `Simulator`."""
         return self.simulator.runs_at_once
+
+    @property
+    def device(self) -> str:
+        """What a worker needs one of; see `bridgegen.simulation.choice.Kind`."""
+        return self._simulated_by.device
 
     def arena(self) -> Arena:
         """Return where an agent drives the adversary's participant in closed loop.
@@ -382,9 +390,9 @@ class Pipeline:
         return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
 
 
-def _remade(**arguments: Any) -> Pipeline:
+def _remade(*, ego: CarriedDriver | None, **made_with: Any) -> Pipeline:
     """Return a pipeline for a worker, which is one thread; its kernels are compiled by then."""
-    pipeline = Pipeline(**arguments, workers=Threads(1))
+    pipeline = Pipeline(**made_with, ego=ego.here() if ego else None, workers=Threads(1))
     with compiling_alone():
         pipeline.warm_up()
     return pipeline

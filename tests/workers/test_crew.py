@@ -18,6 +18,7 @@ class Tripler:
     """Says which rows were asked for; rows of poison kill."""
 
     runs_at_once = 1
+    device = "CPU"
 
     def __init__(self, rows_at_once: int) -> None:
         self.rows_at_once = rows_at_once
@@ -58,6 +59,9 @@ class Simulated(Crew[int]):
         self.benches[self.hired] = Bench()
         self.pending[self.hired] = lambda: ("begun",)
         return self.hired
+
+    def _greet(self, hand):
+        self.pending[hand] = lambda: ("answer", self.benches[hand].holds(""))
 
     def _prepare(self, hand, recipe):
         self.pending[hand] = lambda: ("answer", self.benches[hand].prepare(recipe))
@@ -105,8 +109,8 @@ def test_what_is_lost_is_what_kills(X, at_once, workers, fates):
     expected = [None if x in poison else 3.0 * x for x in X]
     assert outcome(crew, X, at_once, poison) == expected
     killers = sum(x in poison for x in X)
-    # Two for the chunk, one for each half of it, two for the row.
-    assert crew.deaths <= killers * (4 + at_once.bit_length())
+    # One or two for the chunk, one for each half of it, two for the row; one that was not greeted.
+    assert crew.deaths <= killers * (5 + at_once.bit_length())
 
 
 @given(rows, st.integers(1, 9), st.integers(1, 5), st.lists(st.integers(0, 9), max_size=30))
@@ -132,13 +136,33 @@ def test_whatever_happens_no_row_is_done_wrong_or_twice(X, at_once, workers, fat
 
 def test_a_chunk_is_suspected_after_two_ends():
     chunk = Chunk(0, 5)
-    assert chunk.after_end() == [chunk]
-    first, second = chunk.after_end()
+    for _ in range(9):  # nobody knows whether it had begun
+        assert chunk.after_end(was_there=False) == [chunk]
+    assert chunk.after_end(was_there=True) == [chunk]
+    first, second = chunk.after_end(was_there=True)
     assert (first.start, first.stop, second.start, second.stop) == (0, 2, 2, 5)
-    (a, b), (c, d) = first.after_end(), second.after_end()  # once is enough now
+    a, b = first.after_end(was_there=True)  # once is enough now
+    c, d = second.after_end(was_there=True)
     assert [(one.start, one.stop) for one in (a, b, c, d)] == [(0, 1), (1, 2), (2, 3), (3, 5)]
-    assert a.after_end() == [a]  # a row alone has two ends of its own
-    assert a.after_end() == []
+    assert a.after_end(was_there=True) == [a]  # a row alone has two ends of its own
+    assert a.after_end(was_there=True) == []
+
+
+@given(rows, st.integers(1, 9), st.integers(2, 5))
+def test_a_machine_that_fails_takes_idle_workers_with_it(X, at_once, workers):
+    """All die while they are idle, or have just been given something: nobody has heard of it."""
+    crew = Simulated(workers, [])
+    outcome(crew, X + X, at_once, frozenset())
+    dead = set(crew.benches)
+
+    class Gone:
+        def work(self, *_):
+            raise SystemExit
+
+        holds = prepare = work
+
+    crew.benches = dict.fromkeys(dead, Gone())
+    assert outcome(crew, X, at_once, frozenset()) == [3.0 * x for x in X]
 
 
 def test_workers_that_never_begin_are_given_up():

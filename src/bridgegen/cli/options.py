@@ -132,8 +132,8 @@ Junction = Annotated[str | None, typer.Option(help="Which junction of the map.")
 Workers = Annotated[
     str | None,
     typer.Option(
-        help="Who simulates: so many processes of this machine, each one thread. No result depends "
-        "on it.",
+        help="Who simulates: so many processes of this machine, each one thread; or ray, or "
+        "ray://HOST:PORT, a Ray cluster (extra ray). No result depends on it.",
         show_default="threads, one for each core",
     ),
 ]

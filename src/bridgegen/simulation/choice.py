@@ -29,6 +29,7 @@ class Kind:
         description: one sentence.
         settings: what changes its results, by name: what it means, with its unit.
         access: what says where it is on this machine, by the name of the option for it.
+        device: "CPU" or "GPU": what a worker of it needs one of.
         make: of the embedded simulator of a storyboard, that storyboard, the chosen settings and
             the access.
     """
@@ -38,6 +39,7 @@ class Kind:
     make: "Make"
     settings: Mapping[str, str] = field(default_factory=dict)
     access: Mapping[str, str] = field(default_factory=dict)
+    device: str = "CPU"
 
 
 Make = Callable[
@@ -99,6 +101,7 @@ SIMULATORS: Mapping[str, Kind] = {
             _carla,
             settings=CARLA_SETTINGS,
             access=CARLA_OPTIONS,
+            device="GPU",  # a server each
         ),
     )
 }
@@ -137,6 +140,11 @@ class SimulatorChoice:
                     f"{name} is for the simulator {' or '.join(owners) or '(none)'}, got it for "
                     f"{self.name}"
                 )
+
+    @property
+    def device(self) -> str:
+        """What a worker needs one of: "CPU" or "GPU"."""
+        return SIMULATORS[self.name].device
 
     def simulator(
         self, storyboard: "OpenScenario", place: str, driver: "Driver | None" = None

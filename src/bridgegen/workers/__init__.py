@@ -6,12 +6,14 @@ plan, or its connection to a simulator), and rows. What comes of a row depends o
 so no result depends on who did it, on how many there are, or on who died.
 """
 
+from bridgegen.workers.carried import CarriedDriver
 from bridgegen.workers.choice import Choice, open_workers, read_choice
 from bridgegen.workers.recipe import Recipe
 from bridgegen.workers.threads import Threads
 from bridgegen.workers.workers import Lost, Part, Workers
 
 __all__ = [
+    "CarriedDriver",
     "Choice",
     "Lost",
     "Part",

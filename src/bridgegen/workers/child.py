@@ -9,9 +9,13 @@ import pickle
 import queue
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
 from bridgegen.workers.bench import portable
+
+Say = Callable[..., None]
+"""Says something to who began this process; may be called by any thread."""
 
 
 def _listen(requests: "queue.SimpleQueue[bytes]") -> None:
@@ -23,18 +27,26 @@ def _listen(requests: "queue.SimpleQueue[bytes]") -> None:
         os._exit(0)
 
 
-def main() -> None:
-    """Call what is asked for, until nobody asks."""
-    answers = os.fdopen(os.dup(1), "wb")
+def connect() -> tuple["queue.SimpleQueue[bytes]", Say]:
+    """Return what is asked for, as it comes, and how to answer; say that we have begun."""
+    answers, lock = os.fdopen(os.dup(1), "wb"), threading.Lock()
     os.dup2(2, 1)  # what is printed must not get between our messages
 
     def say(*message: Any) -> None:
-        pickle.dump(message, answers, protocol=5)
-        answers.flush()
+        data = pickle.dumps(message, protocol=5)
+        with lock:
+            answers.write(data)
+            answers.flush()
 
     requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), daemon=True).start()
     say("begun")
+    return requests, say
+
+
+def main() -> None:
+    """Call what is asked for, until nobody asks."""
+    requests, say = connect()
     while True:
         request = requests.get()
         try:

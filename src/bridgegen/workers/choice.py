@@ -1,5 +1,6 @@
 """Which workers a user asks for."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,6 +11,8 @@ from bridgegen.workers.workers import Workers
 MOST = 1024
 """Processes of one machine: more is a slip of the finger."""
 
+RAY = "ray"
+
 Choice = int | str | Workers | None
 """A number of processes; ``"ray"`` or ``"ray://HOST:PORT"``; somebody's own; nothing: threads."""
 
@@ -18,7 +21,7 @@ def read_choice(given: int | str | None) -> int | str | None:
     """Return what a user says, checked.
 
     Args:
-        given: how many processes, in digits if it is a text.
+        given: how many processes, in digits if it is a text; or "ray", or "ray://HOST:PORT".
 
     Raises:
         InputError: it is neither a number in range, nor one of Ray's.
@@ -28,7 +31,12 @@ def read_choice(given: int | str | None) -> int | str | None:
     text = str(given)
     if text.isdecimal() and 1 <= int(text) <= MOST:
         return int(text)
-    raise InputError(f"workers must be a number of processes, 1 to {MOST}, got {given}")
+    if text == RAY or re.fullmatch(r"ray://[^/:\s]+:\d+", text):
+        return text
+    raise InputError(
+        f"workers must be a number of processes, 1 to {MOST}, or ray, or ray://HOST:PORT, "
+        f"got {given}"
+    )
 
 
 @contextmanager
@@ -45,10 +53,14 @@ def open_workers(choice: Choice) -> Iterator[Workers]:
     workers: Workers
     if number is None:
         workers = Threads()
-    else:
+    elif isinstance(number, int):
         from bridgegen.workers.processes import Processes
 
-        workers = Processes(int(number))
+        workers = Processes(number)
+    else:
+        from bridgegen.workers.cluster import Cluster
+
+        workers = Cluster(None if number == RAY else number)
     try:
         yield workers
     finally:

@@ -2,6 +2,9 @@
 
 A chunk whose worker ends is done again. One that ends two workers is halved, again and again,
 until the row is alone that does it: that one is `Lost`, and all others have their results.
+
+A machine that fails takes all its workers with it, those too that have nothing to do and that
+nobody misses yet: so a chunk is blamed only if its worker was greeted, and answered, just before.
 """
 
 from abc import ABC, abstractmethod
@@ -17,7 +20,8 @@ from bridgegen.workers.recipe import Recipe
 from bridgegen.workers.workers import Lost, Part, Portable
 
 FALSE_STARTS = 3
-"""So many workers in a row that end before they are ready are a reason to give up."""
+"""So many workers in a row, or as many as there are, that end before they are ready are a reason to
+give up."""
 
 Hand = TypeVar("Hand")
 """A worker, however it is reached."""
@@ -30,13 +34,15 @@ class Chunk:
     Attributes:
         start: the first row.
         stop: the first that is not among them.
-        ends: how many workers have ended while they worked on these.
+        ends: how many workers have ended that are known to have worked on these.
+        doubted: whether one has ended to which these were given.
         suspect: whether it is what is left of a chunk that ended two.
     """
 
     start: int
     stop: int
     ends: int = 0
+    doubted: bool = False
     suspect: bool = False
 
     @property
@@ -44,15 +50,21 @@ class Chunk:
         """How many rows."""
         return self.stop - self.start
 
-    def after_end(self) -> list["Chunk"]:
-        """Return what is to be done when a worker has ended with it; nothing if it is lost."""
-        self.ends += 1
-        if self.ends < 2 and not (self.suspect and self.rows > 1):
+    def after_end(self, *, was_there: bool) -> list["Chunk"]:
+        """Return what is to be done when a worker has ended with it; nothing if it is lost.
+
+        Args:
+            was_there: whether the worker is known to have been there when it was given these.
+        """
+        self.doubted = True
+        self.ends += was_there
+        if self.ends < (1 if self.suspect and self.rows > 1 else 2):
             return [self]
         if self.rows <= 1:
             return []
         middle = (self.start + self.stop) // 2
-        return [Chunk(a, b, suspect=True) for a, b in ((self.start, middle), (middle, self.stop))]
+        halves = ((self.start, middle), (middle, self.stop))
+        return [Chunk(a, b, doubted=True, suspect=True) for a, b in halves]
 
 
 @dataclass(eq=False)
@@ -64,7 +76,8 @@ class Post(Generic[Hand]):
         ready: the keys of the recipes that it has made.
         making: that of the one that it is making.
         chunk: what it works on.
-        begun: whether it has begun.
+        begun: whether it is there, as far as is known.
+        greeted: whether it has answered a greeting, and been given no chunk since.
     """
 
     hand: Hand
@@ -72,6 +85,7 @@ class Post(Generic[Hand]):
     making: str | None = None
     chunk: Chunk | None = None
     begun: bool = False
+    greeted: bool = False
 
     @property
     def is_idle(self) -> bool:
@@ -94,6 +108,10 @@ class Crew(ABC, Generic[Hand]):
     @abstractmethod
     def _hire(self) -> Hand:
         """Begin another worker; it will say that it has begun."""
+
+    @abstractmethod
+    def _greet(self, hand: Hand) -> None:
+        """Have a worker answer anything."""
 
     @abstractmethod
     def _prepare(self, hand: Hand, recipe: Recipe) -> None:
@@ -123,14 +141,14 @@ class Crew(ABC, Generic[Hand]):
                 post = self._posts.get(hand)
                 if post is None:  # it was let go
                     continue
-                if kind == "begun":
-                    post.begun = True
+                if kind == "begun" or (kind == "answer" and not post.begun):
+                    post.begun = post.greeted = True
                 elif kind == "died":
                     self._bury(post, waiting, done)
                 elif kind == "raised" and isinstance(rest[0], Unprepared) and post.chunk:
                     post.ready.clear()
                     waiting.appendleft(post.chunk)
-                    post.chunk = None
+                    post.chunk, post.greeted = None, False
                 elif kind == "raised":
                     raise rest[0]
                 elif post.making is not None:
@@ -139,7 +157,7 @@ class Crew(ABC, Generic[Hand]):
                     post.making = None
                 elif post.chunk is not None:
                     done[post.chunk.start] = Part(post.chunk.rows, rest[0])
-                    post.chunk = None
+                    post.chunk, post.greeted = None, False
         except BaseException:
             self.close()  # nobody wants what they are doing
             raise
@@ -164,25 +182,28 @@ class Crew(ABC, Generic[Hand]):
         for post in [post for post in self._posts.values() if post.is_idle]:
             if not waiting:
                 return
-            if recipe.key in post.ready:
-                post.chunk = chunk = waiting.popleft()
-                self._work(post.hand, recipe.key, work, X[chunk.start : chunk.stop], given)
-            else:
+            if recipe.key not in post.ready:
                 post.making = recipe.key
                 self._prepare(post.hand, recipe)
+            elif waiting[0].doubted and not post.greeted:
+                post.begun = False
+                self._greet(post.hand)
+            else:
+                post.chunk = chunk = waiting.popleft()
+                self._work(post.hand, recipe.key, work, X[chunk.start : chunk.stop], given)
 
     def _bury(self, post: Post[Hand], waiting: deque[Chunk], done: dict[int, Part]) -> None:
         """Take account of a worker that has ended, and of what it was doing."""
         del self._posts[post.hand]
         reason, chunk = self._dismiss(post.hand), post.chunk
         if chunk is None:
-            self._false_starts += not post.is_idle
-            if self._false_starts >= FALSE_STARTS:
+            self._false_starts += not post.ready
+            if self._false_starts >= max(FALSE_STARTS, self.count):
                 raise WorkersError(
-                    f"{FALSE_STARTS} workers in a row have ended before they were ready: {reason}"
+                    f"{self._false_starts} workers in a row ended before they were ready: {reason}"
                 )
             return
-        left = chunk.after_end()
+        left = chunk.after_end(was_there=post.greeted)
         waiting.extendleft(reversed(left))
         if not left:
             done[chunk.start] = Part(chunk.rows, Lost(reason))

@@ -9,7 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import IO, Any
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment of a process that leaves the other cores to the other processes."""
@@ -24,14 +24,19 @@ class Process:
 
     Args:
         said: takes what it says.
+        module: whose ``main`` it runs.
+        errors: takes what it writes to its standard error; ours does by default.
     """
 
-    def __init__(self, said: Said) -> None:
+    def __init__(
+        self, said: Said, module: str = "bridgegen.workers.child", errors: IO[bytes] | None = None
+    ) -> None:
         self._said = said
         self._process = subprocess.Popen(
-            [sys.executable, "-c", "from bridgegen.workers.child import main; main()"],
+            [sys.executable, "-c", f"from {module} import main; main()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=errors,
             env=os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(["", *sys.path])},
             start_new_session=True,  # Ctrl-C is ours, and a driver's process ends with it
         )
@@ -51,10 +56,14 @@ class Process:
             arguments: of it.
             tells: whether it takes, as its last argument, a function that says something here.
         """
+        self.ask(function, arguments, tells)
+
+    def ask(self, *request: Any) -> None:
+        """Send a request, as the module's ``main`` understands it."""
         assert self._process.stdin is not None
-        request = pickle.dumps((function, arguments, tells), protocol=5)
+        data = pickle.dumps(request, protocol=5)
         with suppress(OSError):  # it has died: the reader says so
-            pickle.dump(request, self._process.stdin, protocol=5)
+            pickle.dump(data, self._process.stdin, protocol=5)
             self._process.stdin.flush()
 
     def end(self) -> int:

@@ -38,6 +38,9 @@ class Processes(Crew[Process]):
     def _hire(self) -> Process:
         return Process(self._said)
 
+    def _greet(self, hand: Process) -> None:
+        hand.call(_be_there)
+
     def _prepare(self, hand: Process, recipe: Recipe) -> None:
         hand.call(_prepare, recipe)
 
@@ -64,6 +67,10 @@ def ending(status: int) -> str:
 # --- In the other process -------------------------------------------------------------------------
 
 _bench = Bench()
+
+
+def _be_there() -> None:
+    """Answer."""
 
 
 def _prepare(recipe: Recipe) -> None:

@@ -19,6 +19,10 @@ class Portable(Protocol):
         """In how many threads it had best work, where they share it, ≥ 1."""
 
     @property
+    def device(self) -> str:
+        """What a worker needs one of, as Ray calls it: "CPU", or "GPU"."""
+
+    @property
     def recipe(self) -> Recipe:
         """Makes it again."""
 

@@ -24,7 +24,7 @@ class Poisoned(Pipeline):
         return super().evaluate_rows(X, objective)
 
 
-def _poisoned(poison: np.ndarray, **arguments) -> Poisoned:
-    pipeline = Poisoned(**arguments, workers=Threads(1))
+def _poisoned(poison: np.ndarray, **made_with) -> Poisoned:
+    pipeline = Poisoned(**made_with, workers=Threads(1))
     pipeline.poison = poison
     return pipeline

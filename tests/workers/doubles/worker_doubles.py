@@ -15,6 +15,7 @@ class Doubler:
     """Doubles numbers."""
 
     runs_at_once = 8
+    device = "CPU"
 
     def __init__(self, rows_at_once: int = 4) -> None:
         self.rows_at_once = rows_at_once
