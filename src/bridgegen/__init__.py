@@ -9,16 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, resume, run_search
+    from bridgegen.campaign.confirm import confirm
     from bridgegen.comparison import Comparison, compare
     from bridgegen.odd.reader import load
     from bridgegen.reproduction import Reproduction, reproduce
     from bridgegen.simulate import simulate_file
+    from bridgegen.simulation.choice import SimulatorChoice
 
 __all__ = [
     "Comparison",
     "Reproduction",
     "Run",
+    "SimulatorChoice",
     "compare",
+    "confirm",
     "load",
     "reproduce",
     "resume",
@@ -29,6 +33,7 @@ __all__ = [
 _HOMES = {
     "Comparison": "bridgegen.comparison",
     "compare": "bridgegen.comparison",
+    "confirm": "bridgegen.campaign.confirm",
     "Reproduction": "bridgegen.reproduction",
     "reproduce": "bridgegen.reproduction",
     "Run": "bridgegen.campaign",
@@ -36,6 +41,7 @@ _HOMES = {
     "resume": "bridgegen.campaign",
     "run_search": "bridgegen.campaign",
     "simulate_file": "bridgegen.simulate",
+    "SimulatorChoice": "bridgegen.simulation.choice",
 }
 
 

@@ -312,6 +312,24 @@ def test_a_record_of_another_run_is_refused(folder, double):
     assert confirm(folder, elsewhere(), again=True).summary.confirmed == 4
 
 
+def test_a_run_of_another_simulator_is_confirmed_in_ours(tmp_path, double):
+    """Here is where it was searched: the other car 0.9 m ahead of where ours has it."""
+    double.disturb = shifted(0.9)
+    place = tmp_path / "run"
+    bg.run_search(
+        "crossroads-s2", algorithm="random", budget=30, seed=2, ego="route-follower", keep=2,
+        causes=False, simulator=elsewhere(), out=place,
+    )  # fmt: skip
+    with pytest.raises(InputError, match="was searched in the simulator double"):
+        bg.confirm(place, "double")
+    found = bg.confirm(place, "embedded")
+    assert (found.record.reference, found.record.label) == ("double", "embedded")
+    for one in found.scenarios:
+        first = one.differences.partings[0]
+        assert (first.entity, first.time) == ("bv", 0.0)
+        assert first.gap == pytest.approx(0.9)
+
+
 def test_harm_counts_by_the_thresholds_whatever_its_cause(tmp_path, double):
     place = tmp_path / "run"
     bg.run_search(

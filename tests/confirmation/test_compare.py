@@ -79,6 +79,21 @@ def test_a_gap_is_told_in_the_direction_of_travel():
     assert one.time == one.since == 0.0
 
 
+def test_who_goes_another_way_is_told_by_how_much():
+    """Both at 1 m a step; there it turns left by 90° after ten steps, here it goes on."""
+    k = np.arange(21.0)
+    here = moving(k[np.newaxis], np.zeros((1, 21)))
+    there = moving(np.minimum(k, 10.0)[np.newaxis], np.maximum(k - 10.0, 0.0)[np.newaxis])
+    (one,) = compare(here, there).partings
+    assert (one.time, one.gap) == (pytest.approx(1.1), pytest.approx(np.sqrt(2.0)))
+    assert one.turn == pytest.approx(np.pi / 2)
+    (back,) = compare(there, here).partings
+    assert back.turn == pytest.approx(-np.pi / 2)
+    stands = moving(np.zeros((1, 21)), np.zeros((1, 21)))
+    (one,) = compare(stands, here).partings
+    assert one.turn is None
+
+
 def test_the_limit_itself_is_not_parted():
     exact = compare(moving(steady()), moving(steady(ahead=PARTED)))
     assert exact.partings == ()

@@ -19,7 +19,7 @@ def scenario(k, here=None, there=None, parted=None, failure=""):
     here = here or outcome()
     if there is None:
         return Scenario(evaluation=k, name=f"{k:04d}", row="", here=here, failure=failure)
-    partings = () if parted is None else (Parting("bv", parted, 0.6, 0.6, 0.0, 0.0, parted),)
+    partings = () if parted is None else (Parting("bv", parted, 0.6, 0.6, 0.0, 0.0, None, parted),)
     return Scenario(
         evaluation=k, name=f"{k:04d}", row="", here=here, there=there,
         change=Change.between(here, there), differences=Differences(partings=partings),

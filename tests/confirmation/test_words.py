@@ -1,5 +1,6 @@
 """What is said of two rollouts that part."""
 
+import numpy as np
 import pytest
 
 from bridgegen.confirmation.differences import BoxSizes, Contact, EventTimes, LightTimes, Parting
@@ -39,8 +40,8 @@ def test_a_miss_says_by_how_much():
 
 
 def test_the_first_who_parts_is_told_with_what_came_before():
-    parts = Parting("bv", 3.2, 0.52, -0.51, 0.1, -0.4, 2.6)
-    ego = Parting("ego", 4.1, 0.6, 0.0, 0.6, 0.0, 4.0)
+    parts = Parting("bv", 3.2, 0.52, -0.51, 0.1, -0.4, None, 2.6)
+    ego = Parting("ego", 4.1, 0.6, 0.0, 0.6, 0.0, None, 4.0)
     text = said(
         came_to(False, 3.0, 5.0),
         partings=(parts, ego),
@@ -67,17 +68,31 @@ def test_the_first_who_parts_is_told_with_what_came_before():
     ],
 )
 def test_events_are_told(event, words):
-    parts = Parting("bv", 3.2, 0.6, 0.0, -0.6, 0.0, 3.0)
+    parts = Parting("bv", 3.2, 0.6, 0.0, -0.6, 0.0, None, 3.0)
     text = said(came_to(True, 1.0, 5.0), partings=(parts,), events=(event,))
     assert words in text
     assert "to the right, and as fast" in text
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"),
+    [
+        (None, "slower; on its way"),
+        (0.1, "slower; on its way"),
+        (np.pi / 2, "slower, going 90° to the left of its way here; on its way"),
+        (-0.5, "slower, going 29° to the right of its way here; on its way"),
+    ],
+)
+def test_another_way_is_told(turn, words):
+    parts = Parting("walker", 3.2, 0.6, 0.0, -0.6, -0.1, turn, 3.0)
+    assert words in said(came_to(True, 1.0, 5.0), partings=(parts,))
 
 
 def test_what_else_differs_is_told():
     text = said(
         came_to(True, 1.0, 5.0, Contact(3.0, "van")),
         here=came_to(True, 0.0, 5.0, Contact(2.0, "bv")),
-        partings=(Parting("bv", 1.0, None, None, None, None, 0.9, "there"),),
+        partings=(Parting("bv", 1.0, None, None, None, None, None, 0.9, "there"),),
         boxes=(BoxSizes("bv", (4.0, 2.0, 1.0), (4.5, 1.8, 1.2)),),
         only_here=("cone",),
         only_there=("walker",),

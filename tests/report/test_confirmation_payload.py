@@ -46,7 +46,7 @@ def record(report):
     a, b, c, _ = report.kept
     rest = {p.evaluation for p in report.kept}
     other = next(i for i in np.flatnonzero(report.evaluations.critical) if i not in rest)
-    parts = Parting("bv", 2.5, 0.6, 0.6, 0.0, 0.1, 2.0)
+    parts = Parting("bv", 2.5, 0.6, 0.6, 0.0, 0.1, None, 2.0)
     return Record(
         simulator="esmini",
         label="esmini 3.6",

@@ -61,7 +61,7 @@ class RunConfirmation:
 
 def confirm(
     folder: Path | str,
-    simulator: SimulatorChoice,
+    simulator: SimulatorChoice | str,
     *,
     rows: int | None = None,
     again: bool = False,
@@ -77,7 +77,7 @@ def confirm(
 
     Args:
         folder: of the run, finished or not.
-        simulator: the other one.
+        simulator: the other one; by its name, where nothing else need be said.
         rows: how many of the run's critical scenarios, the most critical ones; those that were
             handed over by default.
         again: whether to forget what was confirmed before.
@@ -95,6 +95,8 @@ def confirm(
         Interrupted: Ctrl-C; the same again goes on.
     """
     stage = stage or (lambda name: None)
+    if isinstance(simulator, str):
+        simulator = SimulatorChoice(simulator)
     if rows is not None and rows < 1:
         raise InputError(f"1 <= rows must hold, got {rows}")
     with Store.open(folder) as store:
@@ -107,7 +109,8 @@ def confirm(
         )
     handed = {one.evaluation: one.name for one in handed_over(place)}
     asked = _chosen(place, every, handed, rows)
-    here = pipeline_of(settings, names, place, ego=ego, command="confirm", causes=False)
+    command = f"confirm --simulator {simulator.name}"
+    here = pipeline_of(settings, names, place, ego=ego, command=command, causes=False)
     stage("compile")
     here.warm_up()
     elsewhere = replace(
@@ -116,7 +119,7 @@ def confirm(
     with open_workers(workers) as crew:
         there = pipeline_of(
             elsewhere, names, place,
-            ego=ego, command="confirm", causes=False, simulator=simulator, workers=crew,
+            ego=ego, command=command, causes=False, simulator=simulator, workers=crew,
         )  # fmt: skip
         empty = _empty(here, there, simulator, settings, place)
         known = {} if again else _known(place, empty, every)

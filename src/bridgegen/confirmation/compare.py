@@ -4,6 +4,7 @@ The one is *here*, the other *there*; every difference is there − here. Where 
 different time steps, the states of the finer one are interpolated at the coarser one's instants.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,6 +27,9 @@ from bridgegen.simulation.rollout import Rollout
 
 SAME_BOX = 1e-3
 """Boxes that differ by less are the same [m]."""
+
+STANDS = 1e-3
+"""Who moves less in a step has no direction [m]."""
 
 _EPSILON = 1e-6  # of times [s]: they are multiples of a step
 
@@ -170,7 +174,7 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
     since = float(times[trace[-1] + 1 if trace.size else 0])
     if alone[k]:
         only = "here" if a.present[k] else "there"
-        return Parting(entity, float(times[k]), None, None, None, None, since, only)
+        return Parting(entity, float(times[k]), None, None, None, None, None, since, only)
     dx, dy = float(b.x[k] - a.x[k]), float(b.y[k] - a.y[k])
     cos, sin = float(np.cos(a.h[k])), float(np.sin(a.h[k]))
     return Parting(
@@ -180,8 +184,19 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
         along=dx * cos + dy * sin,
         across=dy * cos - dx * sin,
         speed=float(b.v[k] - a.v[k]),
+        turn=_turn(a, b, k),
         since=since,
     )
+
+
+def _turn(a: _States, b: _States, k: int) -> float | None:
+    """Return the angle between two directions of travel at an instant; None where one stands."""
+    if k == 0 or not (a.present[k - 1] and b.present[k - 1]):
+        return None
+    (ax, ay), (bx, by) = ((float(s.x[k] - s.x[k - 1]), float(s.y[k] - s.y[k - 1])) for s in (a, b))
+    if min(math.hypot(ax, ay), math.hypot(bx, by)) < STANDS:
+        return None
+    return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
 
 def first_contact(rollout: Rollout, row: int) -> Contact | None:

@@ -44,6 +44,8 @@ class Parting(_Checked):
             that follow.
         across: how far left it is there [m].
         speed: how much faster it is there [m/s].
+        turn: how far to the left of its direction of travel here it moves there [rad], in −π..π;
+            None too where it does not move.
         since: the first instant from which on it was off by more than TRACE without a pause [s].
         only: "here" or "there", if it is in one of them alone, for more than a step.
     """
@@ -54,6 +56,7 @@ class Parting(_Checked):
     along: float | None
     across: float | None
     speed: float | None
+    turn: float | None
     since: float
     only: str | None = None
 

@@ -1,5 +1,7 @@
 """Where and why two rollouts part, in sentences."""
 
+import math
+
 from bridgegen.confirmation.differences import (
     PARTED,
     BoxSizes,
@@ -13,6 +15,9 @@ from bridgegen.objective import Thresholds
 NARROW = (0.25, 0.25)
 """A scenario that misses a threshold by no more than this, on d_min [m] or v_d [m/s], misses it
 narrowly."""
+
+TURNED = math.radians(10.0)
+"""Who moves in a direction that differs by more takes another way."""
 
 LIGHTS = ("off", "red", "red and yellow", "yellow", "green")
 
@@ -119,12 +124,16 @@ def _parting(one: Parting) -> str:
     assert one.across is not None
     assert one.speed is not None
     along = abs(one.along) >= abs(one.across)
-    side = ("ahead", "behind") if along else ("to the left", "to the right")
-    where = side[(one.along if along else one.across) < 0.0]
+    sides = ("ahead", "behind") if along else ("to the left", "to the right")
+    where = sides[(one.along if along else one.across) < 0.0]
     pace = f"{abs(one.speed):.2f} m/s {'faster' if one.speed > 0.0 else 'slower'}"
     if abs(one.speed) < 0.05:
         pace = "as fast"
+    way = ""
+    if one.turn is not None and abs(one.turn) > TURNED:
+        side = "left" if one.turn > 0.0 else "right"
+        way = f", going {math.degrees(abs(one.turn)):.0f}° to the {side} of its way here"
     return (
         f"{one.entity} parts first: at {one.time:.2f} s it is {one.gap:.2f} m apart there, "
-        f"{where}, and {pace}; on its way since {one.since:.2f} s."
+        f"{where}, and {pace}{way}; on its way since {one.since:.2f} s."
     )
