@@ -310,7 +310,11 @@ conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="1" rule="
 <SimulationTimeCondition value="0" rule="greaterOrEqual"/></ByValueCondition></Condition>
 </ConditionGroup></StartTrigger></Act></Story>"""
     before, stop, after = text.rpartition("<StopTrigger>")
-    refuse(UnsupportedError, "the entity bv must be there from", before + gone + stop + after)
+    refuse(
+        UnsupportedError,
+        r"odd.xosc: the entity bv must be there from",
+        before + gone + stop + after,
+    )
     refuse(UnsupportedError, "another name", text.replace('"bv"', '"hero"'))
     tram = text.replace('vehicleCategory="car"', 'vehicleCategory="tram"')
     refuse(UnsupportedError, "that CARLA has, got vehicleCategory tram", tram)

@@ -11,7 +11,13 @@ from pathlib import Path
 from bridgegen.campaign.handover import FOLDER
 from bridgegen.campaign.settings import Settings
 from bridgegen.ego.noise import noise_key
-from bridgegen.errors import FileFormatError, InputError, StorageError, UnknownNameError
+from bridgegen.errors import (
+    FileFormatError,
+    InputError,
+    StorageError,
+    UnknownNameError,
+    UnsupportedError,
+)
 from bridgegen.openx.logic_file import logic_file, roads_of
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
@@ -217,7 +223,10 @@ def _carla(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
     """Return a scenario for CARLA's ScenarioRunner, which all but its ego go through again."""
     plain = _resolved(scenario, path)
     name = f"{plain.file_header.description}-{path.stem}"
-    return for_scenario_runner(plain, _recording(path), roads_of(scenario, path), name)
+    try:
+        return for_scenario_runner(plain, _recording(path), roads_of(scenario, path), name)
+    except UnsupportedError as error:
+        raise UnsupportedError(*(f"{path}: {problem}" for problem in error.problems)) from None
 
 
 def _control() -> bytes:

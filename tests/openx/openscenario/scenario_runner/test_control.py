@@ -3,6 +3,7 @@
 Its world moves vehicles by their velocities, as physics without friction does.
 """
 
+import ast
 import importlib.util
 import math
 import sys
@@ -103,6 +104,11 @@ class Walker(Body, carla.Walker):
 
 class Prop(Body):
     pass
+
+
+def test_old_pythons_read_it():
+    package = files("bridgegen.openx.openscenario.scenario_runner")
+    ast.parse((package / "bridgegen_control.py").read_text(), feature_version=(3, 7))
 
 
 @pytest.fixture(scope="module")

@@ -78,13 +78,7 @@ def for_scenario_runner(
         if one != HERO and (courses[one].moves or not isinstance(body, osc.MiscObject))
     }
     controllers = {one: _controller(one, {"duration": c.duration}) for one, c in moved.items()}
-    controllers[HERO] = _controller(
-        HERO,
-        {
-            **({"traffic_lights": "stand"} if recording.light_names else {}),
-            **{f"weather.{field}": x for field, x in carla_fields(weather[0][1]).items()},
-        },
-    )
+    controllers[HERO] = _controller(HERO, _world(recording, weather[0][1]))
     privates = tuple(
         osc.Private(one, tuple(_start(one, float(recording.v[e, 0]), courses, controllers)))
         for e, one in enumerate(names)
@@ -184,6 +178,12 @@ def _start(
     target = osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(speed))
     yield osc.PrivateAction(osc.LongitudinalAction(osc.SpeedAction(at_once, target)))
     yield osc.PrivateAction(controllers[name])
+
+
+def _world(recording: Recording, weather: osc.Environment) -> dict[str, str | float]:
+    """Return what the ego's controller sets of the world."""
+    lights = {"traffic_lights": "stand"} if recording.light_names else {}
+    return lights | {f"weather.{name}": value for name, value in carla_fields(weather).items()}
 
 
 def _controller(name: str, properties: Mapping[str, str | float]) -> osc.ControllerAction:
