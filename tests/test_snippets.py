@@ -193,7 +193,7 @@ def test_every_snippet_runs(name, page):
 def test_few_snippets_cannot_be_run():
     found = [block for name in PAGES for block in blocks(name) if block.mark == "not run"]
     assert all("esmini" in block.value or "CARLA" in block.value for block in found)
-    assert len(found) <= 6
+    assert len(found) <= 12
 
 
 def test_marks_are_those_that_are_known():
