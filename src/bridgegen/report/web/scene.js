@@ -93,8 +93,7 @@ class Scene {
     return state.entities.map((s, e) => {
       if (!players.includes(e)) return null;
       const seen = this.layers.sensed && e > 0 ? detectionWords(detectionAt(this.kept, e, state.index)) : "";
-      const off = this.layers.elsewhere ? elsewhereWords(this.kept, state, e) : "";
-      return `${s.name}  ${measured(s.v, "m/s", 2)} m/s${seen && seen !== "seen" ? `  ${seen}` : ""}${off ? `  ${off}` : ""}`;
+      return `${s.name}  ${measured(s.v, "m/s", 2)} m/s${seen && seen !== "seen" ? `  ${seen}` : ""}`;
     });
   }
 
