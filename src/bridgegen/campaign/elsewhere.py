@@ -1,5 +1,6 @@
 """Scenarios of a run, run again here and in another simulator, and compared one by one."""
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,9 @@ from bridgegen.workers import Lost
 
 AT_A_TIME = 32
 """Scenarios that are run before what became of them is handed on, at most."""
+
+SECONDS = 0.5
+"""Fewer are run together where they take longer: what is handed on is safe [s]."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +52,18 @@ def run_elsewhere(
         every: all rows of the run.
         evaluations: some of these, which succeeded.
     """
-    size = max(1, min(AT_A_TIME, there.rows_at_once * there.runs_at_once))
-    for start in range(0, len(evaluations), size):
-        some = list(evaluations[start : start + size])
+    most = max(1, min(AT_A_TIME, there.rows_at_once * there.runs_at_once))
+    size, done = min(most, there.runs_at_once), 0
+    while done < len(evaluations):
+        began = time.monotonic()
+        some = list(evaluations[done : done + size])
         X = every.X[some]
         motion = here.rollout(X)
         for row, (k, ran) in enumerate(zip(some, _elsewhere(there, X), strict=True)):
             yield _scenario(here, every, k, motion, row, ran)
+        done += len(some)
+        if time.monotonic() - began < SECONDS:  # no result depends on how many go together
+            size = min(most, 2 * size)
 
 
 def _elsewhere(there: Pipeline, X: Float) -> Iterator[_Ran | str]:
