@@ -172,8 +172,11 @@ class Pipeline:
             self.source = _source(scenario, self.driver, road_map, space)
         if cause is not None:
             require(cause, self.driver)
-        recorded = metrics_of(scenario, self.driver, also) if metrics is None else metrics
-        self.metrics = tuple(recorded)
+        sees = simulator.detects
+        if metrics is None:
+            metrics = metrics_of(scenario, self.driver, also, detects=sees)
+        held = measures.held_by(self.driver, detects=sees)
+        self.metrics = measures.require(metrics, held, f"the driver '{self.driver.name}'")
         _refuse_fixed(scenario, space, self.simulator.fixed)
         self._roads: Any = None
         if not {*self._road_names} & {*space.variables}:
@@ -432,7 +435,11 @@ def _refuse_fixed(scenario: SearchedScenario, space: SearchSpace, fixed: Mapping
 
 
 def metrics_of(
-    scenario: SearchedScenario, driver: egos.Driver, also: Sequence[str] = ()
+    scenario: SearchedScenario,
+    driver: egos.Driver,
+    also: Sequence[str] = (),
+    *,
+    detects: bool = False,
 ) -> tuple[str, ...]:
     """Return the metrics that a search records; see `bridgegen.metrics.to_record`.
 
@@ -441,4 +448,4 @@ def metrics_of(
         InputError: a metric does not exist with this driver.
     """
     terms = (term.metric for term in scenario.objective.terms)
-    return measures.to_record(driver, (*terms, *CLASSIFYING, *also))
+    return measures.to_record(driver, (*terms, *CLASSIFYING, *also), detects=detects)

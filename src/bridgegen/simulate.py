@@ -95,7 +95,7 @@ def simulate_file(
         scenario, str(path), driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
     )
     runs = simulator.around(embedded, scenario)
-    held = measures.held_by(embedded.program.driver)
+    held = measures.held_by(embedded.program.driver, detects=simulator.detects)
     names = measures.existing(tuple(measures.METRICS), held)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
     names = measures.require(asked, held, f"the driver '{embedded.driver}'")

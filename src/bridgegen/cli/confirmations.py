@@ -19,6 +19,8 @@ def confirm(
     port: options.Port = None,
     carla_command: options.CarlaCommand = None,
     carla_timeout: options.CarlaTimeout = None,
+    record: options.Record = None,
+    detector: options.Detector = None,
     rows: Annotated[
         int | None,
         typer.Option(
@@ -50,6 +52,8 @@ def confirm(
         port=port,
         carla_command=carla_command,
         carla_timeout=carla_timeout,
+        record=record,
+        detector=detector,
     )
     assert choice is not None
     with ConfirmationScreen() as screen:

@@ -121,6 +121,19 @@ CarlaCommand = Annotated[
     str | None,
     typer.Option(help="Starts a CARLA server, and again when it has ended.", show_default="none"),
 ]
+Record = Annotated[
+    Path | None,
+    typer.Option(
+        help="A new folder for camera images, LiDAR points, boxes and incidents, with --simulator "
+        "carla."
+    ),
+]
+Detector = Annotated[
+    str | None,
+    typer.Option(
+        help="A detector of your own that looks at CARLA's images: module:Class, file.py:Class."
+    ),
+]
 CarlaTimeout = Annotated[
     float | None,
     typer.Option(help="Seconds that an answer of CARLA's may take.", show_default="20"),

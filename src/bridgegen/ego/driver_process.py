@@ -144,7 +144,7 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
         return FmuDriver(spec)
     where, _, name = spec.rpartition(":")
     try:
-        module = _module_of(where)
+        module = module_of(where)
     except ImportError as error:
         raise InputError(f"{where} cannot be imported: {error}") from error
     found = getattr(module, name, None)
@@ -160,7 +160,12 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
     return driver
 
 
-def _module_of(where: str) -> ModuleType:
+def module_of(where: str) -> ModuleType:
+    """Import a module by its name, or a file that ends in .py.
+
+    Raises:
+        ImportError: there is none.
+    """
     if not where.endswith(".py"):
         return importlib.import_module(where)
     path = Path(where)

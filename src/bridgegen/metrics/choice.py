@@ -8,9 +8,15 @@ from bridgegen.metrics.metric import Need
 from bridgegen.metrics.registry import TABLE_I, get
 
 
-def held_by(driver: Driver) -> tuple[Need, ...]:
-    """Return what a simulator's rollouts of a driver hold beside motion."""
-    return ("detections", "lights", "offset") if driver.perceives else ("lights", "offset")
+def held_by(driver: Driver, *, detects: bool = False) -> tuple[Need, ...]:
+    """Return what a simulator's rollouts of a driver hold beside motion.
+
+    Args:
+        driver: it.
+        detects: whether somebody else detects things there, whatever the driver does.
+    """
+    perceives = detects or driver.perceives
+    return ("detections", "lights", "offset") if perceives else ("lights", "offset")
 
 
 def existing(names: Sequence[str], held: Collection[Need]) -> tuple[str, ...]:
@@ -47,7 +53,7 @@ def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str
     return tuple(names)
 
 
-def to_record(driver: Driver, asked: Sequence[str]) -> tuple[str, ...]:
+def to_record(driver: Driver, asked: Sequence[str], *, detects: bool = False) -> tuple[str, ...]:
     """Return what a search records: Table I's metrics, as far as they exist, and those asked for.
 
     The others wait until somebody asks: together they take longer than the paper's.
@@ -56,6 +62,6 @@ def to_record(driver: Driver, asked: Sequence[str]) -> tuple[str, ...]:
         UnknownNameError: a name is not a metric's.
         InputError: one that is asked for does not exist with this driver.
     """
-    held = held_by(driver)
+    held = held_by(driver, detects=detects)
     chosen = require(asked, held, f"the driver '{driver.name}'")
     return tuple(dict.fromkeys((*existing(TABLE_I, held), *chosen)))

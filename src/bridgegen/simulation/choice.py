@@ -146,6 +146,11 @@ class SimulatorChoice:
         """What a worker needs one of: "CPU" or "GPU"."""
         return SIMULATORS[self.name].device
 
+    @property
+    def detects(self) -> bool:
+        """Whether a detector of the user's looks at what it renders."""
+        return "--detector" in self.access
+
     def simulator(
         self, storyboard: "OpenScenario", place: str, driver: "Driver | None" = None
     ) -> "Simulator[Any]":

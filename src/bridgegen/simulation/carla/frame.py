@@ -9,6 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Float
 
@@ -109,3 +110,18 @@ def seen(
             max(v_x * cos + v_y * sin, 0.0),
         ]
     )
+
+
+def points(
+    scan: npt.NDArray[np.float32], place: tuple[float, float, float]
+) -> npt.NDArray[np.float32]:
+    """Return a LiDAR's points in the ego's frame.
+
+    Args:
+        scan: ``(P, 4)`` x, y, z [m] in the sensor's frame, CARLA's, which looks ahead; intensity.
+        place: where the sensor is in the ego's frame [m].
+    """
+    seen = scan.copy()
+    seen[:, 1] *= -1.0
+    seen[:, :3] += np.array(place, np.float32)
+    return seen

@@ -1,5 +1,8 @@
 """What CARLA itself notices: contacts of the ego, lane markings that it crosses; and red lights."""
 
+import csv
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,3 +92,14 @@ def red_lights(rollout: Rollout) -> list[Incident]:
             if rollout.lights[0, light, k - 1] in (RED, RED_AND_YELLOW):
                 found.append(Incident(k, RED_LIGHT, rollout.light_names[light]))
     return found
+
+
+def write_incidents(folder: Path, incidents: Sequence[Incident], time_step: float) -> None:
+    """Write a row's incidents into its folder, as ``incidents.csv``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "incidents.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("frame", "time", "kind", "what"))
+        writer.writerows(
+            (one.step, round(one.step * time_step, 6), one.kind, one.what) for one in incidents
+        )

@@ -19,6 +19,7 @@ MEANINGS: Mapping[str, str] = {
     "opendrive (always our roads), or the name of one of the server's maps",
     "agent": "for --ego carla-agent: basic, cautious, normal or aggressive",
     "seed": "of the Traffic Manager, for --ego carla-autopilot",
+    "sensor_period": "seconds between two frames of --record and --detector",
 }
 """Of the settings, which change results."""
 
@@ -27,6 +28,8 @@ OPTIONS: Mapping[str, str] = {
     "--port": "its port",
     "--carla-command": "starts the server, and again when it has ended",
     "--carla-timeout": "seconds that an answer may take",
+    "--record": "a new folder for images, LiDAR points, boxes and incidents",
+    "--detector": "a detector of your own, whose boxes are measured",
 }
 """Of where it is, and what it is to leave here."""
 
@@ -42,6 +45,7 @@ class CarlaSettings:
     map: str = "auto"
     agent: str = "basic"
     seed: int = 0
+    sensor_period: float = 0.1
 
     @classmethod
     def of(cls, chosen: Mapping[str, Value]) -> Self:
@@ -63,6 +67,12 @@ class CarlaSettings:
         must("ego", "'physics' or 'kinematic'", ego in ("physics", "kinematic"))
         must("agent", " or ".join(AGENTS), agent in AGENTS)
         must("seed", "0 <= seed < 2^31, whole,", _whole(seed) and 0 <= int(seed or 0) < 2**31)
+        period = chosen.get("sensor_period")
+        must(
+            "sensor_period",
+            f"a multiple of {TIME_STEP:g} s up to 10 s",
+            _number(period) and _is_multiple(float(period or 0.0)),
+        )
         for name in ("ego_model", "map"):
             must(name, "a name", isinstance(chosen.get(name), str) and chosen.get(name) != "")
         if problems:
@@ -81,12 +91,16 @@ class Access:
         port: of its first connection; it takes the next two, too.
         command: starts it; empty: nobody does.
         timeout: [s] that an answer may take.
+        record: a folder for what the sensors record; empty: nothing is.
+        detector: of the user's; empty: none.
     """
 
     host: str = "localhost"
     port: int = 2000
     command: str = ""
     timeout: float = 20.0
+    record: str = ""
+    detector: str = ""
 
     @classmethod
     def of(cls, given: Mapping[str, Value]) -> Self:
@@ -120,3 +134,8 @@ def _whole(value: object) -> bool:
 
 def _number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_multiple(period: float) -> bool:
+    ticks = period / TIME_STEP
+    return 0.0 < period <= 10.0 and abs(ticks - round(ticks)) < 1e-9

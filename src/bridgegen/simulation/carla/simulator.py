@@ -5,6 +5,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +13,14 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import STORYBOARD, Driver
+from bridgegen.ego.detector import Detector, load
 from bridgegen.ego.driver_process import DriverError
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.simulation.carla.eyes import Eyes
 from bridgegen.simulation.carla.guests import GUESTS
-from bridgegen.simulation.carla.incidents import Incidents
+from bridgegen.simulation.carla.incidents import Incidents, write_incidents
 from bridgegen.simulation.carla.lights import Lights
 from bridgegen.simulation.carla.pedals import Car
 from bridgegen.simulation.carla.row import AtTheWheel, Ours, Row, Stopped
@@ -27,8 +30,10 @@ from bridgegen.simulation.carla.stage import Stage
 from bridgegen.simulation.carla.weather import Weather
 from bridgegen.simulation.carla.worlds import Generated, Town, check, loader
 from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
+from bridgegen.simulation.trace import write_trace
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
@@ -55,6 +60,36 @@ class CarlaRoads:
     worlds: tuple[Town | Generated, ...]
 
 
+@dataclass(frozen=True)
+class Found:
+    """What there is of a row beside its motion.
+
+    Attributes:
+        incidents: what CARLA noticed.
+        eyes: whose detections are the row's; None: the driver's sensors' are.
+        folder: where it is recorded; None: it is not.
+    """
+
+    incidents: Incidents
+    eyes: Eyes | None
+    folder: Path | None
+
+    def added(self, rollout: Rollout) -> Rollout:
+        """Return the row's rollout, N = 1, with it."""
+        told = self.incidents.all(rollout)
+        if told:
+            rollout = replace(rollout, incidents={0: told})
+        if self.folder is not None:
+            write_incidents(self.folder, told, rollout.time_step)
+            write_trace(self.folder / "trace.csv", rollout)
+        if self.eyes is not None:
+            detections = self.eyes.detections
+            n = int(rollout.n_steps[0])
+            detections[:, n:] = detections[:, n - 1 : n]
+            rollout = replace(rollout, detections=detections[np.newaxis])
+        return rollout
+
+
 class CarlaSimulator:
     """A `Simulator` that a CARLA server runs, one row at a time.
 
@@ -68,7 +103,8 @@ class CarlaSimulator:
         access: where it is.
 
     Raises:
-        InputError: another time step than CARLA's; or no server answers.
+        InputError: another time step than CARLA's; or no server answers; or there is no such
+            detector, or the folder to record to is not empty.
     """
 
     def __init__(
@@ -88,6 +124,10 @@ class CarlaSimulator:
         self._storyboard, self._settings = storyboard, settings or CarlaSettings()
         self._server = Server(access or Access())
         weakref.finalize(self, self._server.close)
+        self._detector = load_detector(self._server.access.detector)
+        self._number = 0
+        if self._server.access.record:
+            refuse_used(Path(self._server.access.record))
         self._turn = threading.Lock()
         self._is_stopped = threading.Event()
 
@@ -161,6 +201,7 @@ class CarlaSimulator:
             parts = []
             for i, p in enumerate(rows.tolist()):
                 row = {name: float(column[i]) for name, column in columns.items()}
+                self._number += 1
                 parts.append((np.array([i]), self._row(roads, p, row, driver, dry)))
         return joined(parts)
 
@@ -177,12 +218,12 @@ class CarlaSimulator:
         driver: Driver | None,
         dry: bool,
     ) -> Rollout:
-        incidents: Incidents | None = None
+        found: Found | None = None
         for left in reversed(range(TRIES)):
             joint = self.embedded.co_simulation(roads.network, p, values, driver=driver, dry=dry)
             try:
                 if joint.runs:
-                    incidents = self._attempt(roads, p, values, joint, driver)
+                    found = self._attempt(roads, p, values, joint, driver)
                 break
             except DriverError as error:
                 joint.fail(FAILURES[error.kind], str(error))
@@ -200,9 +241,7 @@ class CarlaSimulator:
                 joint.fail(problem.status, str(problem))
                 break
         rollout = joint.rollout()
-        if incidents is not None and rollout.status[0] == 0 and (told := incidents.all(rollout)):
-            return replace(rollout, incidents={0: told})
-        return rollout
+        return rollout if found is None or rollout.status[0] else found.added(rollout)
 
     def _attempt(
         self,
@@ -211,8 +250,8 @@ class CarlaSimulator:
         values: Mapping[str, float],
         joint: "CoSimulation",
         driver: Driver | None,
-    ) -> Incidents:
-        """Run one row; return what CARLA noticed.
+    ) -> "Found":
+        """Run one row; return what was found besides.
 
         Raises:
             RuntimeError: as CARLA raises them.
@@ -239,11 +278,29 @@ class CarlaSimulator:
             if wheel is not None:
                 stack.callback(_end, wheel)
             incidents = Incidents(stage, program.names)
+            eyes = self._eyes(stage, program, joint)
             Row(
                 joint, stage, Weather(self._storyboard, program, values), lights, wheel,
-                [incidents], self._is_stopped.is_set,
+                [incidents] if eyes is None else [incidents, eyes], self._is_stopped.is_set,
             ).run(server)  # fmt: skip
-        return incidents
+            if eyes is not None:
+                eyes.finish()
+        return Found(incidents, eyes if self._detector else None, self._folder())
+
+    def _folder(self) -> Path | None:
+        """Return where the present row is recorded; None if it is not."""
+        if not self._server.access.record:
+            return None
+        return Path(self._server.access.record) / f"{self._number:06}"
+
+    def _eyes(self, stage: Stage, program: Program, joint: "CoSimulation") -> Eyes | None:
+        folder = self._folder()
+        if folder is None and self._detector is None:
+            return None
+        return Eyes(
+            stage, program, joint, period=self._settings.sensor_period,
+            detector=self._detector, folder=folder,
+        )  # fmt: skip
 
     def _moves_ego(self, driver: Driver) -> bool:
         """Say whether the ego is moved as the embedded simulator moves it."""
@@ -263,3 +320,22 @@ class CarlaSimulator:
 def _end(wheel: AtTheWheel) -> None:
     with suppress(RuntimeError):
         wheel.end()
+
+
+def load_detector(spec: str) -> Detector | None:
+    """Return the user's detector; None if there is none.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    return load(spec) if spec else None
+
+
+def refuse_used(folder: Path) -> None:
+    """Refuse to record where something is.
+
+    Raises:
+        InputError: it is a file, or not empty.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"--record: {folder} must be a new folder, or an empty one")
