@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/million.py random|pso [EVALUATIONS]
 
 The evaluation is trivial, the loop and the store are the real ones: ten parameters, the paper's
-number of metrics. Prints seconds and the peak of memory [MiB] of the process.
+number of metrics. Prints seconds, the peak of memory [MiB] of the process, and the store's bytes.
 """
 
 import re
@@ -45,9 +45,10 @@ def main() -> None:
         result = run_loop(algorithm, lambda U: U, evaluate, store, budget)
         if result.evaluations != budget:
             sys.exit(f"{name} ended after {result.evaluations} evaluations: {result.reason}")
+        size = sum(file.stat().st_size for file in store.folder.glob("run.sqlite*"))
     peak = re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())
     assert peak is not None
-    print(f"{time.perf_counter() - start:.0f} {int(peak[1]) / 1024:.0f}")
+    print(f"{time.perf_counter() - start:.2f} {int(peak[1]) / 1024:.0f} {size}")
 
 
 if __name__ == "__main__":

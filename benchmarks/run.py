@@ -33,6 +33,7 @@ from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.search import Problem, Results, get, names
+from workers import workers
 
 SCENARIO = "crossroads-s4"
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
@@ -266,7 +267,7 @@ def million() -> list[Row]:
         done = subprocess.run(
             [sys.executable, str(script), name], stdout=subprocess.PIPE, check=True, text=True
         )
-        wall, peak = done.stdout.split()
+        wall, peak, _ = done.stdout.split()
         rows += [
             (f"1,000,000 evaluations of {name}, peak memory, MiB", peak, "≤ 2,048"),
             ("  s, without the simulator", wall, ""),
@@ -304,7 +305,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     part.__name__: part
     for part in (
         hot_paths, own_drivers, many_actors, senses, decoder, algorithms, files, town, one_file,
-        processes, million,
+        processes, million, workers,
     )
 }  # fmt: skip
 

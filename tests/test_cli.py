@@ -65,7 +65,7 @@ def test_compare_prints_tables_and_words(cli, tmp_path):
         "--budget",
         60,
     )
-    words += ("--set", "pso.population=20", "--jobs", 1, "--out", tmp_path / "c")
+    words += ("--set", "pso.population=20", "--workers", 1, "--out", tmp_path / "c")
     code, out, err = cli(*words)
     assert code == 0, err
     for label in ("R_critic", "quartiles", "A12", "T_critic", "to 50th", "distinct", "hypervolume"):

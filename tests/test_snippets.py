@@ -38,7 +38,7 @@ PAGES = sorted(path.stem for path in DOCS.glob("*.md"))
 BUDGET = "80"
 SHORT = {
     "search": {"--budget": BUDGET, "--keep": "1"},
-    "compare": {"--seeds": "2", "--budget": "40", "--jobs": "1"},
+    "compare": {"--seeds": "2", "--budget": "40", "--workers": "1"},
     "regions": {"--samples": "20"},
     "check-driver": {"--scenario": "cut-in"},
 }
@@ -133,7 +133,7 @@ class Page:
 
     def python(self, block: Block) -> None:
         text = re.sub(r"budget=\d+", f"budget={BUDGET}", block.text)
-        code = compile(text.replace("seeds=20", "seeds=2, jobs=1"), "page", "exec")
+        code = compile(text.replace("seeds=20", "seeds=2, workers=1"), "page", "exec")
         if block.mark not in ELSEWHERE:
             exec(code, self.names)
 

@@ -34,7 +34,7 @@ SETTLED = (
 @pytest.fixture(scope="module")
 def done(tmp_path_factory) -> "bg.Comparison":
     out = tmp_path_factory.mktemp("comparisons") / "s4"
-    return bg.compare("crossroads-s4", **GRID, jobs=1, out=out)
+    return bg.compare("crossroads-s4", **GRID, workers=1, out=out)
 
 
 def the_same(one: Path, other: Path) -> bool:
@@ -156,7 +156,7 @@ def test_killed_and_gone_on_with_it_is_the_same(done, tmp_path):
     """Two processes make the runs, and their leader is killed; then one process makes the rest."""
     out = tmp_path / "s4"
     words = [sys.executable, "-c", "import sys; from bridgegen.cli import main; sys.exit(main())"]
-    words += [*shlex.split(done.plan.command())[1:-1], str(out), "--jobs", "2"]
+    words += [*shlex.split(done.plan.command())[1:-1], str(out), "--workers", "2"]
     process = subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     while process.poll() is None and finished(out) < 1:
         time.sleep(0.01)
@@ -166,7 +166,7 @@ def test_killed_and_gone_on_with_it_is_the_same(done, tmp_path):
     assert kept >= 1
     told = []
     watch = Watch(begun=lambda plan, ended, made: told.append((ended, made)))
-    again = bg.compare("crossroads-s4", **GRID, jobs=1, out=out, watch=watch)
+    again = bg.compare("crossroads-s4", **GRID, workers=1, out=out, watch=watch)
     assert told[0][0] >= kept
     assert told[0][1] == 120 * told[0][0]
     assert not again.gaps
@@ -181,7 +181,7 @@ def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path):
     out = tmp_path / "s4"
     small = {**GRID, "seeds": 1}
     with pytest.raises(Interrupted) as caught:
-        bg.compare("crossroads-s4", **small, jobs=1, out=out, watch=Watch(batch=stop))
+        bg.compare("crossroads-s4", **small, workers=1, out=out, watch=Watch(batch=stop))
     assert "stopped after 1 of 2 runs; go on with 'bridgegen compare" in str(caught.value)
     assert f"--seeds 1 --budget 120 --out {out}'" in str(caught.value)
     assert finished(out) == 1
@@ -189,7 +189,7 @@ def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path):
     assert not (out / "runs.csv").exists()
     ended = out / "runs" / "crossroads-s4-random-0" / "run.sqlite"
     before = ended.stat().st_mtime_ns
-    bg.compare("crossroads-s4", **GRID, jobs=1, out=out)
+    bg.compare("crossroads-s4", **GRID, workers=1, out=out)
     assert ended.stat().st_mtime_ns == before
     assert the_same(done.folder, out)
 
@@ -223,7 +223,7 @@ def test_a_run_that_fails_is_a_gap_and_is_tried_again(tmp_path, monkeypatch):
     monkeypatch.setitem(ALGORITHMS, "failing", Failing)
     monkeypatch.setattr(Failing, "broken", True)
     grid = {"algorithms": ["failing", "pairwise"], "seeds": 2, "budget": 80, "out": tmp_path / "c"}
-    found = bg.compare("crossroads-s4", **grid, jobs=1)
+    found = bg.compare("crossroads-s4", **grid, workers=1)
     gap = Cell("crossroads-s4", "failing", 1)
     assert found.gaps == {gap: "ZeroDivisionError: no more luck"}
     assert found.line("crossroads-s4", "failing", "r_critic").runs == 1
@@ -243,14 +243,14 @@ def test_a_run_that_fails_is_a_gap_and_is_tried_again(tmp_path, monkeypatch):
     assert "pairwise had no more to ask after" in text
 
     monkeypatch.setattr(Failing, "broken", False)
-    whole = bg.compare("crossroads-s4", **{**grid, "algorithms": ["failing"]}, jobs=1)
+    whole = bg.compare("crossroads-s4", **{**grid, "algorithms": ["failing"]}, workers=1)
     assert not whole.gaps
     assert len(whole.records) == 2
 
 
 def test_other_settings_are_refused(done):
     def again(**other):
-        return bg.compare("crossroads-s4", **{**GRID, **other}, jobs=1, out=done.folder)
+        return bg.compare("crossroads-s4", **{**GRID, **other}, workers=1, out=done.folder)
 
     for other, told in (
         ({"budget": 100}, "budget was 120, is 100"),
@@ -282,7 +282,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
         ({"settings": {"ga": {}}}, UnknownNameError, "of this comparison 'ga'"),
         ({"seeds": 0}, InputError, "1 <= seeds"),
         ({"budget": 0}, InputError, "1 <= budget"),
-        ({"jobs": 0}, InputError, "1 <= jobs must hold, got 0"),
+        ({"workers": 0}, InputError, "workers must be a number of processes, 1 to 1024"),
         ({"apart": 0.0}, InputError, "0 < distinct <= 1"),
         ({"ego": "refrence"}, UnknownNameError, "did you mean 'reference'"),
         ({"road_map": "no.xodr"}, InputError, "no.xodr"),
@@ -291,6 +291,6 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
 )
 def test_mistakes_are_told_before_anything_is_run(tmp_path, arguments, error, told):
     with pytest.raises(error, match=re.escape(told)):
-        bg.compare("crossroads-s4", **{"jobs": 1, "out": tmp_path / "c", **arguments})
+        bg.compare("crossroads-s4", **{"workers": 1, "out": tmp_path / "c", **arguments})
     runs = tmp_path / "c" / "runs"
     assert not runs.exists() or not [*runs.rglob("run.sqlite")]

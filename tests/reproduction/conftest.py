@@ -36,5 +36,5 @@ def done(tmp_path_factory) -> tuple[Path, "bg.Reproduction"]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(protocol, "NEEDED_BY_PPO", NOT_THERE)
         patch.chdir(home)
-        result = bg.reproduce(**TINY, jobs=1)
+        result = bg.reproduce(**TINY, workers=1)
     return home / "reproduction", result

@@ -198,7 +198,7 @@ def test_interrupted_and_gone_on_with_it_is_the_same(
 
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Interrupted) as caught:
-        bg.reproduce(**tiny, jobs=1, watch=Watch(batch=stop))
+        bg.reproduce(**tiny, workers=1, watch=Watch(batch=stop))
     told = str(caught.value)
     stopped, _, command = told.partition("; go on with ")
     assert re.fullmatch(rf"stopped after 1\d of {COUNT} runs", stopped)
@@ -210,7 +210,7 @@ def test_interrupted_and_gone_on_with_it_is_the_same(
 
     # Their bytes are tested by themselves, and they take as long as all else.
     monkeypatch.setattr(pictures, "pdf", lambda figure: b"%PDF")
-    monkeypatch.setattr(sys, "argv", [*shlex.split(command.strip("'")), "--jobs", "1"])
+    monkeypatch.setattr(sys, "argv", [*shlex.split(command.strip("'")), "--workers", "1"])
     with pytest.raises(SystemExit) as end:
         main()
     assert not end.value.code
@@ -296,7 +296,7 @@ def test_the_last_spread_is_the_run_s(done):
     arguments = {**protocol.arguments(PRINTED), "out": folder / "as-printed"}
     told = result.found.commands["as-printed"]
     assert "--algorithms random,pso,nsga2-dt --seeds 2 --budget 120 --ego route-follower" in told
-    comparison = bg.compare(**arguments, jobs=1, deliver=False)
+    comparison = bg.compare(**arguments, workers=1, deliver=False)
     measured = comparison.measured["crossroads-s4"]
     for cell, values in measured.values.items():
         curve = spread_curve(comparison.records[cell], measured)
@@ -339,7 +339,7 @@ def test_a_run_that_fails_is_a_gap_and_the_exit_status_tells(
     monkeypatch.setattr(reproduction, "pictures", lambda found, printed: {})
     words = ["reproduce", "--quick", "--iterations", "1", "--scenarios", "crossroads-s4"]
     monkeypatch.setattr(
-        sys, "argv", ["bridgegen", *words, "--jobs", "1", "--out", str(tmp_path / "r")]
+        sys, "argv", ["bridgegen", *words, "--workers", "1", "--out", str(tmp_path / "r")]
     )
     with pytest.raises(SystemExit) as end:
         main()
@@ -373,7 +373,7 @@ def test_ppo_is_run_where_its_packages_are(monkeypatch):
     [
         ({"seeds": 0}, "1 <= seeds <= 1000 must hold, got 0"),
         ({"iterations": 0}, "1 <= iterations <= 10000 must hold, got 0"),
-        ({"jobs": 0}, "1 <= jobs must hold, got 0"),
+        ({"workers": 0}, "workers must be a number of processes, 1 to 1024"),
         ({"scenarios": ["crossroads-s4", "cut-in"]}, "got cut-in"),
         ({"scenarios": ["crossroads-s1"]}, "crossroads-s4 must be among the scenarios"),
         ({"scenarios": ["crossroads-s4", "crossroads-s4"]}, "each scenario must be named once"),

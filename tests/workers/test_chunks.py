@@ -11,13 +11,14 @@ def test_chunks_cover_every_row_once(n, workers, at_once):
     chunks = list(cut(n, workers, at_once))
     assert [row for a, b in chunks for row in range(a, b)] == list(range(n))
     assert all(b - a <= at_once for a, b in chunks)
-    sizes = [b - a for a, b in chunks[:-1]]
-    assert len(set(sizes)) <= 1  # but for the last, all are alike
-    assert len(chunks) >= min(n, workers) // 2  # nearly everybody has something to do
-    if n == 0:
-        assert chunks == [(0, 0)]
+    sizes = [b - a for a, b in chunks]
+    assert max(sizes) - min(sizes) <= 1
+    assert len(chunks) % workers == 0 or len(chunks) == max(n, 1)  # nobody works alone at the end
+    assert len(chunks) <= max(1, workers * (n // (workers * at_once) + 1))  # nor for nothing
 
 
 def test_by_hand():
-    assert list(cut(10, 3, 100)) == [(0, 4), (4, 8), (8, 10)]
-    assert list(cut(10, 1, 4)) == [(0, 4), (4, 8), (8, 10)]
+    assert list(cut(10, 3, 100)) == [(0, 3), (3, 6), (6, 10)]
+    assert list(cut(10, 1, 4)) == [(0, 3), (3, 6), (6, 10)]
+    assert len(list(cut(40, 2, 8))) == 6  # not 5, of which somebody does 3
+    assert list(cut(0, 2, 8)) == [(0, 0)]

@@ -36,9 +36,7 @@ def compare(
             "share of their ranges, in root mean square."
         ),
     ] = 0.1,
-    jobs: Annotated[
-        int | None, typer.Option(help="Runs at a time.", show_default="one on each core")
-    ] = None,
+    workers: options.RunWorkers = None,
     distribution: options.Distribution = None,
     ego: options.Ego = None,
     ideal: options.Ideal = None,
@@ -76,7 +74,7 @@ def compare(
             budget=budget,
             baseline=baseline,
             apart=distinct,
-            jobs=jobs,
+            workers=workers,
             out=out,
             distribution=distribution,
             ego=ego,

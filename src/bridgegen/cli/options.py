@@ -150,6 +150,15 @@ Workers = Annotated[
         show_default="threads, one for each core",
     ),
 ]
+RunWorkers = Annotated[
+    str | None,
+    typer.Option(
+        "--workers",
+        help="So many runs at a time, each in a process; or ray, or ray://HOST:PORT: their "
+        "scenarios are simulated in a Ray cluster (extra ray). No result depends on it.",
+        show_default="one on each core",
+    ),
+]
 FailIf = Annotated[
     list[str] | None,
     typer.Option(

@@ -29,9 +29,7 @@ def reproduce(
         str | None,
         typer.Option(help="Which of crossroads-s1 to -s4, S4 among them.", show_default="all"),
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(help="Runs at a time.", show_default="one on each core")
-    ] = None,
+    workers: options.RunWorkers = None,
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     out: Annotated[
@@ -50,7 +48,7 @@ def reproduce(
             seeds=1 if quick else 10 if seeds is None else seeds,
             iterations=iterations,
             **chosen,
-            jobs=jobs,
+            workers=workers,
             road_map=road_map,
             junction=junction,
             out=out,

@@ -14,10 +14,11 @@ from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.runs import Task, Watcher, evaluations_of
 from bridgegen.comparison.table import summarise, write_tables
 from bridgegen.comparison.workers import run_all
-from bridgegen.errors import InputError, Interrupted, StorageError
+from bridgegen.errors import Interrupted, StorageError
 from bridgegen.odd.space import SearchSpace
 from bridgegen.search.algorithm import Value
 from bridgegen.store.sqlite import Lock
+from bridgegen.workers import read_choice
 
 LOCK = "compare.lock"
 
@@ -44,7 +45,7 @@ def compare(
     budget: int = 1000,
     baseline: str | None = None,
     apart: float = APART,
-    jobs: int | None = None,
+    workers: int | str | None = None,
     out: Path | str | None = None,
     distribution: Path | str | None = None,
     ego: str | None = None,
@@ -81,7 +82,9 @@ def compare(
         baseline: the algorithm that the others are tested against; the first by default.
         apart: critical scenarios are different if their searched parameters differ by this share
             of their ranges, in root mean square.
-        jobs: runs at a time; as many as there are cores by default. No result depends on it.
+        workers: so many runs at a time, each in a process and one thread; as many as there are
+            cores by default. Or "ray", "ray://HOST:PORT": that many, whose scenarios are simulated
+            in a Ray cluster. No result depends on it.
         out: the comparison's folder; ``comparisons/SCENARIOS`` by default.
         distribution: as for ``run_search``, where one scenario file is compared.
         ego: as for ``run_search``, and so on.
@@ -111,8 +114,7 @@ def compare(
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
     watch = watch or Watch()
-    if jobs is not None and jobs < 1:
-        raise InputError(f"1 <= jobs must hold, got {jobs}")
+    who = read_choice(workers)
     plan = make_plan(
         [scenarios] if isinstance(scenarios, str | Path) else scenarios,
         [algorithms] if isinstance(algorithms, str) else algorithms,
@@ -145,7 +147,7 @@ def compare(
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:
-        failures = _run(plan, jobs or _cores(), watch, done)
+        failures = _run(plan, who, watch, done)
         return _conclude(plan, failures, watch, deliver=deliver)
     except KeyboardInterrupt:
         raise Interrupted(
@@ -155,12 +157,12 @@ def compare(
         lock.release()
 
 
-def _run(plan: Plan, jobs: int, watch: Watch, done: list[str]) -> dict[Cell, str]:
+def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> dict[Cell, str]:
     """Make the runs that are missing; return why some failed.
 
     Args:
         plan: the runs.
-        jobs: at a time.
+        who: makes them, as ``read_choice`` returns it.
         watch: told how it is getting on.
         done: is given the name of each run that has ended, this time or earlier.
     """
@@ -183,7 +185,8 @@ def _run(plan: Plan, jobs: int, watch: Watch, done: list[str]) -> dict[Cell, str
         done.append(name)
         watch.ended(name, failure)
 
-    failed = run_all(tasks, jobs, Watcher(watch.compile, watch.batch, ended))
+    at_once, cluster = (who, None) if isinstance(who, int) else (_cores(), who)
+    failed = run_all(tasks, at_once, Watcher(watch.compile, watch.batch, ended), cluster)
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
 
 

@@ -55,11 +55,17 @@ def evaluations_of(folder: Path) -> tuple[int, bool]:
         return len(store), store.finished is not None
 
 
-def attempt(task: Task, batch: Callable[[int], None], stage: Callable[[str], None]) -> str | None:
-    """Make a run, or go on with it, in one thread and without hand-over and report.
+def attempt(
+    task: Task,
+    cluster: str | None,
+    batch: Callable[[int], None],
+    stage: Callable[[str], None],
+) -> str | None:
+    """Make a run, or go on with it, without hand-over and report.
 
     Args:
         task: the run.
+        cluster: where its scenarios are simulated; None is here, in one thread.
         batch: told the evaluations so far.
         stage: told what begins, "compile" or "search".
 
@@ -75,14 +81,14 @@ def attempt(task: Task, batch: Callable[[int], None], stage: Callable[[str], Non
         batch(progress.evaluations)
 
     watch = Watch(stage=stage, batch=told)
-    one = Threads(1)
+    how: dict[str, Any] = {"deliver": False, "workers": cluster or Threads(1), "watch": watch}
     begun = (task.folder / FILE).exists()
     try:
         if begun:
             ego = task.arguments.get("ego")
-            resume(task.folder, ego=ego, deliver=False, workers=one, watch=watch)
+            resume(task.folder, ego=ego, **how)
         else:
-            run_search(**task.arguments, out=task.folder, deliver=False, workers=one, watch=watch)
+            run_search(**task.arguments, out=task.folder, **how)
     except Interrupted:
         raise KeyboardInterrupt from None
     except InputError as error:

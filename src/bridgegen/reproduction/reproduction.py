@@ -14,7 +14,7 @@ from bridgegen.comparison.plan import RUNS, Cell
 from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.runs import evaluations_of
 from bridgegen.disk import write_whole
-from bridgegen.errors import InputError, Interrupted, StorageError
+from bridgegen.errors import Interrupted, StorageError
 from bridgegen.reproduction import paper
 from bridgegen.reproduction.claims import judge, of_fronts
 from bridgegen.reproduction.document import FIGURES, TABLES, Document, Picture, markdown
@@ -26,6 +26,7 @@ from bridgegen.reproduction.results import of_run, results_of
 from bridgegen.reproduction.runs import Run, read_run
 from bridgegen.reproduction.story import RUNS_FILE, Found, in_short, tell
 from bridgegen.reproduction.table import to_csv, to_latex, to_markdown
+from bridgegen.workers import read_choice
 
 MARK, PAGE, README, TIMES_FILE = "reproduction.json", "index.html", "README.md", "times.csv"
 
@@ -91,7 +92,7 @@ def reproduce(
     iterations: int = paper.ITERATIONS,
     scenarios: Iterable[str] = paper.SCENARIOS,
     out: Path | str = "reproduction",
-    jobs: int | None = None,
+    workers: int | str | None = None,
     road_map: Path | str | None = None,
     junction: str | None = None,
     watch: Watch | None = None,
@@ -108,7 +109,7 @@ def reproduce(
         iterations: of each run, of 40 evaluations; the paper's are 25.
         scenarios: of ``paper.SCENARIOS``; S4 must be among them.
         out: the folder.
-        jobs: runs at a time; as many as there are cores by default. No result depends on it.
+        workers: who makes the runs, see ``compare``. No result depends on it.
         road_map: a map to run on, CARLA's Town05 as in the paper, say; a generated crossroads by
             default.
         junction: which junction of the map.
@@ -123,8 +124,7 @@ def reproduce(
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
     watch = watch or Watch()
-    if jobs is not None and jobs < 1:
-        raise InputError(f"1 <= jobs must hold, got {jobs}")
+    read_choice(workers)  # before there is a folder
     protocol = make_protocol(
         seeds=seeds,
         iterations=iterations,
@@ -141,7 +141,9 @@ def reproduce(
         for part in PARTS:
             seen = _watch_part(part, watch, done)
             arguments = protocol.arguments(part)
-            comparisons[part.name] = compare(**arguments, jobs=jobs, deliver=False, watch=seen)
+            comparisons[part.name] = compare(
+                **arguments, workers=workers, deliver=False, watch=seen
+            )
         watch.stage("read")
         found = _read(protocol, comparisons)
         watch.stage("draw")

@@ -1,0 +1,157 @@
+"""What workers gain, and what they cost: processes, and a Ray cluster on this machine.
+
+    .venv/bin/python benchmarks/run.py workers
+
+The simulator is a double that burns processor time, honestly: so much of its own for each row.
+"""
+
+import importlib.util
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.workers import Recipe, Workers, open_workers
+from bridgegen.workers.processes import Processes
+
+ROWS = 40
+"""A batch of the paper's PSO."""
+
+CLUSTER = """
+import os, sys
+from ray.cluster_utils import Cluster
+head = {"num_cpus": 1, "include_dashboard": False}
+cluster = Cluster(initialize_head=True, head_node_args=head)
+cluster.add_node(num_cpus=1)
+print(cluster.address, flush=True)
+sys.stdin.read()
+cluster.shutdown()
+os._exit(0)
+"""
+
+
+class Burner:
+    """Burns processor time for each row.
+
+    Args:
+        seconds: so much [s].
+        rows_at_once: see `bridgegen.workers.workers.Portable`.
+    """
+
+    runs_at_once = 1
+    device = "CPU"
+
+    def __init__(self, seconds: float, rows_at_once: int = 8) -> None:
+        self.seconds, self.rows_at_once = seconds, rows_at_once
+
+    @property
+    def recipe(self) -> Recipe:
+        """See `bridgegen.workers.workers.Portable`."""
+        return Recipe.of(Burner, self.seconds, self.rows_at_once)
+
+    def burn(self, X: Float) -> Float:
+        """Return eleven numbers for each row."""
+        end = time.process_time() + self.seconds * len(X)
+        while time.process_time() < end:
+            pass
+        return np.repeat(X[:, :1], 11, axis=1)
+
+
+def seconds(crew: Workers, burner: Burner, X: Float) -> float:
+    """Return what a batch takes [s]."""
+    start = time.perf_counter()
+    crew.map(burner, "burn", X)
+    return time.perf_counter() - start
+
+
+def speedup(pairs: int = 7) -> tuple[float, float, float]:
+    """Return how much faster two processes are than one: median, least and most of pairs."""
+    X, burner = np.zeros((ROWS, 10)), Burner(0.05)
+    one, two = Processes(1), Processes(2)
+    seconds(one, Burner(0.0), X), seconds(two, Burner(0.0), X)
+    ratios = [seconds(one, burner, X) / seconds(two, burner, X) for _ in range(pairs)]
+    one.close(), two.close()
+    return float(np.median(ratios)), min(ratios), max(ratios)
+
+
+def overhead(crew: Workers, chunks: int = 200) -> float:
+    """Return what a chunk takes that has nothing to do [s], one after the other."""
+    X, burner = np.zeros((1, 10)), Burner(0.0, 1)
+    seconds(crew, burner, X)
+    return min(sum(seconds(crew, burner, X) for _ in range(chunks)) / chunks for _ in range(3))
+
+
+@contextmanager
+def cluster() -> Iterator[None]:
+    """Have a cluster of two nodes with a core each, on the loopback interface."""
+    os.environ |= {
+        "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
+        "RAY_USAGE_STATS_ENABLED": "0",
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
+    process = subprocess.Popen(
+        [sys.executable, "-c", CLUSTER],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    os.environ["RAY_ADDRESS"] = process.stdout.readline().strip()
+    yield
+    del os.environ["RAY_ADDRESS"]
+    process.communicate()
+
+
+def together(campaigns: int, batches: int = 5) -> tuple[float, float]:
+    """Return what campaigns take that run at once, and the first one's end as a share of that."""
+    X, burner, ends = np.zeros((ROWS, 10)), Burner(0.002), []
+    ready = threading.Barrier(campaigns + 1)
+
+    def campaign() -> None:
+        with open_workers("ray") as crew:
+            seconds(crew, Burner(0.0), X)
+            ready.wait()
+            for _ in range(batches):
+                seconds(crew, burner, X)
+            ends.append(time.perf_counter())
+
+    threads = [threading.Thread(target=campaign) for _ in range(campaigns)]
+    for one in threads:
+        one.start()
+    ready.wait()
+    start = time.perf_counter()
+    for one in threads:
+        one.join()
+    whole = max(ends) - start
+    return whole, (min(ends) - start) / whole
+
+
+def workers() -> list[tuple[str, str, str]]:
+    """Return the table's rows."""
+    load = os.getloadavg()[0]
+    median, least, most = speedup()
+    local = Processes(1)
+    told = [
+        (f"two processes over one, 50 ms a row (load {load:.1f})", f"{median:.2f}", "≥ 1.8"),
+        ("  least and most of 7 pairs", f"{least:.2f} to {most:.2f}", ""),
+        ("a chunk that does nothing, a process, ms", f"{1e3 * overhead(local):.2f}", ""),
+    ]
+    local.close()
+    if importlib.util.find_spec("ray") is None:
+        return [*told, ("a Ray cluster", "no Ray", "≤ 10 ms a chunk")]
+    with cluster():
+        with open_workers("ray") as crew:
+            told.append(
+                ("a chunk that does nothing, Ray, ms", f"{1e3 * overhead(crew):.2f}", "≤ 10")
+            )
+        alone, _ = together(1)
+        ten, first = together(10)
+    told += [
+        ("ten campaigns at once over ten after another, Ray", f"{ten / (10 * alone):.2f}", "≈ 1"),
+        ("  the first of them ends at, of the whole", f"{first:.0%}", ""),
+    ]
+    return told
