@@ -246,8 +246,8 @@ def test_the_command_says_it_in_a_table_and_in_a_line(folder, double, cli, monke
     code, out, err = cli("confirm", folder, "--simulator", "double")
     assert (code, err.strip()) == (0, "")
     assert "crossroads-s4, ego route-follower, in double" in out
-    assert re.search(r"^0001 +yes ", out, re.M)
-    assert re.search(r"^0002 +NO .* → .* 2\.00 +bv *$", out, re.M)
+    assert re.search(r"^0001 +critical ", out, re.M)
+    assert re.search(r"^0002 +NOT .* → .* 2\.00 +bv *$", out, re.M)
     assert "0002 is not confirmed. d_min is" in out
     assert "3 of 4 confirmed in double (95 %: 30–95 %); 1 not: 0002." in out
     code, out, _ = cli("confirm", folder, "--simulator", "double", "--json")

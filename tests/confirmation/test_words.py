@@ -27,10 +27,11 @@ def said(there, here=NEAR, **differences):
 
 def test_a_miss_says_by_how_much():
     assert said(came_to(False, 2.04, 5.0)).startswith(
-        "d_min is 2.04 m there: narrowly, 0.04 m above the threshold."
+        "d_min is 2.04 m there, 1.00 m here: narrowly, 0.04 m above the threshold."
     )
+    assert "2.00 m there, 1.00 m here: narrowly, 0.002 m above" in said(came_to(False, 2.002, 5.0))
     assert said(came_to(False, 3.5, 5.0)).startswith(
-        "d_min is 3.50 m there: 1.50 m above the threshold."
+        "d_min is 3.50 m there, 1.00 m here: 1.50 m above the threshold."
     )
     assert said(came_to(False, 1.5, 0.2)).startswith(
         "It comes as close as 1.50 m there, but v_d is 0.20 m/s: 0.80 m/s below the threshold."

@@ -31,25 +31,34 @@ def explanation(here: Outcome, there: Outcome, found: Differences, limits: Thres
         found: how the rollouts differ.
         limits: when a scenario is critical.
     """
-    said = [] if there.critical else [_miss(there, limits)]
+    said = [] if there.critical else [_miss(here, there, limits)]
     return " ".join([*said, *_contacts(here, there), *_story(found)])
 
 
-def _miss(there: Outcome, limits: Thresholds) -> str:
+def _miss(here: Outcome, there: Outcome, limits: Thresholds) -> str:
     """Return by how much a scenario is not critical."""
     if there.d_min is None:
         return "The ego is alone there."
     far = there.d_min - limits.d_min_below
     if far >= 0.0:
         narrowly = _narrowly(far, NARROW[0])
-        return f"d_min is {there.d_min:.2f} m there: {narrowly}{far:.2f} m above the threshold."
+        known = "" if here.d_min is None else f", {here.d_min:.2f} m here"
+        return (
+            f"d_min is {there.d_min:.2f} m there{known}: {narrowly}{_length(far)} m above the "
+            "threshold."
+        )
     v_d = there.v_d or 0.0
     slow = limits.v_d_at_least - v_d
     narrowly = _narrowly(slow, NARROW[1])
     return (
         f"It comes as close as {there.d_min:.2f} m there, but v_d is {v_d:.2f} m/s: "
-        f"{narrowly}{slow:.2f} m/s below the threshold."
+        f"{narrowly}{_length(slow)} m/s below the threshold."
     )
+
+
+def _length(value: float) -> str:
+    """Return a number with two decimals, or with as many as show it."""
+    return f"{value:.2f}" if value >= 0.005 else f"{value:.1g}"
 
 
 def _narrowly(by: float, limit: float) -> str:

@@ -68,23 +68,22 @@ def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
 
 
 def _table(found: "RunConfirmation") -> Table:
-    from bridgegen.confirmation.verdict import name_of
-
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
     table.add_column("scenario", no_wrap=True)
-    table.add_column("critical there")
+    table.add_column("there", no_wrap=True)
     for name in ("d_min [m]", "v_d [m/s]", "contact [s]", "parts [s]"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     table.add_column("first", overflow="fold")
-    words = {True: "yes", False: "NO", None: "not run"}
+    words = {True: "critical", False: "NOT", None: "not run"}
     for one in found.scenarios:
         here, there = one.here, one.there
+        name = one.name or f"eval. {one.evaluation + 1}"
         if there is None or one.differences is None:
-            table.add_row(name_of(one), words[one.confirmed])
+            table.add_row(name, words[one.confirmed])
             continue
         parting = next(iter(one.differences.partings), None)
         table.add_row(
-            name_of(one),
+            name,
             words[one.confirmed],
             _change(here.d_min, there.d_min),
             _change(here.v_d, there.v_d),
