@@ -5,7 +5,7 @@ everything else here prepares it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,9 +26,12 @@ from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.intentions import Intentions
-from bridgegen.simulation.rollout import WORKER_ENDED, Rollout
+from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
+
+FAR_ROWS = 8
+"""Rows that a worker is given at a time whose simulator only its machine has."""
 
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
@@ -104,7 +107,8 @@ class Pipeline:
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded: what was asked for and what the
             objective and the thresholds need.
-        simulator: holds the scenario's storyboard.
+        simulator: holds the scenario's storyboard. The embedded one, where another is asked for and
+            only the workers' machines have it.
         cause: the only one that makes a scenario count as critical, if one was asked for.
         seeks_causes: whether ``evaluate`` finds causes.
     """
@@ -164,9 +168,10 @@ class Pipeline:
         self.source = _source(scenario, driver, road_map, space)
         self.cause, self.seeks_causes = cause, seek_causes or cause is not None
         nominal = self.concrete(space.row({}))
-        self.simulator: Simulator[Any] = simulator.simulator(
-            nominal.storyboard, scenario.name, driver
-        )
+        self._workers = workers or Threads()
+        self._is_far = simulator != EMBEDDED and not self._workers.are_here
+        near = EMBEDDED if self._is_far else simulator
+        self.simulator: Simulator[Any] = near.simulator(nominal.storyboard, scenario.name, driver)
         self.driver = self.simulator.embedded.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
             self.source = _source(scenario, self.driver, road_map, space)
@@ -181,7 +186,6 @@ class Pipeline:
         self._roads: Any = None
         if not {*self._road_names} & {*space.variables}:
             self._roads = self.simulator.roads([nominal.roads])
-        self._workers = workers or Threads()
 
     @cached_property
     def recipe(self) -> Recipe:
@@ -193,7 +197,7 @@ class Pipeline:
     @property
     def rows_at_once(self) -> int:
         """How many rows a worker had best be given; see `Simulator`."""
-        return self.simulator.rows_at_once
+        return FAR_ROWS if self._is_far else self.simulator.rows_at_once
 
     @property
     def runs_at_once(self) -> int:
@@ -214,7 +218,7 @@ class Pipeline:
         """
         if not isinstance(self.source, AdversarySource):
             raise InputError(f"{self.scenario.place}: no adversary drives anybody")
-        if self.simulator is not self.simulator.embedded:
+        if self._is_far or self.simulator is not self.simulator.embedded:
             raise InputError(
                 f"{self.scenario.place}: an agent drives in closed loop in the embedded simulator "
                 "alone; search there, and confirm elsewhere what it finds"
@@ -318,7 +322,17 @@ class Pipeline:
 
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
-        return self._run(*self._roads_of(X), X)
+        if not self._is_far:
+            return self._run(*self._roads_of(X), X)
+        parts, start = [], 0
+        for part in self._share_out("rollout", X):
+            rows, came = np.arange(start, start := start + part.rows), part.came
+            if isinstance(came, Lost):
+                lost = self._run(*self._roads_of(X[rows]), X[rows])
+                status = np.full(part.rows, WORKER_ENDED, np.int8)
+                came = replace(lost, status=status, messages={0: came.reason})
+            parts.append((rows, came))
+        return joined(parts)
 
     def rollouts(self, X: Float) -> list[Rollout | Lost]:
         """Have N rows rolled out by many; return what came of them, a part of the rows in each."""
@@ -334,10 +348,10 @@ class Pipeline:
         """
         embedded = self.simulator.embedded
         roads, rows = self._roads_of(X)
-        rollout = self._run(roads, rows, X)
+        rollout = self.rollout(X)
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         intentions, ways = None, []
-        if plans and self.simulator is embedded:
+        if plans and self.simulator is embedded and not self._is_far:
             intentions = embedded.intentions(roads, rows, columns, rollout)
             ways = [
                 {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}

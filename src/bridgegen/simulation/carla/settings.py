@@ -1,5 +1,6 @@
 """What can be chosen of how CARLA runs a scenario, and where it is."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Self
@@ -24,8 +25,8 @@ MEANINGS: Mapping[str, str] = {
 """Of the settings, which change results."""
 
 OPTIONS: Mapping[str, str] = {
-    "--host": "where the server is",
-    "--port": "its port",
+    "--host": "where the server is; or set CARLA_HOST",
+    "--port": "its port; or set CARLA_PORT",
     "--carla-command": "starts the server, and again when it has ended",
     "--carla-timeout": "seconds that an answer may take",
     "--record": "a new folder for images, LiDAR points, boxes and incidents",
@@ -104,7 +105,7 @@ class Access:
 
     @classmethod
     def of(cls, given: Mapping[str, Value]) -> Self:
-        """Return access from what was given.
+        """Return access from what was given; else from the environment, as on a worker's machine.
 
         Raises:
             InputError: a port or a time that is none.
@@ -112,6 +113,10 @@ class Access:
         said: dict[str, Any] = {
             name.removeprefix("--").removeprefix("carla-"): value for name, value in given.items()
         }
+        if host := os.environ.get("CARLA_HOST"):
+            said.setdefault("host", host)
+        if (text := os.environ.get("CARLA_PORT", "")).isdecimal():
+            said.setdefault("port", int(text))
         port, timeout = said.get("port", 2000), said.get("timeout", 20.0)
         problems = []
         if not (_whole(port) and 0 < int(port) < 65534):

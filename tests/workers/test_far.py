@@ -1,0 +1,89 @@
+"""A simulator that only the workers' machines have: this one gets by with the embedded one."""
+
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import InputError
+from bridgegen.odd.reader import load
+from bridgegen.pipeline import FAR_ROWS, Pipeline
+from bridgegen.simulation import choice
+from bridgegen.simulation.carla.settings import Access
+from bridgegen.simulation.choice import Kind, SimulatorChoice
+from bridgegen.simulation.rollout import WORKER_ENDED
+from bridgegen.workers import Lost, Part
+from bridgegen.workers.chunks import cut
+
+
+class Elsewhere:
+    """Workers that have a simulator; this machine may not ask for it."""
+
+    are_here = False
+    count = 2
+    lost: int | None = None
+
+    def __init__(self) -> None:
+        self.made = None
+
+    def map(self, portable, work, X, *given):
+        choice.SIMULATORS["there"].access["here"] = "yes"  # we are on that machine now
+        if self.made is None:
+            self.made = portable.recipe.make()
+        method = getattr(self.made, work)
+        parts = []
+        for a, b in cut(len(X), self.count, portable.rows_at_once):
+            gone = self.lost is not None and a <= self.lost < b
+            parts.append(Part(b - a, Lost("by test") if gone else method(X[a:b], *given)))
+        del choice.SIMULATORS["there"].access["here"]
+        return parts
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def there(monkeypatch) -> SimulatorChoice:
+    def make(embedded, storyboard, settings, access):
+        if "here" not in choice.SIMULATORS["there"].access:
+            raise InputError("there is no such simulator on this machine")
+        return embedded
+
+    kind = Kind("there", "The embedded one, on another machine.", make, access={}, device="GPU")
+    known = MappingProxyType({**choice.SIMULATORS, "there": kind})
+    monkeypatch.setattr(choice, "SIMULATORS", known)
+    return SimulatorChoice("there")
+
+
+def test_only_workers_have_it(there):
+    scenario = load("crossroads-s4")
+    space = scenario.space()
+    X = space.decode(np.random.default_rng(0).random((3, space.n_var)))
+    with pytest.raises(InputError, match="no such simulator"):
+        Pipeline(scenario, space, simulator=there)
+    crew = Elsewhere()
+    pipeline = Pipeline(scenario, space, simulator=there, workers=crew)
+    assert (pipeline.device, pipeline.rows_at_once) == ("GPU", FAR_ROWS)
+    pipeline.warm_up()
+    pipeline.choose_objective()
+    plain = Pipeline(scenario, space)
+    plain.choose_objective()
+    assert pipeline.evaluate(X).metrics.tobytes() == plain.evaluate(X).metrics.tobytes()
+    assert pipeline.replay(X, plans=True).intentions is None
+    motion, expected = pipeline.rollout(X), plain.rollout(X)
+    assert motion.x.tobytes() == expected.x.tobytes()
+    crew.lost, crew.count = 1, 3
+    motion = pipeline.rollout(X)
+    assert motion.status.tolist() == [0, WORKER_ENDED, 0]
+    assert motion.messages == {1: "by test"}
+    with pytest.raises(InputError, match="no adversary drives anybody"):
+        pipeline.arena()
+
+
+def test_a_workers_machine_says_where_its_server_is(monkeypatch):
+    monkeypatch.delenv("CARLA_HOST", raising=False)
+    monkeypatch.delenv("CARLA_PORT", raising=False)
+    assert Access.of({}).address == "localhost:2000"
+    monkeypatch.setenv("CARLA_HOST", "carla-1")
+    monkeypatch.setenv("CARLA_PORT", "2010")
+    assert Access.of({}).address == "carla-1:2010"
+    assert Access.of({"--host": "mine", "--port": 3000}).address == "mine:3000"
