@@ -9,6 +9,7 @@ import tempfile
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
 
@@ -17,6 +18,7 @@ from lxml import etree
 
 from bridgegen.arrays import Float
 from bridgegen.disk import write_whole
+from bridgegen.errors import FileFormatError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -62,9 +64,19 @@ class RoadFiles:
         for p, model in enumerate(models):
             if id(model) not in written:  # courses may differ on the same roads
                 written[id(model)] = self._folder.path / f"{p:04d}.xodr"
-                write_whole(written[id(model)], [road_xml(model)])
+                write_whole(written[id(model)], [road_xml(_bare(model))])
             paths.append(written[id(model)])
         self.paths = tuple(paths)
+
+
+def _bare(model: OpenDrive) -> OpenDrive:
+    """Return a map without scenery, and without where on the globe it is.
+
+    Nobody's motion depends on either, and esmini calls most kinds of both errors.
+    """
+    header = replace(model.header, geo_reference=None, offset=None)
+    roads = tuple(replace(road, objects=()) for road in model.roads)
+    return replace(model, header=header, roads=roads)
 
 
 class ScenarioFile:
@@ -124,8 +136,7 @@ class Template:
             (node, str(name), expression)
             for node in root.iter(etree.Element)
             for name, text in node.attrib.items()
-            if str(text).startswith("${")
-            and isinstance(expression := parse_value(Kind.DOUBLE, str(text)), Expr)
+            if (expression := _expression(str(text))) is not None
         ]
 
     def write(self, path: Path, values: Mapping[str, float]) -> None:
@@ -154,6 +165,17 @@ class Template:
                     )
         data = etree.tostring(self._root, xml_declaration=True, encoding="UTF-8")
         path.write_bytes(data)
+
+
+def _expression(text: str) -> Expr | None:
+    """Return an attribute's expression; None if it is a literal, or a text that looks like one."""
+    if not text.startswith("${"):
+        return None
+    try:
+        value = parse_value(Kind.DOUBLE, text)
+        return value if isinstance(value, Expr) and value.names is not None else None
+    except FileFormatError:
+        return None
 
 
 def _remove(node: Node) -> None:
