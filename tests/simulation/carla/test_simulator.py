@@ -1,5 +1,8 @@
 """Scenarios in CARLA's world, and what happens when the server fails."""
 
+import subprocess
+import sys
+
 import carla
 import numpy as np
 import pytest
@@ -8,6 +11,7 @@ from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla import frame, server
+from bridgegen.simulation.carla.turn import turn_at
 from bridgegen.simulation.choice import SimulatorChoice
 
 FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections")
@@ -414,6 +418,35 @@ def test_another_time_step_is_refused(machine):
     other = replace(storyboard, file_header=replace(storyboard.file_header, properties=properties))
     with pytest.raises(InputError, match=r"time_step = 0.05 s must hold in carla.* got 0.02 s"):
         SimulatorChoice("carla", {}, {"--port": machine.port}).simulator(other, "x.xosc")
+
+
+def test_processes_take_turns_at_a_server(machine):
+    """Another one waits for the row to end; in this one, turns nest."""
+    code = (
+        "from bridgegen.simulation.carla.turn import turn_at\n"
+        "print('waits', flush=True)\n"
+        f"with turn_at('localhost:{machine.port}'): print('has it', flush=True)"
+    )
+    turn = turn_at(f"localhost:{machine.port}")
+    with turn, turn:
+        other = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+        assert other.stdout.readline() == "waits\n"
+        with pytest.raises(subprocess.TimeoutExpired):
+            other.wait(0.3)
+    assert other.communicate(timeout=20)[0] == "has it\n"
+    assert turn_at(f"localhost:{machine.port}") is turn
+
+
+def test_a_driver_that_fails_as_it_begins_costs_its_row(made, machine, tmp_path):
+    (tmp_path / "bad.py").write_text(
+        "class Bad:\n    def reset(self, n, scene): raise OSError('no licence')\n"
+        "    def act(self, observation): pass\n"
+    )
+    pipeline = made("crossroads-s1", f"{tmp_path / 'bad.py'}:Bad")
+    rollout = pipeline.rollout(rows(pipeline, 1))
+    assert rollout.status[0] == 20
+    assert "no licence" in rollout.messages[0]
+    assert clean(machine)
 
 
 def test_a_server_of_another_version_is_refused(made, machine):

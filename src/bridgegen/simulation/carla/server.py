@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from bridgegen.errors import InputError
 from bridgegen.simulation.carla.settings import TIME_STEP, Access
+from bridgegen.simulation.carla.turn import turn_at
 from bridgegen.simulation.carla.worlds import Worlds
 from bridgegen.simulation.rollout import SIMULATOR_FAILURES
 
@@ -56,6 +57,7 @@ class Server:
         access: where it is.
 
     Attributes:
+        turn: to be had for each row: the server is one scenario's at a time.
         maps: the server's own, by name.
         worlds: what it has loaded.
 
@@ -65,6 +67,7 @@ class Server:
 
     def __init__(self, access: Access) -> None:
         self.access = access
+        self.turn = turn_at(access.address)
         self._process: subprocess.Popen[bytes] | None = None
         self._client: carla.Client | None = None
         self._is_down = False
@@ -105,9 +108,9 @@ class Server:
             yield
         finally:
             with suppress(RuntimeError):  # then it is gone, and its settings with it
+                world.apply_settings(before)
                 world.freeze_all_traffic_lights(False)
                 world.set_weather(weather)
-                world.apply_settings(before)
 
     def tick(self) -> "carla.WorldSnapshot":
         """Let one step pass, and return what came of it."""
@@ -205,8 +208,9 @@ class Server:
                     f"{VERSIONS[-1]}, got {version}"
                 )
             self.maps = list(client.get_available_maps())
-            self.worlds.take(client.get_world())
-            sweep(client, self.world)
+            with self.turn:  # what is there then is nobody's
+                self.worlds.take(client.get_world())
+                sweep(client, self.world)
         except RuntimeError as error:
             self._why = self.diagnosis(error)
             return False

@@ -4,23 +4,25 @@ import threading
 import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import STORYBOARD, Driver
-from bridgegen.ego.detector import Detector, load
+from bridgegen.ego.detector import load
 from bridgegen.ego.driver_process import DriverError
+from bridgegen.ego.drivers import ROUTE_FOLLOWER
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.carla.eyes import Eyes
+from bridgegen.simulation.carla.found import Found, refuse_used
 from bridgegen.simulation.carla.guests import GUESTS
-from bridgegen.simulation.carla.incidents import Incidents, write_incidents
+from bridgegen.simulation.carla.incidents import Incidents
 from bridgegen.simulation.carla.lights import Lights
 from bridgegen.simulation.carla.pedals import Car
 from bridgegen.simulation.carla.row import AtTheWheel, Ours, Row, Stopped
@@ -33,7 +35,6 @@ from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
-from bridgegen.simulation.trace import write_trace
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
@@ -58,36 +59,6 @@ class CarlaRoads:
     network: Network
     models: tuple[OpenDrive, ...]
     worlds: tuple[Town | Generated, ...]
-
-
-@dataclass(frozen=True)
-class Found:
-    """What there is of a row beside its motion.
-
-    Attributes:
-        incidents: what CARLA noticed.
-        eyes: whose detections are the row's; None: the driver's sensors' are.
-        folder: where it is recorded; None: it is not.
-    """
-
-    incidents: Incidents
-    eyes: Eyes | None
-    folder: Path | None
-
-    def added(self, rollout: Rollout) -> Rollout:
-        """Return the row's rollout, N = 1, with it."""
-        told = self.incidents.all(rollout)
-        if told:
-            rollout = replace(rollout, incidents={0: told})
-        if self.folder is not None:
-            write_incidents(self.folder, told, rollout.time_step)
-            write_trace(self.folder / "trace.csv", rollout)
-        if self.eyes is not None:
-            detections = self.eyes.detections
-            n = int(rollout.n_steps[0])
-            detections[:, n:] = detections[:, n - 1 : n]
-            rollout = replace(rollout, detections=detections[np.newaxis])
-        return rollout
 
 
 class CarlaSimulator:
@@ -124,11 +95,11 @@ class CarlaSimulator:
         self._storyboard, self._settings = storyboard, settings or CarlaSettings()
         self._server = Server(access or Access())
         weakref.finalize(self, self._server.close)
-        self._detector = load_detector(self._server.access.detector)
+        at = self._server.access
+        self._detector = load(at.detector) if at.detector else None
         self._number = 0
-        if self._server.access.record:
-            refuse_used(Path(self._server.access.record))
-        self._turn = threading.Lock()
+        if at.record:
+            refuse_used(Path(at.record))
         self._is_stopped = threading.Event()
 
     @property
@@ -195,12 +166,12 @@ class CarlaSimulator:
             InputError: see `Simulator`; or the server has no such map, light or model.
         """
         if not len(rows):
-            return self.embedded.run(roads.network, rows, values, driver=driver, dry=dry)
+            return self.embedded.run(roads.network, rows, values, driver=ROUTE_FOLLOWER)
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
-        with self._turn:
-            parts = []
-            for i, p in enumerate(rows.tolist()):
-                row = {name: float(column[i]) for name, column in columns.items()}
+        parts = []
+        for i, p in enumerate(rows.tolist()):
+            row = {name: float(column[i]) for name, column in columns.items()}
+            with self._server.turn:
                 self._number += 1
                 parts.append((np.array([i]), self._row(roads, p, row, driver, dry)))
         return joined(parts)
@@ -220,7 +191,14 @@ class CarlaSimulator:
     ) -> Rollout:
         found: Found | None = None
         for left in reversed(range(TRIES)):
-            joint = self.embedded.co_simulation(roads.network, p, values, driver=driver, dry=dry)
+            try:
+                joint = self.embedded.co_simulation(
+                    roads.network, p, values, driver=driver, dry=dry
+                )
+            except DriverError as error:
+                return self.embedded.failed(
+                    roads.network, p, values, FAILURES[error.kind], str(error)
+                )
             try:
                 if joint.runs:
                     found = self._attempt(roads, p, values, joint, driver)
@@ -250,7 +228,7 @@ class CarlaSimulator:
         values: Mapping[str, float],
         joint: "CoSimulation",
         driver: Driver | None,
-    ) -> "Found":
+    ) -> Found:
         """Run one row; return what was found besides.
 
         Raises:
@@ -263,7 +241,7 @@ class CarlaSimulator:
         server, program = self._server, self.embedded.program.changed(driver=driver)
         world, model, way = roads.worlds[p], roads.models[p], roads.network.way(p, 0)
         server.load(world, world.key)
-        check(server.worlds.map, way, str(getattr(world, "name", "our roads")))
+        check(server.worlds.map, way, world.name)
         lights = Lights(server.world, model, program.lights)
         with ExitStack() as stack:
             stack.enter_context(server.stepped())
@@ -304,14 +282,14 @@ class CarlaSimulator:
 
     def _moves_ego(self, driver: Driver) -> bool:
         """Say whether the ego is moved as the embedded simulator moves it."""
-        return driver is STORYBOARD or (not driver.home and self._settings.ego == "kinematic")
+        return driver == STORYBOARD or (not driver.home and self._settings.ego == "kinematic")
 
     def _wheel(
         self, driver: Driver, stage: Stage, joint: "CoSimulation", way: Float
     ) -> AtTheWheel | None:
         if driver.home:
-            guest: AtTheWheel = GUESTS[driver.name](self._server, stage, joint, way, self._settings)
-            return guest
+            guest = GUESTS[driver.name](self._server, stage, joint, way, self._settings)
+            return cast(AtTheWheel, guest)
         if self._moves_ego(driver):
             return None
         return Ours(joint, Car.of(stage.ego.get_physics_control()))
@@ -320,22 +298,3 @@ class CarlaSimulator:
 def _end(wheel: AtTheWheel) -> None:
     with suppress(RuntimeError):
         wheel.end()
-
-
-def load_detector(spec: str) -> Detector | None:
-    """Return the user's detector; None if there is none.
-
-    Raises:
-        InputError: it cannot be made.
-    """
-    return load(spec) if spec else None
-
-
-def refuse_used(folder: Path) -> None:
-    """Refuse to record where something is.
-
-    Raises:
-        InputError: it is a file, or not empty.
-    """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"--record: {folder} must be a new folder, or an empty one")

@@ -90,6 +90,8 @@ class Generated:
         model: them.
     """
 
+    name = "our roads"
+
     def __init__(self, model: OpenDrive) -> None:
         if model.header.geo_reference is None:  # CARLA complains on standard output
             header = replace(model.header, geo_reference=NOWHERE)
