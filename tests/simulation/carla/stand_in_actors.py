@@ -91,7 +91,7 @@ def blueprints():
             f"walker.pedestrian.{number:04}", Walker,
             [ActorAttribute("role_name", "pedestrian"), ActorAttribute("is_invincible", "false")],
         )
-        for number in (1, 2, 9)
+        for number in (1, 2, 10)
     ]  # fmt: skip
     found += [ActorBlueprint(one, Prop, [ActorAttribute("role_name", "prop")]) for one in PROPS]
     for one, defaults in SENSORS.items():

@@ -82,10 +82,9 @@ class Stage:
         ego_is_moved: bool = False,
     ) -> None:
         self._server, self._program = server, program
-        objects = {one.name: one.entity_object for one in storyboard.entities.scenario_objects}
-        self._models = [str(getattr(objects[name], "name", "")) for name in program.names]
-        if ego_model:
-            self._models[0] = ego_model
+        self._objects = {
+            one.name: one.entity_object for one in storyboard.entities.scenario_objects
+        }
         self._ego_model = ego_model
         self._ego_is_moved = ego_is_moved
         self._rest = 0.0
@@ -122,13 +121,7 @@ class Stage:
         library = self._server.world.get_blueprint_library()
         known = {one.id for one in library}
         for e, name in enumerate(self._program.names):
-            model = self._models[e]
-            if e == 0 and self._ego_model and model not in known:
-                raise UnknownNameError(
-                    "blueprint of the server (ego_model)", model,
-                    sorted(one for one in known if one.startswith("vehicle.")),
-                )  # fmt: skip
-            blueprint = library.find(choose(int(self._program.kinds[e]), model, known))
+            blueprint = library.find(self._model(e, name, known))
             dressed(blueprint, HERO if e == 0 else f"{MINE}.{name}")
             spot = carla.Transform(frame.location(0.0, 0.0, ALOFT + APART * e))
             actor = self._server.world.spawn_actor(blueprint, spot)
@@ -139,6 +132,19 @@ class Stage:
                 self.ego: Any = actor
         moved = self.bodies if self._ego_is_moved else self.bodies[1:]
         self.do([carla.command.SetSimulatePhysics(one.id, False) for one in moved])
+
+    def _model(self, e: int, name: str, known: set[str]) -> str:
+        """Return the blueprint of an entity."""
+        if e == 0 and self._ego_model:
+            if self._ego_model not in known:
+                vehicles = sorted(one for one in known if one.startswith("vehicle."))
+                raise UnknownNameError(
+                    "blueprint of the server (ego_model)", self._ego_model, vehicles
+                )
+            return self._ego_model
+        length, width, height = self._program.bodies[e, [0, 1, 7]].tolist()
+        kind = int(self._program.kinds[e])
+        return choose(self._objects[name], kind, (length, width, height), known)
 
     def attach(self, kind: str, transform: "carla.Transform", **attributes: object) -> Any:
         """Attach a sensor to the ego; it is taken down with the others.

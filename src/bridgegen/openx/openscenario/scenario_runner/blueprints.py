@@ -98,10 +98,21 @@ def blueprint(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> str | None
     Args:
         body: without references to parameters.
     """
-    candidates = _alike(body)
     box: Any = body.bounding_box.dimensions
-    size = (box.length, box.width, box.height)
-    return min(candidates, key=lambda one: math.dist(candidates[one], size), default=None)
+    return next(iter(ranked(body, (box.length, box.width, box.height))), None)
+
+
+def ranked(
+    body: osc.Vehicle | osc.Pedestrian | osc.MiscObject, size: tuple[float, float, float]
+) -> list[str]:
+    """Return all blueprints that look like a body, the nearest in size first.
+
+    Args:
+        body: of which its size is not looked at.
+        size: length, width and height [m].
+    """
+    candidates = _alike(body)
+    return sorted(candidates, key=lambda one: math.dist(candidates[one], size))
 
 
 def _alike(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> Sizes:

@@ -1,0 +1,52 @@
+"""Which model stands for whom."""
+
+import numpy as np
+import pytest
+
+from bridgegen.ego.kinds import ANIMAL, CAR, NAMES, TRUCK
+from bridgegen.errors import InputError
+from bridgegen.odd.reader import load, names
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.carla.blueprints import SPARE, choose
+
+from .stand_in_actors import blueprints
+
+KNOWN = {one.id for one in blueprints()}
+
+
+class Body:
+    name = "vehicle.tesla.model3"
+
+
+def test_who_is_named_as_a_blueprint_is_that():
+    assert choose(Body(), TRUCK, (9.0, 2.5, 3.5), KNOWN) == "vehicle.tesla.model3"
+
+
+def test_what_the_server_lacks_is_named():
+    with pytest.raises(InputError, match=r"a blueprint for a car, and has none of .*tesla"):
+        choose(object(), CAR, (4.6, 1.9, 1.5), {"vehicle.bh.crossbike"})
+
+
+def test_a_child_stands_for_an_animal():
+    assert choose(object(), ANIMAL, (1.5, 0.5, 1.0), KNOWN) == "walker.pedestrian.0010"
+
+
+def test_there_is_something_for_every_kind():
+    assert sorted(SPARE) == list(range(len(NAMES)))
+
+
+@pytest.mark.parametrize("scenario", names())
+def test_everybody_of_the_catalogue_has_a_model(scenario):
+    """The nearest in size of its kind: on foot if it is, with wheels if it has."""
+    logical = load(scenario)
+    pipeline = Pipeline(logical, logical.space())
+    program = pipeline.simulator.program
+    storyboard = pipeline.concrete(pipeline.space.row({})).storyboard
+    objects = {one.name: one.entity_object for one in storyboard.entities.scenario_objects}
+    for e, name in enumerate(program.names):
+        size = tuple(program.bodies[e, [0, 1, 7]].tolist())
+        kind = NAMES[int(program.kinds[e])]
+        model = choose(objects[name], int(program.kinds[e]), size, KNOWN)
+        expected = {"pedestrian": "walker", "animal": "walker", "other": "static"}
+        assert model.startswith(expected.get(kind, "vehicle"))
+        assert np.isfinite(size).all()
