@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.confirmation.compare import compare, tracks
-from bridgegen.confirmation.differences import PARTED, TRACE, Contact, EventTimes, LightTimes
+from bridgegen.confirmation.differences import (
+    PARTED,
+    TRACE,
+    Contact,
+    EventTimes,
+    LightTimes,
+    Offset,
+)
 from bridgegen.simulation.rollout import Rollout
 
 STEP = 0.1
@@ -77,6 +84,19 @@ def test_a_gap_is_told_in_the_direction_of_travel():
     (one,) = compare(here, moving(x, y - 3.0, h=np.pi / 2)).partings
     assert (one.along, one.across) == (pytest.approx(-3.0), pytest.approx(0.0))
     assert one.time == one.since == 0.0
+
+
+def test_who_was_a_little_off_when_the_first_parted_is_known():
+    """The van parts at 1 s, when the ego is 0.3 m off and the other one not yet by 1 cm."""
+    x = np.zeros((3, 30))
+    other = x.copy()
+    other[0, 5:] = -0.3
+    other[1, 5:], other[1, 15:] = 0.009, 5.0
+    other[2, 10:] = 2.0
+    names = ("ego", "bv", "van")
+    found = compare(moving(x, names=names), moving(other, names=names))
+    assert [one.entity for one in found.partings] == ["van", "bv"]
+    assert found.offsets == (Offset("ego", pytest.approx(0.3)),)
 
 
 def test_who_goes_another_way_is_told_by_how_much():

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from bridgegen.confirmation.differences import BoxSizes, Contact, EventTimes, LightTimes, Parting
+from bridgegen.confirmation.differences import (
+    BoxSizes,
+    Contact,
+    EventTimes,
+    LightTimes,
+    Offset,
+    Parting,
+)
 from bridgegen.confirmation.schema import Differences, Outcome
 from bridgegen.confirmation.words import explanation
 from bridgegen.objective import Thresholds
@@ -87,6 +94,12 @@ def test_events_are_told(event, words):
 def test_another_way_is_told(turn, words):
     parts = Parting("walker", 3.2, 0.6, 0.0, -0.6, -0.1, turn, 3.0)
     assert words in said(came_to(True, 1.0, 5.0), partings=(parts,))
+
+
+def test_who_was_off_before_is_told():
+    parts = Parting("ego", 6.1, 0.52, -0.52, 0.0, -0.5, None, 5.15)
+    text = said(came_to(False, 3.0, 0.0), partings=(parts,), offsets=(Offset("bv", 0.091),))
+    assert text.endswith("on its way since 5.15 s. By then bv was 0.09 m off.")
 
 
 def test_what_else_differs_is_told():

@@ -14,12 +14,14 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float
 from bridgegen.confirmation.differences import (
     PARTED,
+    SLIGHT,
     TRACE,
     BoxSizes,
     Comparison,
     Contact,
     EventTimes,
     LightTimes,
+    Offset,
     Parting,
     Track,
 )
@@ -59,15 +61,17 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison
     step = max(here.time_step, there.time_step)
     bodies = _shared(here, there)
     known, met = {e for e, _ in bodies}, {f for _, f in bodies}
-    partings = [
-        _parting(here.names[e], _states(here, i, e, times), _states(there, j, f, times), times)
-        for e, f in bodies
+    pairs = [
+        (here.names[e], _states(here, i, e, times), _states(there, j, f, times)) for e, f in bodies
     ]
+    partings = [_parting(name, a, b, times) for name, a, b in pairs]
+    parted = sorted(filter(None, partings), key=lambda one: one.time)
     return Comparison(
         step=step,
         ends=(_end(here, i), _end(there, j)),
         contacts=(first_contact(here, i), first_contact(there, j)),
-        partings=tuple(sorted(filter(None, partings), key=lambda one: one.time)),
+        partings=tuple(parted),
+        offsets=_offsets(pairs, times, parted[0]) if parted else (),
         events=_events(here, there, i, j, step),
         lights=_lights(here, there, i, j, times),
         boxes=_boxes(here, there, bodies),
@@ -187,6 +191,16 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
         turn=_turn(a, b, k),
         since=since,
     )
+
+
+def _offsets(
+    pairs: Sequence[tuple[str, _States, _States]], times: Float, first: Parting
+) -> tuple[Offset, ...]:
+    """Return who else was off when the first one parted, who was off most first."""
+    k = int(np.searchsorted(times, first.time - _EPSILON))
+    gaps = [(name, float(_gap(a, b)[k])) for name, a, b in pairs if name != first.entity]
+    off = [Offset(name, gap) for name, gap in gaps if gap > SLIGHT]
+    return tuple(sorted(off, key=lambda one: -one.gap))
 
 
 def _turn(a: _States, b: _States, k: int) -> float | None:

@@ -13,6 +13,10 @@ TRACE = 0.05
 """What is off by more than this [m] is on its way to part."""
 
 
+SLIGHT = 0.01
+"""What is off by more than this [m] may change what a driver decides."""
+
+
 class _Checked:
     """What is read from a file holds nothing else, and only numbers that are finite."""
 
@@ -59,6 +63,19 @@ class Parting(_Checked):
     turn: float | None
     since: float
     only: str | None = None
+
+
+@dataclass(frozen=True)
+class Offset(_Checked):
+    """Who else was a little off when the first one parted, and may have led to it.
+
+    Attributes:
+        entity: who.
+        gap: how far the reference points were apart [m].
+    """
+
+    entity: str
+    gap: float
 
 
 @dataclass(frozen=True)
@@ -122,6 +139,7 @@ class Comparison:
         ends: when each of them ends [s].
         contacts: the ego's first contact in each; None where there is none.
         partings: everybody's who parts, the first one first.
+        offsets: of the others when the first one parted, if they were off by more than SLIGHT.
         events: those that began at different times, the earliest first.
         lights: those that differ, the earliest first.
         boxes: those that differ.
@@ -133,6 +151,7 @@ class Comparison:
     ends: tuple[float, float]
     contacts: tuple[Contact | None, Contact | None]
     partings: tuple[Parting, ...] = ()
+    offsets: tuple[Offset, ...] = ()
     events: tuple[EventTimes, ...] = ()
     lights: tuple[LightTimes, ...] = ()
     boxes: tuple[BoxSizes, ...] = ()

@@ -15,6 +15,7 @@ from bridgegen.confirmation.differences import (
     Contact,
     EventTimes,
     LightTimes,
+    Offset,
     Parting,
     Track,
 )
@@ -117,6 +118,7 @@ class Differences(_Model):
     """How the two rollouts differ, see `differences`."""
 
     partings: tuple[Parting, ...] = ()
+    offsets: tuple[Offset, ...] = ()
     events: tuple[EventTimes, ...] = ()
     lights: tuple[LightTimes, ...] = ()
     boxes: tuple[BoxSizes, ...] = ()

@@ -19,6 +19,9 @@ narrowly."""
 TURNED = math.radians(10.0)
 """Who moves in a direction that differs by more takes another way."""
 
+MOST_OFF = 3
+"""Of those who were a little off, so many are named."""
+
 LIGHTS = ("off", "red", "red and yellow", "yellow", "green")
 
 
@@ -91,6 +94,10 @@ def _story(found: Differences) -> list[str]:
     if not before:
         said.append("No event and no light differs before anybody parts.")
     said.append(_parting(first))
+    together = {one.entity for one in found.partings[1:] if one.time <= first.time}
+    if off := [one for one in found.offsets if one.entity not in together][:MOST_OFF]:
+        others = [f"{one.entity} was {one.gap:.2f} m off" for one in off]
+        said.append(f"By then {', '.join(others)}.")
     if first.entity != found.partings[-1].entity:
         later = [f"{one.entity} at {one.time:.2f} s" for one in found.partings[1:]]
         said.append(f"Then {', '.join(later)}.")
