@@ -1,4 +1,4 @@
-"""A CARLA server to test with: the stand-in, or a real one where ``CARLA_HOST`` names it."""
+"""A CARLA server to test with: the stand-in."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,6 +14,13 @@ from bridgegen.simulation.carla import server  # noqa: E402
 from bridgegen.simulation.choice import SimulatorChoice  # noqa: E402
 
 from .stand_in import DEFAULT_MAP, MACHINES, Client, Machine  # noqa: E402
+
+
+@pytest.fixture(autouse=True)
+def _no_real_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is tested here is the stand-in; the contract is what a real server is held to."""
+    monkeypatch.delenv("CARLA_HOST", raising=False)
+    monkeypatch.delenv("CARLA_PORT", raising=False)
 
 
 @pytest.fixture(scope="session")

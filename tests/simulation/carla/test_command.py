@@ -85,3 +85,28 @@ def test_a_search_in_carla(cli, machine, tmp_path):
     assert json.dumps({"ego": "kinematic"}) in dump
     assert str(machine.port) not in dump
     store.close()
+
+
+def test_what_was_found_is_confirmed_and_simulated_in_carla(cli, machine, tmp_path):
+    """A search here; its scenarios there, by CARLA's physics; and one of them by its file."""
+    import json
+
+    run = tmp_path / "r"
+    status, _, err = cli(
+        "search", "crossroads-s4", "--budget", 200, "--no-causes", "--keep", 2, "--out", run
+    )
+    assert status == 0, err
+    status, out, err = cli("confirm", run, "--simulator", "carla", "--port", machine.port, "--json")
+    assert status == 0, err
+    assert "carla" in out
+    status, out, err = cli(
+        "simulate", run / "critical" / "0001.xosc", "--simulator", "carla", "--port", machine.port,
+        "--record", tmp_path / "seen", "--json",
+    )  # fmt: skip
+    assert status == 0, err
+    facts = json.loads(out[out.index("{") :])
+    assert facts["status"] == "ok"
+    kinds = {one["kind"] for one in facts.get("incidents", ())}
+    assert kinds <= {"collision", "lane invasion", "red light"}
+    assert facts["metrics"]["n_collision"] == 0 or "collision" in kinds
+    assert (tmp_path / "seen" / "000001" / "boxes.csv").exists()

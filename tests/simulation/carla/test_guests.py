@@ -13,6 +13,9 @@ from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla import guests
 
+from . import stand_in
+from .stand_in_actors import TrafficManager, Vehicle
+
 
 def rows(pipeline, n=1):
     return pipeline.space.decode(np.random.default_rng(1).random((n, pipeline.space.n_var)))
@@ -33,6 +36,26 @@ def test_the_autopilot_goes_our_way(made, machine):
     assert np.hypot(*(np.ptp(one[0, 0, :n]) for one in (rollout.x, rollout.y))) > 20.0
     again = pipeline.rollout(X)
     np.testing.assert_array_equal(again.x, rollout.x)
+
+
+def test_the_oldest_traffic_manager_is_told_shares_of_the_limit(made, machine, monkeypatch):
+    """At 8 m/s where 30 km/h are allowed: 4 % less."""
+    told = []
+
+    class Oldest(TrafficManager):
+        def vehicle_percentage_speed_difference(self, actor, percentage):
+            told.append(percentage)
+            self.speeds[actor.id] = 30.0 / 3.6 * (1.0 - percentage / 100.0)
+
+    monkeypatch.delattr(TrafficManager, "set_desired_speed")
+    monkeypatch.setattr(stand_in, "TrafficManager", Oldest)
+    monkeypatch.setattr(Vehicle, "get_speed_limit", lambda self: 30.0, raising=False)
+    pipeline = made("crossroads-s1", "carla-autopilot")
+    X = pipeline.space.row({"ego_speed": 8.0})[np.newaxis]
+    rollout = pipeline.rollout(X)
+    assert rollout.status[0] == 0
+    assert told == [pytest.approx(4.0)]
+    assert rollout.v[0, 0, 60] == pytest.approx(8.0, abs=0.6)
 
 
 @pytest.fixture

@@ -31,7 +31,7 @@ def carla() -> SimulatorChoice:
     from ..carla.stand_in import MACHINES
 
     *_, port = MACHINES
-    return SimulatorChoice("carla", {"ego": "kinematic"}, {"--port": port})
+    return SimulatorChoice("carla", {"ego": "kinematic"}, {"--host": "localhost", "--port": port})
 
 
 @contextmanager

@@ -63,7 +63,16 @@ class Autopilot:
         asked = self._joint.target_speed
         if asked != self._asked:
             self._asked = asked
-            self._manager.set_desired_speed(self._ego, 3.6 * asked)
+            self._tell(3.6 * asked)
+
+    def _tell(self, kmh: float) -> None:
+        if hasattr(self._manager, "set_desired_speed"):
+            self._manager.set_desired_speed(self._ego, kmh)
+        else:  # 0.9.13 knows shares of the speed limit alone
+            limit = max(self._ego.get_speed_limit(), 1.0)
+            self._manager.vehicle_percentage_speed_difference(
+                self._ego, 100.0 * (1.0 - kmh / limit)
+            )
 
     def end(self) -> None:
         """See `AtTheWheel`."""

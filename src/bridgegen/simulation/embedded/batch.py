@@ -285,7 +285,8 @@ def _packed(state: memory.State) -> tuple[npt.NDArray[np.uint8], memory.State]:
     ends = np.cumsum([_room(array) for array in state])
     block = np.empty(int(ends[-1]), dtype=np.uint8)
     packed = _seen(block, state)
-    for view, array in zip(packed, state, strict=True):
+    views: Any = packed
+    for view, array in zip(views, state, strict=True):
         view[...] = array
     return block, packed
 
