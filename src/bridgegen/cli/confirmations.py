@@ -7,20 +7,16 @@ import typer
 
 from bridgegen.cli import options
 from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.where import NOWHERE, Where, located
 
 
 @app.command()
+@located
 def confirm(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
     simulator: Annotated[str, typer.Option(help="The other one: see 'bridgegen list simulators'.")],
     simulator_set: options.SimulatorSettings = None,
-    esmini_lib: options.EsminiLibrary = None,
-    host: options.Host = None,
-    port: options.Port = None,
-    carla_command: options.CarlaCommand = None,
-    carla_timeout: options.CarlaTimeout = None,
-    record: options.Record = None,
-    detector: options.Detector = None,
+    where: Where = NOWHERE,
     rows: Annotated[
         int | None,
         typer.Option(
@@ -44,17 +40,7 @@ def confirm(
     from bridgegen.verdict.of_confirmation import ConfirmationGate
 
     gate = ConfirmationGate.read(fail_if or (), junit)
-    choice = options.read_simulator(
-        simulator,
-        simulator_set,
-        esmini_lib=esmini_lib,
-        host=host,
-        port=port,
-        carla_command=carla_command,
-        carla_timeout=carla_timeout,
-        record=record,
-        detector=detector,
-    )
+    choice = options.read_simulator(simulator, simulator_set, where)
     assert choice is not None
     with ConfirmationScreen() as screen:
         found = confirm_run(

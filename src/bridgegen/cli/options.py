@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.cli.where import Where
 from bridgegen.errors import InputError
-from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice
+from bridgegen.simulation.choice import SimulatorChoice
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
@@ -98,45 +99,6 @@ SimulatorSettings = Annotated[
     typer.Option(
         "--simulator-set", help="A setting of the simulator, NAME=VALUE; may be repeated."
     ),
-]
-EsminiLibrary = Annotated[
-    Path | None,
-    typer.Option(
-        help="esmini's library, libesminiLib.so, for --simulator esmini.",
-        show_default="ESMINI_LIB of the environment",
-    ),
-]
-Host = Annotated[
-    str | None,
-    typer.Option(help="The server's machine, for --simulator carla.", show_default="localhost"),
-]
-Port = Annotated[
-    int | None, typer.Option(help="The server's port, for --simulator carla.", show_default="2000")
-]
-CarlaPort = Annotated[
-    int | None,
-    typer.Option(help="The server's port, of a run in CARLA.", show_default="2000"),
-]
-CarlaCommand = Annotated[
-    str | None,
-    typer.Option(help="Starts a CARLA server, and again when it has ended.", show_default="none"),
-]
-Record = Annotated[
-    Path | None,
-    typer.Option(
-        help="A new folder for camera images, LiDAR points, boxes and incidents, with --simulator "
-        "carla."
-    ),
-]
-Detector = Annotated[
-    str | None,
-    typer.Option(
-        help="A detector of your own that looks at CARLA's images: module:Class, file.py:Class."
-    ),
-]
-CarlaTimeout = Annotated[
-    float | None,
-    typer.Option(help="Seconds that an answer of CARLA's may take.", show_default="20"),
 ]
 RoadMap = Annotated[
     Path | None, typer.Option("--map", help="A map (.xodr, or its import) to search on.")
@@ -233,37 +195,21 @@ def read_settings(pairs: list[str] | None, option: str = "--set") -> dict[str, S
 
 
 def read_simulator(
-    name: str | None, settings: list[str] | None = None, **access: Setting | Path | None
+    name: str | None, settings: list[str] | None, where: Where
 ) -> SimulatorChoice | None:
-    """Read the choice of a simulator; nothing is the run's own.
+    """Read the choice of a simulator; nothing is the default.
 
     Args:
         name: of it.
         settings: ``name=value`` pairs.
-        access: where it is on this machine, by the name of the option; None is not said.
+        where: it is.
     """
-    said = {
-        f"--{one.replace('_', '-')}": str(value) if isinstance(value, Path) else value
-        for one, value in access.items()
-        if value is not None
-    }
     if name is None:
-        if settings or said:
-            what = ", ".join([*said, *(["--simulator-set"] if settings else [])])
+        if settings or where:
+            what = ", ".join([*where, *(["--simulator-set"] if settings else [])])
             raise InputError(f"{what}: name the simulator that it is for (--simulator)")
         return None
-    return SimulatorChoice(name, read_settings(settings, "--simulator-set"), said)
-
-
-def read_access(**access: Setting | Path | None) -> SimulatorChoice | None:
-    """Read where a run's simulator is; nothing is where it is by default.
-
-    Args:
-        access: see ``read_simulator``.
-    """
-    said = [f"--{one.replace('_', '-')}" for one, value in access.items() if value is not None]
-    owners = [one.name for one in SIMULATORS.values() if {*said} & one.access.keys()]
-    return read_simulator(owners[0], None, **access) if owners else None
+    return SimulatorChoice(name, read_settings(settings, "--simulator-set"), where)
 
 
 def read_algorithm_settings(pairs: list[str] | None) -> dict[str, dict[str, Setting]]:

@@ -10,6 +10,7 @@ import typer
 
 from bridgegen.cli import options
 from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.where import NOWHERE, Where, located, read_access
 from bridgegen.ego import split
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 
 @app.command()
+@located
 def search(
     scenario: Annotated[
         str,
@@ -55,13 +57,7 @@ def search(
     adversary: options.Adversary = None,
     simulator: options.Simulator = None,
     simulator_set: options.SimulatorSettings = None,
-    esmini_lib: options.EsminiLibrary = None,
-    host: options.Host = None,
-    port: options.Port = None,
-    carla_command: options.CarlaCommand = None,
-    carla_timeout: options.CarlaTimeout = None,
-    record: options.Record = None,
-    detector: options.Detector = None,
+    where: Where = NOWHERE,
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
@@ -101,17 +97,7 @@ def search(
             causes=causes,
             cause=cause,
             adversary=adversary,
-            simulator=options.read_simulator(
-                simulator,
-                simulator_set,
-                esmini_lib=esmini_lib,
-                host=host,
-                port=port,
-                carla_command=carla_command,
-                carla_timeout=carla_timeout,
-                record=record,
-                detector=detector,
-            ),
+            simulator=options.read_simulator(simulator, simulator_set, where),
             workers=workers,
             watch=screen.watch,
         )
@@ -137,16 +123,11 @@ def new(
 
 
 @app.command()
+@located
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
     ego: options.OwnEgo = None,
-    esmini_lib: options.EsminiLibrary = None,
-    host: options.Host = None,
-    port: options.Port = None,
-    carla_command: options.CarlaCommand = None,
-    carla_timeout: options.CarlaTimeout = None,
-    record: options.Record = None,
-    detector: options.Detector = None,
+    where: Where = NOWHERE,
     workers: options.Workers = None,
     fail_if: options.FailIf = None,
     junit: options.Junit = None,
@@ -161,15 +142,7 @@ def resume(
         run = campaign.resume(
             folder,
             ego=ego,
-            simulator=options.read_access(
-                esmini_lib=esmini_lib,
-                host=host,
-                port=port,
-                carla_command=carla_command,
-                carla_timeout=carla_timeout,
-                record=record,
-                detector=detector,
-            ),
+            simulator=read_access(where),
             workers=workers,
             watch=screen.watch,
         )
@@ -178,6 +151,7 @@ def resume(
 
 
 @app.command()
+@located
 def view(
     run: Annotated[Path, typer.Argument(help="The folder of a run, which may still grow.")],
     port: Annotated[int, typer.Option(help="On 127.0.0.1.", show_default="one that is free")] = 0,
@@ -186,9 +160,7 @@ def view(
         int | None, typer.Option(help="Show this evaluation's scenario, counted from 1.")
     ] = None,
     ego: options.OwnEgo = None,
-    esmini_lib: options.EsminiLibrary = None,
-    host: options.Host = None,
-    carla_port: options.CarlaPort = None,
+    where: Where = NOWHERE,
 ) -> None:
     """Serve a run's report on this machine, live while the search goes on; any scenario plays."""
     from bridgegen.screen.view import serve
@@ -198,11 +170,7 @@ def view(
     site = RunView(
         run,
         ego=ego,
-        simulator=options.read_access(
-            esmini_lib=esmini_lib,
-            host=host,
-            port=carla_port,
-        ),
+        simulator=read_access(where),
     )
     fragment = "" if evaluation is None else site.fragment(evaluation)
     serve(Server(site, port), browser=browser, fragment=fragment)
@@ -228,6 +196,7 @@ def coverage(
 
 
 @app.command()
+@located
 def regions(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
     samples: Annotated[
@@ -245,13 +214,7 @@ def regions(
         typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
     ] = None,
     ego: options.OwnEgo = None,
-    esmini_lib: options.EsminiLibrary = None,
-    host: options.Host = None,
-    port: options.Port = None,
-    carla_command: options.CarlaCommand = None,
-    carla_timeout: options.CarlaTimeout = None,
-    record: options.Record = None,
-    detector: options.Detector = None,
+    where: Where = NOWHERE,
     workers: options.Workers = None,
     as_json: options.Json = False,
 ) -> None:
@@ -263,15 +226,7 @@ def regions(
         found = regions_of(
             run,
             ego=ego,
-            simulator=options.read_access(
-                esmini_lib=esmini_lib,
-                host=host,
-                port=port,
-                carla_command=carla_command,
-                carla_timeout=carla_timeout,
-                record=record,
-                detector=detector,
-            ),
+            simulator=read_access(where),
             samples=samples,
             at_least=at_least,
             seed=seed,
@@ -283,6 +238,7 @@ def regions(
 
 
 @app.command()
+@located
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[
@@ -301,13 +257,7 @@ def simulate(
     metrics: options.OnlyMetrics = None,
     simulator: options.Simulator = None,
     simulator_set: options.SimulatorSettings = None,
-    esmini_lib: options.EsminiLibrary = None,
-    host: options.Host = None,
-    port: options.Port = None,
-    carla_command: options.CarlaCommand = None,
-    carla_timeout: options.CarlaTimeout = None,
-    record: options.Record = None,
-    detector: options.Detector = None,
+    where: Where = NOWHERE,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
@@ -334,18 +284,7 @@ def simulate(
         also=gate.metrics,
         time_step=dt,
         skipped=skipped,
-        simulator=options.read_simulator(
-            simulator,
-            simulator_set,
-            esmini_lib=esmini_lib,
-            host=host,
-            port=port,
-            carla_command=carla_command,
-            carla_timeout=carla_timeout,
-            record=record,
-            detector=detector,
-        )
-        or EMBEDDED,
+        simulator=options.read_simulator(simulator, simulator_set, where) or EMBEDDED,
     )
     for one in skipped or ():
         print(f"bridgegen: warning: left out: {one}", file=sys.stderr)

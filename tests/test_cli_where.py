@@ -1,0 +1,54 @@
+"""The options that say where a simulator is."""
+
+import inspect
+
+import pytest
+
+from bridgegen.cli import runs
+from bridgegen.cli.confirmations import confirm
+from bridgegen.cli.where import NOWHERE, OPTIONS, Where, located, read_access
+from bridgegen.simulation.choice import SIMULATORS
+
+
+def test_there_is_one_for_each_way_that_a_simulator_declares():
+    declared = {name for one in SIMULATORS.values() for name in one.access}
+    assert {f"--{name.replace('_', '-')}" for name in OPTIONS} == declared
+
+
+@pytest.mark.parametrize(
+    "command", [runs.search, runs.resume, runs.regions, runs.simulate, confirm]
+)
+def test_commands_have_them_all(command):
+    assert {*OPTIONS} <= {*inspect.signature(command).parameters}
+
+
+def test_a_command_is_told_what_was_said_by_the_options_names():
+    told = []
+
+    @located
+    def command(run: str, where: Where = NOWHERE) -> None:
+        told.append((run, where))
+
+    command(run="r", **dict.fromkeys(OPTIONS))
+    command(run="r", **dict.fromkeys(OPTIONS) | {"host": "there", "carla_timeout": 3.0})
+    assert told == [("r", {}), ("r", {"--host": "there", "--carla-timeout": 3.0})]
+
+
+def test_what_a_command_means_by_the_same_name_stays_its_own():
+    told = []
+
+    @located
+    def command(port: int = 0, where: Where = NOWHERE) -> None:
+        told.append((port, where))
+
+    assert "carla_port" in inspect.signature(command).parameters
+    rest = {name: None for name in inspect.signature(command).parameters}
+    command(**rest | {"port": 80, "carla_port": 2000})
+    assert told == [(80, {"--port": 2000})]
+
+
+def test_where_a_run_s_simulator_is():
+    assert read_access({}) is None
+    choice = read_access({"--esmini-lib": "there"})
+    assert choice is not None
+    assert (choice.name, choice.access) == ("esmini", {"--esmini-lib": "there"})
