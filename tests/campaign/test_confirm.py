@@ -205,7 +205,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(folder, double):
     with pytest.raises(Interrupted) as stop:
         confirm(folder, elsewhere(), rows=9, progress=lambda done, *_: seen.append(done))
     assert "stopped after 3 of 9 scenarios" in str(stop.value)
-    assert f"bridgegen confirm {folder} --simulator double" in str(stop.value)
+    assert f"go on with 'bridgegen confirm {folder} --simulator double --rows 9'" in str(stop.value)
     assert (seen, len(record_of(folder)["scenarios"])) == ([1, 2, 3], 3)
     double.ran, double.disturb = 100, lambda rollout: rollout
     found = confirm(folder, elsewhere(), rows=9)

@@ -1,6 +1,7 @@
 """A run's critical scenarios, run again in another simulator; the record lies in its folder."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +31,9 @@ from bridgegen.workers import Choice, open_workers
 
 SECONDS = 1.0
 """How long what has come is kept in memory alone [s]."""
+
+Tally = Counter[bool | None]
+"""How many scenarios are confirmed (True), are not (False), and failed (None)."""
 
 MOST_TRACKS = 100
 """Scenarios of which it is kept where everybody was: some ten kilobytes each."""
@@ -68,7 +72,7 @@ def confirm(
     ego: str | None = None,
     workers: Choice = None,
     stage: Callable[[str], None] | None = None,
-    progress: Callable[[int, int, Summary], None] | None = None,
+    progress: Callable[[int, int, Tally], None] | None = None,
 ) -> RunConfirmation:
     """Run a run's critical scenarios in another simulator, and compare.
 
@@ -84,7 +88,8 @@ def confirm(
         ego: where a driver of your own drives, that same driver.
         workers: who runs the other simulator, see ``run_search``.
         stage: told what begins: "compile", "confirm", "report".
-        progress: told how many scenarios are done, of how many, and what they come to.
+        progress: told how many scenarios are done, of how many, and how many of them are confirmed
+            (True), not confirmed (False), not run (None).
 
     Raises:
         WorkersError: there are no workers, or they are lost; the same again goes on.
@@ -131,9 +136,9 @@ def confirm(
             for one in run_elsewhere(here, there, every, todo):
                 book.add(one)
                 if progress:
-                    progress(len(book.fresh), len(todo), summarise(book.of(book.fresh)))
+                    progress(book.tally.total(), len(todo), book.tally)
         except KeyboardInterrupt:
-            raise _stopped(place, simulator.name, len(book.fresh), len(todo)) from None
+            raise _stopped(place, simulator.name, rows, book.tally.total(), len(todo)) from None
         finally:
             record = book.write()
     files = [place / file_name(simulator.name)]
@@ -144,7 +149,7 @@ def confirm(
                 kept = handed_over(place)
                 files.append(write_run_report(here, store, settings, store.read(), kept))
         except KeyboardInterrupt:
-            raise _stopped(place, simulator.name, len(todo), len(todo)) from None
+            raise _stopped(place, simulator.name, rows, len(todo), len(todo)) from None
     return RunConfirmation(place, record, tuple(book.of(asked)), len(todo), tuple(files))
 
 
@@ -173,7 +178,11 @@ def _empty(
 
 
 class _Book:
-    """A record that grows."""
+    """A record that grows.
+
+    Attributes:
+        tally: of what was run now.
+    """
 
     def __init__(
         self,
@@ -183,7 +192,7 @@ class _Book:
         handed: dict[int, str],
         merit: dict[int, int],
     ) -> None:
-        self.fresh: list[int] = []
+        self.tally: Tally = Counter()
         self._folder, self._empty = folder, empty
         self._found, self._handed, self._merit = known, handed, merit
         self._written = 0.0
@@ -191,7 +200,7 @@ class _Book:
     def add(self, one: Scenario) -> None:
         """Take down what became of a scenario; write it soon."""
         self._found[one.evaluation] = one
-        self.fresh.append(one.evaluation)
+        self.tally[one.confirmed] += 1
         if time.monotonic() - self._written >= SECONDS:
             self.write()
 
@@ -262,8 +271,8 @@ def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
     return {one.evaluation: one for one in earlier.scenarios}
 
 
-def _stopped(folder: Path, simulator: str, done: int, total: int) -> Interrupted:
-    return Interrupted(
-        folder, done, total, what="scenarios",
-        command=f"bridgegen confirm {folder} --simulator {simulator}",
-    )  # fmt: skip
+def _stopped(folder: Path, simulator: str, rows: int | None, done: int, total: int) -> Interrupted:
+    command = f"bridgegen confirm {folder} --simulator {simulator}"
+    if rows is not None:
+        command += f" --rows {rows}"
+    return Interrupted(folder, done, total, what="scenarios", command=command)

@@ -10,9 +10,8 @@ from rich.table import Table
 from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
-    from bridgegen.campaign.confirm import RunConfirmation
+    from bridgegen.campaign.confirm import RunConfirmation, Tally
     from bridgegen.confirmation.schema import Outcome
-    from bridgegen.confirmation.summary import Summary
 
 
 class ConfirmationScreen(Live):
@@ -28,9 +27,9 @@ class ConfirmationScreen(Live):
         if stage == "report":
             self.show(what="writing the report", facts="")
 
-    def progress(self, done: int, total: int, summary: "Summary") -> None:
+    def progress(self, done: int, total: int, tally: "Tally") -> None:
         """Take down how many are done, of how many, and what they come to."""
-        facts = f"{summary.confirmed} confirmed, {summary.lost} not, {summary.not_run} not run"
+        facts = f"{tally[True]} confirmed, {tally[False]} not, {tally[None]} not run"
         self.show(done=done, total=total, facts=facts)
 
 
