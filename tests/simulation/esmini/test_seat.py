@@ -9,7 +9,9 @@ import pytest
 from bridgegen.ego import DRIVERS
 from bridgegen.errors import InputError
 from bridgegen.isolated import CallError
+from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario.read import read
+from bridgegen.simulate import simulate_file
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini import seat
 from bridgegen.simulation.esmini.simulator import EsminiSimulator
@@ -49,6 +51,10 @@ def made(library, steps=1, seconds=30.0):
 def library(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     monkeypatch.setattr(seat, "PROGRAM", "stand_in_esmini")
+    warm = tmp_path / "warm.xosc"
+    warm.write_text(TEXT)
+    (tmp_path / "map.xodr").write_bytes(to_xml(crossroads()))
+    assert simulate_file(warm, ego="route-follower").status == "ok"  # compiles, where need be
     return tmp_path / "stand-in.so"
 
 

@@ -116,7 +116,7 @@ class _Row:
                 if library.is_over:
                     joint.end()
             joint.move(k, *demand)
-            if joint.runs:
+            if joint.runs and self._steps > 1:
                 self._move_on(k)
 
     def _impose(self, k: int) -> None:
