@@ -167,7 +167,7 @@ class Pipeline:
         driver = egos.get(name, ideal, time_limit) if name else None
         self.source = _source(scenario, driver, road_map, space)
         self.cause, self.seeks_causes = cause, seek_causes or cause is not None
-        nominal = self.concrete(space.row({}))
+        nominal = self.concrete(space.row({}), road_map.path.name if road_map else "")
         self._workers = workers or Threads()
         self._is_far = simulator != EMBEDDED and not self._workers.are_here
         near = EMBEDDED if self._is_far else simulator

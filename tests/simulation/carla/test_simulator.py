@@ -10,7 +10,9 @@ import pytest
 from bridgegen.ego import get
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla import frame, server
 from bridgegen.simulation.carla.turn import turn_at
@@ -381,6 +383,23 @@ def test_towns_are_loaded_by_their_name(machine, made):
     assert machine.loads[-1] == "Carla/Maps/Town05"
     with pytest.raises(UnknownNameError, match=r"unknown map of the server 'Town5'.*Town05"):
         made("crossroads-s1", "route-follower", map="Town5")
+
+
+def test_a_run_on_a_town_s_map_is_in_that_town(machine, tmp_path):
+    """What the file is called is what counts; another name is roads of ours."""
+    machine.maps["Carla/Maps/Town05"] = machine.maps[DEFAULT_MAP]
+    for name, loaded in (("Town05", "Carla/Maps/Town05"), ("Mine", "Carla/Maps/OpenDriveMap")):
+        path = tmp_path / f"{name}.xodr"
+        path.write_text(machine.maps[DEFAULT_MAP])
+        logical = load("crossroads-s4")
+        road_map = load_map(path, scenario=logical)
+        logical = on_map(logical, road_map)
+        choice = SimulatorChoice("carla", {"ego": "kinematic"}, {"--port": machine.port})
+        pipeline = Pipeline(
+            logical, logical.space(), ego="reference", road_map=road_map, simulator=choice
+        )
+        assert (pipeline.rollout(rows(pipeline, 1)).status == 0).all()
+        assert machine.loads[-1] == loaded
 
 
 def test_a_route_must_be_on_the_servers_map(machine, made):
