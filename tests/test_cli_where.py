@@ -42,7 +42,7 @@ def test_what_a_command_means_by_the_same_name_stays_its_own():
         told.append((port, where))
 
     assert "carla_port" in inspect.signature(command).parameters
-    rest = {name: None for name in inspect.signature(command).parameters}
+    rest = dict.fromkeys(inspect.signature(command).parameters)
     command(**rest | {"port": 80, "carla_port": 2000})
     assert told == [(80, {"--port": 2000})]
 
