@@ -388,3 +388,10 @@ def test_a_command_without_documentation_fails_this_test(cli):
     for command in ("search", "resume", "simulate", "convert", "validate", "list", "ontology"):
         assert f"bridgegen {command}" in readme
         assert command in out
+
+
+def test_a_table_says_which_package_it_needs(cli, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    status, out, err = cli("table", tmp_path, "--out", tmp_path / "tables")
+    assert (status, out) == (2, "")
+    assert "pip install 'bridgegen[parquet]'" in err

@@ -46,6 +46,25 @@ def export(
 
 
 @app.command()
+def table(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of runs, finished or not.")],
+    out: Annotated[Path, typer.Option(help="A folder: each run becomes a file in it.")],
+    sample: Annotated[
+        float,
+        typer.Option(
+            help="Keep this share of what is neither critical nor failed; each row's weight says "
+            "how many it stands for."
+        ),
+    ] = 1.0,
+) -> None:
+    """Write all evaluations of runs as Parquet files, one table to DuckDB, Polars or pandas."""
+    from bridgegen.campaign.table import write_tables
+
+    for path in write_tables(runs, out, sample=sample):
+        print(path)
+
+
+@app.command()
 def convert(
     file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
     out: Annotated[

@@ -1,0 +1,151 @@
+"""The evaluations of many runs for other tools: a Parquet file for each run, whole or a sample.
+
+A folder of such files is one table to DuckDB, Polars, pandas or Spark. A run of any length is
+written a few thousand rows at a time.
+"""
+
+import json
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from hashlib import blake2b
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.campaign.settings import Settings
+from bridgegen.cause import Cause
+from bridgegen.errors import InputError, StorageError
+from bridgegen.store import Rows, Store
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+CHUNK = 65_536
+"""Rows that are written at a time: a row group of the file."""
+
+RUN = ("run", "scenario", "algorithm", "seed", "ego", "simulator")
+"""Columns that say whose a row is: the run's folder, and how it was made."""
+
+WEIGHT = "weight"
+"""The column that says how many of the run's rows a row stands for."""
+
+
+def write_tables(
+    runs: Sequence[Path | str], out: Path | str, *, sample: float = 1.0
+) -> tuple[Path, ...]:
+    """Write the evaluations of runs, finished or not; a file that is there is replaced.
+
+    Of a sample, what is critical and what failed is kept whole; the others by chance, which is the
+    same whenever the same row is asked for, whoever found it.
+
+    Args:
+        runs: their folders, whose names differ.
+        out: a folder; ``out/NAME.parquet`` is written for each.
+        sample: the share of the other rows that is kept, in (0, 1].
+
+    Returns:
+        The files.
+
+    Raises:
+        InputError: two runs of one name, a share out of range, or no package pyarrow.
+        StorageError: not a run, or a file that cannot be written.
+    """
+    if not 0.0 < sample <= 1.0:
+        raise InputError(f"0 < sample <= 1 must hold, got {sample:g}")
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        raise InputError(
+            "tables in Parquet need the package pyarrow: pip install 'bridgegen[parquet]'"
+        ) from None
+    folders = {Path(run).resolve().name: Path(run) for run in runs}
+    if len(folders) < len(runs):
+        names = [Path(run).resolve().name for run in runs]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        raise InputError(f"runs must have names that differ, got twice: {', '.join(twice)}")
+    target = Path(out)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{target}: cannot be made: {error.strerror}") from None
+    return tuple(
+        _write(name, folder, target / f"{name}.parquet", sample) for name, folder in folders.items()
+    )
+
+
+def _write(name: str, folder: Path, path: Path, sample: float) -> Path:
+    import pyarrow as pa
+    import pyarrow.parquet as parquet
+
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with Store.open(folder) as store:
+        settings = Settings.from_dict(store.settings, store.folder)
+        said = dict(zip(RUN, _said(name, settings), strict=True))
+        schema = _schema(store, said, settings, sample)
+        try:
+            with parquet.ParquetWriter(part, schema, compression="zstd") as writer:
+                for rows in store.rows(chunk=CHUNK):
+                    kept, weight = _kept(rows, sample)
+                    columns = _columns(store, said, rows.take(kept), weight)
+                    writer.write_table(pa.table(columns, schema=schema))
+            part.replace(path)
+        except OSError as error:
+            raise StorageError(f"{path}: cannot be written: {error.strerror or error}") from None
+        finally:
+            with suppress(OSError):
+                part.unlink()
+    return path
+
+
+def _said(name: str, settings: Settings) -> tuple[str | int, ...]:
+    scenario = Path(settings.scenario).stem
+    return name, scenario, settings.algorithm, settings.seed, settings.ego, settings.simulator
+
+
+def _schema(store: Store, said: dict[str, Any], settings: Settings, sample: float) -> "pa.Schema":
+    import pyarrow as pa
+
+    columns, text = store.columns, pa.dictionary(pa.int32(), pa.string())
+    fields = [(name, pa.int64() if isinstance(one, int) else text) for name, one in said.items()]
+    fields += [("id", pa.int64()), ("batch", pa.int64()), ("seconds", pa.float64())]
+    fields += [(name, pa.float64()) for name in (*columns.X, *columns.metrics, *columns.F)]
+    fields += [("status", pa.int16()), ("critical", pa.bool_())]
+    fields += [("cause", text), (WEIGHT, pa.float64())]
+    made = {"settings": settings.to_dict(), "version": store.version, "sample": sample}
+    own = {*RUN, WEIGHT} & {*columns.X, *columns.metrics}
+    if own:
+        raise InputError(
+            f"{store.folder}: a column of the table cannot be called as a parameter or a metric: "
+            f"{', '.join(sorted(own))}"
+        )
+    return pa.schema(fields, metadata={"bridgegen": json.dumps(made)})
+
+
+def _kept(rows: Rows, sample: float) -> tuple[Int, Float]:
+    """Return which rows are kept, and how many each stands for."""
+    whole = rows.critical | (rows.status != 0)
+    drawn = whole | (_chances(rows.X) < sample)
+    weight = np.where(whole, 1.0, 1.0 / sample)
+    return np.flatnonzero(drawn), weight[drawn]
+
+
+def _chances(X: Float) -> Float:
+    """Return a number in [0, 1) of each row, by what it holds."""
+    digests = b"".join(blake2b(row.tobytes(), digest_size=8).digest() for row in X)
+    return (np.frombuffer(digests, "<u8") >> np.uint64(11)).astype(np.float64) * 2.0**-53
+
+
+def _columns(store: Store, said: dict[str, Any], rows: Rows, weight: Float) -> dict[str, Any]:
+    n, columns = len(rows), store.columns
+    found: dict[str, Any] = {name: [one] * n for name, one in said.items()}
+    found |= {"id": rows.id, "batch": rows.batch, "seconds": rows.seconds}
+    for names, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
+                          (columns.F, rows.F)):  # fmt: skip
+        found |= dict(zip(names, values.T, strict=True))
+    found |= {"status": rows.status.astype(np.int16), "critical": rows.critical}
+    labels = {int(one): Cause(one).label or None for one in np.unique(rows.cause)}
+    found["cause"] = [labels[one] for one in rows.cause.tolist()]
+    return found | {WEIGHT: weight}
