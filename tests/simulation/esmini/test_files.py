@@ -86,10 +86,11 @@ def test_rows_of_one_template_do_not_stain_each_other(tmp_path):
     storyboard = read(TEXT.encode(), "test.xosc")
     template = ScenarioFile(storyboard, "ego").on(tmp_path / "map.xodr", {})
     data = []
-    for v in (1.0, 2.0, 1.0):
+    for v in (1.0, 2.0, 1.0, float("inf")):
         template.write(tmp_path / "row.xosc", {"v": v, "n": 1.0})
         data.append((tmp_path / "row.xosc").read_bytes())
     assert data[0] == data[2] != data[1]
+    assert b'"${$v / 3}"' in data[3]  # has no value: no other row's stays
 
 
 def test_a_course_takes_the_place_of_the_trajectory(tmp_path):

@@ -88,8 +88,7 @@ class ScenarioFile:
     """
 
     def __init__(self, storyboard: OpenScenario, ego: str | None) -> None:
-        self._data = to_xml(storyboard)
-        root = etree.fromstring(self._data)
+        root = etree.fromstring(to_xml(storyboard))
         for controller in [*root.iterfind("./Entities/ScenarioObject/ObjectController")]:
             _remove(controller)
         if ego is not None:
@@ -155,16 +154,8 @@ class Template:
                 is_whole = declared.get("parameterType") != "double"
                 declared.set("value", str(int(value)) if is_whole else repr(float(value)))
         for node, attribute, expression in self._expressions:
-            if expression.names <= values.keys():
-                with np.errstate(all="ignore"):
-                    found = np.asarray(expression.resolve(dict(values)))
-                if np.isfinite(found):
-                    is_truth = found.dtype == np.bool_
-                    node.set(
-                        attribute, str(bool(found)).lower() if is_truth else repr(float(found))
-                    )
-        data = etree.tostring(self._root, xml_declaration=True, encoding="UTF-8")
-        path.write_bytes(data)
+            node.set(attribute, _worked_out(expression, values))
+        write_whole(path, [etree.tostring(self._root, xml_declaration=True, encoding="UTF-8")])
 
 
 def _expression(text: str) -> Expr | None:
@@ -176,6 +167,17 @@ def _expression(text: str) -> Expr | None:
         return value if isinstance(value, Expr) and value.names is not None else None
     except FileFormatError:
         return None
+
+
+def _worked_out(expression: Expr, values: Mapping[str, float]) -> str:
+    """Return what an expression comes to; itself, where it is not for us to say."""
+    if not expression.names <= values.keys():
+        return str(expression)
+    with np.errstate(all="ignore"):
+        found = np.asarray(expression.resolve(dict(values)))
+    if found.dtype == np.bool_:
+        return str(bool(found)).lower()
+    return repr(float(found)) if np.isfinite(found) else str(expression)
 
 
 def _remove(node: Node) -> None:

@@ -9,7 +9,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bridgegen.errors import InputError
+from bridgegen.errors import BridgeGenError, InputError, StorageError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 from bridgegen.simulation.esmini.library import Library
 from bridgegen.simulation.esmini.log import error_in
@@ -114,6 +114,7 @@ class Seat:
 
         Raises:
             InputError: the library, or the driver of the user's own, is not what it should be.
+            StorageError: its files cannot be written.
             CallError: the process died, or did not answer in time.
         """
         self.start()
@@ -127,8 +128,8 @@ class Seat:
                 "run", sent, row, seconds=self._seconds, progress=lambda: int(self._beats[0])
             )
         except CallError as error:
-            if error.kind == REFUSED:
-                raise InputError(str(error)) from None
+            if error.kind in REFUSALS:
+                raise REFUSALS[error.kind](str(error)) from None
             if said := error_in(self._folder.path / LOG):
                 raise type(error)(error.kind, f"{error}; its log: {said}") from None
             raise
@@ -142,7 +143,10 @@ class Seat:
 
 # --- In the other process -------------------------------------------------------------------------
 
-REFUSED = "refused"
+REFUSALS: dict[str, type[BridgeGenError]] = {
+    one.__name__: one for one in (InputError, StorageError)
+}
+"""What the user is told as it is, whichever process finds it."""
 
 
 def answering(path: str, folder: str) -> tuple[str, Answer]:
@@ -167,8 +171,9 @@ class Answers:
         answers: dict[str, Answer] = {"take": self._take, "warm": self._warm, "run": self._run}
         try:
             return answers[what](*rest)
-        except InputError as error:
-            raise CallError(REFUSED, str(error)) from None
+        except tuple(REFUSALS.values()) as error:
+            kind = next(name for name, one in REFUSALS.items() if isinstance(error, one))
+            raise CallError(kind, str(error)) from None
 
     def _take(self, job: Job, layout: "Layout") -> None:
         from bridgegen.simulation.embedded.shared_arrays import seen
