@@ -93,6 +93,7 @@ def cluster() -> Iterator[None]:
     os.environ |= {
         "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
         "RAY_USAGE_STATS_ENABLED": "0",
+        "RAY_AUTH_MODE": "disabled",
         "PYTHONPATH": os.pathsep.join(sys.path),
     }
     process = subprocess.Popen(

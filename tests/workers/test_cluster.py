@@ -32,6 +32,7 @@ NODES = Path(__file__).parent / "doubles" / "two_nodes.py"
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 LOCAL = {
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # loopback, not this machine's address
+    "RAY_AUTH_MODE": "disabled",  # whatever token somebody keeps in the home folder
     "RAY_health_check_period_ms": "500",
     "RAY_health_check_timeout_ms": "500",
     "RAY_health_check_failure_threshold": "2",
@@ -130,18 +131,19 @@ def wait_for(what) -> None:
         time.sleep(0.05)
 
 
+def test_from_outside_of_the_cluster(nodes, doubles, monkeypatch):
+    """By Ray's own client, as from a machine that is no node of it."""
+    monkeypatch.setenv("BRIDGEGEN_IDLE_SECONDS", "1")
+    with open_workers(f"ray://127.0.0.1:{CLIENT_PORT}") as workers:
+        assert (joined(workers.map(doubles.Doubler(), "double", X)) == 2.0 * X).all()
+
+
 def test_actors_that_nobody_needs_make_room(nodes, doubles, monkeypatch):
     monkeypatch.setenv("BRIDGEGEN_IDLE_SECONDS", "1")
     with open_workers("ray") as workers:
         workers.map(doubles.Doubler(), "double", X)
         assert 1 <= len(actors()) <= 2
     wait_for(lambda: not actors())
-
-
-def test_from_outside_of_the_cluster(nodes, doubles):
-    """By Ray's own client, as from a machine that is no node of it."""
-    with open_workers(f"ray://127.0.0.1:{CLIENT_PORT}") as workers:
-        assert (joined(workers.map(doubles.Doubler(), "double", X)) == 2.0 * X).all()
 
 
 def test_rows_come_back_in_order_from_both_nodes(cluster, doubles):
@@ -228,6 +230,19 @@ def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
     assert done.wait(10.0)
     assert same(rows_of(run.folder), rows_of(undisturbed.folder))
     nodes.obey("grow")
+
+
+def test_a_comparisons_runs_share_the_cluster(nodes, tmp_path, monkeypatch):
+    """Two runs at a time, each with its own way to the cluster, which it finds by itself."""
+    monkeypatch.delenv("RAY_ADDRESS")
+    grid = {"algorithms": ["random", "pso"], "seeds": 1, "budget": 40, "deliver": False}
+    there = bg.compare("crossroads-s4", **grid, workers="ray", out=tmp_path / "there")
+    here = bg.compare("crossroads-s4", **grid, workers=1, out=tmp_path / "here")
+    assert not there.gaps
+    for cell in there.plan.cells:
+        one, other = there.plan.folder(cell), here.plan.folder(cell)
+        assert rows_of(one).F.tobytes() == rows_of(other).F.tobytes()
+        assert rows_of(one).X.tobytes() == rows_of(other).X.tobytes()
 
 
 def test_a_driver_of_ones_own_is_carried_to_where_it_is_not(

@@ -3,6 +3,7 @@
 import importlib.util
 import itertools
 import queue
+import re
 import tempfile
 from importlib.metadata import version
 from typing import IO, Any
@@ -20,7 +21,7 @@ class Cluster(Crew[int]):
 
     Args:
         address: of the cluster: "ray://HOST:PORT" from outside of it, "HOST:PORT" on a machine of
-            it; None is the one that this machine belongs to, or else one that is begun here.
+            it; None is the one that RAY_ADDRESS names, or that this machine belongs to.
 
     Raises:
         InputError: Ray is not installed.
@@ -92,7 +93,12 @@ class Cluster(Crew[int]):
         if who == "joined":
             self._room, self._has_joined = rest[0], True
         elif who == "lost":
-            raise WorkersError(f"{self._where} cannot be reached: {rest[0]}")
+            hint = (
+                ""
+                if self._address
+                else "; 'ray start --head' begins one, ray://HOST:PORT names one"
+            )
+            raise WorkersError(f"{self._where} cannot be reached: {rest[0]}{hint}")
         elif who == "died":
             raise WorkersError(f"{self._where} is lost: {self._last_words()}")
         elif who != "begun":
@@ -150,4 +156,7 @@ class Cluster(Crew[int]):
         self._log.seek(0)
         lines = self._log.read().decode("utf-8", "replace").strip().splitlines()
         said = [line for line in lines if "[state-dump]" not in line]
-        return said[-1].rpartition("] ")[2] if said else "its connection ended"
+        if not said:
+            return "its connection ended"
+        _, _, told = said[-1].rpartition("] ")
+        return re.sub(r"^\S+:\d+: ", "", told).partition(". ")[0]  # without Ray's own source line

@@ -31,8 +31,8 @@ class Gate:
 
     Args:
         say: how to answer.
-        address: of the cluster, as Ray takes it; None is the one that this machine belongs to, or
-            else one that is begun here and ends with us.
+        address: of the cluster, as Ray takes it; None is the one that RAY_ADDRESS names, or that
+            this machine belongs to.
         device: "CPU" or "GPU", of which each actor needs one.
     """
 
@@ -43,8 +43,7 @@ class Gate:
         self._namespace = f"bridgegen-{version('bridgegen')}"
         self._actors: dict[int, Any] = {}
         self._recipes: dict[str, Any] = {}
-        given = {} if address or "RAY_ADDRESS" in os.environ else {"include_dashboard": False}
-        self._connect(address=address, namespace=self._namespace, log_to_driver=False, **given)
+        self._connect(address=address or "auto", namespace=self._namespace, log_to_driver=False)
         self._class = ray.remote(_Actor)
         self._count = self._room()
         say("joined", self._count)
