@@ -66,18 +66,18 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
 
     scenario = load("crossroads-s4")
     space = scenario.space()
-    X = space.decode(np.random.default_rng(0).random((12, space.n_var)))
+    X = space.decode(np.random.default_rng(0).random((4, space.n_var)))
     crew = Processes(2)
     pipeline = Poisoned(scenario, space, seek_causes=True, workers=crew)
     pipeline.choose_objective()
     pipeline.poison = X[3]
     found = pipeline.evaluate(X)
     crew.close()
-    assert found.status.tolist() == [0] * 3 + [WORKER_ENDED] + [0] * 8
+    assert found.status.tolist() == [0, 0, 0, WORKER_ENDED]
     assert found.messages == {3: "by SIGSEGV"}
     assert np.isnan(found.metrics[3]).all()
     assert not found.critical[3]
-    others = np.delete(np.arange(12), 3)
+    others = np.arange(3)
     calm = bg.pipeline.Pipeline(scenario, space, seek_causes=True)
     calm.choose_objective()
     expected = calm.evaluate(X[others])
