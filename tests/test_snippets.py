@@ -192,7 +192,8 @@ def test_every_snippet_runs(name, page):
 
 def test_few_snippets_cannot_be_run():
     found = [block for name in PAGES for block in blocks(name) if block.mark == "not run"]
-    assert all("esmini" in block.value or "CARLA" in block.value for block in found)
+    why = ("esmini", "CARLA", "extra parquet")
+    assert all(any(one in block.value for one in why) for block in found)
     assert len(found) <= 12
 
 
