@@ -40,13 +40,20 @@ class IsolatedProcess:
         module: of ours; run as a program, it calls ``main``.
         arguments: of that program.
         error: what is raised where a call is not answered.
+        apart: whether it has a session of its own: it is not killed with this one, but ends by
+            itself as soon as this one has.
     """
 
     def __init__(
-        self, module: str, arguments: Sequence[str] = (), error: type[CallError] = CallError
+        self,
+        module: str,
+        arguments: Sequence[str] = (),
+        error: type[CallError] = CallError,
+        *,
+        apart: bool = False,
     ) -> None:
         self._command = [sys.executable, "-m", module, *arguments]
-        self._error = error
+        self._error, self._apart = error, apart
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
@@ -67,6 +74,7 @@ class IsolatedProcess:
         process = self._process = subprocess.Popen(
             self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(["", *sys.path])},
+            start_new_session=self._apart,
         )  # fmt: skip
         assert process.stdout is not None
         self._answers = queue.SimpleQueue()
@@ -176,6 +184,7 @@ def serve(
     make: Callable[[], tuple[Any, Answer]],
     told: Callable[[Exception], str] = str,
     spoken: int = 2,
+    at_end: Callable[[], None] = lambda: None,
 ) -> None:
     """Answer requests until nobody is there to make any.
 
@@ -183,6 +192,7 @@ def serve(
         make: returns the greeting, and what answers requests.
         told: says an exception in one line.
         spoken: where what is printed goes, a file's number: the other output by default.
+        at_end: is called when nobody is there any more.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the job itself ends us
     answers = os.fdopen(os.dup(1), "wb")
@@ -194,7 +204,7 @@ def serve(
         return
     _write(answers, ("answer", greeting))
     requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(requests,), daemon=True).start()
+    threading.Thread(target=_listen, args=(requests, at_end), daemon=True).start()
     while True:
         request = requests.get()
         try:
@@ -204,12 +214,14 @@ def serve(
         _write(answers, message)
 
 
-def _listen(requests: "queue.SimpleQueue[Any]") -> None:
+def _listen(requests: "queue.SimpleQueue[Any]", at_end: Callable[[], None]) -> None:
     """Take requests; once nobody is there to make any, the process ends, whatever it is at."""
     try:
         while True:
             requests.put(_read(sys.stdin.buffer))
     except (EOFError, OSError):
+        at_end()
+    finally:
         os._exit(0)
 
 

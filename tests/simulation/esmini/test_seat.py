@@ -1,6 +1,11 @@
 """Processes in which a stand-in of esmini runs rows: what goes wrong costs the row, and no more."""
 
+import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +105,44 @@ def test_who_stops_it_waits_no_longer(library):
     threading.Timer(1.0, simulator.stop).start()
     with pytest.raises(CallError, match="ended"):
         simulator.run(roads, np.zeros(1, dtype=np.int64), {"fault": [HANGS_AT_ONCE]})
+
+
+def test_whoever_is_killed_leaves_nothing_behind(library, tmp_path):
+    """The processes of a killed one end by themselves, and take their files with them."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    script = tmp_path / "killed.py"
+    script.write_text(
+        "import os, signal\n"
+        "from pathlib import Path\n"
+        "import numpy as np\n"
+        "from bridgegen.ego import DRIVERS\n"
+        "from bridgegen.openx.logic_file import roads_of\n"
+        "from bridgegen.openx.openscenario.read import read\n"
+        "from bridgegen.simulation.embedded.simulator import EmbeddedSimulator\n"
+        "from bridgegen.simulation.esmini import seat\n"
+        "from bridgegen.simulation.esmini.simulator import EsminiSimulator\n"
+        "seat.PROGRAM = 'stand_in_esmini'\n"
+        f"path = Path({str(tmp_path / 'warm.xosc')!r})\n"
+        "scenario = read(path)\n"
+        "embedded = EmbeddedSimulator(scenario, 'x', driver=DRIVERS['route-follower'])\n"
+        f"one = EsminiSimulator(embedded, scenario, Path({str(library)!r}), steps=1)\n"
+        "roads = one.roads([roads_of(scenario, path)])\n"
+        "assert one.run(roads, np.zeros(1, dtype=np.int64), {}).status[0] == 0\n"
+        f"assert len(os.listdir({str(temporary)!r})) == 3\n"
+        "os.killpg(0, signal.SIGKILL)\n"
+    )
+    path = os.pathsep.join(["", *sys.path])
+    done = subprocess.run(
+        [sys.executable, str(script)], start_new_session=True, timeout=120,
+        env=os.environ | {"PYTHONPATH": path, "TMPDIR": str(temporary)},
+    )  # fmt: skip
+    assert done.returncode == -signal.SIGKILL
+    for _ in range(100):
+        if not os.listdir(temporary):
+            return
+        time.sleep(0.1)
+    pytest.fail(f"it leaves {os.listdir(temporary)}")
 
 
 def test_a_library_that_is_none_is_refused_before_any_row(library):

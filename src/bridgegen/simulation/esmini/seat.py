@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridgegen.errors import BridgeGenError, InputError, StorageError
@@ -85,7 +86,7 @@ class Seat:
 
         self._job, self._seconds = job, seconds
         self._folder = Folder()
-        self._process = IsolatedProcess(PROGRAM, [str(library), str(self._folder.path)])
+        self._process = IsolatedProcess(PROGRAM, [str(library), str(self._folder.path)], apart=True)
         self._shared = SharedArrays()
         self._roads: object = None  # those that it has been sent
         self._is_warm = False
@@ -149,6 +150,19 @@ REFUSALS: dict[str, type[BridgeGenError]] = {
 """What the user is told as it is, whichever process finds it."""
 
 
+LEFT: set[Path] = set()
+"""Folders, and a file, that nobody needs once the process that asks is gone."""
+
+
+def clear() -> None:
+    """Remove what a process that was killed could not."""
+    for path in LEFT:
+        if path.is_dir():
+            rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
 def answering(path: str, folder: str) -> tuple[str, Answer]:
     """Load the library; return its version, and the answers."""
     library = Library(Path(path))
@@ -165,6 +179,7 @@ class Answers:
 
     def __init__(self, library: Library, folder: Path) -> None:
         self._library, self._folder = library, folder
+        LEFT.add(folder)
 
     def answer(self, what: str, *rest: Any) -> Any:
         """Answer a request: to take a job, to warm up for it, to run a row of it."""
@@ -179,11 +194,13 @@ class Answers:
         from bridgegen.simulation.embedded.shared_arrays import seen
 
         self._job, (self._beats,) = job, seen(layout)
+        LEFT.add(Path(layout.path))
         self._events = job.scenario.event_paths()
 
     def _hold(self, roads: "tuple[Network, RoadFiles] | None") -> None:
         if roads is not None:
             self._network, files = roads
+            LEFT.update(path.parent for path in files.paths)
             self._template = cache(partial(_template, self._job.scenario, files))
 
     def _warm(self, roads: "tuple[Network, RoadFiles] | None", network: int) -> None:
@@ -252,7 +269,7 @@ def main(start: Callable[[str, str], tuple[str, Answer]] = answering) -> None:
     import os
 
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    serve(partial(start, *sys.argv[1:3]), spoken=nowhere)
+    serve(partial(start, *sys.argv[1:3]), spoken=nowhere, at_end=clear)
 
 
 if __name__ == "__main__":
