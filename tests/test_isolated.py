@@ -96,7 +96,7 @@ def test_it_ends_with_whoever_asks_even_while_it_hangs(process, tmp_path):
         "from bridgegen.isolated import IsolatedProcess\n"
         "one = IsolatedProcess('isolated_worker', ['you'])\n"
         "one.start(30.0)\n"
-        "print(one._process.pid, flush=True)\n"
+        "print(one._child.pid, flush=True)\n"
         "threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGKILL)).start()\n"
         "one.ask('hang', seconds=60.0)\n"
     )

@@ -4,18 +4,12 @@ What is called there may raise, take too long, or take its process down with it:
 and nothing else. The process is ended then, and another one is begun for the next.
 """
 
-import contextlib
-import os
 import pickle
 import queue
-import signal
-import struct
-import subprocess
-import sys
-import threading
-import weakref
 from collections.abc import Callable, Sequence
-from typing import IO, Any
+from typing import Any
+
+from bridgegen.child import Child, connect
 
 Answer = Callable[..., Any]
 """Answers a request, in the other process."""
@@ -40,8 +34,7 @@ class IsolatedProcess:
         module: of ours; run as a program, it calls ``main``.
         arguments: of that program.
         error: what is raised where a call is not answered.
-        apart: whether it has a session of its own: it is not killed with this one, but ends by
-            itself as soon as this one has.
+        apart: see `Child`.
     """
 
     def __init__(
@@ -52,15 +45,14 @@ class IsolatedProcess:
         *,
         apart: bool = False,
     ) -> None:
-        self._command = [sys.executable, "-m", module, *arguments]
-        self._error, self._apart = error, apart
-        self._process: subprocess.Popen[bytes] | None = None
+        self._program, self._error, self._apart = ["-m", module, *arguments], error, apart
+        self._child: Child | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     @property
     def runs(self) -> bool:
         """Whether it has been started, and not ended since."""
-        return self._process is not None
+        return self._child is not None
 
     def start(self, seconds: float) -> Any:
         """Begin the process; return its greeting.
@@ -71,18 +63,8 @@ class IsolatedProcess:
         Raises:
             CallError: it cannot be begun.
         """
-        process = self._process = subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(["", *sys.path])},
-            start_new_session=self._apart,
-        )  # fmt: skip
-        assert process.stdout is not None
         self._answers = queue.SimpleQueue()
-        reader = threading.Thread(
-            target=_forward, args=(process.stdout, self._answers), daemon=True
-        )
-        reader.start()
-        self._end = weakref.finalize(self, _end, process, reader)
+        self._child = Child(self._program, self._answers.put, apart=self._apart)
         try:
             return self._answer(seconds)
         except CallError:
@@ -101,11 +83,9 @@ class IsolatedProcess:
             CallError: it was not answered; unless it "raised", or as `Answer` says, the process
                 has ended.
         """
-        process = self._process
-        assert process is not None
-        assert process.stdin is not None
+        assert self._child is not None
         try:
-            _write(process.stdin, request)
+            self._child.send(request)
         except OSError:
             self.close()
             raise self._error("died", "its process has ended") from None
@@ -113,15 +93,15 @@ class IsolatedProcess:
 
     def kill(self) -> None:
         """End the process from another thread: who waits for it gets a `CallError`."""
-        process = self._process
-        if process is not None:
-            process.kill()
+        child = self._child
+        if child is not None:
+            child.kill()
 
     def close(self) -> None:
         """End the process, if it is running; so does this object's end."""
-        if self._process is not None:
-            self._end()
-        self._process = None
+        if self._child is not None:
+            self._child.end()
+        self._child = None
 
     def _answer(self, seconds: float, progress: Callable[[], int] | None = None) -> Any:
         so_far = progress() if progress else 0
@@ -137,44 +117,10 @@ class IsolatedProcess:
         if kind == "answer":
             return rest[0]
         if kind == "died":
-            status = self._process.wait() if self._process else None
+            status = self._child.end() if self._child else None
             self.close()
             raise self._error("died", f"its process ended with status {status}")
         raise self._error(kind, rest[0])
-
-
-def _end(process: subprocess.Popen[bytes], reader: threading.Thread) -> None:
-    process.kill()
-    process.wait()
-    reader.join()  # the pipe has ended
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with contextlib.suppress(OSError):
-                pipe.close()
-
-
-def _forward(pipe: IO[bytes], answers: "queue.SimpleQueue[Any]") -> None:
-    """Put what comes out of a pipe into a queue: only that can be waited for with a limit."""
-    try:
-        while True:
-            answers.put(_read(pipe))
-    except (EOFError, OSError, ValueError, pickle.UnpicklingError):
-        answers.put(("died",))
-
-
-def _write(pipe: IO[bytes], message: Any) -> None:
-    data = pickle.dumps(message, protocol=5)
-    pipe.write(struct.pack("<q", len(data)))
-    pipe.write(data)
-    pipe.flush()
-
-
-def _read(pipe: IO[bytes]) -> Any:
-    """Return the next message; both ends are ours, and the other process is trusted."""
-    head = pipe.read(8)
-    if len(head) < 8:
-        raise EOFError
-    return pickle.loads(pipe.read(struct.unpack("<q", head)[0]))
 
 
 # --- In the other process -------------------------------------------------------------------------
@@ -194,35 +140,20 @@ def serve(
         spoken: where what is printed goes, a file's number: the other output by default.
         at_end: is called when nobody is there any more.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the job itself ends us
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(spoken, 1)  # what is printed must not get between our answers
+    requests, say = connect(spoken, at_end)
     try:
         greeting, answer = make()
     except Exception as error:
-        _write(answers, _failure(error, told))
+        say(*_failure(error, told))
         return
-    _write(answers, ("answer", greeting))
-    requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(requests, at_end), daemon=True).start()
+    say("answer", greeting)
     while True:
         request = requests.get()
         try:
-            message: tuple[str, Any] = ("answer", answer(*request))
+            message: tuple[str, Any] = ("answer", answer(*pickle.loads(request)))
         except Exception as error:
             message = _failure(error, told)
-        _write(answers, message)
-
-
-def _listen(requests: "queue.SimpleQueue[Any]", at_end: Callable[[], None]) -> None:
-    """Take requests; once nobody is there to make any, the process ends, whatever it is at."""
-    try:
-        while True:
-            requests.put(_read(sys.stdin.buffer))
-    except (EOFError, OSError):
-        at_end()
-    finally:
-        os._exit(0)
+        say(*message)
 
 
 def _failure(error: Exception, told: Callable[[Exception], str]) -> tuple[str, str]:

@@ -12,7 +12,7 @@ import time
 from importlib.metadata import version
 from typing import Any
 
-from bridgegen.workers.child import Say, connect
+from bridgegen.child import Say, connect
 from bridgegen.workers.recipe import Recipe
 from bridgegen.workers.station import IDLE_SECONDS, Station
 
@@ -157,6 +157,7 @@ def _reason(error: Exception) -> str:
 def main() -> None:
     """Do what is asked for, until nobody asks."""
     requests, say = connect()
+    say("begun")
     gate: Gate | None = None
     while True:
         name, *arguments = pickle.loads(requests.get())

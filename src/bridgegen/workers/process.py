@@ -1,15 +1,11 @@
 """A process that calls functions for us, seen from here."""
 
-import os
-import pickle
 import queue
-import signal
-import subprocess
-import sys
-import threading
 from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, Any
+
+from bridgegen.child import Child
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment of a process that leaves the other cores to the other processes."""
@@ -29,24 +25,20 @@ class Process:
     """
 
     def __init__(
-        self, said: Said, module: str = "bridgegen.workers.child", errors: IO[bytes] | None = None
+        self, said: Said, module: str = "bridgegen.workers.caller", errors: IO[bytes] | None = None
     ) -> None:
-        self._said = said
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {module} import main; main()"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            env=os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(["", *sys.path])},
-            start_new_session=True,  # Ctrl-C is ours, and a driver's process ends with it
+        self._child = Child(
+            ["-c", f"from {module} import main; main()"],
+            lambda message: said.put((self, message)),
+            apart=True,  # Ctrl-C is ours, and a driver's process ends with it
+            environment=ONE_THREAD,
+            errors=errors,
         )
-        self._reader = threading.Thread(target=self._listen, daemon=True)
-        self._reader.start()
 
     @property
     def pid(self) -> int:
         """Its number."""
-        return self._process.pid
+        return self._child.pid
 
     def call(self, function: Callable[..., Any], *arguments: Any, tells: bool = False) -> None:
         """Have a function called; what it returns or raises will be said.
@@ -60,28 +52,9 @@ class Process:
 
     def ask(self, *request: Any) -> None:
         """Send a request, as the module's ``main`` understands it."""
-        assert self._process.stdin is not None
-        data = pickle.dumps(request, protocol=5)
-        with suppress(OSError):  # it has died: the reader says so
-            pickle.dump(data, self._process.stdin, protocol=5)
-            self._process.stdin.flush()
+        with suppress(OSError):  # it has died: the last that it says tells
+            self._child.send(request)
 
     def end(self) -> int:
         """End the process and those that it has begun, at once; return its exit status."""
-        with suppress(OSError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        status = self._process.wait()
-        self._reader.join()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
-        return status
-
-    def _listen(self) -> None:
-        assert self._process.stdout is not None
-        try:
-            while True:
-                self._said.put((self, pickle.load(self._process.stdout)))
-        except (EOFError, OSError, pickle.UnpicklingError, ValueError):
-            self._said.put((self, ("died",)))
+        return self._child.end()
