@@ -77,7 +77,7 @@ FIRST_SEVEN = ("n_collision", "ttc", "d_min", "v_d", "l_offset", "a_change", "n_
 def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monkeypatch):
     """It holds seven metrics, in another order, and says nothing of more."""
     with monkeypatch.context() as patch:
-        patch.setattr("bridgegen.pipeline.metrics_of", lambda *_: FIRST_SEVEN)
+        patch.setattr("bridgegen.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
         patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
         bg.run_search("crossroads-s4", budget=80, out=tmp_path / "run")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
