@@ -19,6 +19,7 @@ from bridgegen.ego.drivers import ROUTE_FOLLOWER
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.carla.eyes import Eyes
 from bridgegen.simulation.carla.found import Found, refuse_used
 from bridgegen.simulation.carla.guests import GUESTS
@@ -61,7 +62,7 @@ class CarlaRoads:
     worlds: tuple[Town | Generated, ...]
 
 
-class CarlaSimulator:
+class CarlaSimulator(AroundEmbedded):
     """A `Simulator` that a CARLA server runs, one row at a time.
 
     The storyboard moves the participants, as in the embedded simulator; our driver drives the ego,
@@ -86,7 +87,7 @@ class CarlaSimulator:
         settings: CarlaSettings | None = None,
         access: Access | None = None,
     ) -> None:
-        self.embedded = embedded
+        super().__init__(embedded)
         if self.embedded.time_step != TIME_STEP:
             raise InputError(
                 f"{embedded.program.place}: time_step = {TIME_STEP:g} s must hold in carla, whose "
@@ -103,11 +104,6 @@ class CarlaSimulator:
         self._is_stopped = threading.Event()
 
     @property
-    def driver(self) -> str:
-        """See `Simulator`."""
-        return self.embedded.driver
-
-    @property
     def rows_at_once(self) -> int:
         """See `Simulator`."""
         return ROWS
@@ -116,26 +112,6 @@ class CarlaSimulator:
     def runs_at_once(self) -> int:
         """See `Simulator`: there is one server."""
         return 1
-
-    @property
-    def time_step(self) -> float:
-        """See `Simulator`."""
-        return self.embedded.time_step
-
-    @property
-    def duration(self) -> float:
-        """See `Simulator`."""
-        return self.embedded.duration
-
-    @property
-    def fixed(self) -> Mapping[str, str]:
-        """See `Simulator`."""
-        return self.embedded.fixed
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """See `Simulator`."""
-        return self.embedded.parameters
 
     def roads(
         self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()

@@ -16,6 +16,7 @@ from bridgegen.errors import InputError
 from bridgegen.isolated import CallError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
@@ -83,7 +84,7 @@ class EsminiRoads(NamedTuple):
     files: RoadFiles
 
 
-class EsminiSimulator:
+class EsminiSimulator(AroundEmbedded):
     """A `Simulator` that has esmini run the storyboard, and our driver the ego.
 
     Where the storyboard moves the ego, esmini's own controller does.
@@ -113,7 +114,7 @@ class EsminiSimulator:
         steps: int,
         seconds: float = SECONDS,
     ) -> None:
-        self.embedded = embedded
+        super().__init__(embedded)
         driver = embedded.program.driver
         self._drives = driver != STORYBOARD
         ego = embedded.program.names[0] if self._drives else None
@@ -128,11 +129,6 @@ class EsminiSimulator:
             self.version = seat.version
 
     @property
-    def driver(self) -> str:
-        """See `Simulator`."""
-        return self.embedded.driver
-
-    @property
     def rows_at_once(self) -> int:
         """See `Simulator`."""
         return ROWS
@@ -141,26 +137,6 @@ class EsminiSimulator:
     def runs_at_once(self) -> int:
         """See `Simulator`."""
         return os.cpu_count() or 1
-
-    @property
-    def time_step(self) -> float:
-        """See `Simulator`."""
-        return self.embedded.time_step
-
-    @property
-    def duration(self) -> float:
-        """See `Simulator`."""
-        return self.embedded.duration
-
-    @property
-    def fixed(self) -> Mapping[str, str]:
-        """See `Simulator`."""
-        return self.embedded.fixed
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """See `Simulator`."""
-        return self.embedded.parameters
 
     def roads(
         self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
