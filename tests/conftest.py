@@ -24,6 +24,21 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.fixture(scope="session")
+def same_rows() -> Any:
+    """Say whether two runs, by their folders, have recorded the same, to the bit."""
+    from bridgegen.store import Store
+
+    names = ("id", "U", "X", "metrics", "F", "status", "critical", "cause")
+
+    def same(one: Path, other: Path) -> bool:
+        with Store.open(one) as a, Store.open(other) as b:
+            rows, others = a.read(), b.read()
+        return all(getattr(rows, n).tobytes() == getattr(others, n).tobytes() for n in names)
+
+    return same
+
+
 @pytest.fixture
 def cli(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
     """Run a command line; return (exit status, standard output, standard error)."""

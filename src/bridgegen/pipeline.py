@@ -5,12 +5,11 @@ everything else here prepares it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from bridgegen import ego as egos
 from bridgegen import metrics as measures
@@ -19,13 +18,13 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause, Counterfactual, causes, require
 from bridgegen.compiled import compiling_alone
 from bridgegen.errors import InputError
+from bridgegen.evaluation import Evaluation, Replay
 from bridgegen.objective import CLASSIFYING, Objective, Objectives, Thresholds, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.simulation.embedded.intentions import Intentions
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
@@ -35,65 +34,6 @@ FAR_ROWS = 8
 
 SAMPLE = 400
 """Random scenarios from which weights and scales are taken, where an objective needs them."""
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """What a batch of N rows came to.
-
-    Attributes:
-        metrics: ``(N, M)`` float64, NaN in a failed row.
-        F: ``(N, n_obj)`` float64, minimised; a filler in a failed row.
-        critical: ``(N,)`` bool, of those of the cause that is asked for, if one is.
-        status: ``(N,)`` int8, 0 is success.
-        messages: by row, what else there is to say of its failure.
-        cause: ``(N,)`` int8, the `Cause` of what the thresholds call critical; None where causes
-            are not sought.
-    """
-
-    metrics: Float
-    F: Float
-    critical: Bool
-    status: npt.NDArray[np.int8]
-    messages: Mapping[int, str] = field(default_factory=dict)
-    cause: npt.NDArray[np.int8] | None = None
-
-    @classmethod
-    def join(cls, parts: Sequence["Evaluation"]) -> "Evaluation":
-        """Return the evaluations of several parts, at least one, in their order."""
-        starts = np.cumsum([0, *(len(one.status) for one in parts)]).tolist()
-        messages = {
-            start + row: text
-            for start, one in zip(starts, parts, strict=False)
-            for row, text in one.messages.items()
-        }
-        sought = [one.cause for one in parts if one.cause is not None]
-        return cls(
-            np.concatenate([one.metrics for one in parts]),
-            np.concatenate([one.F for one in parts]),
-            np.concatenate([one.critical for one in parts]),
-            np.concatenate([one.status for one in parts]),
-            messages,
-            np.concatenate(sought) if sought else None,
-        )
-
-
-@dataclass(frozen=True)
-class Replay:
-    """A rollout of N rows, with what it does not hold itself.
-
-    Attributes:
-        rollout: what happened.
-        intentions: what the egos meant to do, if that was asked for.
-        ways: by row and number the ways that these name, ``(n, 2)`` float64 [m] each.
-        weathers: by row the weather from the start on, and from each change of it: the instant, and
-            ``(WEATHER,)`` as sensors feel it (``ego._weather_columns``).
-    """
-
-    rollout: Rollout
-    intentions: Intentions | None
-    ways: Sequence[Mapping[int, Float]]
-    weathers: Sequence[Sequence[tuple[int, Float]]]
 
 
 class Pipeline:

@@ -31,20 +31,15 @@ def rows_of(folder: Path):
         return store.read()
 
 
-def same(a, b) -> bool:
-    return all(
-        getattr(a, name).tobytes() == getattr(b, name).tobytes()
-        for name in ("id", "U", "X", "metrics", "F", "status", "critical", "cause")
-    )
-
-
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_processes_find_what_threads_find_whoever_is_killed(undisturbed, tmp_path, count):
+def test_processes_find_what_threads_find_whoever_is_killed(
+    undisturbed, tmp_path, count, same_rows
+):
     crew, killed = Processes(count), []
 
     def kill(progress) -> None:
@@ -55,7 +50,7 @@ def test_processes_find_what_threads_find_whoever_is_killed(undisturbed, tmp_pat
     run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=crew, watch=Watch(batch=kill))
     crew.close()
     assert len(set(killed)) == 2
-    assert same(rows_of(run.folder), rows_of(undisturbed.folder))
+    assert same_rows(run.folder, undisturbed.folder)
     assert run.settings == undisturbed.settings
     assert not crew.pids
 
@@ -86,13 +81,13 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     assert np.isfinite(found.F).all()
 
 
-def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path):
+def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path, same_rows):
     search = {"scenario": "crossroads-s1", "algorithm": "random", "budget": 16, "keep": 0}
     ego = f"{DRIVERS}:FailsFast"
     one = bg.run_search(**search, ego=ego, out=tmp_path / "one")
     two = bg.run_search(**search, ego=ego, out=tmp_path / "two", workers=2)
     assert one.summary.failed == two.summary.failed > 0
-    assert same(rows_of(one.folder), rows_of(two.folder))
+    assert same_rows(one.folder, two.folder)
     assert one.failures == two.failures
 
 

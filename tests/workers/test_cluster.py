@@ -202,20 +202,13 @@ def rows_of(folder: Path):
         return store.read()
 
 
-def same(a, b) -> bool:
-    return all(
-        getattr(a, name).tobytes() == getattr(b, name).tobytes()
-        for name in ("id", "U", "X", "metrics", "F", "status", "critical", "cause")
-    )
-
-
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
 
 
 def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
-    nodes, cluster, undisturbed, tmp_path
+    nodes, cluster, undisturbed, tmp_path, same_rows
 ):
     done = threading.Event()
 
@@ -228,7 +221,7 @@ def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
 
     run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=cluster, watch=Watch(batch=disturb))
     assert done.wait(10.0)
-    assert same(rows_of(run.folder), rows_of(undisturbed.folder))
+    assert same_rows(run.folder, undisturbed.folder)
     nodes.obey("grow")
 
 
@@ -246,19 +239,19 @@ def test_a_comparisons_runs_share_the_cluster(nodes, tmp_path, monkeypatch):
 
 
 def test_a_driver_of_ones_own_is_carried_to_where_it_is_not(
-    cluster, undisturbed, tmp_path, monkeypatch
+    cluster, undisturbed, tmp_path, monkeypatch, same_rows
 ):
     monkeypatch.chdir(tmp_path)  # actors are elsewhere: a relative path leads nowhere for them
     Path("mine.py").write_text(DRIVERS.read_text("utf-8"), "utf-8")
     search = {"scenario": "crossroads-s1", "algorithm": "random", "budget": 16, "keep": 0}
     here = bg.run_search(**search, ego="mine.py:FailsFast", out="here")
     there = bg.run_search(**search, ego="mine.py:FailsFast", out="there", workers=cluster)
-    assert same(rows_of(here.folder), rows_of(there.folder))
+    assert same_rows(here.folder, there.folder)
     assert here.failures == there.failures != {}
 
 
 def test_a_cluster_that_is_lost_is_told_and_the_run_can_be_gone_on_with(
-    nodes, undisturbed, tmp_path, monkeypatch
+    nodes, undisturbed, tmp_path, monkeypatch, same_rows
 ):
     monkeypatch.setenv("RAY_gcs_rpc_server_reconnect_timeout_s", "2")  # Ray tries for a minute
 
@@ -275,7 +268,7 @@ def test_a_cluster_that_is_lost_is_told_and_the_run_can_be_gone_on_with(
             watch=Watch(batch=lambda progress: (lose(progress), time.sleep(4.0))),
         )  # fmt: skip
     resumed = bg.resume(place)
-    assert same(rows_of(resumed.folder), rows_of(undisturbed.folder))
+    assert same_rows(resumed.folder, undisturbed.folder)
 
 
 def test_no_cluster_there(doubles, monkeypatch):

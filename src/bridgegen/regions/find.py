@@ -32,7 +32,7 @@ _STREAM = 5  # keeps these random numbers apart from others of the same seed
 
 
 class Result(Protocol):
-    """What fresh rows came to; `bridgegen.pipeline.Evaluation` is one."""
+    """What fresh rows came to; `bridgegen.evaluation.Evaluation` is one."""
 
     @property
     def critical(self) -> Bool:

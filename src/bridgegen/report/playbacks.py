@@ -7,9 +7,10 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.cause import Cause
 from bridgegen.ego import _weather_columns as column
+from bridgegen.evaluation import Replay
 from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.ontology.check import constraints_in_words
-from bridgegen.pipeline import Pipeline, Replay
+from bridgegen.pipeline import Pipeline
 from bridgegen.report.painter import paint
 from bridgegen.report.playback import Course, Playback, Weather
 from bridgegen.report.scenery import Scenery, bodies, lamps

@@ -26,6 +26,25 @@ WAIT_SECONDS = 60.0
 """How long a client may take to take over the ego."""
 
 
+class AskedSpeed:
+    """What the storyboard asks of the ego, told whenever it changes.
+
+    Args:
+        joint: the scenario.
+        tell: takes it [km/h].
+    """
+
+    def __init__(self, joint: CoSimulation, tell: Callable[[float], None]) -> None:
+        self._joint, self._tell, self._last = joint, tell, math.nan
+
+    def pass_on(self) -> None:
+        """Tell it, if it is new."""
+        asked = self._joint.target_speed
+        if asked != self._last:
+            self._last = asked
+            self._tell(3.6 * asked)
+
+
 class Autopilot:
     """CARLA's Traffic Manager, told the route and the speed that the storyboard asks for.
 
@@ -45,7 +64,7 @@ class Autopilot:
         way: Float,
         settings: CarlaSettings,
     ) -> None:
-        self._ego, self._joint, self._asked = stage.ego, joint, math.nan
+        self._ego, self._asked = stage.ego, AskedSpeed(joint, self._tell)
         self._path = [frame.location(x, y) for x, y in spaced(way)]
         self._port = server.access.port + TRAFFIC_MANAGER
         self._manager: Any = server.client.get_trafficmanager(self._port)
@@ -60,10 +79,7 @@ class Autopilot:
 
     def control(self, k: int) -> None:
         """See `AtTheWheel`: only the speed is told."""
-        asked = self._joint.target_speed
-        if asked != self._asked:
-            self._asked = asked
-            self._tell(3.6 * asked)
+        self._asked.pass_on()
 
     def _tell(self, kmh: float) -> None:
         if hasattr(self._manager, "set_desired_speed"):
@@ -111,11 +127,11 @@ class Agent:
                 "carla-agent: the package 'agents' of your CARLA (PythonAPI/carla) must be on "
                 f"PYTHONPATH, with what it needs; {error}"
             ) from None
-        self._joint, self._asked = joint, math.nan
         if settings.agent == "basic":
             self._agent: Any = BasicAgent(stage.ego)
         else:
             self._agent = BehaviorAgent(stage.ego, behavior=settings.agent)
+        self._asked = AskedSpeed(joint, self._agent.set_target_speed)
         found = (server.worlds.map.get_waypoint(frame.location(x, y)) for x, y in spaced(way))
         self._plan = [(one, RoadOption.LANEFOLLOW) for one in found if one is not None]
 
@@ -125,10 +141,7 @@ class Agent:
 
     def control(self, k: int) -> "carla.VehicleControl":
         """See `AtTheWheel`."""
-        asked = self._joint.target_speed
-        if asked != self._asked:
-            self._asked = asked
-            self._agent.set_target_speed(3.6 * asked)
+        self._asked.pass_on()
         control: carla.VehicleControl = self._agent.run_step()
         return control
 
