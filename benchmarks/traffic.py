@@ -14,6 +14,7 @@ import numpy as np
 from rates import Rate, rate_of
 
 from bridgegen import metrics
+from bridgegen.odd.others import with_others
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.pipeline import Pipeline
@@ -73,9 +74,11 @@ def traffic(actors: int) -> LogicalScenario:
         return load(path)
 
 
-def traffic_rate(actors: int, ego: str, rows: int, also: tuple[str, ...] = ()) -> Rate:
+def traffic_rate(
+    actors: int, ego: str, rows: int, also: tuple[str, ...] = (), others: str = "scripted"
+) -> Rate:
     """Return how fast scenarios of so many actors are evaluated, with more metrics or the usual."""
-    scenario = traffic(actors)
+    scenario = with_others(traffic(actors), others)
     space = scenario.space()
     pipeline = Pipeline(scenario, space, ego=ego, also=also)
     pipeline.choose_objective()
@@ -86,10 +89,14 @@ def traffic_rate(actors: int, ego: str, rows: int, also: tuple[str, ...] = ()) -
 if __name__ == "__main__":
     for number in (2, 4, 8, 15, 30, 60, 120):
         rows = max(4, 2000 // number)
-        for ego in ("route-follower", "reference"):
-            rate = traffic_rate(number, ego, rows, ALL if ego == "reference" else ())
+        for ego, others in (
+            ("route-follower", "scripted"), ("route-follower", "attentive"),
+            ("reference", "scripted"),
+        ):  # fmt: skip
+            rate = traffic_rate(number, ego, rows, ALL if ego == "reference" else (), others)
             print(
-                f"{number:>4} actors, {ego:<14} {rate.per_second:>8,.0f} scenarios/s, "
+                f"{number:>4} actors, {ego:<14} others {others:<9} "
+                f"{rate.per_second:>8,.0f} scenarios/s, "
                 f"{1e6 * rate.cpu_seconds:>8,.0f} µs of CPU each, "
                 f"{1e6 * rate.cpu_seconds / number:>6,.0f} µs an actor"
             )

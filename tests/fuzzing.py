@@ -170,7 +170,7 @@ def _logical(seed: Seed, folder: Path) -> None:
 
 
 def _recording(seed: Seed, folder: Path) -> None:
-    from bridgegen.metrics.measure import measure_recording
+    from bridgegen.conflict.recorded import measure_recording
 
     path = folder / "mutated.csv"
     path.write_bytes(seed.data)

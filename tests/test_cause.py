@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from bridgegen.cause import CAUSES, Cause, causes, counterfactuals, require
 from bridgegen.ego import DRIVERS, STORYBOARD
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.objective import Objective, Thresholds
+from bridgegen.odd.others import with_others
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.embedded import simulator
@@ -28,8 +30,8 @@ def replays(driver):
 def test_the_replays_of_a_driver_with_all_stages():
     assert replays(WHOLE) == [
         ("perception", "reference", "perception", ""),
-        ("planning", "un-r157", ""),
-        ("planning", "fsm", ""),
+        ("planning", "careful", ""),
+        ("planning", "careful-fsm", ""),
         ("control", "reference", "control", ""),
         ("control", "reference", "dry"),
     ]
@@ -37,17 +39,17 @@ def test_the_replays_of_a_driver_with_all_stages():
 
 def test_what_is_ideal_already_is_not_put_right_but_stays_ideal():
     assert replays(WHOLE.idealised(["perception"])) == [
-        ("planning", "un-r157", ""),
-        ("planning", "fsm", ""),
+        ("planning", "careful", ""),
+        ("planning", "careful-fsm", ""),
         ("control", "reference", "control", "perception", ""),
         ("control", "reference", "perception", "dry"),
     ]
 
 
 def test_a_driver_without_stages_skips_them_and_is_no_judge_of_itself():
-    assert [one[:2] for one in replays(DRIVERS["fsm"])] == [
-        ("planning", "un-r157"),
-        ("control", "fsm"),
+    assert [one[:2] for one in replays(DRIVERS["careful-fsm"])] == [
+        ("planning", "careful"),
+        ("control", "careful-fsm"),
     ]
     assert replays(STORYBOARD) == []
 
@@ -127,6 +129,9 @@ def test_only_the_cause_that_is_asked_for_counts_and_F_is_as_ever():
     assert 0 < some.critical.sum() < all_of_them.critical.sum()
 
 
+BY_THRESHOLDS = Objective.build([("d_min", 1.0)], thresholds=Thresholds(d_min_below=1.0))
+"""Critical, whoever is responsible: many harms of every cause."""
+
 CLEAR = {
     "fog_density": 0.0,
     "precipitation": 0.0,
@@ -137,12 +142,12 @@ CLEAR = {
 
 
 def test_what_the_reference_does_not_see_in_thick_fog_is_perception_s_fault():
-    scenario = load("left-across-path")
+    scenario = with_others(load("left-across-path"), "scripted")
     space, moving = scenario.space(), scenario.space(axes=("participants",))
     pipeline = Pipeline(scenario, space, ego="reference", seek_causes=True)
     seeing = Pipeline(scenario, space, ego="reference", ideal=("perception",))
     for one in (pipeline, seeing):
-        one.choose_objective()
+        one.choose_objective(BY_THRESHOLDS)
     # The same participants in both weathers, none faster than the fog allows.
     same = [
         {name: min(value, 7.0) if name.endswith("speed") else value for name, value in row.items()}
@@ -166,7 +171,7 @@ def test_the_reference_s_harm_has_every_cause():
     for name in ("jam-tail-in-fog", "crossroads-s3"):
         scenario = load(name)
         pipeline = Pipeline(scenario, scenario.space(), ego="reference", seek_causes=True)
-        pipeline.choose_objective()
+        pipeline.choose_objective(BY_THRESHOLDS)
         rows = np.random.default_rng(11).random((120, pipeline.space.n_var))
         found |= set(pipeline.evaluate(pipeline.space.decode(rows)).cause.tolist())
     assert found == set(Cause)

@@ -355,3 +355,46 @@ def test_a_missing_column_is_an_error_not_a_guess():
         paper().critical([[1.0, 2.0]], ["d_min", "v_d"])
     with pytest.raises(ValueError, match="metrics must have shape"):
         paper().F([[1.0, 2.0, 3.0]], ["d_min", "v_d"])
+
+
+# ------------------------------------------------------------------------ harm
+
+
+def by_harm(**more) -> Objective:
+    return Objective.build([("harm", 1.0)], rule="harm", **more)
+
+
+def test_harm_is_critical_from_a_near_miss_on():
+    values = [[0.29], [0.3], [0.61], [np.nan]]
+    assert by_harm().critical(values, ["harm"]).tolist() == [False, True, True, False]
+    F, ok = by_harm().F(values, ["harm"])
+    assert F[:3, 0].tolist() == [-0.29, -0.3, -0.61]
+    assert ok.tolist() == [True, True, True, False]
+
+
+def test_any_conflict_counts_where_that_is_asked_for():
+    every = by_harm(count="any")
+    assert every.names == ("harm_any",)
+    assert every.critical([[0.0, 0.7]], ["harm", "harm_any"]).tolist() == [True]
+    assert by_harm().critical([[0.0, 0.7]], ["harm", "harm_any"]).tolist() == [False]
+
+
+def test_what_could_not_happen_is_not_fit():
+    F, ok = by_harm().F([[0.9], [0.2]], ["harm"], fit=[False, True])
+    assert ok.tolist() == [False, True]
+    assert F[0, 0] == 0.0 > F[1, 0]  # as if nothing had happened
+
+
+def test_an_objective_of_an_earlier_version_goes_by_its_thresholds():
+    earlier = {k: v for k, v in paper().to_dict().items() if k not in ("rule", "count")}
+    assert Objective.from_dict(earlier) == paper()
+    assert Objective.from_dict(by_harm(count="any").to_dict()) == by_harm(count="any")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [({"rule": "luck"}, "rule of what is critical"), ({"count": "none"}, "conflicts that count")],
+)
+def test_unknown_rules_are_refused(wrong, message):
+    with pytest.raises(UnknownNameError, match=message):
+        Objective.from_dict({**paper().to_dict(), **wrong})

@@ -3,8 +3,8 @@
 The first of these after which the scenario is no longer critical is the cause:
 
 1. *perception*: the driver perceives ideally;
-2. *planning*: a careful and competent driver drives, who perceives ideally, too: that of UN R157,
-   or the fuzzy safety model;
+2. *planning*: a careful and competent driver drives, who perceives ideally, too: that of UN R157
+   or of the fuzzy safety model, each extended to any road (`careful`, `careful-fsm`);
 3. *control*: the driver's control is ideal, or the road is dry;
 4. *unavoidable*: none of them.
 
@@ -27,7 +27,7 @@ from bridgegen.arrays import Bool, Int
 from bridgegen.ego import Driver
 from bridgegen.errors import InputError, UnknownNameError
 
-CAREFUL = ("un-r157", "fsm")
+CAREFUL = ("careful", "careful-fsm")
 """The careful and competent drivers; either is enough."""
 
 

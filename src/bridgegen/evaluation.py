@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.simulation.embedded.intentions import Intentions
 from bridgegen.simulation.rollout import Rollout
 
@@ -20,6 +22,7 @@ class Evaluation:
         F: ``(N, n_obj)`` float64, minimised; a filler in a failed row.
         critical: ``(N,)`` bool, of those of the cause that is asked for, if one is.
         status: ``(N,)`` int8, 0 is success.
+        findings: the decisive conflict of each row.
         messages: by row, what else there is to say of its failure.
         cause: ``(N,)`` int8, the `Cause` of what the thresholds call critical; None where causes
             are not sought.
@@ -29,6 +32,7 @@ class Evaluation:
     F: Float
     critical: Bool
     status: npt.NDArray[np.int8]
+    findings: Findings
     messages: Mapping[int, str] = field(default_factory=dict)
     cause: npt.NDArray[np.int8] | None = None
 
@@ -47,8 +51,62 @@ class Evaluation:
             np.concatenate([one.F for one in parts]),
             np.concatenate([one.critical for one in parts]),
             np.concatenate([one.status for one in parts]),
+            Findings.join([one.findings for one in parts]),
             messages,
             np.concatenate(sought) if sought else None,
+        )
+
+
+@dataclass(frozen=True)
+class Trials:
+    """What N rows came to that are driven to see whether harm persists.
+
+    Attributes:
+        harm: ``(N,)`` float64, 0 where there is no result.
+        severity: ``(N,)`` float64, probability of MAIS3+ in the ego's collision.
+        ok: ``(N,)`` bool, the simulation succeeded and the traffic could happen.
+        findings: the decisive conflict of each row.
+        place: ``(N,)`` texts, where on its route the ego's front is then; see
+            `bridgegen.conflict.place`.
+    """
+
+    harm: Float
+    severity: Float
+    ok: Bool
+    findings: Findings
+    place: npt.NDArray[np.object_]
+
+    def __len__(self) -> int:
+        return len(self.harm)
+
+    @property
+    def harmful(self) -> Bool:
+        """``(N,)`` bool: a collision or near miss of the ego's."""
+        harmful: Bool = self.ok & (self.harm >= NEAR_MISS)
+        return harmful
+
+    @classmethod
+    def none(cls, n: int) -> "Trials":
+        """Return N rows without a result."""
+        nothing = np.zeros(n)
+        texts = np.full(n, "", dtype=object)
+        return cls(nothing, nothing, np.zeros(n, np.bool_), Findings.none(n), texts)
+
+    @classmethod
+    def join(cls, parts: Sequence["Trials"]) -> "Trials":
+        """Return those of several parts, at least one, in their order."""
+        return cls(
+            np.concatenate([one.harm for one in parts]),
+            np.concatenate([one.severity for one in parts]),
+            np.concatenate([one.ok for one in parts]),
+            Findings.join([one.findings for one in parts]),
+            np.concatenate([one.place for one in parts]),
+        )
+
+    def take(self, at: Int | Bool) -> "Trials":
+        """Return those of some rows."""
+        return Trials(
+            self.harm[at], self.severity[at], self.ok[at], self.findings.take(at), self.place[at]
         )
 
 

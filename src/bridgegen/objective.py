@@ -1,7 +1,8 @@
 """Metrics → F, what a search minimises; and which scenarios count as critical.
 
 The paper's fitness grows with criticality, so F = −fitness. Its single objective is a weighted sum
-of metrics; the weights are fixed, or come from the entropy of a random sample (Eqs. 4 to 7).
+of metrics; the weights are fixed, or come from the entropy of a random sample (Eqs. 4 to 7). The
+default of all scenarios but the paper's is ``harm`` (`bridgegen.conflict.harm`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,15 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, as_float
+from bridgegen.conflict.harm import NEAR_MISS, Count
+from bridgegen.conflict.quantities import HARM, HARM_ANY, get
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.metrics import get
 
 Weights = Literal["fixed", "entropy"]
 Scale = Literal["raw", "standardised"]
 Objectives = Literal["one", "many"]
+Rule = Literal["harm", "thresholds"]
+"""What makes a scenario critical: its harm, or the paper's thresholds."""
 
 CLASSIFYING = ("n_collision", "d_min", "v_d")
-"""The metrics that tell critical scenarios from others."""
+"""The metrics that the paper's thresholds read."""
 
 # The unit of a metric in the paper's fitness, as a factor on ours: its v_d is in km/h.
 PAPER_FACTOR = {"v_d": 3.6}
@@ -29,7 +33,7 @@ PAPER_FACTOR = {"v_d": 3.6}
 
 @dataclass(frozen=True)
 class Thresholds:
-    """A scenario is critical if it has a collision, or comes close while the ego is moving.
+    """The paper: a scenario is critical if it has a collision, or comes close to one in motion.
 
     Attributes:
         n_collision_above: [count]; critical if n_collision > this.
@@ -73,7 +77,12 @@ class Objective:
         weights: one per term, ≥ 0; 1 each with ``many``.
         scale: "raw" or "standardised".
         objectives: "one" or "many".
-        thresholds: when a scenario is critical.
+        thresholds: when a scenario is critical by the rule "thresholds".
+        rule: what makes a scenario critical: "harm", a collision or near miss of the ego's (see
+            `bridgegen.conflict.harm`), or "thresholds". With "harm", implausible scenarios are
+            neither critical nor fit.
+        count: whose conflicts count as harm: "ego", those that the ego is responsible for or could
+            have prevented; or "any".
         low: the sample's least x' per term; empty on the raw scale.
         span: the sample's range of x' per term, > 0; empty on the raw scale.
     """
@@ -85,12 +94,16 @@ class Objective:
     thresholds: Thresholds = Thresholds()
     low: tuple[float, ...] = ()
     span: tuple[float, ...] = ()
+    rule: Rule = "thresholds"
+    count: Count = "ego"
 
     def __post_init__(self) -> None:
         for name in self.names:
             get(name)
         _choice("scale", self.scale, ("raw", "standardised"))
         _choice("number of objectives", self.objectives, ("one", "many"))
+        _choice("rule of what is critical", self.rule, ("harm", "thresholds"))
+        _choice("conflicts that count", self.count, ("ego", "any"))
         n = len(self.names)
         n_scale = n if self.scale == "standardised" else 0
         problems = []
@@ -116,6 +129,8 @@ class Objective:
         scale: Scale = "raw",
         objectives: Objectives = "one",
         thresholds: Thresholds | None = None,
+        rule: Rule = "thresholds",
+        count: Count = "ego",
         sample: tuple[npt.ArrayLike, Sequence[str]] | None = None,
     ) -> Self:
         """Return the objective, its weights and scale taken from a random sample where asked to.
@@ -127,6 +142,9 @@ class Objective:
             scale: "raw" or "standardised" by the sample.
             objectives: "one" weighted sum, or "many", one per term (weights are then not used).
             thresholds: when a scenario is critical; the paper's by default.
+            rule: "harm" or "thresholds".
+            count: whose conflicts count as harm: "ego" or "any". With "any", the term ``harm``
+                means ``harm_any``.
             sample: metrics ``(m, M)`` of m random scenarios and the M columns' names; failed rows
                 (NaN) are left out. Needed where ``needs_sample`` says so.
 
@@ -136,14 +154,16 @@ class Objective:
                 twice; every scenario of the sample failed.
             ValueError: the sample is missing or lacks a column.
         """
+        if count == "any":
+            terms = [(HARM_ANY if name == HARM else name, weight) for name, weight in terms]
         names = tuple(name for name, _ in terms)
         for name in names:
             get(name)
         _choice("way of weighting", weights, ("fixed", "entropy"))
         wrong = [n for n, w in terms if (w is None) == (weights == "fixed")]
         if wrong and objectives == "one":
-            rule = "need a weight for" if weights == "fixed" else "leave no place for a weight of"
-            raise InputError(*(f"{weights} weights {rule} {name}" for name in wrong))
+            need = "need a weight for" if weights == "fixed" else "leave no place for a weight of"
+            raise InputError(*(f"{weights} weights {need} {name}" for name in wrong))
         resolved = tuple(1.0 if w is None or objectives == "many" else float(w) for _, w in terms)
         low: tuple[float, ...] = ()
         span: tuple[float, ...] = ()
@@ -160,7 +180,7 @@ class Objective:
             if weights == "entropy" and objectives == "one":
                 resolved = tuple(entropy_weights((x - least) / extent).tolist())
         given = thresholds or Thresholds()
-        return cls(names, resolved, scale, objectives, given, low, span)
+        return cls(names, resolved, scale, objectives, given, low, span, rule, count)
 
     @property
     def n_obj(self) -> int:
@@ -168,16 +188,29 @@ class Objective:
         return 1 if self.objectives == "one" else len(self.names)
 
     @property
-    def needed_metrics(self) -> tuple[str, ...]:
-        """The metrics that F and the thresholds read, each once, the terms' first."""
-        return tuple(dict.fromkeys((*self.names, *CLASSIFYING)))
+    def harm(self) -> str:
+        """The quantity that the rule "harm" reads."""
+        return HARM_ANY if self.count == "any" else HARM
 
-    def F(self, metrics: npt.ArrayLike, names: Sequence[str]) -> tuple[Float, Bool]:
+    @property
+    def classifying(self) -> tuple[str, ...]:
+        """The quantities that the rule reads."""
+        return (self.harm,) if self.rule == "harm" else CLASSIFYING
+
+    @property
+    def needed_metrics(self) -> tuple[str, ...]:
+        """The quantities that F and the rule read, each once, the terms' first."""
+        return tuple(dict.fromkeys((*self.names, *self.classifying)))
+
+    def F(
+        self, metrics: npt.ArrayLike, names: Sequence[str], fit: npt.ArrayLike = True
+    ) -> tuple[Float, Bool]:
         """Return F and which rows of it are results.
 
         Args:
             metrics: ``(N, M)``, in the metrics' units, NaN where the scenario failed.
             names: of the M columns; more than the objective's may be there.
+            fit: ``(N,)`` bool, False where a scenario is no result whatever its metrics say.
 
         Returns:
             F: ``(N, n_obj)`` float64, finite, smaller is more critical.
@@ -188,7 +221,7 @@ class Objective:
             ValueError: a column is missing.
         """
         x = self._scaled(positivised(metrics, names, self.names))
-        ok: Bool = np.logical_not(np.isnan(x).any(axis=1))
+        ok: Bool = np.logical_not(np.isnan(x).any(axis=1)) & np.asarray(fit, dtype=np.bool_)
         caps = np.array([[get(name).cap for name in self.names]])
         x[~ok] = self._scaled(positivised(caps, self.names, self.names))
         if self.objectives == "many":
@@ -206,6 +239,9 @@ class Objective:
             ValueError: a column is missing.
         """
         values = as_float("metrics", metrics, (None, len(names)), finite=False)
+        if self.rule == "harm":
+            harmful: Bool = values[:, _column(names, self.harm)] >= NEAR_MISS
+            return harmful
         n_collision, d_min, v_d = (values[:, _column(names, name)] for name in CLASSIFYING)
         limit = self.thresholds
         close = (d_min < limit.d_min_below) & (v_d >= limit.v_d_at_least)
@@ -226,6 +262,7 @@ class Objective:
         Raises:
             InputError: a key is unknown or missing, or a value breaks a rule.
         """
+        data = {"rule": "thresholds", "count": "ego", **data}  # earlier versions had no others
         if odd := set(data) ^ {field.name for field in fields(cls)}:
             raise InputError(f"unknown or missing keys of an objective: {sorted(odd)}")
         try:

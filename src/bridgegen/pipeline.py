@@ -10,21 +10,30 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.adversary import AdversarySource, Arena
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.cause import Cause, Counterfactual, causes, require
+from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals, require
 from bridgegen.compiled import compiling_alone
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.findings import KINDS, Findings
+from bridgegen.conflict.harm import Count, decisive
+from bridgegen.conflict.place import place_on_route
+from bridgegen.conflict.plausibility import Implausible, plausibility
+from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError
-from bridgegen.evaluation import Evaluation, Replay
+from bridgegen.evaluation import Evaluation, Replay, Trials
 from bridgegen.objective import CLASSIFYING, Objective, Objectives, Thresholds, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
+from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
@@ -121,7 +130,7 @@ class Pipeline:
         if metrics is None:
             metrics = metrics_of(scenario, self.driver, also, detects=sees)
         held = measures.held_by(self.driver, detects=sees)
-        self.metrics = measures.require(metrics, held, f"the driver '{self.driver.name}'")
+        self.metrics = quantities.require(metrics, held, f"the driver '{self.driver.name}'")
         _refuse_fixed(scenario, space, self.simulator.fixed)
         self._roads: Any = None
         if not {*self._road_names} & {*space.variables}:
@@ -199,6 +208,8 @@ class Pipeline:
                 thresholds=Thresholds(
                     limits.n_collision_above, limits.d_min_below, limits.v_d_at_least
                 ),
+                rule=spec.rule,
+                count=spec.count,
                 sample=sample,
             )
         self.objective = objective
@@ -230,18 +241,94 @@ class Pipeline:
         """Evaluate N rows at once, in this thread; ``evaluate`` has it done by many."""
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
-        metrics = measures.evaluate(rollout, self.metrics)
-        F, ok = objective.F(metrics, self.metrics)
+        metrics = quantities.evaluate(rollout, self.metrics)
+        gate = plausibility(rollout)
+        findings = Findings.of(analyse(rollout), gate.labels, objective.count)
+        fit = gate.code == Implausible.NONE if objective.rule == "harm" else True
+        F, ok = objective.F(metrics, self.metrics, fit)
         critical = objective.critical(metrics, self.metrics) & ok
         if not self.seeks_causes:
-            return Evaluation(metrics, F, critical, rollout.status, rollout.messages)
+            return Evaluation(metrics, F, critical, rollout.status, findings, rollout.messages)
 
         def harmless(at: Int, replay: Counterfactual) -> Bool:
             return _harmless(self._run(roads, rows[at], X[at], replay), objective)
 
         cause = causes(self.driver, critical, harmless)
         counts = critical if self.cause is None else cause == self.cause
-        return Evaluation(metrics, F, counts, rollout.status, rollout.messages, cause)
+        return Evaluation(metrics, F, counts, rollout.status, findings, rollout.messages, cause)
+
+    @property
+    def tries(self) -> bool:
+        """Whether ``try_all`` can be asked: rows are simulated by the embedded simulator."""
+        return self._simulated_by == EMBEDDED
+
+    @cached_property
+    def fixes(self) -> tuple[Counterfactual, ...]:
+        """The changes that ``try_all`` knows by number: those by which causes are sought."""
+        return counterfactuals(self.driver)
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """What each participant is, "car" or "pedestrian" say, by its name."""
+        program = self.simulator.embedded.program
+        return dict(zip(program.names, (NAMES[k] for k in program.kinds), strict=True))
+
+    def try_all(self, X: Float, fix: Int | None = None, noise: Float | None = None) -> Trials:
+        """Drive N rows once more, each as is or with one thing put right; see `Trials`.
+
+        Args:
+            X: ``(N, len(space.names))`` feasible rows.
+            fix: ``(N,)`` number of each row's change in ``fixes``; −1 as is, which is the default.
+            noise: ``(N, len(space.names))`` rows whose random numbers these rows get, so that a
+                row and its neighbours differ in nothing else; their own by default.
+        """
+        numbers = np.full(len(X), -1) if fix is None else fix
+        keys = X if noise is None else noise
+        rows = np.concatenate([X, keys, numbers[:, np.newaxis].astype(np.float64)], axis=1)
+        given = (self.objective.harm, self.objective.count)
+        if not len(rows):
+            return Trials.none(0)
+        order = np.arange(len(rows))
+        if self._roads is not None:  # a worker had best have rows of one driver
+            order = np.argsort(numbers, kind="stable")
+        parts = self._share_out("try_rows", rows[order], *given)
+        came = [Trials.none(one.rows) if isinstance(one.came, Lost) else one.came for one in parts]
+        return Trials.join(came).take(np.argsort(order))
+
+    def try_rows(self, rows: Float, harm: str, count: Count) -> Trials:
+        """Drive N rows at once, in this thread; ``try_all`` has it done by many.
+
+        Args:
+            rows: ``(N, 2 n + 1)``: X, the rows whose random numbers they get, number of the fix.
+            harm: the quantity that counts.
+            count: whose conflicts do.
+        """
+        n = len(self.space.names)
+        X, keys, numbers = rows[:, :n], rows[:, n : 2 * n], rows[:, -1].astype(np.int64)
+        roads, which = self._roads_of(X)
+        parts, order = [], []
+        for number in np.unique(numbers).tolist():
+            at = np.flatnonzero(numbers == number)
+            replay = self.fixes[number] if number >= 0 else None
+            rollout = self.simulator.embedded.run(
+                roads, which[at], self._columns(X[at]), noise=self.noise_keys(keys[at]),
+                driver=replay.driver if replay else None, dry=replay is not None and replay.dry,
+            )  # fmt: skip
+            order.append(at)
+            parts.append(_trials(rollout, roads, which[at], harm, count))
+        return Trials.join(parts).take(np.argsort(np.concatenate(order)))
+
+    def noise_keys(self, X: Float) -> npt.NDArray[np.uint64]:
+        """Return the keys of N rows' random numbers, ``(N,)``."""
+        return self.simulator.embedded.noise_keys(self._columns(X), len(X))
+
+    def rollout_again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
+        """Roll out N rows in the embedded simulator with the random numbers of some keys."""
+        roads, rows = self._roads_of(X)
+        return self.simulator.embedded.run(roads, rows, self._columns(X), noise=noise)
+
+    def _columns(self, X: Float) -> dict[str, Float]:
+        return {name: X[:, i] for i, name in enumerate(self.space.names)}
 
     def facts(self, x: Float) -> dict[str, float]:
         """Return the parameters of one row that its scenario depends on, by name.
@@ -278,17 +365,21 @@ class Pipeline:
         """Have N rows rolled out by many; return what came of them, a part of the rows in each."""
         return [one.came for one in self._share_out("rollout", X)]
 
-    def replay(self, X: Float, *, plans: bool = True) -> Replay:
+    def replay(
+        self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
+    ) -> Replay:
         """Roll out N rows as ``evaluate`` does, and find out what went on besides.
 
         Args:
             X: ``(N, len(space.names))`` float64.
             plans: whether to find out what the egos meant to do, which takes many times as long;
                 only the embedded simulator can.
+            noise: ``(N,)`` keys of the rows' random numbers, in the embedded simulator; their own
+                by default.
         """
         embedded = self.simulator.embedded
         roads, rows = self._roads_of(X)
-        rollout = self.rollout(X)
+        rollout = self.rollout(X) if noise is None else self.rollout_again(X, noise)
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         intentions, ways = None, []
         if plans and self.simulator is embedded and not self._is_far:
@@ -310,7 +401,7 @@ class Pipeline:
 
     def measure_rows(self, X: Float) -> Float:
         """Return the metrics of N rows, ``(N, M)``, in this thread."""
-        return measures.evaluate(self.rollout(X), self.metrics)
+        return quantities.evaluate(self.rollout(X), self.metrics)
 
     def _share_out(self, work: str, X: Float, *given: Any) -> list[Part]:
         """Have the workers do this pipeline's work on rows; return what came of them, in order."""
@@ -326,7 +417,8 @@ class Pipeline:
         F, critical = self.objective.F(metrics, self.metrics)
         status = np.full(part.rows, WORKER_ENDED, np.int8)
         cause = np.full(part.rows, Cause.NONE, np.int8) if self.seeks_causes else None
-        return Evaluation(metrics, F, critical, status, {0: part.came.reason}, cause)
+        findings = Findings.none(part.rows)
+        return Evaluation(metrics, F, critical, status, findings, {0: part.came.reason}, cause)
 
     def _roads_of(self, X: Float) -> tuple[Any, Int]:
         """Return the compiled road networks of some rows, and which row has which."""
@@ -357,9 +449,34 @@ def _remade(*, ego: CarriedDriver | None, **made_with: Any) -> Pipeline:
 
 def _harmless(rollout: Rollout, objective: Objective) -> Bool:
     """Return which rows succeed and are not critical."""
-    metrics = measures.evaluate(rollout, CLASSIFYING)
-    harmless: Bool = (rollout.status == 0) & ~objective.critical(metrics, CLASSIFYING)
+    names = objective.classifying
+    metrics = quantities.evaluate(rollout, names)
+    harmless: Bool = (rollout.status == 0) & ~objective.critical(metrics, names)
     return harmless
+
+
+def _trials(rollout: Rollout, roads: Network, which: Int, harm: str, count: Count) -> Trials:
+    """Return what a rollout came to; ``which`` is the road network of each row, ``(N,)``."""
+    n = rollout.shape[0]
+    conflicts = analyse(rollout)
+    values = quantities.evaluate(rollout, [harm, "severity"])
+    findings = Findings.of(conflicts, plausibility(rollout).labels, count)
+    ok: Bool = (rollout.status == 0) & (findings.implausible == "")
+    place = np.full(n, "", dtype=object)
+    rows = np.arange(n)
+    instant = conflicts.instant[rows, decisive(conflicts, count)[0]]
+    front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
+    h = rollout.h[rows, 0, instant]
+    x = rollout.x[rows, 0, instant] + front * np.cos(h)
+    y = rollout.y[rows, 0, instant] + front * np.sin(h)
+    wanted = ok & np.isin(findings.conflict, list(KINDS.values()))
+    for p in np.unique(which[wanted]).tolist():
+        at = np.flatnonzero(wanted & (which == p))
+        step = float(roads.tables.steps[p, 0])
+        place[at] = place_on_route(roads.way(p, 0), step, roads.in_junctions(p), x[at], y[at])
+    return Trials(
+        np.where(ok, values[:, 0], 0.0), np.where(ok, values[:, 1], 0.0), ok, findings, place
+    )
 
 
 def _source(
@@ -395,11 +512,15 @@ def metrics_of(
     *,
     detects: bool = False,
 ) -> tuple[str, ...]:
-    """Return the metrics that a search records; see `bridgegen.metrics.to_record`.
+    """Return the quantities that a search records.
+
+    The metrics that `bridgegen.metrics.to_record` says, then what the conflict analysis measures.
 
     Raises:
         UnknownNameError: no such metric.
         InputError: a metric does not exist with this driver.
     """
     terms = (term.metric for term in scenario.objective.terms)
-    return measures.to_record(driver, (*terms, *CLASSIFYING, *also), detects=detects)
+    asked = [name for name in (*terms, *CLASSIFYING, *also) if name not in quantities.MEASURED]
+    recorded = measures.to_record(driver, asked, detects=detects)
+    return (*recorded, *quantities.MEASURED)

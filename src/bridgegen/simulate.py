@@ -11,7 +11,9 @@ import numpy as np
 
 from bridgegen import ego as egos
 from bridgegen import metrics as measures
-from bridgegen.errors import FileFormatError
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import Conflicts, analyse
+from bridgegen.errors import FileFormatError, UnknownNameError
 from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
@@ -31,8 +33,10 @@ class FileResult:
         status: "ok", or why there is no result.
         seconds: simulated until the stop trigger fired [s].
         parameters: the file's numeric parameters.
-        metrics: by name, in the metric's unit.
+        metrics: by name, in the metric's unit; the quantities of the conflict analysis too.
         rollout: the motion, N = 1.
+        conflicts: the conflict analysis, N = 1; `bridgegen.conflict.summary.summarise` gives the
+            decisive conflict.
         cause: what the search that handed the file over found its harm put down to, as its header
             says; None where it says nothing, or another driver than the file's drives.
     """
@@ -43,6 +47,7 @@ class FileResult:
     parameters: Mapping[str, float]
     metrics: Mapping[str, float]
     rollout: Rollout
+    conflicts: Conflicts
     cause: str | None = None
 
     @property
@@ -56,6 +61,7 @@ def simulate_file(
     *,
     ego: str | None = None,
     ideal: Iterable[str] | None = None,
+    others: str | None = None,
     time_limit: float | None = None,
     metrics: Sequence[str] | None = None,
     also: Sequence[str] = (),
@@ -70,6 +76,8 @@ def simulate_file(
         ego: the ego's driver; what the file's controller says by default.
         ideal: stages of the driver to be ideal; what the file's controller says by default, none
             with another ``ego``.
+        others: "attentive" or "scripted": who drives the other participants; what their
+            controllers say by default.
         time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.
         also: names of metrics that must be among them.
@@ -86,21 +94,29 @@ def simulate_file(
         UnknownNameError: no such driver, stage or metric.
     """
     driver = egos.get(ego, time_limit=time_limit) if ego else None
+    if others is not None and others not in egos.OTHERS:
+        raise UnknownNameError("driver of other participants", others, egos.OTHERS)
     scenario = read_scenario(path, skipped=skipped)
     roads = roads_of(scenario, path)
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     embedded = EmbeddedSimulator(
-        scenario, str(path), driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
+        scenario,
+        str(path),
+        driver=driver,
+        ideal=ideal,
+        others=others,
+        time_step=time_step,
+        skipped=skipped,
     )
     runs = simulator.around(embedded, scenario)
     held = measures.held_by(embedded.program.driver, detects=simulator.detects)
-    names = measures.existing(tuple(measures.METRICS), held)
+    names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
-    names = measures.require(asked, held, f"the driver '{embedded.driver}'")
+    names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
     rollout = runs.run(runs.roads([roads]), np.zeros(1, dtype=np.int64), {})
-    values = measures.evaluate(rollout, names)[0]
+    values = quantities.evaluate(rollout, names)[0]
     return FileResult(
         driver=embedded.driver,
         status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
@@ -108,7 +124,8 @@ def simulate_file(
         parameters=embedded.parameters,
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
-        cause=_stated_cause(scenario) if ego is None and ideal is None else None,
+        conflicts=analyse(rollout),
+        cause=_stated_cause(scenario) if ego is None and ideal is None and others is None else None,
     )
 
 

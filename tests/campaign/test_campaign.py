@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import handover
 from bridgegen.campaign.handover import most_critical
 from bridgegen.cli import main
+from bridgegen.conflict.findings import COLUMNS
 from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.metrics import METRICS
 from bridgegen.openx.convert import import_file
 from bridgegen.store import Store
+from bridgegen.triage.distinct import DISTINCT
 
 TOWN05 = Path(__file__).parents[3] / "shared" / "data" / "Town05.xodr"
 
@@ -84,12 +85,13 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
         ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
         settings = json.loads(text)
         del settings["chosen"]["metrics"]
-        for later in ("distribution", "ideal", "causes", "cause"):
+        for later in ("distribution", "ideal", "causes", "cause", "others"):
             del settings[later]
         connection.execute(
             "UPDATE run SET value = ? WHERE key = 'settings'", (json.dumps(settings),)
         )
-        connection.execute("ALTER TABLE evaluations DROP COLUMN cause")
+        for name in ("cause", *COLUMNS):
+            connection.execute(f"ALTER TABLE evaluations DROP COLUMN {name}")
         connection.execute("UPDATE run SET value = '1' WHERE key = 'schema'")
         connection.execute("DELETE FROM evaluations WHERE id >= 40")
     run = bg.resume(tmp_path / "run")
@@ -177,7 +179,7 @@ def test_most_critical_are_distinct_critical_and_in_order():
     assert kept[0] == np.flatnonzero(critical)[np.argmin(F[critical, 0])]
     for i, a in enumerate(kept):
         for b in kept[:i]:
-            assert np.sqrt(((U[a] - U[b]) ** 2).mean()) >= min(handover.DISTINCT)
+            assert np.sqrt(((U[a] - U[b]) ** 2).mean()) >= min(DISTINCT)
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ CLOSE = stochastic(
 
 @pytest.mark.parametrize(("ego", "body"), [(None, None), ("reference", CLOSE)])
 def test_what_is_found_is_handed_over_as_the_user_s_own_file(tmp_path, ego, body):
-    run = search(tmp_path, body, ego=ego)
+    run = search(tmp_path, body, ego=ego, objective={"paper": None})
     # The budget and the seed are the distribution's, unless the user says otherwise.
     assert (run.settings.budget, run.settings.seed) == (60, 7)
     assert run.settings.ego == (ego or "storyboard")

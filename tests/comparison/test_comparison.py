@@ -74,6 +74,10 @@ def test_every_number_is_its_run_s(done):
         ways = coverage_of(folder, strength=2)[1].ways
         assert value[["critical_bins", "critical_pairs"]].tolist() == [w.critical for w in ways]
         assert 1 <= value["distinct"] <= len(hits)
+        told_of = rows.findings.take(rows.critical)
+        keys = zip(told_of.conflict_type, told_of.responsible, told_of.rule, told_of.partner,
+                   strict=True)  # fmt: skip
+        assert value["modes"] == len({key for key in keys if key[0]})
         assert set(told["folder"]) == {f"runs/{folder.name}"}
         assert set(told["evaluations"]) == {120}
 

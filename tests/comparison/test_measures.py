@@ -7,7 +7,8 @@ import pytest
 
 from bridgegen.comparison.measures import counts, measure, measures, ordinal, others, waited_for
 from bridgegen.comparison.plan import Cell
-from bridgegen.comparison.record import Record
+from bridgegen.comparison.record import Record, modes_of
+from bridgegen.conflict.findings import Findings
 
 INF = math.inf
 
@@ -19,7 +20,7 @@ def record(reached: float, front: list[list[float]], *, critical=60, searched=("
         evaluations=1000, failed=0,
         critical=critical, reached={1: 2.0, 10: 20.0, 50: reached}, seconds=4.0,
         seconds_reached={1: 0.1, 10: 0.2, 50: reached / 100.0}, distinct=5, critical_bins=7,
-        critical_pairs=9, found=np.array([1, critical]), fronts=(x[:0], x),
+        critical_pairs=9, modes=3, found=np.array([1, critical]), fronts=(x[:0], x),
         low=x.min(axis=0) if len(x) else None, high=x.max(axis=0) if len(x) else None,
     )  # fmt: skip
 
@@ -40,6 +41,7 @@ def test_by_hand():
     assert found.curves[one].tolist() == pytest.approx([0.0, 0.75])
     assert found.reference.tolist() == [[0.0, 0.5], [0.5, 0.0]]
     assert best["gd"] == 0.0
+    assert best["modes"] == 3.0
     assert other["hypervolume"] == 0.0
     # From (1, 1) to (½, 0) as to (0, ½).
     assert other["gd"] == pytest.approx(math.sqrt(1.25))
@@ -87,3 +89,18 @@ def test_ordinals():
     assert [ordinal(n) for n in (1, 2, 3, 4, 10, 11, 12, 13, 21, 50, 111)] == [
         "1st", "2nd", "3rd", "4th", "10th", "11th", "12th", "13th", "21st", "50th", "111th",
     ]  # fmt: skip
+
+
+def test_modes_are_different_conflicts_and_passing_by_is_none():
+    def texts(*values):
+        return np.array(values, dtype=object)
+
+    none = texts("", "", "", "", "")
+    found = Findings(
+        conflict=none, conflict_type=texts("crossing", "crossing", "crossing", "", "turning"),
+        responsible=texts("ego", "ego", "shared", "", "ego"),
+        rule=texts("signs", "signs", "signs", "", "signs"),
+        partner=texts("bv", "bv", "bv", "", "bv"), implausible=none,
+    )  # fmt: skip
+    assert len(modes_of(found)) == 3
+    assert modes_of(Findings.none(4)) == set()

@@ -1,5 +1,7 @@
 """A run that is read chunk by chunk is the run that is read at once."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from bridgegen.comparison.fronts import front
 from bridgegen.comparison.record import _Reader, points
+from bridgegen.conflict.findings import Findings
 from bridgegen.store.rows import Rows
 
 
@@ -17,11 +20,13 @@ def rows_of(n: int, seed: int) -> Rows:
     metrics[:, 0] += 0.5
     status = (rng.random(n) < 0.2).astype(np.int64)
     metrics[status != 0] = np.nan
+    kinds = np.array(["", "crossing", "turning"], dtype=object)
+    found = replace(Findings.none(n), conflict_type=kinds[rng.integers(0, 3, n)])
     return Rows(
         id=np.arange(n), batch=np.zeros(n, np.int64), seconds=np.arange(n) / 10.0,
         U=rng.random((n, 1)), X=rng.random((n, 1)), metrics=metrics, F=np.zeros((n, 1)),
         status=status, critical=(status == 0) & (rng.random(n) < 0.4),
-        cause=np.zeros(n, np.int8),
+        cause=np.zeros(n, np.int8), findings=found,
     )  # fmt: skip
 
 
@@ -37,6 +42,8 @@ def test_chunks_do_not_matter(n, budget, chunk, seed):
     assert reader.found == [int(rows.critical[:k].sum()) for k in at]
     numbers = np.flatnonzero(rows.critical)
     assert reader.hits == [(k + 1, k / 10.0) for k in numbers.tolist()]
+    kinds = set(rows.findings.conflict_type[rows.critical]) - {""}
+    assert {kind for kind, *_ in reader.modes} == kinds
     good = rows.status == 0
     terms = rows.metrics * [-1.0, 1.0]
     for k, seen in zip(at, reader.fronts, strict=True):

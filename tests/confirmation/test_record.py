@@ -63,6 +63,25 @@ RECORD = Record(
 )
 
 
+def test_a_record_of_an_earlier_version_is_read(tmp_path):
+    """Before harm there were thresholds alone, and no conflict in an outcome."""
+    path = write_record(tmp_path, RECORD)
+    facts = json.loads(path.read_text("utf-8"))
+    new = ("harm", "severity", "conflict", "conflict_type", "responsible", "partner")
+    for name in ("rule", "count"):
+        del facts[name]
+    for one in facts["scenarios"]:
+        del one["robustness"]
+        for place in ("here", "there"):
+            for name in new if one[place] else ():
+                del one[place][name]
+        if one["change"]:
+            del one["change"]["harm"]
+    path.write_text(json.dumps(facts), "utf-8")
+    assert read_record(path) == RECORD
+    assert RECORD.rule == "thresholds"
+
+
 def test_what_is_written_is_read(tmp_path):
     path = write_record(tmp_path, RECORD)
     assert path == tmp_path / "confirmation-esmini.json"

@@ -46,6 +46,28 @@ def test_failed_ones_count_neither_way():
     assert (s.parted.n, s.parted.median) == (2, 2.0)
 
 
+def test_robust_and_knife_edge_are_counted_apart():
+    shares = (0.9, 0.2, 0.6, 0.1)
+    tested = [
+        one.model_copy(update={"robustness": share})
+        for one, share in zip(THREE, shares, strict=True)
+    ]
+    s = summarise(tested)
+    assert s.robust == (2, 2)
+    assert s.knife_edge == (1, 0)
+    line, second, *_ = sentences("esmini 3.6", tested)
+    assert "1 not: 0002 (knife-edge)" in line
+    assert second.startswith("Confirmed: 2 of 2 robust, 0 of 1 knife-edge.")
+    assert summarise(THREE).robust == (0, 0)
+
+
+def test_harm_changes_where_it_is_known():
+    here = outcome().model_copy(update={"harm": 0.75})
+    there = outcome().model_copy(update={"harm": 0.5})
+    s = summarise([scenario(1, here, there), scenario(2, outcome(), outcome())])
+    assert (s.harm.n, s.harm.max) == (1, 0.25)
+
+
 def test_the_sentences_are_for_people():
     line, *rest = sentences("esmini 3.6", THREE)
     assert line == (

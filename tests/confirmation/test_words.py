@@ -47,6 +47,44 @@ def test_a_miss_says_by_how_much():
     assert "threshold" not in said(came_to(True, 1.1, 5.0))
 
 
+HARMFUL = Outcome(critical=True, d_min=0.0, v_d=5.0, n_collision=1.0, F=(-0.62,), harm=0.62,
+                  severity=0.05, conflict="contact", conflict_type="crossing", responsible="ego",
+                  partner="bv")  # fmt: skip
+
+
+def of_harm(harm, conflict="", kind="", responsible=""):
+    return Outcome(critical=False, d_min=1.0, v_d=5.0, n_collision=0.0, F=(-harm,), harm=harm,
+                   conflict=conflict, conflict_type=kind, responsible=responsible,
+                   partner="bv" if conflict else "")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("there", "text"),
+    [
+        (of_harm(0.05), "No collision course there: harm is 0.05 there, 0.62 here, below 0.3."),
+        (
+            of_harm(0.29, "collision course"),
+            "Only a collision course with bv there: harm is 0.29 there, 0.62 here, narrowly, "
+            "below 0.3.",
+        ),
+        (
+            of_harm(0.0, "near miss", "crossing", "other"),
+            "A near miss with bv (crossing) there, for which bv is responsible: harm is 0.00 "
+            "there, 0.62 here, below 0.3.",
+        ),
+        (
+            of_harm(0.0, "contact", "ego standing", "none"),
+            "A contact with bv (ego standing) there, for which nobody is responsible: harm is "
+            "0.00 there, 0.62 here, below 0.3.",
+        ),
+    ],
+)
+def test_by_harm_a_miss_says_what_conflict_there_is(there, text):
+    told = explanation(HARMFUL, there, Differences(), LIMITS, "harm")
+    assert told.startswith(text)
+    assert "threshold" not in told
+
+
 def test_the_first_who_parts_is_told_with_what_came_before():
     parts = Parting("bv", 3.2, 0.52, -0.51, 0.1, -0.4, None, 2.6)
     ego = Parting("ego", 4.1, 0.6, 0.0, 0.6, 0.0, None, 4.0)

@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bridgegen.ego import kinds
+
 DT = 0.05
 CAR = np.array([4.6, 1.9, 1.4])
 WALKER = np.array([0.5, 0.6, 0.0])
@@ -19,24 +21,36 @@ def path(x: float, y: float, h: float, length: float = 600.0) -> np.ndarray:
 class Road:
     """The ego from x = 0 along +x; another on a path of its own, at a speed of each instant.
 
-    `aside` (T,) moves the other to the left of its path; it is then changing its lane.
+    `aside` (T,) moves the other to the left of its path; it is then changing its lane. A third
+    body, a car, stands at ``standing`` [m], its rear, if that is given.
     """
 
     def __init__(
-        self, drive: Callable[..., float], speed: float, other: np.ndarray, body: np.ndarray = CAR
+        self,
+        drive: Callable[..., float],
+        speed: float,
+        other: np.ndarray,
+        body: np.ndarray = CAR,
+        kind: int = kinds.CAR,
+        standing: float | None = None,
     ) -> None:
         self.drive, self.speed, self.body = drive, speed, body
-        self.present = np.ones(2, dtype=np.bool_)
-        self.paths = np.stack([path(0.0, 0.0, 0.0), other])
+        self.stands = [] if standing is None else [ahead(standing)]
+        self.present = np.ones(2 + len(self.stands), dtype=np.bool_)
+        self.paths = np.stack([path(0.0, 0.0, 0.0), other, *self.stands])
+        self.kinds = np.array([kinds.CAR, kind, kinds.CAR][: len(self.paths)])
 
     def run(self, seconds: float, w: Callable[[float], float], aside=None) -> "Road":
-        n = round(seconds / DT) + 1
-        x, y, h, v = np.zeros((4, 2, n))
+        n, m = round(seconds / DT) + 1, len(self.paths)
+        x, y, h, v = np.zeros((4, m, n))
         self.x, self.y, self.v, self.a = x, y, v, np.zeros(n)
-        counts, steps = np.full(2, self.paths.shape[1]), np.full(2, DS)
-        bodies = np.stack([CAR, self.body])
-        station, attention = np.zeros(2), np.zeros((2, 3))
-        on, to = np.arange(2), np.full(2, -1 if aside is None else 1)
+        counts, steps = np.full(m, self.paths.shape[1]), np.full(m, DS)
+        bodies = np.stack([CAR, self.body, CAR][:m])
+        station, attention = np.zeros(m), np.zeros((m, 3))
+        on, to = np.arange(m), np.full(m, -1)
+        to[1] = -1 if aside is None else 1
+        for e in range(2, m):
+            x[e] = self.paths[e, 0, 0]
         v[0, 0] = self.speed
         heading = self.paths[1, 0, 2]
         for k in range(n):
@@ -48,7 +62,7 @@ class Road:
             x[0, k] = station[0]
             asked = self.drive(
                 k, DT, self.paths, counts, steps, station, on, to, self.speed, self.present, x, y,
-                h, v, bodies, attention,
+                h, v, bodies, self.kinds, attention,
             )  # fmt: skip
             end = max(v[0, k] + asked * DT, 0.0)
             self.a[k] = (end - v[0, k]) / DT

@@ -35,10 +35,14 @@ def test_the_critical_measure_where_the_present_braking_does_it():
 
 
 def test_braking_is_comfortable_by_the_first_and_hard_by_the_second():
-    assert braking(80.0, 20.0, 20.0, 0.0) == 0.0
-    assert braking(2.0 + 0.5 * (38.4286 + 19.7619), 20.0, 20.0, 0.0) == pytest.approx(2.0, abs=1e-4)
-    assert braking(1.0 + 0.5 * (20.0 + 15.8333), 20.0, 10.0, 0.0) == pytest.approx(5.0, abs=1e-3)
-    assert braking(5.0, 20.0, 0.0, 0.0) == 6.0
+    assert braking(80.0, 20.0, 20.0, 0.0, 0.0) == 0.0
+    assert braking(2.0 + 0.5 * (38.4286 + 19.7619), 20.0, 20.0, 0.0, 0.0) == pytest.approx(
+        2.0, abs=1e-4
+    )
+    assert braking(1.0 + 0.5 * (20.0 + 15.8333), 20.0, 10.0, 0.0, 1.0) == pytest.approx(
+        5.0, abs=1e-3
+    )
+    assert braking(5.0, 20.0, 0.0, 0.0, 0.0) == 6.0
 
 
 @given(st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(-6.0, 2.0), st.floats(0.0, 200.0))
@@ -75,3 +79,33 @@ def test_who_drifts_towards_it_but_will_be_behind_is_no_concern():
     lane = path(5.0, -3.5, 0.0)
     road = Road(drive_fsm, 25.0, lane).run(2.0, lambda t: 10.0, lambda t: 0.3 * t)
     assert (road.a == 0.0).all()
+
+
+def test_a_cut_in_counts_once_it_will_be_there_before_the_ego_is_past():
+    # 1.6 m across at 1 m/s: there after 1.6 s; past after (20 + 4.6 + 4.6 m) / 10 m/s = 2.92 s.
+    lane = path(20.0 + 4.6, -3.5, 0.0)
+    road = Road(drive_fsm, 20.0, lane).run(3.0, lambda t: 10.0, lambda t: 1.0 * t)
+    assert road.brakes_at == pytest.approx(0.75, abs=2.0 * DT)
+    # At 0.5 m/s it is there after 3.2 s, later than that by more than the 0.1 s of slack.
+    road = Road(drive_fsm, 20.0, lane).run(1.5, lambda t: 10.0, lambda t: 0.5 * t)
+    assert (road.a == 0.0).all()
+
+
+def test_it_does_not_look_through_the_vehicle_ahead_until_that_is_0_375_m_aside():
+    # At 25 m/s its unsafe distance to who stands is 25·0.75 + 625/8 + 4 = 100.9 m.
+    stays = Road(drive_fsm, 25.0, ahead(60.0), standing=80.0).run(0.7, lambda t: 25.0)
+    assert (stays.a == 0.0).all()
+    leaves = Road(drive_fsm, 25.0, ahead(60.0), standing=150.0)
+    leaves.run(3.0, lambda t: 25.0, lambda t: 1.0 * max(t - 1.0, 0.0))
+    # It is beyond 0.375 m at 1.4 s, with 150 − 35 m left, unsafe from (150 − 100.9)/25 = 1.96 s on.
+    assert leaves.brakes_at == pytest.approx(1.96 + 0.75, abs=2.0 * DT)
+
+
+def test_once_it_has_reacted_it_brakes_again_without_waiting():
+    v = 20.0
+    road = Road(drive_fsm, v, ahead(60.0)).run(6.0, lambda t: max(20.0 - 6.0 * t, 0.0))
+    braking_at = np.flatnonzero(road.a < -1e-9)
+    first = braking_at[0]
+    free = np.flatnonzero(road.a[first:] >= 0.0)
+    moving = road.v[0, first:][free] > 0.5
+    assert not moving.any()  # from the first touch of the brake it keeps braking to the end

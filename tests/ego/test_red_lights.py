@@ -23,7 +23,9 @@ def red(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("ego", ["reference", "un-r157", "fsm", "route-follower"])
+@pytest.mark.parametrize(
+    "ego", ["reference", "un-r157", "fsm", "careful", "careful-fsm", "route-follower"]
+)
 def test_it_stops_before_the_line_and_goes_on_at_green(red: Path, ego: str) -> None:
     scenario = load(red)
     space = scenario.space()

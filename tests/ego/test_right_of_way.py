@@ -6,7 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego.right_of_way import NOBODY_SAYS, THEY_WAIT, WE_WAIT, right_of_way
+from bridgegen.ego.right_of_way import (
+    BY_MAP,
+    BY_SIGNS,
+    FROM_THE_RIGHT,
+    NOBODY_SAYS,
+    ONCOMING,
+    THEY_WAIT,
+    WE_WAIT,
+    claim,
+    claims,
+    right_of_way,
+)
 from bridgegen.ego.scene import stop_signs
 from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.model import OpenDrive, Priority
@@ -124,6 +135,56 @@ def test_of_the_map_s_own_priorities(tmp_path: Path) -> None:
     stated = replace(model, junctions=(junction, *model.junctions[1:]))
     assert right_of_way(stated, own, other) == THEY_WAIT
     assert right_of_way(stated, other, own) == WE_WAIT
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("crossroads-s1", -FROM_THE_RIGHT),
+        ("crossroads-s2", ONCOMING),  # the other turns left towards the ego
+        ("left-across-path", -ONCOMING),
+        ("roundabout-entry", -BY_SIGNS),
+        ("red-light-runner", 0),  # lights decide who may enter
+        ("lead-brakes", 0),
+    ],
+)
+def test_who_goes_first_by_law_in_the_catalogue(name: str, expected: int) -> None:
+    model, (own, other, *_) = catalogue(name)
+    assert claim(model, own, other) == expected
+
+
+@pytest.mark.parametrize(
+    ("leg", "signs", "expected"),
+    [
+        ("B", {}, FROM_THE_RIGHT),  # the ego comes from the right of who comes from the west
+        ("D", {}, -FROM_THE_RIGHT),
+        ("B", {"A": "yield"}, -BY_SIGNS),
+        ("D", {"D": "stop"}, BY_SIGNS),
+        ("D", {"A": "stop", "D": "stop"}, -FROM_THE_RIGHT),
+    ],
+)
+def test_a_claim_is_antisymmetric_and_names_its_rule(
+    tmp_path: Path, leg: str, signs: dict[str, str], expected: int
+) -> None:
+    to = {"B": "D", "D": "B"}[leg]
+    model, (own, other) = routes(crossing(tmp_path, leg, to, **signs))
+    assert claim(model, own, other) == expected
+    assert claim(model, other, own) == -expected
+    assert claims(model, [own, None, other]).tolist() == [
+        [0, 0, expected], [0, 0, 0], [-expected, 0, 0]
+    ]  # fmt: skip
+
+
+def test_a_priority_of_the_map_overrules_the_rule_of_the_right(tmp_path: Path) -> None:
+    model, (own, other) = routes(crossing(tmp_path, "D", "B"))
+    inside = [
+        next(one.road_id for one in each.steps if model.road(one.road_id).is_connecting)
+        for each in (own, other)
+    ]
+    junction = replace(model.junctions[0], priorities=(Priority(inside[0], inside[1]),))
+    stated = replace(model, junctions=(junction, *model.junctions[1:]))
+    assert claim(stated, own, other) == BY_MAP
+    assert claim(stated, other, own) == -BY_MAP
 
 
 def test_a_stop_sign_has_its_line_before_the_junction(tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ def make_rollout(
         detections=np.zeros((0, 0, 0, 8)) if detections is None else np.array(detections, float),
         stop_lines=np.zeros((n, 0, 3)) if stop_lines is None else np.array(stop_lines, float),
         stop_lights=np.asarray(stop_lights, dtype=np.int64),
+        stop_entities=np.zeros(len(stop_lights), dtype=np.int64),
     )
 
 
@@ -85,6 +86,7 @@ def drive_around(n=12, e=3, t=50, seed=0, within=15.0):
             axis=-1,
         ),
         stop_lights=np.array([2, 0]),
+        stop_entities=np.array([0, 0]),
     )
 
 

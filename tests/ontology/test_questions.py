@@ -304,6 +304,12 @@ def test_what_came_of_it(everything):
         (crash, bg("has_who"), node("bv")),
         (crash, bg("has_world_x"), ox.Literal(-3.5)),
         (crash, bg("has_world_y"), ox.Literal(1.0)),
+        (crash, bg("has_conflict_type"), ox.Literal("crossing")),
+        (crash, bg("has_responsibility"), ox.Literal("ego")),
+        (crash, bg("has_responsible"), node("ego")),
+        (crash, bg("has_responsibility_rule"), ox.Literal("red light")),
+        (crash, bg("has_severity"), ox.Literal(0.25)),
+        (crash, bg("has_delta_v"), ox.Literal(6.5)),
         (node("scenario"), bg("has_outcome"), jam),
         (jam, TYPE, bg("TrafficJam")),
         (jam, bg("has_name"), ox.Literal("later jam")),
@@ -313,8 +319,13 @@ def test_what_came_of_it(everything):
         (jam, bg("on_lane"), node("leg_B_in_1")),
     )
     assert ask(after, "outcomes").rows == (
-        ("crash", "traffic accident", 7.25, "bv, ego", -3.5, 1.0, None, None),
-        ("later jam", "traffic jam", 12.0, "bv", None, None, "leg_B_in_1", 9.5),
+        ("crash", "traffic accident", 7.25, "bv, ego", "crossing", "ego", 0.25, 6.5, None,
+         -3.5, 1.0, None, None),
+        ("later jam", "traffic jam", 12.0, "bv", None, None, None, None, None,
+         None, None, "leg_B_in_1", 9.5),
+    )  # fmt: skip
+    assert ask(after, "responsible").rows == (
+        ("crash", "traffic accident", "crossing", "ego", "ego", "red light", 7.25),
     )
     assert ask(after, "jams") == ask(everything, "jams")  # what came later was not there before
 
@@ -336,7 +347,7 @@ def test_conditions_of_a_group_stand_together(everything):
 def test_every_question_finds_something_in_everything(everything):
     """But for those about two routes, as only the ego has one, and about what came of it."""
     silent = {name for name in questions() if not ask(everything, name).rows}
-    assert silent == {"conflicts", "outcomes"}
+    assert silent == {"conflicts", "outcomes", "responsible"}
 
 
 def test_every_question_says_what_it_asks():

@@ -36,16 +36,16 @@ def test_where_none_was_sought_nothing_is_said(report):
     told = payload(report)
     assert told["causes"] is None
     assert told["rows"]["cause"] is None
-    assert not any("put right" in sentence for sentence in sentences(report))
+    assert not any("Quick labels" in sentence for sentence in sentences(report))
 
 
 def test_one_sentence_says_what_helps(caused):
     counts = np.bincount(caused.evaluations.cause, minlength=5)
-    (told,) = [one for one in sentences(caused) if "put right" in one]
+    (told,) = [one for one in sentences(caused) if one.startswith("Quick labels")]
     assert told == (
-        f"Replayed with one thing put right at a time, {counts[2]} would not happen to a careful "
-        f"and competent driver (planning), {counts[3]} would not happen with ideal control or on "
-        f"a dry road (control), {counts[4]} would happen all the same (unavoidable)."
+        f"Quick labels, of one replay each with one stage idealised: {counts[2]} would not happen "
+        f"to a careful and competent driver (planning), {counts[3]} would not happen with ideal "
+        f"control or on a dry road (control), {counts[4]} would happen all the same (unavoidable)."
     )
 
 

@@ -89,7 +89,7 @@ def test_the_table_shows_a_dash_for_what_does_not_exist(with_summary):
         first_critical=None, fiftieth_critical=None, n_critical=0, n_evaluations=0,
         wall_seconds=nan,
     )  # fmt: skip
-    table = dict(sentences.summary_table(data.summary))
+    table = dict(sentences.summary_table(data))
     assert table["Critical share, R_critic"] == "– (0 of 0)"
     assert table["First critical"] == table["50th critical"] == "not reached"
     assert {value for name, value in table.items() if "d_min" in name or "v_d" in name} == {"–"}
@@ -115,13 +115,13 @@ def test_r_critic_has_an_interval_and_what_it_means_is_said(with_summary):
     told = {"n_evaluations": 100, "n_critical": 10, "r_critic": 0.1}
     chosen, drawn = with_summary(**told), with_summary(**told, independent=True, algorithm="random")
     for data in (chosen, drawn):
-        table = {k: v.replace(THIN, " ") for k, v in sentences.summary_table(data.summary)}
+        table = {k: v.replace(THIN, " ") for k, v in sentences.summary_table(data)}
         assert table["R_critic, 95 % interval *"] == "5.5 to 17.4 %"  # worked by hand
     assert "pso chose them by plan or by what earlier ones" in sentences.interval_note(
         chosen.summary
     )
     assert "not how likely harm is" in sentences.interval_note(chosen.summary)
     assert "independent random draws, so it holds" in sentences.interval_note(drawn.summary)
-    empty = with_summary(n_evaluations=0, n_critical=0).summary
-    assert sentences.interval_note(empty) == ""
+    empty = with_summary(n_evaluations=0, n_critical=0)
+    assert sentences.interval_note(empty.summary) == ""
     assert dict(sentences.summary_table(empty))["R_critic, 95 % interval *"] == "–"

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from bridgegen.campaign.handover import write_scenario
 from bridgegen.cli import main
+from bridgegen.conflict.recorded import measure_recording
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, UnknownNameError
-from bridgegen.metrics.measure import measure_recording
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file

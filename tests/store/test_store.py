@@ -1,4 +1,5 @@
 import sqlite3
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from bridgegen.conflict.findings import COLUMNS, Findings
 from bridgegen.errors import InputError, StorageError
 from bridgegen.store import Store
 from bridgegen.store.rows import Columns, quoted
@@ -95,7 +97,7 @@ def test_people_can_query_it(tmp_path):
     names = [row[1] for row in db.execute("PRAGMA table_info(evaluations)")]
     assert names == [
         "id", "batch", "seconds", "u", "ego_speed", "fog_density", "d_min", "v_d", "ttc",
-        "f0", "f1", "status", "critical", "cause",
+        "f0", "f1", "status", "critical", "cause", *COLUMNS,
     ]  # fmt: skip
     (n,) = db.execute("SELECT count(*) FROM evaluations WHERE critical AND d_min < 0").fetchone()
     assert n == np.count_nonzero(result.critical & (result.metrics[:, 0] < 0))
@@ -142,7 +144,8 @@ def test_a_run_of_the_first_schema_has_no_causes_and_goes_on(tmp_path):
     with create(tmp_path / "run", parameters=["cause", "b"]) as store:
         store.append(*batch(4), seconds=1.0)
     db = sqlite3.connect(tmp_path / "run" / "run.sqlite")
-    db.execute("ALTER TABLE evaluations DROP COLUMN cause")
+    for name in ("cause", *COLUMNS):
+        db.execute(f"ALTER TABLE evaluations DROP COLUMN {name}")
     db.execute("ALTER TABLE evaluations RENAME COLUMN cause_parameter TO cause")
     db.execute("UPDATE run SET value = '1' WHERE key = 'schema'")
     db.commit()
@@ -156,6 +159,45 @@ def test_a_run_of_the_first_schema_has_no_causes_and_goes_on(tmp_path):
         assert (rows.X[4:] == X).all()
         assert "cause" in store.frame()  # the parameter
         assert store.frame()["cause"].dtype == float
+
+
+def test_a_run_of_the_second_schema_has_no_findings_and_is_resumed(tmp_path):
+    with create(tmp_path / "run") as store:
+        store.append(*batch(4), seconds=1.0)
+    db = sqlite3.connect(tmp_path / "run" / "run.sqlite")
+    for name in COLUMNS:
+        db.execute(f"ALTER TABLE evaluations DROP COLUMN {name}")
+    db.execute("UPDATE run SET value = '2' WHERE key = 'schema'")
+    db.commit()
+    db.close()
+    with Store.open(tmp_path / "run", write=True) as store:
+        store.append(*batch(2, seed=1), seconds=2.0)
+        assert set(store.read().findings.conflict.tolist()) == {""}
+        assert not {*COLUMNS} & {*store.frame()}
+
+
+def test_findings_come_back_and_are_part_of_the_digest(tmp_path):
+    U, X, result = batch(3)
+    texts = [
+        ["near miss", "", "contact"],
+        ["crossing", "", "head-on"],
+        ["ego", "", "other"],
+        ["signs", "", "left its lane"],
+        ["bv", "", "bv"],
+        ["", "others collide", ""],
+    ]
+    result.findings = Findings(*(np.array(one, dtype=object) for one in texts))
+    with create(tmp_path / "run") as store:
+        store.append(U, X, result, 1.0)
+        rows, frame = store.read(), store.frame()
+    assert [one.tolist() for one in rows.findings.columns().values()] == texts
+    assert frame["responsible"].fillna("").tolist() == ["ego", "", "other"]
+    changed = replace(rows, findings=replace(rows.findings, rule=rows.findings.rule[::-1]))
+    assert changed.digest() != rows.digest()
+    assert rows.take(np.array([2])).findings.row(0) == {
+        "conflict": "contact", "conflict_type": "head-on", "responsible": "other",
+        "rule": "left its lane", "partner": "bv", "implausible": None,
+    }  # fmt: skip
 
 
 def test_an_empty_run_can_be_read(tmp_path):
@@ -174,6 +216,7 @@ def test_frame(tmp_path):
     assert frame.index.name == "id"
     assert list(frame) == [
         "batch", "seconds", *PARAMETERS, *METRICS, "f0", "f1", "status", "critical", "cause",
+        *COLUMNS,
     ]  # fmt: skip
     assert frame["v_d"].to_numpy().tobytes() == rows.metrics[:, 1].tobytes()
     assert frame["f1"].to_numpy().tobytes() == rows.F[:, 1].tobytes()

@@ -43,7 +43,7 @@ class Growing:
         """Record the next n rows."""
         start = len(self._store)
         rows = self.rows.take(np.arange(start, start + n))
-        names = ("metrics", "F", "critical", "status", "cause")
+        names = ("metrics", "F", "critical", "status", "cause", "findings")
         result = SimpleNamespace(messages={}, **{name: getattr(rows, name) for name in names})
         self._store.append(rows.U, rows.X, result, seconds=0.1 * (start + n))
 

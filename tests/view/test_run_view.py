@@ -39,7 +39,10 @@ def test_the_page_is_the_report_and_may_ask_its_server(view, finished):
     assert (told.pop("live"), written.pop("live")) == (True, False)
     # What the server gives when it is asked, the report holds itself.
     assert len(written.pop("packed")["evaluations"]) + len(written["kept"]) == n_critical(view)
-    assert written.pop("files").keys() == {f for one in written["kept"] for f in one["files"]}
+    minimal = {f"critical/{path.name}" for path in (finished / "critical").glob("minimal-*")}
+    of_kept = {f for one in written["kept"] for f in one["files"]}
+    assert written.pop("files").keys() == of_kept | minimal
+    assert all(view.file(name) for name in minimal)
     assert (told.pop("packed")["evaluations"], told.pop("files")) == ([], {})
     assert told == written
     assert b"connect-src 'self'" in page

@@ -5,14 +5,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from bridgegen import search as toolkit
-from bridgegen.campaign.chosen import chosen_objective, columns_of
+from bridgegen.campaign.beforehand import refuse_beforehand
+from bridgegen.campaign.chosen import chosen_objective, columns_of, counted
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
 from bridgegen.campaign.run import Run
-from bridgegen.campaign.scenarios import is_file, load, refuse_standstill
+from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, Interrupted, WorkersError
@@ -21,6 +24,8 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store import Store, refuse_used
+from bridgegen.triage.record import write_record
+from bridgegen.triage.triage import triage
 from bridgegen.workers import Choice, Workers, open_workers
 
 MAX_BUDGET = 10_000_000
@@ -31,7 +36,7 @@ class Watch:
     """Who wants to know how a campaign is getting on; each is called from the same thread.
 
     Attributes:
-        stage: told what begins: "compile", "search", "hand over", "report".
+        stage: told what begins: "compile", "search", "triage", "hand over", "report".
         workers: told who evaluates, before anything is.
         batch: told after each batch.
         written: told how many scenarios are handed over.
@@ -64,10 +69,12 @@ def run_search(
     weights: str | None = None,
     scale: str | None = None,
     objectives: str | None = None,
+    count: str | None = None,
     metrics: Sequence[str] = (),
     causes: bool = True,
     cause: str | None = None,
     adversary: str | None = None,
+    others: str | None = None,
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     workers: Choice = None,
@@ -95,17 +102,22 @@ def run_search(
         keep: how many critical scenarios to hand over.
         out: the run's folder, new; ``runs/SCENARIO-ALGORITHM-SEED`` by default.
         objective: metrics and their weights (None with entropy weights), instead of the
-            scenario's.
+            scenario's; ``{"harm": None}`` or ``{"paper": None}`` for one of these, with its rule
+            of what is critical.
         weights: "fixed", or "entropy" of a random sample, instead of the scenario's way.
         scale: "raw", or "standardised" by a random sample, instead of the scenario's.
         objectives: "one", the terms' weighted sum, or "many", one for each term; what the
             algorithm is made for, by default.
+        count: whose conflicts count as harm: "ego", those that the ego is responsible for or could
+            have prevented (the default), or "any".
         metrics: names of those to record besides the objective's and the paper's.
         causes: whether to find the cause of each critical scenario, by replaying it.
         cause: "perception", "planning", "control" or "unavoidable": a critical scenario of another
             cause does not count.
         adversary: the participant that an adversary drives, see `bridgegen.odd.adversary`; with an
             algorithm that is one, the first vehicle by default.
+        others: "attentive" or "scripted": who drives all participants but the ego (and the one
+            that an adversary drives); what the scenario says by default.
         simulator: which one runs the scenarios; the embedded one by default.
         deliver: whether to write the critical scenarios and the report; ``resume`` does it later.
         workers: who evaluates: so many processes, or ``"ray"``, ``"ray://HOST:PORT"``; threads of
@@ -116,19 +128,20 @@ def run_search(
         The finished run.
 
     Raises:
-        InputError: anything that the arguments or files say wrongly.
+        InputError: anything that the arguments or files say wrongly; or a scenario at the defaults
+            or the corners of the ranges that could not be exported.
         StorageError: the folder exists or cannot be written.
         WorkersError: there are no workers, or they are lost; ``resume`` goes on.
         Interrupted: Ctrl-C; likewise.
     """
     watch, simulates = watch or Watch(), simulator or EMBEDDED
-    catalogue = load(scenario, distribution)
+    catalogue = driven_by(load(scenario, distribution), others)
     budget = catalogue.budget if budget is None else budget
     seed = catalogue.seed if seed is None else seed
     _check_numbers(budget, seed, keep)
     method = toolkit.get(algorithm)
     columns = columns_of(method, objectives)
-    spec = chosen_objective(catalogue.objective, objective, weights, scale, columns)
+    spec = chosen_objective(catalogue.objective, objective, weights, scale, columns, counted(count))
     logical = replace(catalogue, objective=spec)
     logical, roads = placed(logical, road_map, junction)
     driven: str | None = None
@@ -161,6 +174,7 @@ def run_search(
         )
         watch.stage("compile")
         pipeline.warm_up()
+        refuse_beforehand(pipeline)
         chosen = pipeline.choose_objective(objectives=columns, seed=seed)
         made_with = Settings(
             scenario=str(Path(scenario).resolve()) if is_file(scenario) else str(scenario),
@@ -182,6 +196,7 @@ def run_search(
             causes=causes,
             cause=cause,
             adversary=driven,
+            others=others,
             simulator=simulates.name,
             simulator_settings=dict(simulates.settings),
             objective=chosen.to_dict(),
@@ -190,6 +205,7 @@ def run_search(
                 "weights": weights,
                 "scale": scale,
                 "objectives": objectives,
+                "count": count,
                 "metrics": list(metrics),
             },
         )
@@ -268,8 +284,7 @@ def _go(
             algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, watch.batch
         )
     except WorkersError as error:
-        problem = f"{error}; {len(store)} evaluations are kept"
-        raise WorkersError(f"{problem}, go on with 'bridgegen resume {store.folder}'") from error
+        raise _workers_lost(error, store) from error
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
     if not deliver:
@@ -278,14 +293,32 @@ def _go(
         _finish(pipeline, store, settings, watch)
     except KeyboardInterrupt:
         raise Interrupted(store.folder, result.evaluations, settings.budget) from None
+    except WorkersError as error:
+        raise _workers_lost(error, store) from error
     return Run(store.folder)
 
 
+def _workers_lost(error: WorkersError, store: Store) -> WorkersError:
+    problem = f"{error}; {len(store)} evaluations are kept"
+    return WorkersError(f"{problem}, go on with 'bridgegen resume {store.folder}'")
+
+
 def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> None:
+    watch.stage("triage")
+    rows, found = store.read(), None
+    best = np.zeros(0, dtype=np.int64)
+    if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
+        triaged = triage(
+            pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep
+        )
+        found, best = triaged.record, np.array(triaged.exports, dtype=np.int64)
+        write_record(store.folder, found)
+    if pipeline.objective.rule == "thresholds" and len(best) < settings.keep:
+        # What the paper calls critical is kept besides, in the paper's order.
+        more = most_critical(rows.U, rows.F, rows.critical, settings.keep)
+        best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]
     watch.stage("hand over")
-    rows = store.read()
-    best = most_critical(rows.U, rows.F, rows.critical, settings.keep)
-    kept = hand_over(pipeline, rows.take(best), store.folder, watch.written)
+    kept = hand_over(pipeline, rows.take(best), store.folder, watch.written, found)
     watch.stage("report")
     write_run_report(pipeline, store, settings, rows, kept)
 

@@ -2,12 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import cast, get_args
+from typing import Any, cast, get_args
 
+from bridgegen.conflict.harm import Count
+from bridgegen.conflict.quantities import HARM
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.objective import Objectives
+from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.scenario import ObjectiveSpec, Term
 from bridgegen.search import Algorithm
+
+PAPER = "paper"
+"""What ``--objective`` calls the paper's objective, and its rule of what is critical."""
+
+BESIDE_HARM = "d_min"
+"""The second objective of a search of many whose only term is harm."""
 
 
 def columns_of(method: type[Algorithm], objectives: str | None) -> Objectives:
@@ -20,14 +29,50 @@ def columns_of(method: type[Algorithm], objectives: str | None) -> Objectives:
     raise UnknownNameError("number of objectives", objectives, get_args(Objectives))
 
 
+def counted(count: str | None) -> Count | None:
+    """Return whose conflicts the user says are harm.
+
+    Raises:
+        UnknownNameError: no such choice.
+    """
+    for known in get_args(Count):
+        if count == known:
+            return cast(Count, known)
+    if count is not None:
+        raise UnknownNameError("choice of whose conflicts count", count, get_args(Count))
+    return None
+
+
 def chosen_objective(
     spec: ObjectiveSpec,
     metrics: Mapping[str, float | None] | None,
     weights: str | None,
     scale: str | None,
     columns: Objectives,
+    count: Count | None = None,
 ) -> ObjectiveSpec:
-    """Return the scenario's objective with what the user wants instead."""
+    """Return the scenario's objective with what the user wants instead.
+
+    Args:
+        spec: the scenario's.
+        metrics: and their weights; ``{"harm": None}`` and ``{"paper": None}`` choose the rule of
+            what is critical, too.
+        weights: "fixed" or "entropy".
+        scale: "raw" or "standardised".
+        columns: one or many objectives.
+        count: whose conflicts are harm, "ego" or "any".
+
+    Raises:
+        InputError: weights where they have no part; ``paper`` among others.
+    """
+    if metrics is not None and PAPER in metrics:
+        if len(metrics) > 1 or metrics[PAPER] is not None:
+            raise InputError(f"the objective '{PAPER}' stands alone, without a weight")
+        spec, metrics = replace(PAPERS, critical=spec.critical), None
+    if metrics is not None and HARM in metrics:
+        spec = replace(spec, rule="harm", weights="fixed")
+        if len(metrics) == 1:
+            metrics = {HARM: 1.0 if columns == "one" and weights != "entropy" else None}
     if columns == "many":
         given = [f"{name}={w:g}" for name, w in (metrics or {}).items() if w is not None]
         given += [f"--weights {weights}"] if weights else []
@@ -42,4 +87,7 @@ def chosen_objective(
         terms = tuple(Term(name, weight) for name, weight in metrics.items())
     elif way == "entropy":
         terms = tuple(Term(term.metric) for term in terms)
-    return replace(spec, terms=terms, weights=way, scale=scale or spec.scale)  # type: ignore[arg-type]
+    if columns == "many" and [term.metric for term in terms] == [HARM]:
+        terms = (*terms, Term(BESIDE_HARM))
+    ways: dict[str, Any] = {"weights": way, "scale": scale or spec.scale}
+    return replace(spec, terms=terms, count=count or spec.count, **ways)

@@ -27,6 +27,8 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Rows, Store
+from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
+from bridgegen.triage.record import read_record as read_triage
 from bridgegen.workers import Choice, open_workers
 
 SECONDS = 1.0
@@ -129,7 +131,7 @@ def confirm(
         empty = _empty(here, there, simulator, settings, place)
         known = {} if again else _known(place, empty, every)
         todo = [k for k in asked if k not in known or known[k].there is None]
-        book = _Book(place, empty, known, handed, _merit(every))
+        book = _Book(place, empty, known, handed, _merit(every), _robustness(place, every))
         book.write()  # a folder that cannot be written is said before anything is run
         stage("confirm")
         try:
@@ -173,6 +175,8 @@ def _empty(
         scenario=here.scenario.name,
         ego=here.driver.label,
         thresholds=objective.thresholds,
+        rule=objective.rule,
+        count=objective.count,
         objectives=objective.names if objective.objectives == "many" else ("F",),
     )
 
@@ -191,10 +195,12 @@ class _Book:
         known: dict[int, Scenario],
         handed: dict[int, str],
         merit: dict[int, int],
+        robustness: dict[int, float | None],
     ) -> None:
         self.tally: Tally = Counter()
         self._folder, self._empty = folder, empty
         self._found, self._handed, self._merit = known, handed, merit
+        self._robustness = robustness
         self._written = 0.0
 
     def add(self, one: Scenario) -> None:
@@ -205,9 +211,13 @@ class _Book:
             self.write()
 
     def of(self, evaluations: Sequence[int]) -> list[Scenario]:
-        """Return what became of some evaluations, under the names of their files."""
-        found = (self._found[k] for k in evaluations)
-        return [one.model_copy(update={"name": self._handed.get(one.evaluation)}) for one in found]
+        """Return what became of some evaluations, with names of files and robustness."""
+        return [
+            self._found[k].model_copy(
+                update={"name": self._handed.get(k), "robustness": self._robustness.get(k)}
+            )
+            for k in evaluations
+        ]
 
     def write(self) -> Record:
         """Write all, most critical first."""
@@ -249,6 +259,14 @@ def _merit(every: Rows) -> dict[int, int]:
     return {k: place for place, k in enumerate(order.tolist())}
 
 
+def _robustness(folder: Path, every: Rows) -> dict[int, float | None]:
+    """Return the robustness of the evaluations whose neighbours were tested."""
+    found = read_triage(folder / TRIAGE_FILE)
+    if found is None or found.results != every.digest():
+        return {}
+    return {one.evaluation: one.robustness for one in found.neighbourhoods}
+
+
 def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
     """Return what was confirmed before, in the same way.
 
@@ -261,7 +279,7 @@ def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
     if earlier is None:
         return {}
     check_rows(path, earlier.scenarios, every.X, every.metrics)
-    for name in ("label", "settings", "ego", "thresholds", "objectives"):
+    for name in ("label", "settings", "ego", "thresholds", "rule", "count", "objectives"):
         was, would = getattr(earlier, name), getattr(empty, name)
         if was != would:
             raise InputError(

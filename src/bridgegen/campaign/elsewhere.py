@@ -1,17 +1,20 @@
 """Scenarios of a run, run again here and in another simulator, and compared one by one."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen import metrics as measures
 from bridgegen.arrays import Float
 from bridgegen.confirmation.compare import compare, first_contact, tracks
 from bridgegen.confirmation.record import digest_of
 from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Scenario, number
 from bridgegen.confirmation.words import explanation
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.harm import Count
 from bridgegen.errors import InputError
 from bridgegen.objective import CLASSIFYING
 from bridgegen.pipeline import Pipeline
@@ -21,6 +24,9 @@ from bridgegen.workers import Lost
 
 AT_A_TIME = 32
 """Scenarios that are run before what became of them is handed on, at most."""
+
+FOUND = ("conflict", "conflict_type", "responsible", "partner")
+"""What a record says of the decisive conflict."""
 
 SECONDS = 0.5
 """Fewer are run together where they take longer: what is handed on is safe [s]."""
@@ -34,11 +40,13 @@ class _Ran:
         rollout: of several rows.
         row: which of them.
         metrics: ``(M,)`` of that row; NaN where it failed.
+        findings: of all rows of the rollout.
     """
 
     rollout: Rollout
     row: int
     metrics: Float
+    findings: Findings
 
 
 def run_elsewhere(
@@ -59,14 +67,15 @@ def run_elsewhere(
         some = list(evaluations[done : done + size])
         X = every.X[some]
         motion = here.rollout(X)
-        for row, (k, ran) in enumerate(zip(some, _elsewhere(there, X), strict=True)):
+        found = _elsewhere(there, X, here.objective.count)
+        for row, (k, ran) in enumerate(zip(some, found, strict=True)):
             yield _scenario(here, every, k, motion, row, ran)
         done += len(some)
         if time.monotonic() - began < SECONDS:  # no result depends on how many go together
             size = min(most, 2 * size)
 
 
-def _elsewhere(there: Pipeline, X: Float) -> Iterator[_Ran | str]:
+def _elsewhere(there: Pipeline, X: Float, count: Count) -> Iterator[_Ran | str]:
     """Return what became of each row, or why nothing did."""
     try:
         found = there.rollouts(X)
@@ -75,15 +84,20 @@ def _elsewhere(there: Pipeline, X: Float) -> Iterator[_Ran | str]:
             yield "; ".join(error.problems)
             return
         for x in X:  # which of them is it?
-            yield from _elsewhere(there, x[np.newaxis])
+            yield from _elsewhere(there, x[np.newaxis], count)
         return
     for one in found:
         if isinstance(one, Lost):
             yield f"{STATUS_MESSAGES[WORKER_ENDED]}: {one.reason}"
             continue
-        metrics = measures.evaluate(one, there.metrics)
+        metrics = quantities.evaluate(one, there.metrics)
+        findings = _findings(one, count)
         for row in range(one.shape[0]):
-            yield _Ran(one, row, metrics[row])
+            yield _Ran(one, row, metrics[row], findings)
+
+
+def _findings(rollout: Rollout, count: Count) -> Findings:
+    return Findings.of(analyse(rollout), [""] * rollout.shape[0], count)
 
 
 def _scenario(
@@ -91,7 +105,7 @@ def _scenario(
 ) -> Scenario:
     """Return what became of evaluation k, whose motion here is a row of a rollout."""
     objective = here.objective
-    known = _outcome(here, every.metrics[k], every.F[k])
+    known = _outcome(here, every.metrics[k], every.F[k], every.findings.row(k))
     digest = digest_of(every.X[k], every.metrics[k])
     if isinstance(ran, str) or ran.rollout.status[ran.row] != 0:
         failure = _legal(ran if isinstance(ran, str) else _failure(ran))
@@ -99,7 +113,7 @@ def _scenario(
         return Scenario(evaluation=k, name=None, row=digest, here=ours, failure=failure)
     F, _ = objective.F(ran.metrics[np.newaxis], here.metrics)
     found = compare(motion, ran.rollout, row, ran.row)
-    both = (known, _outcome(here, ran.metrics, F[0]))
+    both = (known, _outcome(here, ran.metrics, F[0], ran.findings.row(ran.row)))
     ours, theirs = (
         one.model_copy(update={"contact": contact, "ends": ends})
         for one, contact, ends in zip(both, found.contacts, found.ends, strict=True)
@@ -114,12 +128,19 @@ def _scenario(
         change=Change.between(ours, theirs),
         differences=differences,
         tracks=tuple(Course.of(one) for one in tracks(motion, ran.rollout, row, ran.row)),
-        explanation=explanation(ours, theirs, differences, objective.thresholds),
+        explanation=explanation(ours, theirs, differences, objective.thresholds, objective.rule),
     )
 
 
-def _outcome(pipeline: Pipeline, metrics: Float, F: Float) -> Outcome:
+def _outcome(
+    pipeline: Pipeline, metrics: Float, F: Float, finding: Mapping[str, str | None]
+) -> Outcome:
     names = pipeline.metrics
+    measured = {
+        name: number(metrics[names.index(of)])
+        for name, of in (("harm", pipeline.objective.harm), ("severity", "severity"))
+        if of in names
+    }
     n_collision, d_min, v_d = (number(metrics[names.index(name)]) for name in CLASSIFYING)
     return Outcome(
         critical=bool(pipeline.objective.critical(metrics[np.newaxis], names)[0]),
@@ -127,6 +148,8 @@ def _outcome(pipeline: Pipeline, metrics: Float, F: Float) -> Outcome:
         d_min=d_min,
         v_d=v_d,
         F=tuple(number(one) for one in F),
+        **measured,
+        **{name: finding[name] or "" for name in FOUND},
     )
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from importlib.resources import files as resources
 from pathlib import Path
 
-from bridgegen.campaign.handover import FOLDER
+from bridgegen.campaign.handover import FOLDER, MINIMAL, keyed
 from bridgegen.campaign.settings import Settings
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import (
@@ -21,7 +21,6 @@ from bridgegen.errors import (
 from bridgegen.openx.logic_file import logic_file, roads_of
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
-from bridgegen.openx.openscenario.declarations import DRIVER, NOISE_KEY
 from bridgegen.openx.openscenario.parameters import numbers
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.recorded import Recording, recorded
@@ -31,6 +30,7 @@ from bridgegen.openx.openscenario.versions import VERSIONS, to_version
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulate import simulate_file
+from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.store import Store
 
 EXPORT = "export"
@@ -45,6 +45,7 @@ def export(
     scenarios: Sequence[str] = (),
     out: Path | None = None,
     town: str | None = None,
+    notes: list[str] | None = None,
 ) -> list[Path]:
     """Write scenarios in another flavour, each beside a copy of its map.
 
@@ -54,10 +55,13 @@ def export(
     Args:
         source: the folder of a run, for its handed-over scenarios, or one ``.xosc`` file.
         flavour: one of `FLAVOURS`.
-        scenarios: names of a run's scenarios ("0001"); all by default.
+        scenarios: names of a run's scenarios ("0001", "minimal-01"); all but the minimal ones by
+            default.
         out: the folder to write to; ``export/FLAVOUR`` in the run's or the file's by default.
         town: for the flavour "carla", CARLA's own map to run on, which is then named instead of
             a file; that of a run on a map called ``TownNN.xodr`` by default.
+        notes: takes a sentence for each file in which participants other than the ego have a
+            driver that the tools which read the flavour do not know.
 
     Returns:
         The files written: an ``.xosc`` and its ``.xodr`` each, and what the flavour needs besides.
@@ -81,10 +85,34 @@ def export(
         town = _town_of(source)
     base = source.parent if source.suffix.lower() == ".xosc" else source
     folder = out or base / EXPORT / flavour
-    found = [file for path in paths for file in _export(path, FLAVOURS[flavour], folder, town)]
+    found = []
+    for path in paths:
+        found += _export(path, FLAVOURS[flavour], folder, town)
+        if notes is not None:
+            notes += _ignored_drivers(path, flavour)
     beside = {folder / name: data() for name, data in _BESIDE.get(flavour, {}).items()}
     _write(beside, folder, ())
     return [*found, *beside]
+
+
+def _ignored_drivers(path: Path, flavour: str) -> list[str]:
+    """Return what a flavour cannot say of who drives the participants other than the ego."""
+    if flavour == RECORDED:  # their motion is in the file
+        return []
+    program = compile_storyboard(read(path), str(path))
+    names = ", ".join(f"'{program.names[e]}'" for e in program.attends.tolist())
+    if not names:
+        return []
+    what = (
+        "other tools than BridgeGen ignore their driver 'attentive' and move them as the "
+        f"storyboard says; --flavour {RECORDED} has them move as they did"
+    )
+    if flavour == CARLA:
+        what = (
+            "they repeat the motion that their driver 'attentive' gave them when the exported ego "
+            "drove; they do not react to another one"
+        )
+    return [f"{path}: participants {names}: {what}"]
 
 
 def _town_of(run: Path) -> str | None:
@@ -111,7 +139,9 @@ def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
     for name in scenarios:
         if name not in kept:
             raise UnknownNameError(f"scenario of {source}", name, kept)
-    return [path for name, path in kept.items() if not scenarios or name in scenarios]
+    if scenarios:
+        return [path for name, path in kept.items() if name in scenarios]
+    return [path for name, path in kept.items() if not name.startswith(MINIMAL)]
 
 
 def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> list[Path]:
@@ -172,20 +202,7 @@ def _keyed(scenario: osc.OpenScenario) -> osc.OpenScenario:
 
     Without parameters it would follow from nothing, and the driver would see other things.
     """
-    key = osc.Property(NOISE_KEY, str(noise_key(numbers(scenario), 1)[0]))
-
-    def keyed(one: osc.ObjectController) -> osc.ObjectController:
-        said = one.controller.properties
-        if said is None or said.get(DRIVER) is None or said.get(NOISE_KEY) is not None:
-            return one
-        properties = replace(said, properties=(*said.properties, key))
-        return replace(one, controller=replace(one.controller, properties=properties))
-
-    objects = tuple(
-        replace(one, object_controllers=tuple(keyed(each) for each in one.object_controllers))
-        for one in scenario.entities.scenario_objects
-    )
-    return replace(scenario, entities=replace(scenario.entities, scenario_objects=objects))
+    return keyed(scenario, str(noise_key(numbers(scenario), 1)[0]))
 
 
 def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
@@ -234,7 +251,7 @@ def _control() -> bytes:
     return (resources(package) / CONTROL).read_bytes()
 
 
-CARLA = "carla"
+CARLA, RECORDED = "carla", "recorded"
 _BESIDE: Mapping[str, Mapping[str, Callable[[], bytes]]] = {CARLA: {CONTROL: _control}}
 """What a flavour needs beside its files."""
 _LEVEL = re.compile(r"\w+")
@@ -243,7 +260,7 @@ _TOWN = re.compile(r"Town\d\d(HD)?(_Opt)?")
 FLAVOURS: dict[str, Flavour] = {
     **{version: partial(_in_version, version) for version in VERSIONS},
     "resolved": _resolved,
-    "recorded": _recorded,
+    RECORDED: _recorded,
     CARLA: _carla,
 }
 """What can be written: a version of the standard with parameters; 1.2 without; the motion as the

@@ -3,7 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,25 +11,40 @@ import pyoxigraph as ox
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.outcomes import with_outcomes
+from bridgegen.conflict.quantities import QUANTITIES
+from bridgegen.conflict.summary import ConflictSummary, summarise
 from bridgegen.errors import OntologyError, StorageError
-from bridgegen.metrics import METRICS
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import save
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import bg
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.openx.openscenario.declarations import (
+    CAUSE,
+    CONFLICT_TYPE,
+    DRIVER,
+    NOISE_KEY,
+    RESPONSIBLE,
+    SEVERITY,
+)
+from bridgegen.openx.openscenario.values import format_double
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.dominance import by_merit
-from bridgegen.simulation.outcomes import with_outcomes
+from bridgegen.simulation.rollout import Rollout
 from bridgegen.store import Rows
-
-DISTINCT = (0.2, 0.1)
-"""Two kept scenarios differ by at least this much: root mean square over the searched parameters,
-each scaled to 0..1. The second distance counts where too few differ by the first."""
+from bridgegen.triage.distinct import distinct
+from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Triage
 
 FOLDER = "critical"
+MINIMAL = "minimal-"
+"""How the files of minimal scenarios are called, in the same folder."""
+
+NOT_EXPORTED = "not-exported.json"
+"""The file of a run's folder that names the scenarios whose export was refused; none without."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,21 @@ class Kept:
     files: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Refused:
+    """A scenario that could not be exported.
+
+    Attributes:
+        name: that its files would have.
+        evaluation: its row in the store.
+        problems: why not.
+    """
+
+    name: str
+    evaluation: int
+    problems: tuple[str, ...]
+
+
 def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
     """Return the rows of the most critical scenarios that differ from each other, best first.
 
@@ -58,22 +88,8 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
     """
     order = np.flatnonzero(critical)
     order = order[by_merit(F[order])]
-    kept: list[int] = []
-    for distance in DISTINCT:
-        near = np.zeros(len(order), dtype=bool)
-        for row in kept:
-            near |= _apart(U[order], U[row]) < distance
-        rest = order[~near]
-        while len(rest) and len(kept) < keep:
-            best = int(rest[0])
-            kept.append(best)
-            rest = rest[_apart(U[rest], U[best]) >= distance]
+    kept = distinct(U, order, keep)
     return order[np.isin(order, kept)]
-
-
-def _apart(U: Float, u: Float) -> Float:
-    distance: Float = np.sqrt(((U - u) ** 2).mean(axis=1))
-    return distance
 
 
 def hand_over(
@@ -81,43 +97,100 @@ def hand_over(
     rows: Rows,
     folder: Path,
     progress: Callable[[int], None] | None = None,
+    found: Triage | None = None,
 ) -> tuple[Kept, ...]:
     """Write each row's ``.owl``, ``.xodr``, ``.xosc`` and ``.json`` into ``folder/critical``.
 
-    The folder is replaced as a whole, once all of it is written.
+    The folder is replaced as a whole, once all of it is written. A scenario whose individuals break
+    a rule is left out, and named in ``NOT_EXPORTED``; see `not_exported`. Minimal scenarios of the
+    failure modes are written beside them, as ``minimal-01.*`` and so on.
 
     Args:
         pipeline: what evaluated the rows.
         rows: the scenarios, most critical first.
         folder: the run's.
-        progress: told after each, how many are written.
+        progress: told after each row, how many are written.
+        found: the run's triage, if there is one.
 
     Raises:
-        OntologyError: a scenario's individuals break a constraint.
         StorageError: the folder cannot be written.
     """
     target, fresh = folder / FOLDER, folder / f"{FOLDER}.part"
     names = [f"{rank:04d}" for rank in range(1, len(rows) + 1)]
-    kept = []
+    kept, refused = [], []
     try:
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir()
         for i, name in enumerate(names):
-            files = write_scenario(pipeline, rows.X[i], fresh, name, Cause(rows.cause[i]))
+            tested = found.neighbourhood(int(rows.id[i])) if found else None
+            if pipeline.cause is not None:  # the run asked for the quick one
+                tested = tested.model_copy(update={"cause": ""}) if tested else None
+            cause = _cause(Cause(rows.cause[i]), tested)
+            rollout = pipeline.rollout(rows.X[i][np.newaxis])
+            conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
+            try:
+                files = write_scenario(
+                    pipeline, rows.X[i], fresh, name, cause, rollout=rollout, found=conflict
+                )
+            except OntologyError as error:
+                refused.append(Refused(name, int(rows.id[i]), error.problems))
+                continue
             files.append(fresh / f"{name}.json")
-            files[-1].write_text(_facts(pipeline, rows, i, name), encoding="utf-8")
+            facts = (
+                _facts(pipeline, rows, i, name)
+                | _tested(name, Cause(rows.cause[i]), tested, found)
+                | {"conflict": None if conflict is None else conflict.to_dict()}
+            )
+            files[-1].write_text(_json(facts), encoding="utf-8")
             paths = tuple(f"{FOLDER}/{file.name}" for file in files)
             kept.append(Kept(name, int(rows.id[i]), paths))
             if progress:
                 progress(i + 1)
+        for mode in found.modes if found else ():
+            if mode.minimal is not None:
+                try:
+                    _write_minimal(pipeline, mode, mode.minimal, fresh)
+                except OntologyError as error:
+                    refused.append(Refused(mode.minimal.name, mode.worst, error.problems))
         shutil.rmtree(target, ignore_errors=True)
         fresh.rename(target)
+        _name_refused(refused, folder / NOT_EXPORTED)
     except OSError as error:
         raise StorageError(
             f"{target}: cannot be written: {error.strerror}; the evaluations are kept, "
             f"'bridgegen resume {folder}' writes the files"
         ) from None
     return tuple(kept)
+
+
+def _name_refused(refused: list[Refused], path: Path) -> None:
+    """Write which scenarios were refused, and why; no file where none was."""
+    if not refused:
+        path.unlink(missing_ok=True)
+        return
+    said = [asdict(one) for one in refused]
+    path.write_text(json.dumps(said, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def not_exported(folder: Path) -> tuple[Refused, ...]:
+    """Return the critical scenarios of a run that could not be exported, most critical first.
+
+    Args:
+        folder: the run's.
+
+    Raises:
+        StorageError: the file that names them is not what was written.
+    """
+    path = folder / NOT_EXPORTED
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        return tuple(Refused(o["name"], int(o["evaluation"]), tuple(o["problems"])) for o in said)
+    except FileNotFoundError:
+        return ()
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StorageError(
+            f"{path}: is not what was written: {error}; 'bridgegen resume {folder}' writes it again"
+        ) from None
 
 
 def handed_over(folder: Path) -> tuple[Kept, ...]:
@@ -130,7 +203,7 @@ def handed_over(folder: Path) -> tuple[Kept, ...]:
         StorageError: a scenario's ``.json`` is not what was written.
     """
     kept = []
-    for path in sorted((folder / FOLDER).glob("*.json")):
+    for path in sorted((folder / FOLDER).glob("[0-9]*.json")):
         try:
             evaluation = int(json.loads(path.read_text(encoding="utf-8"))["evaluation"])
         except (OSError, ValueError, KeyError, TypeError) as error:
@@ -145,12 +218,31 @@ def handed_over(folder: Path) -> tuple[Kept, ...]:
 
 
 def write_scenario(
-    pipeline: Pipeline, x: Float, folder: Path, name: str, cause: Cause = Cause.NONE
+    pipeline: Pipeline,
+    x: Float,
+    folder: Path,
+    name: str,
+    cause: Cause = Cause.NONE,
+    *,
+    rollout: Rollout | None = None,
+    noise: str | None = None,
+    found: ConflictSummary | None = None,
 ) -> list[Path]:
     """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
 
-    The ontology also holds what the scenario's rollout brought about (``has_outcome``) and the
-    cause of it, if it is known (``has_cause``); so does the header of the storyboard.
+    The ontology also holds the outcomes of the scenario's rollout (``has_outcome``), its cause, if
+    it is known (``has_cause``), and type, responsibility and severity of its decisive conflict; the
+    last four are in the header of the storyboard, too.
+
+    Args:
+        pipeline: what evaluated the row.
+        x: ``(len(space.names),)``.
+        folder: that is there.
+        name: of the files.
+        cause: of its harm, if it is known.
+        rollout: of the row alone; made here if it is not given.
+        noise: the key of its random numbers, which the storyboard then states.
+        found: its decisive conflict; from the rollout, if that is not given.
 
     Raises:
         OntologyError: its individuals break a constraint (SHACL).
@@ -158,56 +250,155 @@ def write_scenario(
     """
     owl, xodr, xosc = (folder / f"{name}.{kind}" for kind in ("owl", "xodr", "xosc"))
     concrete = pipeline.concrete(x, xodr.name)
-    rollout = pipeline.rollout(x[np.newaxis])
+    if rollout is None:
+        rollout = pipeline.rollout(x[np.newaxis])
+        found = summarise(analyse(rollout))
+    individuals = concrete.individuals
+    if individuals is not None:
+        individuals = with_outcomes(individuals, rollout, concrete.roads)
+        individuals = _with_findings(individuals, cause, found)
+        violations = check(individuals, pipeline.source.constraints)
+        if violations:
+            raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
     xodr.write_bytes(concrete.road_data)
-    xosc.write_bytes(scenario_xml(_caused(concrete.storyboard, cause)))
-    if concrete.individuals is None:
+    storyboard = _explained(concrete.storyboard, cause, found)
+    xosc.write_bytes(scenario_xml(keyed(storyboard, noise) if noise else storyboard))
+    if individuals is None:
         return [xodr, xosc]
-    individuals = with_outcomes(concrete.individuals, rollout, concrete.roads)
-    if cause:
-        individuals = _with_cause(individuals, cause)
-    violations = check(individuals, pipeline.source.constraints)
-    if violations:
-        raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
     save(individuals, owl)
     return [owl, xodr, xosc]
 
 
-def _caused(storyboard: osc.OpenScenario, cause: Cause) -> osc.OpenScenario:
-    """Return a scenario whose header says its cause, from version 1.2 on: earlier ones cannot."""
+def _explained(
+    storyboard: osc.OpenScenario, cause: Cause, found: ConflictSummary | None
+) -> osc.OpenScenario:
+    """Return a scenario whose header says cause and decisive conflict, as far as they are known.
+
+    From version 1.2 on: earlier headers have no properties.
+    """
     header = storyboard.file_header
-    if not cause or header.rev_minor in (0, 1):
+    stated = {CAUSE: cause.label} if cause else {}
+    if found is not None and found.happened:
+        stated |= {CONFLICT_TYPE: found.type, RESPONSIBLE: found.responsible}
+        stated[SEVERITY] = format_double(found.severity)
+    if not stated or header.rev_minor in (0, 1):
         return storyboard
     said = header.properties or osc.Properties()
-    others = tuple(one for one in said.properties if one.name != CAUSE)
-    properties = replace(said, properties=(*others, osc.Property(CAUSE, cause.label)))
+    others = tuple(one for one in said.properties if one.name not in stated)
+    added = tuple(osc.Property(name, value) for name, value in stated.items())
+    properties = replace(said, properties=(*others, *added))
     return replace(storyboard, file_header=replace(header, properties=properties))
 
 
-def _with_cause(individuals: Individuals, cause: Cause) -> Individuals:
+def keyed(scenario: osc.OpenScenario, key: str) -> osc.OpenScenario:
+    """Return a scenario that states the key of its driver's random numbers, unless it does."""
+
+    def stated(one: osc.ObjectController) -> osc.ObjectController:
+        said = one.controller.properties
+        if said is None or said.get(DRIVER) is None or said.get(NOISE_KEY) is not None:
+            return one
+        properties = replace(said, properties=(*said.properties, osc.Property(NOISE_KEY, key)))
+        return replace(one, controller=replace(one.controller, properties=properties))
+
+    objects = tuple(
+        replace(one, object_controllers=tuple(stated(each) for each in one.object_controllers))
+        for one in scenario.entities.scenario_objects
+    )
+    return replace(scenario, entities=replace(scenario.entities, scenario_objects=objects))
+
+
+def _with_findings(
+    individuals: Individuals, cause: Cause, found: ConflictSummary | None
+) -> Individuals:
     scenario = individuals.one("Scenario")
-    quad = ox.Quad(scenario, bg("has_cause"), ox.Literal(cause.label))
-    return Individuals([*individuals.quads, quad])
+    values: dict[str, str | float] = {"has_cause": cause.label} if cause else {}
+    if found is not None and found.happened:
+        values |= {"has_conflict_type": found.type, "has_responsibility": found.responsible}
+        values["has_severity"] = found.severity
+    stated = {bg(name) for name in values}  # a file may say what an earlier search found
+    before = [
+        one for one in individuals.quads if one.subject != scenario or one.predicate not in stated
+    ]
+    quads = [ox.Quad(scenario, bg(name), ox.Literal(value)) for name, value in values.items()]
+    return Individuals([*before, *quads])
 
 
-def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> str:
-    """Return one scenario's parameters and metrics as JSON; what is infinite or NaN is null."""
+def _cause(quick: Cause, tested: Neighbourhood | None) -> Cause:
+    """Return the cause that a scenario's files state: tested by neighbours, where it is."""
+    if tested is None or not tested.cause:
+        return quick
+    return Cause.NONE if tested.cause == "sensitive" else Cause.named(tested.cause)
+
+
+def _tested(
+    name: str, quick: Cause, tested: Neighbourhood | None, found: Triage | None
+) -> dict[str, object]:
+    """Return what the triage says of an exported scenario, as JSON's types."""
+    modes = [one.number for one in (found.modes if found else ()) if name in one.exports]
+    cause = tested.cause if tested is not None and tested.cause else quick.label
+    return {
+        "cause": cause or None,
+        "quick_cause": quick.label or None,
+        "mode": modes[0] if modes else None,
+        "robustness": tested.robustness if tested is not None else None,
+    }
+
+
+def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Path) -> None:
+    """Write a mode's minimal scenario; its metrics are those of its own rollout."""
+    X = np.array([minimal.x])
+    rollout = pipeline.rollout_again(X, np.array([minimal.noise_key], dtype=np.uint64))
+    conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
+    metrics = quantities.evaluate(rollout, pipeline.metrics)
+    critical = pipeline.objective.critical(metrics, pipeline.metrics)
+    noise = minimal.noise_key if pipeline.driver.stages else None  # others have no noise
+    write_scenario(
+        pipeline, X[0], folder, minimal.name, rollout=rollout, noise=noise, found=conflict
+    )
     units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
     facts = {
+        "name": minimal.name,
+        "scenario": pipeline.scenario.name,
+        "ego": pipeline.driver.label,
+        "mode": mode.number,
+        "title": mode.title,
+        "sentence": minimal.sentence,
+        "conditions": [one.model_dump() for one in minimal.conditions],
+        "critical": bool(critical[0]),
+        "noise_key": minimal.noise_key,
+        "robustness": minimal.robustness,
+        "conflict": None if conflict is None else conflict.to_dict(),
+        "parameters": _named(pipeline.facts(X[0]), units),
+        "metrics": _named(
+            dict(zip(pipeline.metrics, metrics[0].tolist(), strict=True)),
+            {name: QUANTITIES[name].unit for name in pipeline.metrics},
+        ),
+        "F": pipeline.objective.F(metrics, pipeline.metrics)[0][0].tolist(),
+    }
+    (folder / f"{minimal.name}.json").write_text(_json(facts), encoding="utf-8")
+
+
+def _json(facts: Mapping[str, object]) -> str:
+    return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, object]:
+    """Return one scenario's parameters and metrics; what is infinite or NaN is None."""
+    units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
+    return {
         "name": name,
         "evaluation": int(rows.id[i]),
         "scenario": pipeline.scenario.name,
         "ego": pipeline.driver.label,
         "critical": bool(rows.critical[i]),
-        "cause": Cause(rows.cause[i]).label or None,
+        "implausible": rows.findings.implausible[i] or None,
         "parameters": _named(pipeline.facts(rows.X[i]), units),
         "metrics": _named(
             dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),
-            {name: METRICS[name].unit for name in pipeline.metrics},
+            {name: QUANTITIES[name].unit for name in pipeline.metrics},
         ),
         "F": rows.F[i].tolist(),
     }
-    return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _named(

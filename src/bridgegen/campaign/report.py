@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bridgegen.campaign.handover import Kept
+from bridgegen.campaign.handover import FOLDER, MINIMAL, Kept
 from bridgegen.campaign.run import REPORT
 from bridgegen.campaign.settings import Settings
 from bridgegen.confirmation.record import read_records
@@ -15,6 +15,9 @@ from bridgegen.report.data import ReportData
 from bridgegen.report.page import write_report
 from bridgegen.store import Rows, Store
 from bridgegen.store.summary import summarise
+from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
+from bridgegen.triage.record import Triage
+from bridgegen.triage.record import read_record as read_triage
 
 
 def write_run_report(
@@ -34,7 +37,8 @@ def write_run_report(
         FileFormatError: the regions' file, or a confirmation's, is not one, or another run's.
     """
     path = store.folder / REPORT
-    files = {name: (store.folder / name).read_bytes() for one in kept for name in one.files}
+    names = [*(name for one in kept for name in one.files), *minimal_files(store.folder)]
+    files = {name: (store.folder / name).read_bytes() for name in names}
     data = run_data(pipeline, store, settings, rows, kept, files=files, more=True)
     write_report(path, data)
     return path
@@ -64,9 +68,10 @@ def run_data(
         more: whether the page holds the motion of more than ``kept``.
 
     Raises:
-        FileFormatError: the regions' file, or a confirmation's, is not one, or another run's.
+        FileFormatError: the file of the triage, the regions or a confirmation is not one, or is
+            another run's.
     """
-    metric = store.metrics.index
+    metric, results = store.metrics.index, rows.digest()
     summary = summarise(
         rows.critical, rows.status == 0,
         rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
@@ -80,15 +85,31 @@ def run_data(
         version=store.version, notes=store.notes, view=view_command(store.folder),
         regions=read_record(store.folder / JSON_FILE),
         confirmations=read_records(store.folder, rows.X, rows.metrics), coverage=coverage,
-        hashes=_hashes(settings, rows), files=files, more=more,
+        hashes=_hashes(settings, results), triage=_triage(store.folder, results),
+        minimal_files=minimal_files(store.folder),
+        files=files, more=more,
     )  # fmt: skip
 
 
-def _hashes(settings: Settings, rows: Rows) -> dict[str, str]:
+def minimal_files(folder: Path) -> tuple[str, ...]:
+    """Return the files of a run's minimal scenarios, relative to its folder."""
+    found = {one.name for one in (folder / FOLDER).glob(f"{MINIMAL}*.*")}
+    stems = sorted({name.partition(".")[0] for name in found})
+    names = [f"{stem}.{kind}" for stem in stems for kind in ("owl", "xodr", "xosc", "json")]
+    return tuple(f"{FOLDER}/{name}" for name in names if name in found)
+
+
+def _triage(folder: Path, results: str) -> Triage | None:
+    """Return the triage of these results; None where the run has grown since it was made."""
+    found = read_triage(folder / TRIAGE_FILE)
+    return found if found is not None and found.results == results else None
+
+
+def _hashes(settings: Settings, results: str) -> dict[str, str]:
     found = {"Scenario, SHA-256": settings.fingerprint}
     if settings.map_digest is not None:
         found["Map, SHA-256"] = settings.map_digest
-    return {**found, "Results, SHA-256": f"{rows.digest()} (the command above gives the same)"}
+    return {**found, "Results, SHA-256": f"{results} (the command above gives the same)"}
 
 
 def view_command(folder: Path) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from bridgegen.campaign.scenarios import load
+from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
 from bridgegen.ego import STORYBOARD, is_spec
@@ -108,7 +108,7 @@ def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | N
         StorageError: the scenario or the map is not what it was.
         InputError: the scenario or the map is missing.
     """
-    logical = load(settings.scenario, settings.distribution)
+    logical = driven_by(load(settings.scenario, settings.distribution), settings.others)
     if logical.fingerprint != settings.fingerprint:
         what = " or its distribution" if settings.distribution else ""
         raise StorageError(

@@ -2,15 +2,17 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bridgegen.campaign.handover import FOLDER
+from bridgegen.campaign.handover import FOLDER, MINIMAL, Refused, not_exported
 from bridgegen.campaign.settings import Settings
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Store
 from bridgegen.store.rows import Rows
 from bridgegen.store.summary import summarise
+from bridgegen.triage.record import JSON_FILE, Mode, Triage, read_record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,7 +63,35 @@ class Run:
     @property
     def scenarios(self) -> tuple[Path, ...]:
         """The handed-over OpenSCENARIO files, the most critical first."""
-        return tuple(sorted((self.folder / FOLDER).glob("*.xosc")))
+        return tuple(sorted((self.folder / FOLDER).glob("[0-9]*.xosc")))
+
+    @property
+    def minimal_scenarios(self) -> tuple[Path, ...]:
+        """The OpenSCENARIO files of minimal scenarios, in the order of the failure modes."""
+        return tuple(sorted((self.folder / FOLDER).glob(f"{MINIMAL}*.xosc")))
+
+    @cached_property
+    def triage(self) -> Triage | None:
+        """What is known of its failures and of the space; None before the run has finished.
+
+        Raises:
+            FileFormatError: its record is damaged, or another run's.
+        """
+        path = self.folder / JSON_FILE
+        if not path.is_file():
+            return None
+        with Store.open(self.folder) as store:
+            return read_record(path, store.read().digest())
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The ways in which the driver comes to harm, robust ones first; see ``triage``."""
+        return self.triage.modes if self.triage is not None else ()
+
+    @property
+    def not_exported(self) -> tuple[Refused, ...]:
+        """The critical scenarios whose export was refused, and why, the most critical first."""
+        return not_exported(self.folder)
 
     @property
     def report(self) -> Path:

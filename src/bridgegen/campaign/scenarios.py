@@ -5,9 +5,12 @@ from typing import NoReturn
 
 from bridgegen.errors import InputError
 from bridgegen.odd import reader
-from bridgegen.odd.scenario import SearchedScenario
+from bridgegen.odd.others import ATTENTIVE, require, with_others
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.file_scenario import FileScenario, load_file_scenario
+from bridgegen.openx.file_scenario import with_others as drive_file_by
 from bridgegen.openx.openscenario.parameters import values
+from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 STORYBOARD = ".xosc"
@@ -36,6 +39,29 @@ def load(scenario: str | Path, distribution: str | Path | None = None) -> Search
             f"{scenario}"
         )
     return reader.load(scenario)
+
+
+def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenario:
+    """Return a scenario with another driver of all participants but the ego.
+
+    Args:
+        scenario: of any kind.
+        others: "attentive" or "scripted"; None leaves it to the scenario.
+
+    Raises:
+        UnknownNameError: no such driver.
+        UnsupportedError: a scenario file that cannot be run.
+    """
+    if others is None:
+        return scenario
+    require(others)
+    if isinstance(scenario, LogicalScenario):
+        return with_others(scenario, others)
+    if isinstance(scenario, FileScenario):
+        program = compile_storyboard(scenario.storyboard, scenario.place, others=others)
+        attentive = (program.names[e] for e in program.attends.tolist())
+        return drive_file_by(scenario, dict.fromkeys(attentive, ATTENTIVE))
+    return scenario
 
 
 def refuse_standstill(scenario: SearchedScenario) -> NoReturn:

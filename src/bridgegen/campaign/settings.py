@@ -17,6 +17,7 @@ SINCE: Mapping[str, Any] = {
     "causes": False,
     "cause": None,
     "adversary": None,
+    "others": "scripted",
     "simulator": "embedded",
     "simulator_settings": {},
 }
@@ -47,11 +48,13 @@ class Settings:
         causes: whether the causes of critical scenarios are sought.
         cause: the only one that counts, or None.
         adversary: the participant that an adversary drives, or None.
+        others: who drives the other participants, where it is not what the scenario says.
         simulator: which one runs the scenarios.
         simulator_settings: what was chosen of how it does.
         objective: the objective with its weights, as ``Objective.to_dict`` gives it.
         chosen: what the user chose of the objective instead of the scenario's: metrics with
-            weights, way of weighting, scale, one or many; None each where nothing; and the metrics
+            weights, way of weighting, scale, one or many, whose conflicts count; None each where
+            nothing; and the metrics
             to be recorded besides.
     """
 
@@ -74,6 +77,7 @@ class Settings:
     causes: bool
     cause: str | None
     adversary: str | None
+    others: str | None
     simulator: str
     simulator_settings: Mapping[str, Any]
     objective: Mapping[str, Any]
@@ -115,6 +119,8 @@ class Settings:
             words += ["--cause", self.cause]
         if self.adversary:
             words += ["--adversary", self.adversary]
+        if self.others:
+            words += ["--others", self.others]
         if self.simulator != EMBEDDED.name:
             words += ["--simulator", self.simulator]
         for name, value in self.simulator_settings.items():
@@ -128,7 +134,7 @@ class Settings:
         if self.chosen["objective"]:
             terms = self.chosen["objective"].items()
             words += ["--objective", ",".join(m if w is None else f"{m}={w!r}" for m, w in terms)]
-        for option in ("weights", "scale", "objectives"):
+        for option in ("weights", "scale", "objectives", "count"):
             if self.chosen.get(option):  # runs of the first versions do not have them all
                 words += [f"--{option}", self.chosen[option]]
         if also := self.chosen.get("metrics"):  # not in runs of the first versions

@@ -17,6 +17,7 @@ import numpy as np
 from bridgegen.arrays import Float, Int
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
+from bridgegen.conflict.findings import COLUMNS
 from bridgegen.errors import InputError, StorageError
 from bridgegen.store import Rows, Store
 
@@ -113,7 +114,7 @@ def _schema(store: Store, said: dict[str, Any], settings: Settings, sample: floa
     fields += [("id", pa.int64()), ("batch", pa.int64()), ("seconds", pa.float64())]
     fields += [(name, pa.float64()) for name in (*columns.X, *columns.metrics, *columns.F)]
     fields += [("status", pa.int16()), ("critical", pa.bool_())]
-    fields += [("cause", text), (WEIGHT, pa.float64())]
+    fields += [*((name, text) for name in ("cause", *COLUMNS)), (WEIGHT, pa.float64())]
     made = {"settings": settings.to_dict(), "version": store.version, "sample": sample}
     own = {*RUN, WEIGHT} & {*columns.X, *columns.metrics}
     if own:
@@ -148,4 +149,6 @@ def _columns(store: Store, said: dict[str, Any], rows: Rows, weight: Float) -> d
     found |= {"status": rows.status.astype(np.int16), "critical": rows.critical}
     labels = {int(one): Cause(one).label or None for one in np.unique(rows.cause)}
     found["cause"] = [labels[one] for one in rows.cause.tolist()]
+    found |= {name: [text or None for text in texts.tolist()]
+              for name, texts in rows.findings.columns().items()}  # fmt: skip
     return found | {WEIGHT: weight}

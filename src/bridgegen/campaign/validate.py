@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from bridgegen.campaign.beforehand import CHECKED_BY_VALIDATE, refuse_beforehand
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.ontology import reasoner
@@ -24,8 +25,8 @@ def validate_file(path: Path, *, reason: bool = False) -> list[str]:
 
     An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
-    ``.yaml`` is read, and built at its defaults up to the ways that its participants take; its
-    effects are run.
+    ``.yaml`` is read; it is built, checked and simulated at its defaults and at the corners of its
+    ranges, with its effects.
 
     Args:
         path: the file.
@@ -89,5 +90,6 @@ def _storyboard(path: Path) -> list[str]:
 
 def _logical(path: Path) -> list[str]:
     scenario = load_scenario(path)
-    Pipeline(scenario, scenario.space())  # builds, converts and compiles it at the defaults
+    pipeline = Pipeline(scenario, scenario.space())  # builds and compiles it at the defaults
+    refuse_beforehand(pipeline, CHECKED_BY_VALIDATE)
     return []

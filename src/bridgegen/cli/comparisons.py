@@ -47,10 +47,12 @@ def compare(
     weights: options.Weights = None,
     scale: options.Scale = None,
     objectives: options.Objectives = None,
+    count: options.Count = None,
     metrics: options.Metrics = None,
     causes: options.Causes = False,
     cause: options.Cause = None,
     adversary: options.Adversary = None,
+    others: options.Others = None,
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     out: Annotated[
@@ -88,10 +90,12 @@ def compare(
             weights=weights,
             scale=scale,
             objectives=objectives,
+            count=count,
             metrics=options.read_names(metrics),
             causes=causes,
             cause=cause,
             adversary=adversary,
+            others=others,
             watch=screen.watch,
         )
     print_comparison(result, screen.seconds)

@@ -41,8 +41,13 @@ def export(
     """Write handed-over scenarios as other tools want them, each with its map."""
     from bridgegen.campaign.export import export as export_scenarios
 
-    for path in export_scenarios(source, flavour, scenarios=scenario or (), out=out, town=town):
+    notes: list[str] = []
+    for path in export_scenarios(
+        source, flavour, scenarios=scenario or (), out=out, town=town, notes=notes
+    ):
         print(path)
+    for note in notes:
+        print(f"bridgegen: warning: {note}", file=sys.stderr)
 
 
 @app.command()
@@ -209,8 +214,8 @@ def metrics(
     only: options.OnlyMetrics = None,
     as_json: options.Json = False,
 ) -> None:
-    """Print the metrics of a recording that another simulator, or the road, made."""
-    from bridgegen.metrics.measure import measure_recording
+    """Print conflict and metrics of a recording that another simulator, or the road, made."""
+    from bridgegen.conflict.recorded import measure_recording
     from bridgegen.screen.files import print_measured
 
     measured = measure_recording(

@@ -34,12 +34,13 @@ def list_algorithms(as_json: options.Json = False) -> None:
 
 @listing.command("drivers")
 def list_drivers(as_json: options.Json = False) -> None:
-    """The drivers that an ego can have."""
-    from bridgegen.ego import DRIVERS, GUESTS
+    """The drivers that an ego can have, and those of other participants."""
+    from bridgegen.ego import DRIVERS, GUESTS, OTHERS
     from bridgegen.ego.drivers import join
     from bridgegen.screen.tables import print_table
 
     rows = [(one.name, one.description, join(one.stages)) for one in (DRIVERS | GUESTS).values()]
+    rows += [(name, f"Of other participants: {what}", "") for name, what in OTHERS.items()]
     print_table(("driver", "description", "can be ideal"), rows, as_json=as_json)
 
 
@@ -62,15 +63,16 @@ def list_simulators(as_json: options.Json = False) -> None:
 @listing.command("metrics")
 def list_metrics(as_json: options.Json = False) -> None:
     """The criticality metrics."""
-    from bridgegen.metrics import METRICS, TABLE_I
+    from bridgegen.conflict.quantities import MEASURED, QUANTITIES
+    from bridgegen.metrics import TABLE_I
     from bridgegen.screen.tables import print_table
 
     rows = [
         (
-            m.name, m.unit, m.sense, m.description, m.needs,
-            "always" if m.name in TABLE_I else "if asked for",
+            m.name, m.unit, m.sense, m.description, getattr(m, "needs", None),
+            "always" if m.name in (*TABLE_I, *MEASURED) else "if asked for",
         )
-        for m in METRICS.values()
+        for m in QUANTITIES.values()
     ]  # fmt: skip
     head = ("metric", "unit", "more critical if", "description", "needs", "recorded")
     print_table(head, rows, as_json=as_json)

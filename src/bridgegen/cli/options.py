@@ -53,7 +53,9 @@ Fix = Annotated[
 Objective = Annotated[
     str | None,
     typer.Option(
-        help="Metrics and weights, e.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy."
+        help="harm, paper, or metrics and weights, e.g. d_min=0.8,v_d=0.2, or d_min,ttc with "
+        "--weights entropy.",
+        show_default="the scenario's",
     ),
 ]
 Weights = Annotated[str | None, typer.Option(help="fixed, or entropy (from a random sample).")]
@@ -63,6 +65,14 @@ Objectives = Annotated[
     typer.Option(
         help="one: the metrics' weighted sum; many: each metric by itself.",
         show_default="what the algorithm is made for",
+    ),
+]
+Count = Annotated[
+    str | None,
+    typer.Option(
+        help="Whose conflicts are harm: ego, those that the ego is responsible for or could have "
+        "prevented; or any.",
+        show_default="ego",
     ),
 ]
 Metrics = Annotated[
@@ -88,6 +98,13 @@ Adversary = Annotated[
     typer.Option(
         help="A vehicle that an adversary drives instead of the scenario's events.",
         show_default="none; with ppo-adversary the first",
+    ),
+]
+Others = Annotated[
+    str | None,
+    typer.Option(
+        help="Who drives all other participants: attentive, or scripted (nobody heeds anybody).",
+        show_default="what the scenario says",
     ),
 ]
 Simulator = Annotated[

@@ -51,10 +51,12 @@ def search(
     weights: options.Weights = None,
     scale: options.Scale = None,
     objectives: options.Objectives = None,
+    count: options.Count = None,
     metrics: options.Metrics = None,
     causes: options.Causes = True,
     cause: options.Cause = None,
     adversary: options.Adversary = None,
+    others: options.Others = None,
     simulator: options.Simulator = None,
     simulator_set: options.SimulatorSettings = None,
     where: Where = NOWHERE,
@@ -93,10 +95,12 @@ def search(
             weights=weights,
             scale=scale,
             objectives=objectives,
+            count=count,
             metrics=options.read_names(metrics),
             causes=causes,
             cause=cause,
             adversary=adversary,
+            others=others,
             simulator=options.read_simulator(simulator, simulator_set, where),
             workers=workers,
             watch=screen.watch,
@@ -245,6 +249,7 @@ def simulate(
         str | None, typer.Option(help="Who drives; what the file says by default.")
     ] = None,
     ideal: options.Ideal = None,
+    others: options.Others = None,
     time_limit: options.TimeLimit = None,
     dt: Annotated[
         float | None,
@@ -265,8 +270,8 @@ def simulate(
     junit: options.Junit = None,
     as_json: options.Json = False,
 ) -> None:
-    """Run one scenario file and print its metrics."""
-    from bridgegen.screen.files import print_file_result
+    """Run one scenario file and print its conflict and its metrics."""
+    from bridgegen.screen.files import conflict_facts, print_file_result
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.choice import EMBEDDED
     from bridgegen.simulation.trace import write_trace
@@ -279,6 +284,7 @@ def simulate(
         file,
         ego=ego,
         ideal=stages,
+        others=others,
         time_limit=time_limit,
         metrics=options.read_names(metrics),
         also=gate.metrics,
@@ -298,6 +304,7 @@ def simulate(
         }
         values = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
         facts |= {"cause": result.cause, "parameters": result.parameters, "metrics": values}
+        facts |= conflict_facts(result.conflicts)
         if result.incidents:
             step = result.rollout.time_step
             facts["incidents"] = [

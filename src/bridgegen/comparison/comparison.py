@@ -59,10 +59,12 @@ def compare(
     weights: str | None = None,
     scale: str | None = None,
     objectives: str | None = None,
+    count: str | None = None,
     metrics: Sequence[str] = (),
     causes: bool = False,
     cause: str | None = None,
     adversary: str | None = None,
+    others: str | None = None,
     deliver: bool = True,
     watch: Watch | None = None,
 ) -> Comparison:
@@ -98,10 +100,12 @@ def compare(
         weights: "fixed" or "entropy".
         scale: "raw" or "standardised".
         objectives: "one" or "many" with every algorithm; what each is made for, by default.
+        count: whose conflicts count as harm, as for ``run_search``.
         metrics: to record besides.
         causes: whether to find the cause of each critical scenario; takes longer.
         cause: the only one that counts.
         adversary: the participant that an adversary drives, with every algorithm.
+        others: who drives the other participants.
         deliver: whether to write tables, figures and page; the same call with True does it later.
         watch: told how it is getting on.
 
@@ -137,10 +141,12 @@ def compare(
             "weights": weights,
             "scale": scale,
             "objectives": objectives,
+            "count": count,
             "metrics": tuple(metrics),
             "causes": causes or cause is not None,
             "cause": cause,
             "adversary": adversary,
+            **({} if others is None else {"others": others}),
         },
     )
     begin(plan)

@@ -63,6 +63,10 @@ def measures(budget: int) -> tuple[Measure, ...]:
             for n in counts(budget)
         ),
         Measure("distinct", "distinct", "different critical scenarios", True),
+        Measure(
+            "modes", "modes", "different conflicts of the critical scenarios: type, responsible, "
+            "rule, partner", True,
+        ),
         Measure("critical_bins", "bins", "bins of parameters that hold a critical scenario", True),
         Measure(
             "critical_pairs", "pairs", "pairs of two parameters' bins that hold a critical "
@@ -146,6 +150,7 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
             "r_critic": one.critical / one.evaluations if one.evaluations else float("nan"),
             "t_critic": relative[cell],
             **{f"to_{n}": count for n, count in one.reached.items()},
+            "modes": float(one.modes),
             **dict.fromkeys(("distinct", "critical_bins", "critical_pairs"), float("nan")),
             **(_in_parameters(one) if cell.algorithm not in strange else {}),
             "hypervolume": float(curves[cell][-1]),

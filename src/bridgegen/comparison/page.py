@@ -16,9 +16,9 @@ from bridgegen.comparison.plan import RUNS, Cell
 from bridgegen.comparison.record import points
 from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.table import Line
+from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
-from bridgegen.metrics import METRICS
 
 FIGURES = "figures"
 
@@ -233,7 +233,7 @@ def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
     k = waited_for(plan.budget)
     boxes = "; ".join(
         f"{name}: " + ", ".join(
-            f"{term} {abs(worst):.4g} to {abs(best):.4g} {METRICS[term].unit}".removesuffix(" 1")
+            f"{term} {abs(worst):.4g} to {abs(best):.4g} {QUANTITIES[term].unit}".removesuffix(" 1")
             for term, worst, best in zip(
                 next(r for c, r in comparison.records.items() if c.scenario == name).terms,
                 one.scale.worst, one.scale.best, strict=True,
@@ -250,6 +250,9 @@ def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
         f"{100 * plan.apart:g} % of their ranges or more, in root mean square; they are counted in "
         "the order in which the run found them, each against those counted before it, up to "
         "10,000.",
+        "Modes are the different conflicts of a run’s critical scenarios: type, who is "
+        "responsible, by which rule, and the other participant. A critical scenario without a near "
+        "miss or a contact, which the paper’s thresholds allow, has none.",
         "Bins are five a parameter, and pairs of bins those of two parameters, as "
         "“bridgegen coverage” counts them.",
         "Hypervolume, distance and spread are those of the metrics that the objective is made "

@@ -11,6 +11,7 @@ from bridgegen.campaign.restored import searched
 from bridgegen.campaign.settings import Settings
 from bridgegen.comparison.distinct import distinct, normalised
 from bridgegen.comparison.fronts import front
+from bridgegen.conflict.findings import Findings
 from bridgegen.objective import Objective, positivised
 from bridgegen.odd.coverage import coverage
 from bridgegen.odd.space import SearchSpace
@@ -37,6 +38,8 @@ class Record:
         seconds: [s] that it took.
         seconds_reached: [s] by k, likewise.
         distinct: how many different critical scenarios it found.
+        modes: how many different conflicts its critical scenarios have: type, responsible, rule,
+            partner.
         critical_bins: bins of parameters that hold a critical scenario.
         critical_pairs: pairs of bins of two parameters that do.
         found: ``(c,)`` int64, critical scenarios by the c points of its curve.
@@ -57,12 +60,17 @@ class Record:
     seconds: float
     seconds_reached: Mapping[int, float]
     distinct: int
+    modes: int
     critical_bins: int
     critical_pairs: int
     found: Int
     fronts: tuple[Float, ...]
     low: Float | None
     high: Float | None
+
+
+MODE = ("conflict_type", "responsible", "rule", "partner")
+"""What makes two critical scenarios different in their conflict."""
 
 
 def points(budget: int) -> Int:
@@ -119,6 +127,7 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
         seconds=seconds,
         seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
         distinct=int(distinct(normalised(space, critical), apart).sum()),
+        modes=len(reader.modes),
         critical_bins=bins[0].critical,
         critical_pairs=bins[1].critical if len(bins) > 1 else 0,
         found=np.array(reader.found, np.int64),
@@ -126,6 +135,16 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
         low=reader.low,
         high=reader.high,
     )
+
+
+def modes_of(findings: Findings) -> set[tuple[str, ...]]:
+    """Return the different conflicts of some rows: type, responsible, rule and partner.
+
+    Rows without a near miss or a contact have none.
+    """
+    columns = findings.columns()
+    keys = zip(*(columns[name].tolist() for name in MODE), strict=True)
+    return {key for key in keys if key[0]}
 
 
 class _Reader:
@@ -136,6 +155,7 @@ class _Reader:
         self.count = self.failed = 0
         self.hits: list[tuple[int, float]] = []
         self.critical: list[Float] = []
+        self.modes: set[tuple[str, ...]] = set()
         self._front = np.empty((0, len(terms)))
         self.low: Float | None = None
         self.high: Float | None = None
@@ -162,6 +182,7 @@ class _Reader:
         before = len(self.hits)
         self.hits += zip(numbers, rows.seconds[at].tolist(), strict=True)
         self.critical.append(rows.X[at])
+        self.modes |= modes_of(rows.findings.take(at))
         if ok.any():
             low, high = x[ok].min(axis=0), x[ok].max(axis=0)
             self.low = low if self.low is None else np.minimum(self.low, low)

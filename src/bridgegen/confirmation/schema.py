@@ -19,13 +19,14 @@ from bridgegen.confirmation.differences import (
     Parting,
     Track,
 )
-from bridgegen.objective import Thresholds
+from bridgegen.conflict.harm import Count
+from bridgegen.objective import Rule, Thresholds
 
 SCALE = {"x": 100, "y": 100, "h": 1000}
 """Units to 1 m or rad of what a track has as whole numbers."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=0, le=10**8)]
+Whole = Annotated[int, Field(ge=0, le=10**8)]
 Units = Annotated[int, Field(ge=-(10**9), le=10**9)]
 
 
@@ -37,13 +38,19 @@ class Outcome(_Model):
     """What a scenario came to in one simulator.
 
     Attributes:
-        critical: by the run's own thresholds, whatever its cause.
+        critical: by the run's own rule, whatever its cause.
         d_min: [m]; None is infinite, nobody else is there.
         v_d: [m/s].
         n_collision: [count].
         F: objectives, minimised.
         contact: the ego's first one, if there is one.
-        ends: when [s]; None where nobody compared.
+        ends: when [s]; None where the rollouts were not compared.
+        harm: in [0, 1], of the conflicts that the run counts; None in records of earlier versions.
+        severity: probability of a MAIS3+ injury; likewise.
+        conflict: "contact", "near miss", "collision course", or "" where there is none.
+        conflict_type: label of its type.
+        responsible: who is responsible for it.
+        partner: the other participant.
     """
 
     critical: bool
@@ -53,6 +60,12 @@ class Outcome(_Model):
     F: tuple[Number | None, ...]
     contact: Contact | None = None
     ends: Number | None = None
+    harm: Number | None = None
+    severity: Number | None = None
+    conflict: str = ""
+    conflict_type: str = ""
+    responsible: str = ""
+    partner: str = ""
 
 
 class Change(_Model):
@@ -63,12 +76,14 @@ class Change(_Model):
         v_d: [m/s].
         F: objectives.
         contact: of the time of the first contact [s]; None unless both have one.
+        harm: None in records of earlier versions.
     """
 
     d_min: Number | None
     v_d: Number | None
     F: tuple[Number | None, ...]
     contact: Number | None
+    harm: Number | None = None
 
     @classmethod
     def between(cls, here: Outcome, there: Outcome) -> "Change":
@@ -79,6 +94,7 @@ class Change(_Model):
             v_d=_minus(there.v_d, here.v_d),
             F=tuple(_minus(q, p) for p, q in zip(here.F, there.F, strict=True)),
             contact=b.time - a.time if a and b else None,
+            harm=_minus(there.harm, here.harm),
         )
 
 
@@ -145,9 +161,11 @@ class Scenario(_Model):
         differences: of the rollouts.
         tracks: where those were there who were off; of the first scenarios only.
         explanation: the same in words.
+        robustness: share of its neighbours that are harmful here, as the run's triage has it; None
+            where they were not tested.
     """
 
-    evaluation: Count
+    evaluation: Whole
     name: str | None
     row: str
     here: Outcome
@@ -157,6 +175,12 @@ class Scenario(_Model):
     differences: Differences | None = None
     tracks: tuple[Course, ...] = ()
     explanation: str = ""
+    robustness: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of its neighbours are harmful: a miss is no surprise."""
+        return self.robustness is not None and self.robustness < 0.5
 
     @model_validator(mode="after")
     def _whole(self) -> "Scenario":
@@ -181,7 +205,9 @@ class Record(_Model):
         run: the run's folder.
         scenario: the logical scenario.
         ego: who drives.
-        thresholds: when a scenario is critical.
+        thresholds: when a scenario is critical by the rule "thresholds".
+        rule: what makes a scenario critical, "harm" or "thresholds".
+        count: whose conflicts are harm, "ego" or "any".
         objectives: the names of F's columns.
         parted_at: see `differences.PARTED`.
         trace: see `differences.TRACE`.
@@ -197,6 +223,8 @@ class Record(_Model):
     scenario: str
     ego: str
     thresholds: Thresholds
+    rule: Rule = "thresholds"
+    count: Count = "ego"
     objectives: tuple[str, ...]
     parted_at: Number = PARTED
     trace: Number = TRACE

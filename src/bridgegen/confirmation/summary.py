@@ -39,6 +39,10 @@ class Summary:
         confirmed: that are critical there, too.
         not_run: that failed there; they say nothing.
         contacts: those with a contact in both, here alone, there alone.
+        robust: of those that ran and whose neighbours were tested, how many are robust, and how
+            many of these are confirmed.
+        knife_edge: likewise of the others, harmful in fewer than half of their neighbours.
+        harm: differences of harm, of those that ran; of none in records of earlier versions.
         d_min: differences of d_min [m], of those that ran.
         v_d: of v_d [m/s].
         F: of the objective, where there is one.
@@ -50,6 +54,9 @@ class Summary:
     confirmed: int
     not_run: int
     contacts: tuple[int, int, int]
+    robust: tuple[int, int]
+    knife_edge: tuple[int, int]
+    harm: Spread
     d_min: Spread
     v_d: Spread
     F: Spread
@@ -97,6 +104,9 @@ def summarise(scenarios: Iterable[Scenario]) -> Summary:
             touches.count((True, False)),
             touches.count((False, True)),
         ),
+        robust=_of_tested(every, knife_edge=False),
+        knife_edge=_of_tested(every, knife_edge=True),
+        harm=Spread.of(one.harm for one in change),
         d_min=Spread.of(one.d_min for one in change),
         v_d=Spread.of(one.v_d for one in change),
         F=Spread.of(one.F[0] for one in change if len(one.F) == 1),
@@ -105,13 +115,23 @@ def summarise(scenarios: Iterable[Scenario]) -> Summary:
     )
 
 
+def _of_tested(every: Iterable[Scenario], *, knife_edge: bool) -> tuple[int, int]:
+    """Return how many robust, or knife-edge, scenarios ran, and how many are confirmed."""
+    ran = [
+        one.confirmed
+        for one in every
+        if one.there and one.robustness is not None and one.knife_edge == knife_edge
+    ]
+    return len(ran), sum(map(bool, ran))
+
+
 def to_json(summary: Summary) -> dict[str, Any]:
     """Return a summary as JSON's types."""
     low, high = summary.interval
     both, here, there = summary.contacts
     spreads = {
         name: {"n": one.n, "median": one.median, "max": one.max}
-        for name in ("d_min", "v_d", "F", "contact", "parted")
+        for name in ("harm", "d_min", "v_d", "F", "contact", "parted")
         for one in [getattr(summary, name)]
     }
     return {
@@ -122,6 +142,8 @@ def to_json(summary: Summary) -> dict[str, Any]:
         "not_run": summary.not_run,
         "share": summary.share,
         "interval": [low, high],
+        "robust": {"ran": summary.robust[0], "confirmed": summary.robust[1]},
+        "knife_edge": {"ran": summary.knife_edge[0], "confirmed": summary.knife_edge[1]},
         "contacts": {"both": both, "here_alone": here, "there_alone": there},
         "differences": spreads,
     }

@@ -27,19 +27,39 @@ def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
         return [f"None of {s.scenarios} scenarios ran in {label}."]
     low, high = (f"{100.0 * end:.0f}" for end in s.interval)
     line = f"{s.confirmed} of {s.ran} confirmed in {label} (95 %: {low}–{high} %)"
-    lost = [name_of(one) for one in scenarios if one.confirmed is False]
+    lost = [
+        name_of(one) + (" (knife-edge)" if one.knife_edge else "")
+        for one in scenarios
+        if one.confirmed is False
+    ]
     if lost:
         more = ", …" if len(lost) > NAMED else ""
         line += f"; {len(lost)} not: {', '.join(lost[:NAMED])}{more}"
     if s.not_run:
         line += f"; {s.not_run} not run, which says nothing of them"
-    return [f"{line}.", *_differences(s)]
+    return [f"{line}.", *_robust(s), *_differences(s)]
+
+
+def _robust(s: Summary) -> list[str]:
+    """Return how many robust and how many knife-edge scenarios are confirmed."""
+    told = [
+        f"{confirmed} of {ran} {kind}"
+        for (ran, confirmed), kind in ((s.robust, "robust"), (s.knife_edge, "knife-edge"))
+        if ran
+    ]
+    if not told:
+        return []
+    return [
+        f"Confirmed: {', '.join(told)}. Knife-edge is what is harmful in fewer than half of its "
+        "neighbours."
+    ]
 
 
 def _differences(s: Summary) -> list[str]:
     told = filter(
         None,
         [
+            _spread("harm", s.harm, ""),
             _spread("d_min", s.d_min, "m"),
             _spread("v_d", s.v_d, "m/s"),
             _spread("first contact", s.contact, "s"),
@@ -62,4 +82,4 @@ def _differences(s: Summary) -> list[str]:
 def _spread(name: str, one: Spread, unit: str) -> str:
     if one.median is None or one.max is None:
         return ""
-    return f"{name} {one.median:.3f} ({one.max:.3f}) {unit}"
+    return f"{name} {one.median:.3f} ({one.max:.3f}) {unit}".rstrip()

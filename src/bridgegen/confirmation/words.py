@@ -10,11 +10,15 @@ from bridgegen.confirmation.differences import (
     Parting,
 )
 from bridgegen.confirmation.schema import Differences, Outcome
-from bridgegen.objective import Thresholds
+from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.objective import Rule, Thresholds
 
 NARROW = (0.25, 0.25)
 """A scenario that misses a threshold by no more than this, on d_min [m] or v_d [m/s], misses it
 narrowly."""
+
+NARROW_HARM = 0.02
+"""Likewise on harm."""
 
 TURNED = math.radians(10.0)
 """Who moves in a direction that differs by more takes another way."""
@@ -25,17 +29,49 @@ MOST_OFF = 3
 LIGHTS = ("off", "red", "red and yellow", "yellow", "green")
 
 
-def explanation(here: Outcome, there: Outcome, found: Differences, limits: Thresholds) -> str:
+def explanation(
+    here: Outcome,
+    there: Outcome,
+    found: Differences,
+    limits: Thresholds,
+    rule: Rule = "thresholds",
+) -> str:
     """Return what is known of why a scenario is, or is not, critical there.
 
     Args:
         here: what it came to here.
         there: what it came to there.
         found: how the rollouts differ.
-        limits: when a scenario is critical.
+        limits: when a scenario is critical by the rule "thresholds".
+        rule: what makes a scenario critical.
     """
-    said = [] if there.critical else [_miss(here, there, limits)]
+    said = []
+    if not there.critical:
+        said = [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
     return " ".join([*said, *_contacts(here, there), *_story(found)])
+
+
+def _less_harm(here: Outcome, there: Outcome) -> str:
+    """Return why a scenario is not critical there by harm."""
+    if there.d_min is None:
+        return "The ego is alone there."
+    conflict = f"{there.conflict} with {there.partner}"
+    if there.conflict_type:
+        conflict += f" ({there.conflict_type})"
+    if not there.conflict:
+        what = "No collision course there"
+    elif there.conflict == "collision course":
+        what = f"Only a {conflict} there"
+    else:
+        who = {"other": there.partner, "none": "nobody"}.get(there.responsible, there.responsible)
+        what = f"A {conflict} there, for which {who} is responsible"
+    if there.harm is None or here.harm is None:
+        return f"{what}."
+    narrowly = _narrowly(NEAR_MISS - there.harm, NARROW_HARM)
+    return (
+        f"{what}: harm is {there.harm:.2f} there, {here.harm:.2f} here, {narrowly}below "
+        f"{NEAR_MISS:g}."
+    )
 
 
 def _miss(here: Outcome, there: Outcome, limits: Thresholds) -> str:

@@ -3,6 +3,7 @@
 from bridgegen.ego.drivers import (
     DRIVERS,
     GUESTS,
+    OTHERS,
     STAGES,
     STORYBOARD,
     Driver,
@@ -15,6 +16,7 @@ from bridgegen.ego.drivers import (
 __all__ = [
     "DRIVERS",
     "GUESTS",
+    "OTHERS",
     "STAGES",
     "STORYBOARD",
     "Driver",

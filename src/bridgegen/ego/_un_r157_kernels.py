@@ -1,110 +1,139 @@
-"""The competent and careful human driver of UN Regulation 157 (ALKS), annex 3, made to drive.
+"""The competent and careful human driver of UN Regulation 157 (ALKS), made to drive.
 
-The regulation says how this driver reacts to three disturbances on a motorway: somebody cuts in,
-cuts out, or brakes. The risk is perceived 0.4 s after the other has come 0.375 m nearer to the
-ego's lane, or when it brakes by more than 5 m/s² (0.4 s as well); it is reacted to if the time to
-collision is below 2 s; braking begins 0.75 s later, and grows by 12.65 m/s³ up to 0.774 g. Who
-reappears before somebody that cuts out is a body like any other here.
+The driver reacts to the regulation's three disturbances, and to nothing else in an emergency:
 
-What the regulation leaves open, and what holds here:
+- *cut-in*: a vehicle from beside comes onto the strip that the ego sweeps, ahead of it, and the
+  time to collision is at most 2 s at that instant;
+- *cut-out*: the vehicle ahead, at a time headway of at most 2 s, leaves the middle of the ego's way
+  by more than 0.375 m, and a slower vehicle is on the way beyond it;
+- *deceleration*: the vehicle ahead, at a time headway of at most 2 s, brakes by more than 5 m/s².
 
-- of who crosses, the time to collision is that until the two bodies meet (``_conflict_kernels``);
-- who has been known to lead, or crosses, is a risk, too, once it takes more than comfortable
-  braking not to meet there;
-- the driver brakes until nobody will be met within 4 s;
-- without a risk, it keeps the speed that its path allows, and follows whom it knows of by the
-  intelligent driver model, braking no harder than comfortably.
+It takes its foot off the accelerator (0.4 m/s²); 0.75 s later it brakes, by 12.65 m/s³ up to
+0.774 g, until it is no faster than the vehicle that it reacts to.
 
-The driver sees everybody. ``attention`` has a row of three per body: where it is beside the ego's
-way (``_conflict_kernels``), and the instant since when it is known, counted from 1, 0 if it is not;
-row 0 is the ego's: the instant since when there is a risk, likewise, the acceleration asked for
-[m/s²], and 1 while it brakes for the risk.
+Otherwise it follows its route and, as the regulation takes for granted, the vehicle ahead on its
+way: by the intelligent driver model and, where a comfortable deceleration does not do, as hard as
+needed, up to 0.774 g. It does not look beyond the vehicle ahead. It does not brake for crossing or
+oncoming traffic, nor for anybody on foot; `_careful_kernels` does.
 
-Source: UN Regulation 157, 01 series of amendments, annex 3; Mattas et al., Accident Analysis &
-Prevention 174 (2022) 106743, who call it the CC human driver.
+The text of the regulation adds 0.4 s of perception to each disturbance, and lets it begin in a
+cut-in at 0.375 m of lateral movement. The Commission's code, agreed upon with the model's authors,
+has none of the 0.4 s, and lets the cut-in begin where the bodies overlap; so does this driver.
+
+The driver sees every vehicle. ``attention`` has a row of three per body: how far its centre is
+beside the ego's way [m], and 1 while it is on the strip that the ego sweeps; row 0 is the ego's:
+the instant since when it reacts, counted from 1, 0 if it does not, the acceleration asked for
+[m/s²], and the body that it reacts to.
+
+Sources: UN Regulation 157, 01 series of amendments, annex 3 (00 series: annex 4, appendix 3), the
+competent and careful human driver; European Commission, JRC-FSM, its "CC human driver"; Mattas et
+al., Accident Analysis & Prevention 174 (2022) 106743.
 """
 
+import math
+
 from bridgegen.compiled import kernel
-from bridgegen.ego._conflict_kernels import (
-    ASIDE,
-    CROSSING,
-    FARTHEST,
-    LEADER,
-    NOBODY,
-    WANDERING,
-    foresee,
-)
+from bridgegen.ego._ahead_kernels import place_on_way
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
 from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego.kinds import PEDESTRIAN
 
-EVALUATION = 0.4  # s, until the risk is perceived
-BRAKES_HARD = 5.0  # m/s², of who drives ahead
-CRITICAL_TTC = 2.0  # s
+CRITICAL_TTC = 2.0  # s, up to which a cut-in is dangerous
+CRITICAL_HEADWAY = 2.0 + 1e-6  # s, up to which a cut-out or a deceleration is; and rounding
+WANDERING = 0.375  # m, from the middle of the way, that are no change of lane
+BRAKES_HARD = 5.0  # m/s², of the vehicle ahead
 REACTION = 0.75  # s, from the risk until braking begins
+RELEASE = 0.4  # m/s², with the foot off the accelerator; source: JRC-FSM
 BRAKING = 0.774 * 9.81  # m/s²
-JERK = 12.65  # m/s³
+JERK = 12.65  # m/s³: full braking after 0.6 s
+SPARE = 1.0  # m, left to the vehicle ahead where following takes more than comfort
 
-HARD_TO_STOP = 3.0  # m/s² that it takes, after the reaction, not to meet somebody: a risk …
-EASY_TO_STOP = 1.0  # … and up to which it has ceased to be one
-CLEAR = 4.0  # s, within which nobody may be met when the brake is let go
-ALWAYS = -1e9  # the instant since when those are known who were there from the start
-KNOWN = 2
-RISK, ASKED, BRAKES = 0, 1, 2
+SEES = 100.0  # m beyond the distance that it takes to stop, up to which it looks at anybody
+
+ASIDE, ON_WAY = 0, 1
+RISK, ASKED, THREAT = 0, 1, 2
+
+
+@kernel
+def follow(gap, v, w, slowing):
+    """Return the acceleration [m/s²] behind a vehicle known for long, at speed w [m/s].
+
+    It is ``gap`` [m] ahead and brakes by ``slowing`` [m/s²], or does not if that is <= 0.
+    """
+    room = max(gap - SPARE, 0.1)
+    needed = 0.5 * max(v - w, 0.0) ** 2 / room
+    if slowing > 0.0:
+        needed = max(needed, 0.5 * v * v / (room + 0.5 * w * w / slowing))
+    asked = max(idm(gap, v, w), -COMFORT_DECELERATION)
+    return asked if needed <= COMFORT_DECELERATION else min(asked, -min(needed, BRAKING))
 
 
 @kernel
 def drive_un_r157(
-    k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
+    k, dt, paths, path_n, path_ds, station, on, planned, present, x, y, h, speed, bodies, kinds,
     attention,
 ):  # fmt: skip
     """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
 
     The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
-    ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
-    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
-    ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; and ``attention``
-    ``(E, 3)``, zeros before the first instant, changed in place.
+    ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, of both
+    of which the ego's alone is read; who is ``present``; ``x``, ``y``, ``h``, ``speed`` ``(E, T)``,
+    of which nothing after instant k is read; ``bodies`` ``(E, ·)``; their ``kinds`` ``(E,)``; and
+    ``attention`` ``(E, 3)``, zeros before the first instant, changed in place.
     """
     v, own = speed[0, k], on[0]
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
-    reach = 15.0 + (EVALUATION + REACTION) * v + v * v / (2.0 * COMFORT_DECELERATION)
-    risk, brakes = False, attention[0, BRAKES] > 0.0
-    limit, hard = (CLEAR, EASY_TO_STOP) if brakes else (CRITICAL_TTC, HARD_TO_STOP)
+    reach = SEES + CRITICAL_HEADWAY * v + v * v / (2.0 * COMFORT_DECELERATION)
+    threat, threatens, cut_in = int(attention[0, THREAT]), False, 0
+    lead, lead_ahead, lead_gap, lead_along, lead_slowing = 0, math.inf, math.inf, 0.0, 0.0
+    beyond, beyond_ahead, beyond_along = 0, math.inf, 0.0
+    leaves = False
     for e in range(1, len(speed)):
-        if not present[e]:
+        if not present[e] or kinds[e] >= PEDESTRIAN:
             continue
-        p, w, turn, slowing = on[e], speed[e, k], 0.0, 0.0
-        if k > 0:
-            turn, slowing = (h[e, k] - h[e, k - 1]) / dt, (speed[e, k - 1] - w) / dt
-        what, ttc, gap, along, lateral = foresee(
-            k, dt, paths[own], path_n[own], path_ds[own], station[0], v, bodies[0], to[e] < 0,
-            paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
-            bodies[e], CLEAR, reach, attention[e],
+        w = speed[e, k]
+        slowing = (speed[e, k - 1] - w) / dt if k > 0 else 0.0
+        ahead, gap, aside, side, along = place_on_way(
+            paths[own], path_n[own], path_ds[own], station[0], reach, bodies[0],
+            x[e, k], y[e, k], h[e, k], w, bodies[e],
         )  # fmt: skip
-        wanders = lateral > 0.0 and attention[e, FARTHEST] - attention[e, ASIDE] <= WANDERING
-        if what == NOBODY or (what == LEADER and wanders):
-            attention[e, KNOWN] = 0.0
+        before, was_on_way = attention[e, ASIDE], attention[e, ON_WAY] > 0.0
+        on_way = side <= 0.0
+        attention[e, ASIDE], attention[e, ON_WAY] = aside, 1.0 if on_way else 0.0
+        if not on_way or ahead < 0.0:
             continue
-        if attention[e, KNOWN] == 0.0:
-            attention[e, KNOWN] = k + 1.0 if k > 0 else ALWAYS
-        known_for = (k + 1.0 - attention[e, KNOWN]) * dt + 1e-9
-        if known_for < EVALUATION:
-            continue
-        risk = risk or ttc < limit or (what == LEADER and slowing > BRAKES_HARD)
-        if what == CROSSING or known_for >= EVALUATION + REACTION:
-            closing = max(v - along, 0.0)
-            left = max(gap - (0.0 if brakes else closing * REACTION), 0.1)
-            risk = risk or closing * closing / (2.0 * left) > hard
-        if what == LEADER and known_for >= EVALUATION + REACTION:
-            wanted = min(wanted, max(idm(gap, v, along), -COMFORT_DECELERATION))
-    if not risk:
-        attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
-        return wanted
+        if k > 0 and not was_on_way and max(gap, 0.0) <= CRITICAL_TTC * (v - along):
+            cut_in = e
+        if e == threat:
+            threatens = v > along or slowing > BRAKES_HARD
+        if ahead < lead_ahead:
+            beyond, beyond_ahead, beyond_along = lead, lead_ahead, lead_along
+            lead, lead_ahead, lead_gap, lead_along, lead_slowing = e, ahead, gap, along, slowing
+            leaves = was_on_way and before <= WANDERING < aside
+        elif ahead < beyond_ahead:
+            beyond, beyond_ahead, beyond_along = e, ahead, along
+    risky = 0
+    if lead > 0 and lead_gap <= CRITICAL_HEADWAY * v:
+        if leaves and beyond > 0 and v > beyond_along:
+            risky = beyond
+        elif lead_slowing > BRAKES_HARD:
+            risky = lead
+    if cut_in > 0:
+        risky = cut_in
+    if risky > 0:
+        attention[0, THREAT] = risky
+        if attention[0, RISK] == 0.0:
+            attention[0, RISK] = k + 1.0
+    elif threat > 0 and not threatens:
+        attention[0, RISK], attention[0, THREAT] = 0.0, 0.0
     if attention[0, RISK] == 0.0:
-        attention[0, RISK] = k + 1.0
-    asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
+        if lead > 0:
+            wanted = min(wanted, follow(lead_gap, v, lead_along, lead_slowing))
+        attention[0, ASKED] = wanted
+        return wanted
+    asked = min(attention[0, ASKED], -RELEASE)
     if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
-        attention[0, BRAKES] = 1.0
         asked = max(asked - JERK * dt, -BRAKING)
+    asked = min(asked, wanted)
     attention[0, ASKED] = asked
     return asked

@@ -21,6 +21,17 @@ TIME_LIMIT = 10.0
 """Seconds that one call of a user's driver may take, where the user says nothing else."""
 
 
+SCRIPTED, ATTENTIVE = 0, 1
+"""Codes of who drives participants other than the ego."""
+
+OTHERS = {
+    "attentive": "Does what its script says unless somebody is in its way: keeps its distance, "
+    "gives way, brakes after 0.75 s by up to 0.774 g, waits for a gap to change lane.",
+    "scripted": "Does what its script says, whatever happens.",
+}
+"""The drivers of participants other than the ego: name and description."""
+
+
 @dataclass(frozen=True)
 class Driver:
     """A system under test that the embedded simulator can run.
@@ -91,19 +102,34 @@ REFERENCE = Driver(
 UN_R157 = Driver(
     "un-r157",
     2,
-    "The competent and careful human driver of UN Regulation 157: reacts to a risk after 0.75 s, "
-    "then brakes by up to 0.774 g; sees everybody.",
+    "The competent and careful human driver of UN Regulation 157, exact in its three disturbances "
+    "(cut-in, cut-out, deceleration): brakes after 0.75 s, by up to 0.774 g; follows otherwise.",
+)
+CAREFUL = Driver(
+    "careful",
+    4,
+    "UN R157's driver extended to any road: reacts to who crosses, walks or stands in its way as "
+    "well, after 0.4 s of perception and 0.75 s; sees everybody.",
 )
 FSM = Driver(
     "fsm",
     3,
     "The fuzzy safety model: brakes in anticipation, up to 6 m/s², by how unsafe its distances "
-    "are; sees everybody.",
+    "are; in UN R157's disturbances as in the Commission's code.",
+)
+CAREFUL_FSM = Driver(
+    "careful-fsm",
+    5,
+    "The fuzzy safety model extended to any road: sees through the vehicle ahead, and keeps more "
+    "room; sees everybody.",
 )
 STORYBOARD = Driver("storyboard", NOBODY, "Nobody: the file's own actions move the ego.")
 """What an ego without a driver says it is driven by; not to be chosen."""
 
-DRIVERS = {driver.name: driver for driver in (ROUTE_FOLLOWER, REFERENCE, UN_R157, FSM)}
+DRIVERS = {
+    driver.name: driver
+    for driver in (ROUTE_FOLLOWER, REFERENCE, UN_R157, FSM, CAREFUL, CAREFUL_FSM)
+}
 
 GUESTS = {
     driver.name: driver

@@ -5,9 +5,12 @@ for who comes towards), § 10; sign numbers of the VzKat, which our own maps use
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from bridgegen.arrays import Int
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive, Road
@@ -20,6 +23,10 @@ PRIORITY = ("301", "306")
 """Signs: right of way at this junction, priority road."""
 
 THEY_WAIT, NOBODY_SAYS, WE_WAIT = 1, 0, -1
+
+BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING = 1, 2, 3, 4
+"""What a claim rests on: the junction's priorities, signs, the rule of the right, or the rule that
+a left turn waits for oncoming traffic."""
 
 AT_JUNCTION = 40.0
 """A sign so far before a junction [m] is for that junction."""
@@ -48,6 +55,42 @@ def right_of_way(model: OpenDrive, own: Route, other: Route) -> int:
     return NOBODY_SAYS
 
 
+def claim(model: OpenDrive, own: Route, other: Route) -> int:
+    """Return which of two routes goes first at the first junction that they have in common.
+
+    Unlike ``right_of_way``, which tells a driver what to count on, this is the law as it stands:
+    it is antisymmetric, and it holds the rule of the right in both directions. Where lights
+    control the junction, they decide who may enter; the claim then holds what they leave open,
+    that a left turn waits for oncoming traffic.
+
+    Returns:
+        > 0: the other route gives way; < 0: this one does; 0: no rule says. The absolute value
+        says why: ``BY_MAP``, ``BY_SIGNS``, ``FROM_THE_RIGHT`` or ``ONCOMING``.
+    """
+    theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
+    for ours in crossings(model, own):
+        if ours.junction in theirs:
+            they = theirs[ours.junction]
+            return _claim(model, ours, they) - _claim(model, they, ours)
+    return 0
+
+
+def claims(model: OpenDrive, routes: Sequence[Route | None]) -> Int:
+    """Return the `claim` of each of E routes against each other, ``(E, E)`` int64.
+
+    Args:
+        model: the road network.
+        routes: of the participants; None off the lanes, which claims nothing.
+    """
+    found = np.zeros((len(routes), len(routes)), dtype=np.int64)
+    for a, own in enumerate(routes):
+        for b, other in enumerate(routes[:a]):
+            if own is not None and other is not None:
+                found[a, b] = claim(model, own, other)
+                found[b, a] = -found[a, b]
+    return found
+
+
 def crossings(model: OpenDrive, route: Route) -> Iterator[Crossing]:
     """Yield a route's junctions in its order; not one that it begins in."""
     for before, step in zip(route.steps, route.steps[1:], strict=False):
@@ -62,6 +105,26 @@ def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
         return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
     way = {"+": 1, "-": -1}.get(signal.orientation)
     return way in (None, road.direction(lane_id))
+
+
+def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
+    """Return why the other gives way at a junction, 0 if no rule says so."""
+    if ours.before.road_id == theirs.before.road_id:
+        return 0
+    pairs = {(one.high, one.low) for one in model.junction(ours.junction).priorities}
+    inside = ours.inside.road_id, theirs.inside.road_id
+    if inside in pairs or inside[::-1] in pairs:
+        return BY_MAP if inside in pairs else 0
+    our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
+    by_lights = any(sign.dynamic == "yes" for sign in (*our_signs, *their_signs))
+    difference = _standing(our_signs) - _standing(their_signs)
+    if difference and not by_lights:
+        return BY_SIGNS if difference > 0 else 0
+    from_theirs = _turn(_heading(model, theirs.before), _heading(model, ours.before))
+    if abs(from_theirs) >= math.pi - ASIDE:
+        they_turn_left = _turns_left(model, theirs) and not _turns_left(model, ours)
+        return ONCOMING if they_turn_left else 0
+    return FROM_THE_RIGHT if from_theirs > ASIDE and not by_lights else 0
 
 
 def _at(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.ego.right_of_way import STOP_SIGN, crossings, governs, right_of_way
+from bridgegen.ego.right_of_way import STOP_SIGN, claims, crossings, governs, right_of_way
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
@@ -56,6 +56,8 @@ class Scene(NamedTuple):
         hypothesis_ranks: ``(P, W)`` int64, who waits where they meet; see ``right_of_way``.
         hypothesis_first: ``(P, E + 1)`` int64: entity e's are those from ``[e]`` to ``[e + 1]``.
         path_ranks: ``(P, E)`` int64, as `hypothesis_ranks`, of the ways that the entities take.
+        claims: ``(P, E, E)`` int64, which of two entities' routes goes first; see
+            ``right_of_way.claim``.
     """
 
     road: Float
@@ -69,6 +71,7 @@ class Scene(NamedTuple):
     hypothesis_ranks: Int
     hypothesis_first: Int
     path_ranks: Int
+    claims: Int
 
 
 def survey(
@@ -143,6 +146,7 @@ def survey(
                 ]
             ]
         ),
+        claims(model, routes)[None],
     )
 
 
@@ -160,6 +164,7 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
         _padded([scene.hypothesis_ranks for scene in scenes], 0),
         _padded([scene.hypothesis_first for scene in scenes], 0),
         _padded([scene.path_ranks for scene in scenes], 0),
+        _padded([scene.claims for scene in scenes], 0),
     )
 
 

@@ -4,7 +4,7 @@
 """
 
 from bridgegen.metrics.choice import existing, held_by, require, to_record
-from bridgegen.metrics.metric import Metric, Need
+from bridgegen.metrics.metric import Metric, Need, Quantity
 from bridgegen.metrics.registry import METRICS, TABLE_I, evaluate, get
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "TABLE_I",
     "Metric",
     "Need",
+    "Quantity",
     "evaluate",
     "existing",
     "get",

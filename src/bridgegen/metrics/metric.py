@@ -18,7 +18,7 @@ from the route only if a simulator made it, not a recording of somebody else's."
 
 
 @dataclass(frozen=True)
-class Metric:
+class Quantity:
     """A number per scenario that says how critical it was.
 
     Attributes:
@@ -27,9 +27,7 @@ class Metric:
         description: one line for people.
         sense: which values are more critical, "smaller" or "larger" ones.
         cap: the value, finite, that counts as "not critical at all"; in an objective every value
-            that is less critical still, +inf for one, counts as this. The metric is not capped.
-        compute: rollout → ``(N,)`` float64, NaN exactly where the scenario failed.
-        needs: what a rollout must hold for the metric to exist; None where the motion is enough.
+            that is less critical still, +inf for one, counts as this. The quantity is not capped.
     """
 
     name: str
@@ -37,8 +35,6 @@ class Metric:
     description: str
     sense: Literal["smaller", "larger"]
     cap: float
-    compute: Callable[[Rollout], Float]
-    needs: Need | None = None
 
     def __post_init__(self) -> None:
         if self.sense not in ("smaller", "larger"):
@@ -50,6 +46,19 @@ class Metric:
     def sign(self) -> float:
         """+1 if larger values are more critical, −1 if smaller ones are."""
         return 1.0 if self.sense == "larger" else -1.0
+
+
+@dataclass(frozen=True)
+class Metric(Quantity):
+    """A quantity that is a function of the rollout alone, in a file of its own.
+
+    Attributes:
+        compute: rollout → ``(N,)`` float64, NaN exactly where the scenario failed.
+        needs: what a rollout must hold for the metric to exist; None where the motion is enough.
+    """
+
+    compute: Callable[[Rollout], Float]
+    needs: Need | None = None
 
 
 def shared(rollout: Rollout, derive: Callable[[Rollout], Derived]) -> Derived:

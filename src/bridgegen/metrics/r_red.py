@@ -29,11 +29,14 @@ def r_red(rollout: Rollout) -> Float:
 
     n, _, t = rollout.shape
     n_lights = rollout.lights.shape[1] if rollout.lights.size else 0
-    stop_lights = np.ascontiguousarray(rollout.stop_lights, dtype=np.int64)
+    egos = np.flatnonzero(rollout.stop_entities == 0)
+    stop_lights = np.ascontiguousarray(rollout.stop_lights[egos], dtype=np.int64)
     out = np.zeros(n)
     if not stop_lights.size:
         return without_failed(rollout, out)
-    lines = as_float("rollout.stop_lines", rollout.stop_lines, (n, len(stop_lights), 3))
+    shape = (n, len(rollout.stop_lights), 3)
+    every = as_float("rollout.stop_lines", rollout.stop_lines, shape, finite=False)
+    lines = as_float("rollout.stop_lines", every[:, egos], (n, len(egos), 3))
     lights = np.ascontiguousarray(rollout.lights, dtype=np.int8)
     if n and lights.shape != (n, n_lights, t):
         raise ValueError(f"rollout.lights must have shape (N, S, T), got {lights.shape}")

@@ -121,7 +121,14 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     rest = tuple(event for event in scenario.events if event.participant != participant)
     _refuse_awaited(scenario, own, rest)
     adversary = _adversary(scenario, who, own)
-    story = replace(scenario.story, events=rest)
+    # The adversary is its driver.
+    story = replace(
+        scenario.story,
+        participants=tuple(
+            replace(one, driver="scripted") if one is who else one for one in scenario.participants
+        ),
+        events=rest,
+    )
     left = replace(scenario, story=story)
     limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
     needed = {quantity for quantity in limits if isinstance(quantity, str)}

@@ -10,6 +10,9 @@ from bridgegen.odd.schema import ObjectiveSection
 PAPERS = ObjectiveSpec((Term("d_min", 0.8297), Term("v_d", 0.1703)), "fixed", "raw")
 """The paper's objective and thresholds (Section V, Table III)."""
 
+HARM = ObjectiveSpec((Term("harm", 1.0),), "fixed", "raw", rule="harm")
+"""The default: how much a scenario is a failure of the ego; see `bridgegen.conflict.harm`."""
+
 _CRITICAL: Path = ("objective", "critical")
 
 
@@ -33,9 +36,12 @@ def read_objective(given: ObjectiveSection, say: Callable[[str, Path], None]) ->
                 f"fixed weights need one greater than 0 for {term.metric}, got {term.weight}",
                 path,
             )
-    limits = given.critical.model_dump()
+    by_harm = given.critical == "harm"
+    limits = {} if isinstance(given.critical, str) else given.critical.model_dump()
     for key, value in limits.items():
         if not 0.0 <= value < math.inf:
             say(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
     terms = tuple(Term(one.metric, one.weight) for one in given.terms)
-    return ObjectiveSpec(terms, given.weights, given.scale, Critical(**limits))
+    return ObjectiveSpec(
+        terms, given.weights, given.scale, Critical(**limits), "harm" if by_harm else "thresholds"
+    )

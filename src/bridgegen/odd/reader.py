@@ -5,13 +5,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.odd.changes import TemporaryChanges, jam_members
 from bridgegen.odd.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.odd.constraints import problems_of
 from bridgegen.odd.expression import parse
-from bridgegen.odd.objectives import read_objective
+from bridgegen.odd.objectives import HARM, read_objective
+from bridgegen.odd.others import DRIVERS, SCRIPTED, driven
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, read_axes
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
 from bridgegen.odd.quantities import Quantities
@@ -19,7 +21,7 @@ from bridgegen.odd.roads import KNOBS, RoadsSpec
 from bridgegen.odd.roads_reader import read_roads
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.rules import bounds_between_layers
-from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec
 from bridgegen.odd.schema import (
     BoundSection,
     DerivedSection,
@@ -246,11 +248,11 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         raise ScenarioError(*problems, *said.problems)  # no place can be checked without them
     board = Storyboard(quantities, roads, said.prefixes, jam_members(quantities))
     changes = TemporaryChanges(quantities, roads)
-    story = Story(
-        (*board.participants, *changes.participants), board.events, changes.jams, changes.works
-    )
-    raw = section(ObjectiveSection, document.data.get("objective"))
-    objective = None if raw is None else read_objective(raw, quantities.say)
+    said_of_others = document.data.get("others")
+    others = said_of_others if said_of_others in DRIVERS else SCRIPTED
+    participants = driven((*board.participants, *changes.participants), board.events, others)
+    story = Story(participants, board.events, changes.jams, changes.works)
+    objective = _objective(document.data.get("objective", "harm"), quantities)
     said.derived += changes.derived
     derived |= {one.name: one for one in changes.derived}
     between = bounds_between_layers(roads, story, parameters, said.prefixes, document.place)
@@ -273,6 +275,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         place=document.place,
         duration=given.duration,
         time_step=given.time_step,
+        road_end=given.road_end,
         roads=roads,
         story=story,
         driver=given.driver,
@@ -285,6 +288,14 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     )
     try_out(scenario)
     return scenario
+
+
+def _objective(data: Any, quantities: Quantities) -> ObjectiveSpec | None:
+    """Return what the file optimises; None if that is not of the right shape."""
+    if data == "harm":
+        return HARM
+    raw = section(ObjectiveSection, data)
+    return None if raw is None else read_objective(raw, quantities.say)
 
 
 def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:

@@ -49,13 +49,18 @@ class ObjectiveSpec:
         weights: "fixed": as the terms give them; "entropy": from a random sample (paper,
             Eqs. 4 to 7).
         scale: "raw": metrics as they are; "standardised": by the same sample.
-        critical: what counts as critical.
+        critical: the thresholds of what counts as critical by the rule "thresholds".
+        rule: "harm": critical is what the conflict analysis finds harmful; or "thresholds".
+        count: whose conflicts are harm: "ego", those that the ego is responsible for or could have
+            prevented; or "any".
     """
 
     terms: tuple[Term, ...]
     weights: Literal["fixed", "entropy"]
     scale: Literal["raw", "standardised"]
     critical: Critical = field(default_factory=Critical)
+    rule: Literal["harm", "thresholds"] = "thresholds"
+    count: Literal["ego", "any"] = "ego"
 
 
 @dataclass(frozen=True)
@@ -152,6 +157,7 @@ class LogicalScenario(SearchedScenario):
         source: where it comes from.
         duration: [s] of simulated time.
         time_step: [s].
+        road_end: what participants other than the ego do where their road ends.
         roads: the road network.
         story: who takes part, and what happens.
         driver: who drives the ego unless the user says otherwise.
@@ -167,7 +173,15 @@ class LogicalScenario(SearchedScenario):
     story: Story
     driver: str
     effects: tuple[str, ...]
+    road_end: Literal["leave", "stand"] = field(default="leave", kw_only=True)
     adversary: "Adversary | None" = field(default=None, repr=False, kw_only=True)
+
+    @property
+    def fingerprint(self) -> str:
+        """See `SearchedScenario`; that of a scenario without drivers does not depend on them."""
+        said = repr(self)
+        drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
+        return sha256((said + repr(drivers) if drivers else said).encode()).hexdigest()
 
     @property
     def participants(self) -> tuple[Participant, ...]:

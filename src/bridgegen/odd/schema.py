@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from bridgegen.odd.roads_schema import RoadsSection
-from bridgegen.odd.shape import AxisName, Formula, Number, ShapedSection, Text, Word
+from bridgegen.odd.shape import AxisName, Formula, Number, OrWord, ShapedSection, Text, Word
 from bridgegen.odd.story_schema import (
     EventSection,
     JamSection,
@@ -122,8 +122,10 @@ class ObjectiveSection(ShapedSection):
     """Of the terms, or by the entropy of a random sample."""
     scale: Literal["raw", "standardised"]
     """In the units of the metrics, or standardised by a random sample."""
-    critical: CriticalSection = CriticalSection()
-    """What makes a scenario critical."""
+    critical: Annotated[CriticalSection | Literal["harm"], OrWord(CriticalSection, "harm")] = (
+        CriticalSection()
+    )
+    """What makes a scenario critical: thresholds, or harm."""
 
 
 class ScenarioFile(ShapedSection):
@@ -143,10 +145,14 @@ class ScenarioFile(ShapedSection):
     """Its measures."""
     driver: Word = "route-follower"
     """Who drives the ego, unless --ego says otherwise; see 'bridgegen list drivers'."""
+    others: Literal["attentive", "scripted"] = "scripted"
+    """Who drives the other participants, unless --others says otherwise; see their ``driver``."""
     duration: Number
     """Of the simulation [s]."""
     time_step: Number
     """Of the simulation [s]."""
+    road_end: Literal["leave", "stand"] = "leave"
+    """What participants other than the ego do where their road ends: leave, or stand."""
     axes: Annotated[list[AxisName], Field(min_length=1)]
     """What is searched, unless --axes says otherwise."""
     include: list[Text] = []
@@ -169,5 +175,7 @@ class ScenarioFile(ShapedSection):
     """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}
     """By name: what follows from parameters."""
-    objective: ObjectiveSection
-    """What is optimised, and what counts as critical."""
+    objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
+        "harm"
+    )
+    """What is optimised, and what counts as critical; harm: see docs/conflicts.md."""

@@ -2,18 +2,20 @@
 
 import re
 from types import UnionType
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     PlainValidator,
     StringConstraints,
     ValidationError,
     WithJsonSchema,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
 from bridgegen.odd.parameters import nearest
 from bridgegen.odd.plain_yaml import Document, Path
@@ -87,6 +89,32 @@ class ShapedSection(BaseModel):
 
 Section = TypeVar("Section", bound=ShapedSection)
 
+
+class OrWord:
+    """A section of a file in whose place one word may stand: ``Annotated[S | Literal[word], …]``.
+
+    Unlike a plain union, it says of a section that does not fit what does not fit in it.
+    """
+
+    def __init__(self, model: type[ShapedSection], word: str) -> None:
+        self._model, self._word = model, word
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        def read(value: Any, section: core_schema.ValidatorFunctionWrapHandler) -> Any:
+            return value if isinstance(value, str) and value == self._word else section(value)
+
+        return core_schema.no_info_wrap_validator_function(
+            read, handler.generate_schema(self._model)
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [{"const": self._word}, handler(schema)]}
+
+
 _MESSAGES = {
     "dict_type": "must be a mapping",
     "float_type": "must be a number",
@@ -143,7 +171,7 @@ def _model_at(model: type[BaseModel], path: Path) -> type[BaseModel]:
     for part in path:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             kind = kind.model_fields[str(part)].annotation
-            if isinstance(kind, UnionType):  # Section | None
+            if isinstance(kind, UnionType) or get_origin(kind) is Union:  # Section | None
                 kind = get_args(kind)[0]
         else:  # list[Section] or dict[str, Section]
             kind = get_args(kind)[-1]

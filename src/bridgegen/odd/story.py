@@ -72,6 +72,7 @@ class Participant:
         end: where its route ends; None: it goes on along its lane, or along its path.
         speed: [m/s] at time 0; of the ego also its target.
         path: the points of its own way, ``start`` first; empty: it keeps to lanes.
+        driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Participant:
     end: Waypoint | None
     speed: Quantity
     path: tuple[Waypoint, ...] = ()
+    driver: str = field(default="", repr=False, kw_only=True)
 
     @property
     def kind(self) -> Kind:

@@ -40,6 +40,8 @@ class ParticipantSection(ShapedSection):
     """Instead of start and end: straight lines through places (pedestrian, animal, bicycle)."""
     speed: QuantityField = 0.0
     """At time 0 [m/s]; of the ego also its target."""
+    driver: Word | None = None
+    """attentive or scripted, instead of what ``others`` says; not of the ego."""
 
 
 class ConditionSection(ShapedSection):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from bridgegen.odd.others import ATTENTIVE, DRIVERS
 from bridgegen.odd.parameters import nearest
 from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
@@ -80,6 +81,7 @@ class Storyboard:
             if not name.isidentifier() or not name.isascii():
                 self._say(f"a participant's name is a word, got '{name}'", path)
             self._check(given.speed, "m/s", (*path, "speed"))
+            self._check_driver(name, given, path)
             if given.path:
                 yield self._walker(name, given, path)
             elif given.start is None:
@@ -109,7 +111,8 @@ class Storyboard:
             self._say(f"a {given.type} keeps to lanes; a path is for {kinds}", path)
         if given.type == "pedestrian":
             self._places.check_crossing(name, points, path)
-        return Participant(name, given.type, points[0], None, given.speed, points)
+        driver = given.driver or ""
+        return Participant(name, given.type, points[0], None, given.speed, points, driver=driver)
 
     def _driver(
         self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
@@ -135,7 +138,28 @@ class Storyboard:
             self._say(f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path)
         if TYPES[given.type] == "vehicle" and start.lane == "sidewalk":
             self._say(f"{name} must stand on a lane: vehicles are on roads only", path)
-        return Participant(name, given.type, start, end, given.speed)
+        return Participant(name, given.type, start, end, given.speed, driver=given.driver or "")
+
+    def _check_driver(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check who drives a participant, if it says so."""
+        driver, place = given.driver, (*path, "driver")
+        if driver is None:
+            return
+        if name == EGO:
+            self._say(
+                f"the ego's driver is named once, by the scenario's own key 'driver'; got "
+                f"'{driver}' here",
+                place,
+            )
+        elif driver not in DRIVERS:
+            hint = nearest(driver, DRIVERS)
+            self._say(
+                f"the driver of {name} must be one of {', '.join(DRIVERS)} (others are for the "
+                f"ego), got '{driver}'{hint}",
+                place,
+            )
+        elif driver == ATTENTIVE and TYPES[given.type] == "obstacle":
+            self._say(f"{name} is an obstacle, which nobody drives; got '{driver}'", place)
 
     def _check_route(
         self,

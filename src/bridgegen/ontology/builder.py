@@ -101,6 +101,8 @@ class Builder:
         self.put(node, "has_name", scenario.name)
         self.put(node, "has_duration", float(scenario.duration))
         self.put(node, "has_time_step", float(scenario.time_step))
+        if scenario.road_end == "stand":
+            self.put(node, "has_road_end", scenario.road_end)
         return node
 
     def parameter(self, name: str, parameter: Parameter | Derived) -> ox.NamedNode:

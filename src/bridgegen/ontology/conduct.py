@@ -33,6 +33,7 @@ def conduct_rules() -> Iterator[Rule]:
     yield from _bends()
     yield from _closed_roads()
     yield from _temporary_changes()
+    yield from _conflicts()
 
 
 # -- where -----------------------------------------------------------------------------------------
@@ -283,4 +284,28 @@ def _temporary_changes() -> Iterator[Rule]:
         "- 0.5e0 * (?length + ?length_2) AS ?gap) "
         f"FILTER(?gap < -{_SLACK}) }}",
         ("TrafficJam",),
+    )  # fmt: skip
+
+
+# -- accidents and near misses ---------------------------------------------------------------------
+
+
+def _conflicts() -> Iterator[Rule]:
+    outcome = "$this bg:has_outcome ?value ."
+    yield about(
+        "severity-is-a-probability", "Scenario", "has_severity",
+        "must be a probability, 0 to 1, got {?got}",
+        "Severity is the probability of a MAIS3+ injury.", "ours",
+        f"SELECT DISTINCT $this ?value ({shown('?severity')} AS ?got) WHERE {{ "
+        "$this a bg:Scenario . { BIND($this AS ?value) } UNION { $this bg:has_outcome ?value } "
+        "?value bg:has_severity ?severity . FILTER(?severity < 0 || ?severity > 1) }",
+        ("has_severity",),
+    )  # fmt: skip
+    yield about(
+        "responsible-takes-part", "Scenario", "has_responsible",
+        "must be one of its participants, got {?got}",
+        "Only a participant of an accident or a near miss can be responsible for it.", "ours",
+        f"SELECT DISTINCT $this ?value ({called('?who')} AS ?got) WHERE {{ {outcome} "
+        "?value bg:has_responsible ?who . FILTER NOT EXISTS { ?value bg:has_who ?who } }",
+        ("has_responsible",),
     )  # fmt: skip

@@ -6,6 +6,7 @@ import pyoxigraph as ox
 
 from bridgegen.errors import OntologyError
 from bridgegen.odd.bodies import BODIES
+from bridgegen.odd.others import ATTENTIVE
 from bridgegen.odd.story import (
     Action,
     Change,
@@ -61,16 +62,25 @@ EGO = "ego"
 def add_participant(
     builder: Builder, one: Participant, site: Site, driver: str, ideal: str
 ) -> ox.NamedNode:
-    """Add a participant with its body, route and init actions; the ego with its driver."""
+    """Add a participant with its body, route and init actions, and its driver if it has one.
+
+    Args:
+        builder: takes the individuals.
+        one: the participant.
+        site: where it is.
+        driver: the ego's.
+        ideal: the stages of that which are ideal, separated by commas.
+    """
     put, name = builder.put, one.name
     node = builder.node(name, CLASSES[one.type])
     put(node, "has_name", name)
     _add_body(builder, node, one.type)
-    if name == EGO:
+    driver = driver if name == EGO else one.driver
+    if name == EGO or driver == ATTENTIVE:
         controller = builder.node(f"{name}_controller", "Controller")
         put(controller, "has_name", f"{name}_driver")
         put(controller, "has_driver", driver)
-        if ideal:
+        if ideal and name == EGO:
             put(controller, "has_ideal_stages", ideal)
         put(node, "has_controller", controller)
     start = add_position(builder, f"{name}_start", one.start, site)

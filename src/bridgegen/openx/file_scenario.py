@@ -12,7 +12,7 @@ from pathlib import Path
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
-from bridgegen.odd.objectives import PAPERS
+from bridgegen.odd.objectives import HARM
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.ontology.graph import Individuals
@@ -109,7 +109,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         parameters=ranges.parameters,
         bounds=(),
         derived=ranges.derived,
-        objective=PAPERS,
+        objective=HARM,
         driver=None,
         **_of_draws(definition, str(distribution)),
         storyboard=storyboard,
@@ -249,10 +249,39 @@ def with_driver(storyboard: osc.OpenScenario, driver: str, ideal: str = "") -> o
         ideal: its stages that are ideal, separated by commas.
     """
     said = (osc.Property(DRIVER, driver), *([osc.Property(IDEAL, ideal)] if ideal else []))
-    name = ego_of(storyboard)
+    return _with_drivers(storyboard, {ego_of(storyboard): said})
+
+
+def with_others(scenario: FileScenario, drivers: Mapping[str, str]) -> FileScenario:
+    """Return a scenario file whose participants' controllers name these drivers, and no others.
+
+    Args:
+        scenario: the file.
+        drivers: by the names of participants other than the ego; the rest has none.
+    """
+    ego, found = ego_of(scenario.storyboard), {}
+    for one in scenario.storyboard.entities.scenario_objects:
+        name = str(one.name)
+        driver = drivers.get(name)
+        named = any(
+            each.controller.properties is not None
+            and each.controller.properties.get(DRIVER) is not None
+            for each in one.object_controllers
+        )
+        if name != ego and (driver is not None or named):
+            found[name] = (osc.Property(DRIVER, driver),) if driver is not None else ()
+    return replace(scenario, storyboard=_with_drivers(scenario.storyboard, found))
+
+
+def _with_drivers(
+    storyboard: osc.OpenScenario, drivers: Mapping[str, tuple[osc.Property, ...]]
+) -> osc.OpenScenario:
+    """Return a scenario file in which the first controllers of some entities say these things."""
+    if not drivers:
+        return storyboard
     objects = []
     for one in storyboard.entities.scenario_objects:
-        if str(one.name) == name:
+        if (said := drivers.get(str(one.name))) is not None:
             controllers = one.object_controllers or (
                 osc.ObjectController(osc.Controller("driver", osc.Properties())),
             )

@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from math import comb
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bridgegen import metrics as measures
 from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
+from bridgegen.conflict import quantities
+from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.errors import ScenarioError
-from bridgegen.objective import Thresholds
+from bridgegen.objective import Objective
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
@@ -19,12 +21,14 @@ from bridgegen.report.data import (
     ReportData,
     RunSummary,
 )
+from bridgegen.report.findings_payload import MOST_MODES
 from bridgegen.report.notes import tables
 from bridgegen.report.playback import Playback
-from bridgegen.report.playbacks import playbacks
+from bridgegen.report.playbacks import minimal_playbacks, playbacks
 from bridgegen.search.dominance import by_merit
 from bridgegen.store import Rows
 from bridgegen.store.summary import Summary
+from bridgegen.triage.record import Mode, Triage
 
 SAMPLE = 50_000
 """Random scenarios that tell what is feasible: fewer than `bridgegen coverage` draws, for speed."""
@@ -65,6 +69,8 @@ def build_report(
     coverage: bool = True,
     files: Mapping[str, bytes] | None = None,
     more: bool = True,
+    triage: Triage | None = None,
+    minimal_files: Sequence[str] = (),
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -88,9 +94,11 @@ def build_report(
         coverage: whether to count what was covered.
         files: those of ``kept``, by their paths relative to the page, if it is to hold them.
         more: whether the page is to hold the motion of more than ``kept``.
+        triage: failure modes and bound of the run, if they are known.
+        minimal_files: of the minimal scenarios, by their paths relative to the page.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
-    terms = pipeline.objective.names
+    terms, by_harm = pipeline.objective.names, pipeline.objective.rule == "harm"
     if pipeline.objective.objectives == "one":
         weighted = zip(terms, pipeline.objective.weights, strict=True)
         wanted = {"weights of the objective": ", ".join(f"{n} {w:.4g}" for n, w in weighted)}
@@ -108,8 +116,8 @@ def build_report(
         n_evaluations=summary.evaluations,
         n_critical=summary.critical,
         r_critic=summary.r_critic,
-        critical_rule=_rule(limits, pipeline.cause),
-        critical_distance=limits.d_min_below,
+        critical_rule=rule_in_words(pipeline.objective, pipeline.cause),
+        critical_distance=None if by_harm else limits.d_min_below,
         first_critical=summary.first,
         fiftieth_critical=summary.fiftieth,
         d_min_best=summary.d_min_best,
@@ -122,6 +130,7 @@ def build_report(
         command=command,
         view=view,
         independent=algorithm == INDEPENDENT,
+        harm=pipeline.objective.harm if by_harm else "",
         hashes=hashes,
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
@@ -129,6 +138,11 @@ def build_report(
             "simulated": f"{pipeline.simulator.duration:g} s at {pipeline.simulator.time_step:g} s",
         },
     )
+    modes = triage.modes[:MOST_MODES] if triage else ()
+    first = [one.shown for one in modes]
+    if triage and not modes:  # what came nearest to harm
+        nearest = [one.evaluation for one in triage.bound.least if one.evaluation is not None]
+        first = nearest[:1]
     return ReportData(
         head,
         _evaluations(pipeline, rows),
@@ -136,20 +150,37 @@ def build_report(
         _coverage(pipeline, rows) if coverage else None,
         tables(notes, pipeline.space),
         regions,
-        more=_more(pipeline, rows, {evaluation for _, evaluation, _ in kept}) if more else (),
+        more=_more(pipeline, rows, {evaluation for _, evaluation, _ in kept}, first)
+        if more
+        else (),
         files=files or {},
         confirmations=confirmations,
+        triage=triage,
+        minimal=_minimal(pipeline, modes, minimal_files),
     )
 
 
-def _rule(limits: Thresholds, cause: Cause | None) -> str:
-    """Return what counts as critical, in words."""
-    many = limits.n_collision_above
-    contact = "a collision" if many == 0 else f"more than {many:g} collisions"
-    close = (
-        f"d_min below {limits.d_min_below:g} m while v_d is at least {limits.v_d_at_least:g} m/s"
-    )
-    rule = f"{contact}, or {close}"
+def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
+    """Return what counts as critical, in words.
+
+    Args:
+        objective: with the rule.
+        cause: the only one that counts, if one was asked for.
+    """
+    limits, many = objective.thresholds, objective.thresholds.n_collision_above
+    if objective.rule == "harm" and objective.count == "any":
+        rule = f"a collision or a near miss, whoever is responsible, harm_any ≥ {NEAR_MISS:g}"
+    elif objective.rule == "harm":
+        rule = (
+            "a collision that the ego is responsible for or could have prevented, or a near miss "
+            f"that it is responsible for, harm ≥ {NEAR_MISS:g}"
+        )
+    else:
+        contact = "a collision" if many == 0 else f"more than {many:g} collisions"
+        rule = (
+            f"{contact}, or d_min below {limits.d_min_below:g} m while v_d is at least "
+            f"{limits.v_d_at_least:g} m/s"
+        )
     return rule if cause is None else f"{rule}, put down to {cause.label}"
 
 
@@ -170,8 +201,8 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
         if name not in {*pipeline.source.unused_names, *space.decisions}
     )
     metrics = tuple(
-        Column(name, measures.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
-               measures.get(name).description)
+        Column(name, quantities.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
+               quantities.get(name).description)
         for j, name in enumerate(pipeline.metrics)
     )  # fmt: skip
     one = pipeline.objective.objectives == "one"
@@ -181,18 +212,42 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
     )
     cause = rows.cause if rows.cause.any() else None
     return Evaluations(
-        rows.batch, parameters, metrics, objectives, rows.critical, rows.status, cause
-    )
+        rows.batch, parameters, metrics, objectives, rows.critical, rows.status, cause,
+        rows.findings if any(rows.findings.conflict) or any(rows.findings.implausible) else None,
+    )  # fmt: skip
 
 
-def _more(pipeline: Pipeline, rows: Rows, kept: set[int]) -> tuple[Playback, ...]:
-    """Return the playbacks of the most critical scenarios besides those that were kept."""
+def _minimal(
+    pipeline: Pipeline, modes: Sequence[Mode], files: Sequence[str]
+) -> tuple[Playback, ...]:
+    """Return the playbacks of the minimal scenarios of failure modes."""
+    wanted = [
+        (
+            one.minimal.name or f"minimal form of mode {one.number}",
+            one.shown,
+            tuple(name for name in files if Path(name).stem == one.minimal.name),
+            one.minimal,
+        )
+        for one in modes
+        if one.minimal is not None
+    ]
+    return () if pipeline.driver.is_own else minimal_playbacks(pipeline, wanted)
+
+
+def _more(
+    pipeline: Pipeline, rows: Rows, kept: set[int], wanted: Sequence[int]
+) -> tuple[Playback, ...]:
+    """Return the playbacks of scenarios besides those that were kept.
+
+    First those that are wanted, then the most critical ones.
+    """
     critical = np.flatnonzero(rows.critical & (rows.status == 0))
     order = [i for i in critical[by_merit(rows.F[critical])].tolist() if i not in kept]
     space = pipeline.space
     own = space.decisions or {*pipeline.source.static_names} & {*space.variables}
     most = MOTIONS_OF_THEIR_OWN if own else max(MOTIONS, len(rows) // 10)
-    order = [] if pipeline.driver.is_own else order[:most]
+    first = [evaluation for evaluation in wanted if evaluation not in kept]
+    order = [] if pipeline.driver.is_own else list(dict.fromkeys([*first, *order]))[:most]
     found: list[Playback] = []
     for start in range(0, len(order), AT_A_TIME):
         some = [(f"evaluation {i + 1}", i, ()) for i in order[start : start + AT_A_TIME]]

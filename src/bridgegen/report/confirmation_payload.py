@@ -43,6 +43,7 @@ def _simulator(record: Record) -> dict[str, Any]:
         "simulator": record.simulator,
         "label": record.label,
         "reference": record.reference,
+        "rule": record.rule,
         "sentences": sentences(record.label, record.scenarios),
         "parted_at": record.parted_at,
         "scale": dict(record.scale),
@@ -68,7 +69,7 @@ def _scenario(one: Scenario) -> dict[str, Any]:
 
 def _outcome(one: Outcome) -> dict[str, Any]:
     contact = None if one.contact is None else one.contact.time
-    return {"d_min": one.d_min, "v_d": one.v_d, "contact": contact}
+    return {"harm": one.harm, "d_min": one.d_min, "v_d": one.v_d, "contact": contact}
 
 
 def _tracks(record: Record, one: Scenario) -> list[dict[str, Any]]:

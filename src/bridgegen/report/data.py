@@ -13,9 +13,11 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.confirmation.schema import Record
+from bridgegen.conflict.findings import Findings
 from bridgegen.odd.coverage import CoverageMap
 from bridgegen.report.notes import NoteTable
 from bridgegen.report.playback import Playback
+from bridgegen.triage.record import Triage
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class RunSummary:
         started: when the run began, as ISO 8601 text; may be empty.
         view: the command line that shows this run's page with the motion of every scenario.
         independent: whether each row was drawn by itself, as random search draws them.
+        harm: the metric that makes a scenario critical, "harm" or "harm_any"; "" where the paper's
+            thresholds do.
         hashes: of what the run was made from and of what came of it, name → digest.
         settings: further settings worth keeping, name → text, in display order.
     """
@@ -81,6 +85,7 @@ class RunSummary:
     started: str = ""
     view: str = ""
     independent: bool = False
+    harm: str = ""
     hashes: Mapping[str, str] | None = None
     settings: Mapping[str, str] | None = None
 
@@ -121,6 +126,7 @@ class Evaluations:
         critical: ``(N,)`` bool.
         status: ``(N,)`` int64, 0 is success; every other row is counted but not drawn.
         cause: ``(N,)``, a `bridgegen.cause.Cause` each; None where causes were not sought.
+        findings: the decisive conflict of each row; None where conflicts were not recorded.
     """
 
     iteration: Int
@@ -130,6 +136,7 @@ class Evaluations:
     critical: Bool
     status: Int
     cause: npt.NDArray[np.int8] | None = None
+    findings: Findings | None = None
 
     def __post_init__(self) -> None:
         n = self.iteration.size
@@ -143,6 +150,8 @@ class Evaluations:
         for name, array in arrays.items():
             if array is not None and array.shape != (n,):
                 raise ValueError(f"{name} must have shape {(n,)}, got {array.shape}")
+        if self.findings is not None and len(self.findings) != n:
+            raise ValueError(f"findings must be those of {n} rows, got {len(self.findings)}")
         if n and (self.iteration[1:] < self.iteration[:-1]).any():
             raise ValueError("iteration must ascend")
 
@@ -167,6 +176,8 @@ class ReportData:
         notes: what the algorithm learnt.
         regions: the critical ones, as `bridgegen.regions.record` has them, if they are known.
         confirmations: of its scenarios in other simulators, one each.
+        triage: the failure modes and what is known of the space, once the run has finished.
+        minimal: the minimal scenarios of failure modes; ``evaluation`` is the mode's ``shown``.
     """
 
     summary: RunSummary
@@ -178,10 +189,12 @@ class ReportData:
     more: tuple[Playback, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     confirmations: Sequence[Record] = ()
+    triage: Triage | None = None
+    minimal: tuple[Playback, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size
-        for playback in (*self.kept, *self.more):
+        for playback in (*self.kept, *self.more, *self.minimal):
             if not 0 <= playback.evaluation < n:
                 raise ValueError(
                     f"evaluation of playback '{playback.name}' must be in 0..{n - 1}, "

@@ -14,12 +14,12 @@ from bridgegen.report.data import ReportData
 from bridgegen.report.payload import to_json
 
 SCRIPTS = (
-    "common.js", "page.js", "regions.js", "elsewhere.js", "filters.js", "causes.js", "notes.js",
-    "inflate.js", "downloads.js", "playbacks.js",
+    "common.js", "page.js", "regions.js", "elsewhere.js", "filters.js", "causes.js", "modes.js",
+    "notes.js", "inflate.js", "downloads.js", "playbacks.js",
     "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
-    "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "scene.js",
-    "strip.js", "curves.js", "picture.js", "player.js", "parallel.js", "front.js", "near.js",
-    "charts.js", "coverage.js", "coverage_pairs.js",
+    "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "conflict.js",
+    "scene.js", "strip.js", "curves.js", "picture.js", "player.js", "parallel.js", "front.js",
+    "near.js", "charts.js", "coverage.js", "coverage_pairs.js",
 )  # fmt: skip
 """Joined in this order into one function scope; ``page.js`` holds what the others share."""
 
@@ -37,6 +37,7 @@ STYLES = (
     "elsewhere.css",
     "playback.css",
     "live.css",
+    "modes.css",
 )
 
 

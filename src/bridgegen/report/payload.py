@@ -6,6 +6,7 @@ number that is NaN or infinite becomes null.
 
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,11 @@ from bridgegen.report import convergence, sentences
 from bridgegen.report.confirmation_payload import confirmations_payload
 from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, ReportData
+from bridgegen.report.findings_payload import (
+    findings_payload,
+    implausible_payload,
+    triage_payload,
+)
 from bridgegen.report.packed import packed_files, packed_motions, road_key
 from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.playback_payload import (
@@ -35,6 +41,9 @@ ROWS = 20_000
 
 TRENDS = {"d_min": False, "v_d": True}
 """The metrics shown over iterations, and whether a larger one is worse."""
+
+TRENDS_OF_HARM = {"harm": True, "d_min": False}
+"""Likewise, where harm makes a scenario critical."""
 
 
 def to_json(data: ReportData, *, live: bool = False) -> str:
@@ -61,8 +70,11 @@ def script_json(value: Any) -> str:
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
     elsewhere = confirmations_payload(data.confirmations)
+    harm = data.summary.harm
     wanted = [one.evaluation for one in (*data.kept, *data.more)]
     wanted += [one["evaluation"] for each in elsewhere for one in each["scenarios"]]
+    modes = data.triage.modes if data.triage else ()
+    wanted += [one.shown for one in modes]
     shown = _shown(data.evaluations, wanted)
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
@@ -78,10 +90,13 @@ def payload(data: ReportData) -> dict[str, Any]:
     return {
         "live": False,
         "summary": _summary(data),
-        "rows": _rows(data.evaluations, shown),
+        "rows": _rows(data.evaluations, shown, harm=harm),
+        "triage": triage_payload(data.triage) if data.triage else None,
+        "minimal": packed_motions(data.minimal, index),
+        "implausible": implausible_payload(data.evaluations.findings),
         "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,
         "confirmations": elsewhere,
-        "batches": _batches(data.evaluations),
+        "batches": _batches(data.evaluations, TRENDS_OF_HARM if harm else TRENDS),
         "causes": _causes(data.evaluations),
         "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
@@ -103,15 +118,20 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
     Of the rows those that are new, and the ranks of all; or all of them anew, ``whole``, where a
     long run is thinned. Everything else as it is now.
     """
-    e = data.evaluations
+    e, harm = data.evaluations, data.summary.harm
     shown = _shown(e, [])
     whole = e.status.size > ROWS
     new = shown if whole else shown & (np.arange(shown.size) >= after)
     return {
         "summary": _summary(data),
         "whole": whole,
-        "rows": {**_rows(e, new), "rank": _ranks(e, shown), "front": _front(e, shown)},
-        "batches": _batches(e),
+        "rows": {
+            **_rows(e, new, harm=harm),
+            "rank": _ranks(e, shown, harm=harm),
+            "front": _front(e, shown),
+        },
+        "implausible": implausible_payload(e.findings),
+        "batches": _batches(e, TRENDS_OF_HARM if harm else TRENDS),
         "causes": _causes(e),
         "regions": regions_payload(data.regions, e, shown) if data.regions else None,
         "confirmations": confirmations_payload(data.confirmations),
@@ -127,12 +147,13 @@ def _summary(data: ReportData) -> dict[str, Any]:
         "finished": s.finished,
         "budget": int(s.budget),
         "sentences": sentences.sentences(data),
-        "table": sentences.summary_table(s),
+        "table": sentences.summary_table(data),
         "note": sentences.interval_note(s),
         "provenance": sentences.provenance(s),
         "command": s.command,
         "view": s.view,
         "critical_distance": _number(s.critical_distance),
+        "harm": s.harm,
     }
 
 
@@ -147,7 +168,7 @@ def _shown(e: Evaluations, kept: list[int]) -> Bool:
     return ok
 
 
-def _rows(e: Evaluations, ok: Bool) -> dict[str, Any]:
+def _rows(e: Evaluations, ok: Bool, *, harm: str = "") -> dict[str, Any]:
     groups = [("parameter", e.parameters), ("metric", e.metrics), ("objective", e.objectives)]
     return {
         "n": int(e.status.size),
@@ -157,15 +178,20 @@ def _rows(e: Evaluations, ok: Bool) -> dict[str, Any]:
         "iteration": (e.iteration[ok] + 1).tolist(),
         "critical": e.critical[ok].astype(np.int64).tolist(),
         "cause": None if e.cause is None else e.cause[ok].tolist(),
-        "rank": _ranks(e, ok),
+        "findings": findings_payload(e.findings, ok) if e.findings else None,
+        "rank": _ranks(e, ok, harm=harm),
         "front": _front(e, ok),
         "columns": [_column(c, group, ok) for group, columns in groups for c in columns],
         "telling": convergence.telling_parameters(e.parameters, e.critical, ok),
     }
 
 
-def _ranks(e: Evaluations, ok: Bool) -> list[int]:
-    """Return each row's place among all critical ones, 1 for the most critical; 0 for others."""
+def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
+    """Return each row's place among all critical ones, 1 for the most critical; 0 for others.
+
+    By harm, so that no near miss is above a collision of the ego's responsibility, where harm makes
+    a scenario critical; else by the objectives.
+    """
     critical = np.flatnonzero(e.critical & (e.status == 0))
     rank = np.zeros(e.critical.size, dtype=np.int64)
     F = (
@@ -173,7 +199,11 @@ def _ranks(e: Evaluations, ok: Bool) -> list[int]:
         if e.objectives
         else np.zeros((rank.size, 1))
     )
-    rank[critical[by_merit(F[critical])]] = np.arange(1, critical.size + 1)
+    order = critical[by_merit(F[critical])]
+    for column in e.metrics:
+        if column.name == harm:
+            order = order[np.argsort(-column.values[order], kind="stable")]
+    rank[order] = np.arange(1, critical.size + 1)
     told: list[int] = rank[ok].tolist()
     return told
 
@@ -213,14 +243,14 @@ def _column(column: Column, group: str, ok: Any) -> dict[str, Any]:
     }
 
 
-def _batches(e: Evaluations) -> dict[str, Any]:
+def _batches(e: Evaluations, trends_of: Mapping[str, bool] = TRENDS) -> dict[str, Any]:
     found = convergence.batches(e)
     n = found.first.size
     trends = {}
     for column in e.metrics:
-        if column.name in TRENDS:
+        if column.name in trends_of:
             values = np.where(e.status == 0, column.values, np.nan)
-            t = convergence.trend(values, found.group, n, larger_is_worse=TRENDS[column.name])
+            t = convergence.trend(values, found.group, n, larger_is_worse=trends_of[column.name])
             trends[column.name] = {
                 "unit": column.unit,
                 "median": significant(t.median),

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.conflict.summary import ConflictSummary
 from bridgegen.report.picture import Picture
 
 AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median", "stripe"})
@@ -174,6 +175,25 @@ class Course:
 
 
 @dataclass(frozen=True)
+class Conflict:
+    """The decisive conflict of a scenario, and where it is in the motion.
+
+    Attributes:
+        summary: what happened, with all figures.
+        partner: number of the other participant.
+        instant: of contact, or of the least time to collision.
+        decided: instant at which the risk arose that decides on responsibility.
+        zones: of the ego and of the other, `bridgegen.conflict.types.Zone` each.
+    """
+
+    summary: ConflictSummary
+    partner: int
+    instant: int
+    decided: int
+    zones: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class Playback:
     """One kept scenario, recorded: E entities over T instants, instant k at ``k · time_step``.
 
@@ -198,13 +218,14 @@ class Playback:
         files: paths of its files relative to the page ("critical/0001.xosc").
         picture: its individuals in five columns, if they are to be shown.
         lamps: the traffic lights.
-        cause: what its harm is put down to; may be empty.
+        cause: the quick label of its cause; may be empty.
         a: ``(E, T)`` float64 [m/s²], forward acceleration from each instant on; None: not known.
         ttc: ``(T,)`` float64 [s], the ego's least time to collision; None: not known.
         sensed: what the ego's sensors made of the others; None where it perceives nothing.
         course: where the ego means to go; None where nobody knows.
         weather: from the start on, and whenever it changes; empty: not known.
         street_lights: ``(n, 2)`` float64 [m].
+        conflict: the decisive one; None if there is none, or it was not analysed.
     """
 
     name: str
@@ -232,6 +253,7 @@ class Playback:
     course: Course | None = None
     weather: tuple[Weather, ...] = ()
     street_lights: Float | None = None
+    conflict: Conflict | None = None
 
     def __post_init__(self) -> None:
         place = f"playback '{self.name}'"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.report.findings_payload import conflict_payload
 from bridgegen.report.playback import Course, Lamp, Playback, Sensed, Weather
 from bridgegen.report.series import packed
 
@@ -59,6 +60,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
         "evaluation": int(p.evaluation),
         "critical": bool(p.critical),
         "cause": p.cause,
+        "conflict": None if p.conflict is None else conflict_payload(p.conflict),
         "parameters": {name: number(value) for name, value in p.parameters.items()},
         "metrics": {name: number(value) for name, value in p.metrics.items()},
         "files": list(p.files),

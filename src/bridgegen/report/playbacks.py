@@ -1,25 +1,54 @@
 """The kept scenarios, rolled out again, with all that their playback shows."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.cause import Cause
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import Conflicts, analyse
+from bridgegen.conflict.harm import Count
+from bridgegen.conflict.outcomes import with_outcomes
+from bridgegen.conflict.summary import summarise
 from bridgegen.ego import _weather_columns as column
 from bridgegen.evaluation import Replay
 from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.painter import paint
-from bridgegen.report.playback import Course, Playback, Weather
+from bridgegen.report.playback import Conflict, Course, Playback, Weather
 from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.report.sensing import sensed
-from bridgegen.simulation.outcomes import with_outcomes
 from bridgegen.store import Rows
+from bridgegen.triage.record import Minimal
 
 THIN = 0.01
 """How far a way's line may be off where its points lie nearly straight [m]."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A row that is played.
+
+    Attributes:
+        name: of its files, or for people.
+        evaluation: its row in the store, from 0; of a minimal scenario, what that was made from.
+        files: paths relative to the page.
+        x: ``(len(space.names),)``.
+        metrics: ``(M,)``.
+        critical: whether it counts as critical.
+        cause: the quick label; may be empty.
+    """
+
+    name: str
+    evaluation: int
+    files: tuple[str, ...]
+    x: Float
+    metrics: Float
+    critical: bool
+    cause: str
 
 
 def playbacks(
@@ -41,31 +70,69 @@ def playbacks(
     if not kept:
         return ()
     at = [evaluation for _, evaluation, _ in kept]
-    replay = pipeline.replay(rows.X[at], plans=not brief)
-    rollout = replay.rollout
+    shown = [
+        Shown(
+            name, evaluation, files, rows.X[evaluation], rows.metrics[evaluation],
+            bool(rows.critical[evaluation]), Cause(rows.cause[evaluation]).label,
+        )
+        for name, evaluation, files in kept
+    ]  # fmt: skip
+    return _played(pipeline, shown, pipeline.replay(rows.X[at], plans=not brief), brief=brief)
+
+
+def minimal_playbacks(
+    pipeline: Pipeline, wanted: Sequence[tuple[str, int, tuple[str, ...], Minimal]]
+) -> tuple[Playback, ...]:
+    """Return the playbacks of minimal scenarios, which are no rows of the run.
+
+    Args:
+        pipeline: what evaluated the run.
+        wanted: name of each, the evaluation that it is the minimal form of, its files, and itself.
+    """
+    if not wanted:
+        return ()
+    X = np.array([one.x for *_, one in wanted])
+    noise = np.array([one.noise_key for *_, one in wanted], dtype=np.uint64)
+    replay = pipeline.replay(X, plans=False, noise=noise)
+    metrics = quantities.evaluate(replay.rollout, pipeline.metrics)
+    critical = pipeline.objective.critical(metrics, pipeline.metrics)
+    shown = [
+        Shown(name, evaluation, files, X[k], metrics[k], bool(critical[k]), "")
+        for k, (name, evaluation, files, _) in enumerate(wanted)
+    ]
+    return _played(pipeline, shown, replay, brief=True)
+
+
+def _played(
+    pipeline: Pipeline, shown: Sequence[Shown], replay: Replay, *, brief: bool
+) -> tuple[Playback, ...]:
+    """Return the playbacks of rows that were rolled out."""
+    rollout, objective = replay.rollout, getattr(pipeline, "objective", None)
+    count: Count = objective.count if objective else "ego"
+    conflicts = analyse(rollout)
     entities, scenery = bodies(rollout, pipeline.source.bodies), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
     ttc, detections = ttc_over_time(rollout), sensed(rollout)
     checked = constraints_in_words(pipeline.source.constraints)
     found = []
-    for k, (name, evaluation, files) in enumerate(kept):
-        concrete = pipeline.concrete(rows.X[evaluation]) if not brief else None
+    for k, one in enumerate(shown):
+        concrete = pipeline.concrete(one.x) if not brief else None
         motion = {name: getattr(rollout, name)[k] for name in "xyhva"}
         if rollout.present.size:  # who is not there has no place and no speed
             motion |= {name: np.where(rollout.present[k], motion[name], np.nan) for name in "xyva"}
-        road = scenery.road(rows.X[evaluation])
+        road = scenery.road(one.x)
         picture = None
         if concrete is not None and concrete.individuals is not None:
             whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
             picture = paint(whole, (), checked)
         found.append(
             Playback(
-                name=name,
+                name=one.name,
                 rank=k + 1,
-                evaluation=evaluation,
-                parameters=pipeline.facts(rows.X[evaluation]),
-                metrics=dict(zip(pipeline.metrics, rows.metrics[evaluation].tolist(), strict=True)),
-                critical=bool(rows.critical[evaluation]),
+                evaluation=one.evaluation,
+                parameters=pipeline.facts(one.x),
+                metrics=dict(zip(pipeline.metrics, one.metrics.tolist(), strict=True)),
+                critical=one.critical,
                 time_step=rollout.time_step,
                 entities=entities,
                 **motion,
@@ -73,17 +140,34 @@ def playbacks(
                 ttc=ttc[k],
                 lanes=road.outlines,
                 n_steps=int(rollout.n_steps[k]),
-                files=files,
+                files=one.files,
                 picture=picture,
                 lamps=lamps(rollout, k, road.lights),
-                cause=Cause(rows.cause[evaluation]).label,
+                cause=one.cause,
                 sensed=detections[k] if detections else None,
                 course=_course(replay, k),
                 weather=tuple(_weather(step, one) for step, one in replay.weathers[k]),
                 street_lights=road.street_lights,
+                conflict=_conflict(conflicts, k, count),
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _conflict(conflicts: Conflicts, row: int, count: Count) -> Conflict | None:
+    """Return the decisive conflict of a row."""
+    summary = summarise(conflicts, row, count)
+    if summary is None:
+        return None
+    other = conflicts.names.index(summary.partner)
+    instant = int(conflicts.instant[row, other])
+    return Conflict(
+        summary=summary,
+        partner=other,
+        instant=instant,
+        decided=int(conflicts.decided[row, other]) if summary.happened else instant,
+        zones=(int(conflicts.zone_ego[row, other]), int(conflicts.zone_other[row, other])),
+    )
 
 
 def _course(replay: Replay, row: int) -> Course | None:

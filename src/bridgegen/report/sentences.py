@@ -11,6 +11,9 @@ from bridgegen.report.data import ReportData, RunSummary
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 
+MOST_TITLES = 3
+"""Failure modes that the text names."""
+
 AVOIDED = {
     Cause.PERCEPTION: "would not happen with ideal perception",
     Cause.PLANNING: "would not happen to a careful and competent driver",
@@ -31,9 +34,11 @@ def sentences(data: ReportData) -> list[str]:
     ]
     if not s.finished:
         words[0] = words[0][:-1] + f", so far, of a budget of {s.budget:,}."
+    words += _implausible(data)
     if s.n_critical == 0:
         none = "It is not" if s.n_evaluations == 1 else "None of them is"
-        return [*words, f"{none} critical (critical means {s.critical_rule})."]
+        words.append(f"{none} critical (critical means {s.critical_rule}).")
+        return [*words, *([data.triage.bound.sentence] if data.triage else [])]
     found = f"{s.n_critical:,} of them ({share(s.r_critic)}) "
     found += f"{'is' if s.n_critical == 1 else 'are'} critical ({s.critical_rule})"
     if s.first_critical is not None:
@@ -42,11 +47,17 @@ def sentences(data: ReportData) -> list[str]:
             found += f", the 50th at {s.fiftieth_critical:,}"
     words.append(found + ".")
     confirmed = [verdicts(one.label, one.scenarios)[0] for one in data.confirmations]
-    return [*words, *filter(None, (_causes(data), _worst(data))), *confirmed]
+    worst = _worst_harm(data) if s.harm else _worst(data)
+    return [*words, *filter(None, (_modes(data), _causes(data), worst)), *confirmed]
 
 
-def summary_table(s: RunSummary) -> list[tuple[str, str]]:
-    """Return the rows of the small table: what, and how much of it with its unit."""
+def summary_table(data: ReportData) -> list[tuple[str, str]]:
+    """Return the rows of the small table: what, and how much of it with its unit.
+
+    The paper's distances and speeds where its thresholds make a scenario critical; else collisions,
+    near misses and severity.
+    """
+    s = data.summary
     return [
         (
             "Critical share, R_critic",
@@ -55,12 +66,37 @@ def summary_table(s: RunSummary) -> list[tuple[str, str]]:
         ("R_critic, 95 % interval *", _interval(s)),
         ("First critical", _at(s.first_critical)),
         ("50th critical", _at(s.fiftieth_critical)),
+        *(_of_harm(data) if s.harm and data.evaluations.findings else _of_paper(s)),
+        ("Wall time", duration(s.wall_seconds)),
+    ]
+
+
+def _of_paper(s: RunSummary) -> list[tuple[str, str]]:
+    return [
         ("Distance d_min, smallest", metres(s.d_min_best)),
         ("Distance d_min, median", metres(s.d_min_median)),
         ("Speed v_d at d_min, highest", speed(s.v_d_best)),
         ("Speed v_d at d_min, median", speed(s.v_d_median)),
-        ("Wall time", duration(s.wall_seconds)),
     ]
+
+
+def _of_harm(data: ReportData) -> list[tuple[str, str]]:
+    e = data.evaluations
+    assert e.findings is not None
+    critical = e.critical & (e.status == 0)
+    contact = critical & (e.findings.conflict == "contact")
+    rows = [
+        ("Critical: collisions", f"{np.count_nonzero(contact):,}"),
+        ("Critical: near misses", f"{np.count_nonzero(critical & ~contact):,}"),
+    ]
+    for column in e.metrics:
+        if column.name == "severity":
+            worst = float(column.values[contact].max()) if contact.any() else float("nan")
+            rows.append(("Severity (MAIS3+), highest", share(worst)))
+        if column.name == data.summary.harm:
+            values = column.values[(e.status == 0) & np.isfinite(column.values)]
+            rows.append(("Harm, highest", f"{values.max():.3f}" if values.size else "–"))
+    return rows
 
 
 def interval_note(s: RunSummary) -> str:
@@ -141,7 +177,53 @@ def _causes(data: ReportData) -> str:
         for cause in CAUSES
         if (n := int(np.count_nonzero(causes == cause)))
     ]
-    return f"Replayed with one thing put right at a time, {', '.join(told)}."
+    return f"Quick labels, of one replay each with one stage idealised: {', '.join(told)}."
+
+
+def _modes(data: ReportData) -> str:
+    """Return the failure modes in one sentence; nothing before the run has finished."""
+    if data.triage is None or not data.triage.modes:
+        return ""
+    n = len(data.triage.modes) + data.triage.unrecorded_modes
+    titles = [f"{one.title} ({one.count:,})" for one in data.triage.modes[:MOST_TITLES]]
+    more = ", …" if n > MOST_TITLES else ""
+    return f"{_ways(n)} in which {data.summary.ego} comes to harm: {'; '.join(titles)}{more}."
+
+
+def _ways(n: int) -> str:
+    return "One way" if n == 1 else f"{n:,} ways"
+
+
+def _implausible(data: ReportData) -> list[str]:
+    """Return how many rows could not happen and are left out."""
+    findings = data.evaluations.findings
+    n = int(np.count_nonzero(findings.implausible != "")) if findings else 0
+    if not n:
+        return []
+    part = share(n / data.summary.n_evaluations)
+    return [
+        f"{_count(n, 'scenario')} ({part}) {'has' if n == 1 else 'have'} traffic that could not "
+        f"happen and {'is' if n == 1 else 'are'} not counted."
+    ]
+
+
+def _worst_harm(data: ReportData) -> str:
+    """Return how many critical scenarios are collisions, how severe, and how many near misses."""
+    e = data.evaluations
+    if e.findings is None:
+        return _worst(data)
+    critical = e.critical & (e.status == 0)
+    contact = critical & (e.findings.conflict == "contact")
+    n_contact = int(np.count_nonzero(contact))
+    n_near = int(np.count_nonzero(critical)) - n_contact
+    if not n_contact:
+        return f"{'It is a near miss' if n_near == 1 else 'All are near misses'}; no collision."
+    text = f"{_count(n_contact, 'collision')}"
+    severity = next((one.values for one in e.metrics if one.name == "severity"), None)
+    if severity is not None:
+        worst = float(severity[contact].max())
+        text += f", the most severe with a probability of {share(worst)} of a MAIS3+ injury"
+    return f"{text}; {n_near:,} {'near miss' if n_near == 1 else 'near misses'}."
 
 
 def _worst(data: ReportData) -> str:

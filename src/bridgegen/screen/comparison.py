@@ -125,7 +125,8 @@ def _variety(comparison: "Comparison", scenario: str) -> Table:
     from bridgegen.comparison import words
 
     told = {
-        "distinct", "critical_bins", "critical_pairs", "hypervolume", "gd", "spread", "seconds",
+        "distinct", "modes", "critical_bins", "critical_pairs", "hypervolume", "gd", "spread",
+        "seconds",
     }  # fmt: skip
     shown = [one for one in comparison.measures if one.name in told]
     table = _table("algorithm", *(one.title for one in shown))

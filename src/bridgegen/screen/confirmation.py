@@ -70,7 +70,9 @@ def _table(found: "RunConfirmation") -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
     table.add_column("scenario", no_wrap=True)
     table.add_column("there", no_wrap=True)
-    for name in ("d_min [m]", "v_d [m/s]", "contact [s]", "parts [s]"):
+    by_harm = found.record.rule == "harm"
+    figures = ("harm", "d_min [m]") if by_harm else ("d_min [m]", "v_d [m/s]")
+    for name in (*figures, "contact [s]", "parts [s]"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("first", overflow="fold")
     words = {True: "critical", False: "NOT", None: "not run"}
@@ -84,8 +86,9 @@ def _table(found: "RunConfirmation") -> Table:
         table.add_row(
             name,
             words[one.confirmed],
+            *([_change(here.harm, there.harm, none="–")] if by_harm else []),
             _change(here.d_min, there.d_min),
-            _change(here.v_d, there.v_d),
+            *([] if by_harm else [_change(here.v_d, there.v_d)]),
             _change(_touch(here), _touch(there), none="–"),
             f"{parting.time:.2f}" if parting else "never",
             parting.entity if parting else "",

@@ -5,11 +5,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bridgegen.campaign.driver_contract import Check
-    from bridgegen.metrics.measure import Measured
+    from bridgegen.conflict.analysis import Conflicts
+    from bridgegen.conflict.recorded import Measured
     from bridgegen.simulate import FileResult
 
 
@@ -22,7 +23,63 @@ def print_file_result(file: Path, result: "FileResult") -> None:
         print(f"cause of its harm, as it was found: {result.cause}")
     for one in result.incidents:
         print(f"at {one.step * result.rollout.time_step:.2f} s: {one.kind}: {one.what}")
+    _print_conflict(result.conflicts)
     _print_metrics(result.metrics)
+
+
+def conflict_facts(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> dict[str, Any]:
+    """Return the decisive conflict of a file as JSON's types; ``conflict`` is None without one.
+
+    Args:
+        conflicts: N = 1.
+        assumptions: what the analysis assumes.
+    """
+    from bridgegen.conflict.summary import summarise
+
+    summary = summarise(conflicts)
+    facts = None if summary is None else summary.to_dict() | {"assumptions": [*assumptions]}
+    return {"conflict": facts}
+
+
+def _print_conflict(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> None:
+    """Print the decisive conflict: a sentence, then its facts."""
+    from bridgegen.conflict.summary import CAREFUL_DRIVER, summarise
+
+    one = summarise(conflicts)
+    if one is None:
+        print("conflict: none")
+        return
+    print(f"conflict: {one.sentence}")
+    lines: list[tuple[str, str]] = []
+    if one.happened:
+        prevents = "would" if one.preventable else "would not"
+        lines += [
+            ("type", f"{one.conflict}, {one.type} ({one.type_source})"),
+            ("zones", f"ego {one.zone_ego}, {one.partner} {one.zone_other}"),
+            ("responsible", one.responsible),
+            ("rule", f"{one.rule}: {one.rule_says} ({one.rule_source})"),
+            ("decided", f"at {one.decided:.2f} s, {one.left:.2f} s before contact"),
+            ("preventable", f"{CAREFUL_DRIVER} {prevents} have avoided it"),
+        ]
+    lines += [
+        ("closing speed", f"{one.closing_normal:.1f} m/s across the surfaces that meet, "
+                          f"{one.closing_tangential:.1f} m/s along them"),
+    ]  # fmt: skip
+    if one.conflict == "contact":
+        lines += [
+            ("delta-v", f"ego {one.delta_v_ego:.1f} m/s, "
+                        f"{one.partner} {one.delta_v_other:.1f} m/s"),
+            ("severity", f"{one.severity:.3g} (probability of a MAIS3+ injury)"),
+        ]  # fmt: skip
+    else:
+        lines += [
+            ("least TTC", f"{one.ttc:.2f} s at {one.time:.2f} s"),
+            ("deceleration", f"{one.needed_deceleration:.1f} m/s² needed then"),
+        ]
+    for name, text in lines:
+        print(f"  {name:<13}  {text}")
+    for text in assumptions if one.happened else ():
+        print(f"  {'assumed':<13}  {text}")
 
 
 def print_measured(file: Path, measured: "Measured", *, as_json: bool) -> None:
@@ -32,7 +89,7 @@ def print_measured(file: Path, measured: "Measured", *, as_json: bool) -> None:
         facts = {
             "file": str(file), "ego": rollout.names[0], "entities": rollout.names, "instants": n,
             "time_step": rollout.time_step, "metrics": _finite(measured.metrics),
-            "notes": measured.notes,
+            "notes": measured.notes, **conflict_facts(measured.conflicts, measured.assumptions),
         }  # fmt: skip
         print(json.dumps(facts, indent=2))
         return
@@ -40,15 +97,16 @@ def print_measured(file: Path, measured: "Measured", *, as_json: bool) -> None:
         f"{file}: ego {rollout.names[0]}, {len(rollout.names) - 1} others, {measured.seconds:g} s "
         f"in {n} instants"
     )
+    _print_conflict(measured.conflicts, measured.assumptions)
     _print_metrics(measured.metrics)
 
 
 def _print_metrics(values: Mapping[str, float]) -> None:
-    from bridgegen.metrics import METRICS
+    from bridgegen.conflict.quantities import QUANTITIES
 
     width = max(len(name) for name in values)
     for name, value in values.items():
-        unit = METRICS[name].unit
+        unit = QUANTITIES[name].unit
         print(f"{name:<{width}}  {value:.6g}{'' if unit == '1' else ' ' + unit}")
 
 

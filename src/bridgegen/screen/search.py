@@ -8,14 +8,19 @@ from bridgegen.screen.live import Live
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, Watch
     from bridgegen.campaign.loop import Progress
+    from bridgegen.triage import Triage
     from bridgegen.workers import Workers
 
 _STAGES = {
     "compile": "compiling",
     "search": "",  # the bar says it; a terminal has but 80 columns
+    "triage": "testing what was found",
     "hand over": "writing the critical scenarios",
     "report": "writing the report",
 }
+
+MOST_MODES = 10
+"""Failure modes that are shown at most."""
 
 MOST_REASONS = 5
 """Why evaluations failed is told in so many lines at most."""
@@ -72,26 +77,61 @@ class SearchScreen(Live):
 
 
 def print_summary(run: "Run", seconds: float) -> None:
-    """Print a run's figures, the whole job's time [s], and where its files are."""
-    s, settings = run.summary, run.settings
+    """Print what was found, a run's figures, the whole job's time [s], and where its files are.
+
+    What was found comes first; with the paper's rule of what is critical, after the figures.
+    """
+    s, settings, found = run.summary, run.settings, run.triage
+    leads = settings.objective.get("rule") == "harm"
+    if found is not None and leads:
+        _print_found(found)
+        print()
+    quick = "quick causes" if found is not None else "causes"
     rows = [
         ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
         ("search", f"{settings.algorithm}, seed {settings.seed}"),
         ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
         ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical{_by(settings.cause)})"),
-        *([("causes", ", ".join(f"{k} {n}" for k, n in s.causes.items()))] if s.causes else []),
+        *([(quick, ", ".join(f"{k} {n}" for k, n in s.causes.items()))] if s.causes else []),
         ("first critical after", _count(s.first)),
         ("50th critical after", _count(s.fiftieth)),
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
-        ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}"),
+        ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}{_minimal(run)}"),
         ("report", str(run.report)),
+    ]
+    rows += [
+        ("not exported", f"{one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}")
+        for one in run.not_exported
     ]
     reasons = run.failures.most_common(MOST_REASONS)
     rows += [("failed", f"{count} × {reason}") for reason, count in reasons]
     for name, value in rows:
         print(f"{name:<22}{value}")
+    if found is not None and not leads:
+        print()
+        _print_found(found)
+
+
+def _print_found(found: "Triage") -> None:
+    """Print the failure modes, one line each, and what is known of the space."""
+    from bridgegen.triage.words import headline, mode_in_words
+
+    print(headline(found))
+    for one in found.modes[:MOST_MODES]:
+        print(mode_in_words(one, found))
+        if one.minimal is not None:
+            edge = " (knife-edge)" if one.minimal.knife_edge else ""
+            print(f"     simplest{edge}: {one.minimal.sentence}")
+    more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
+    if more:
+        print(f"     and {more} more")
+
+
+def _minimal(run: "Run") -> str:
+    n = len(run.minimal_scenarios)
+    return f", and {n} minimal" if n else ""
 
 
 def _by(cause: str | None) -> str:

@@ -26,15 +26,19 @@ class Observer:
     near 0, where collisions are, and coarse far away. A value less critical than its metric's cap,
     +inf among them, counts as the cap; NaN, which a failed scenario has, as 0.
 
+    What the conflict analysis measures is not observed: an agent sees the metrics.
+
     Args:
         problem: names the parameters and the metrics; metrics that BridgeGen does not know have no
             cap.
     """
 
     def __init__(self, problem: Problem) -> None:
+        from bridgegen.conflict.quantities import MEASURED
         from bridgegen.metrics import METRICS
 
-        known = [METRICS.get(name) for name in problem.metrics]
+        self._seen = [j for j, name in enumerate(problem.metrics) if name not in MEASURED]
+        known = [METRICS.get(problem.metrics[j]) for j in self._seen]
         self._sign = np.array([1.0 if one is None else one.sign for one in known])
         floor = [-np.inf if one is None else one.sign * one.cap for one in known]
         self._floor = np.array(floor, dtype=np.float64)
@@ -47,7 +51,8 @@ class Observer:
             U: ``(n, n_var)`` in [0, 1].
             metrics: ``(n, len(problem.metrics))`` in the metrics' units.
         """
-        value = self._sign * np.maximum(self._sign * metrics, self._floor)
+        seen = metrics[:, self._seen]
+        value = self._sign * np.maximum(self._sign * seen, self._floor)
         small = np.sign(value) * np.log1p(np.abs(value)) / np.log1p(LARGEST)
         small = np.clip(np.nan_to_num(small, nan=0.0), -1.0, 1.0)
         return np.hstack([2.0 * U - 1.0, small]).astype(np.float32)

@@ -54,6 +54,22 @@ def boxes_of(path: Path) -> dict[str, tuple[float, float, float]]:
     return boxes
 
 
+def kinds_of(path: Path) -> dict[str, int]:
+    """Return what a scenario file's entities are, as `bridgegen.ego.kinds` numbers it.
+
+    Raises:
+        FileFormatError: not a valid OpenSCENARIO file.
+    """
+    from bridgegen.simulation.embedded.compiler.bodies import kind
+
+    scenario = resolved(read_scenario(path), str(path))
+    return {
+        str(one.name): kind(one.entity_object)
+        for one in scenario.entities.scenario_objects
+        if isinstance(one.entity_object, osc.Vehicle | osc.Pedestrian | osc.MiscObject)
+    }
+
+
 def _plain(value: object) -> float:
     assert isinstance(value, float)  # resolved: no parameter is left
     return value

@@ -88,9 +88,15 @@ class Rollout:
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
             instant, in the columns of `bridgegen.ego.detections`; rows of the ego itself
             are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
-        stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where the ego's
-            route crosses the stop line of a traffic light, the heading in travel direction.
+        stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where a route
+            crosses the stop line of a traffic light, the heading in travel direction.
         stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
+        stop_entities: ``(L,)`` int64, whose route it is.
+        claims: ``(N, E, E)`` int64, which of two participants' routes goes first; see
+            `bridgegen.ego.right_of_way.claim`. ``(0, 0, 0)`` where no map is known.
+        crosswalks: ``(N, C, 5)`` float64, the crosswalks that the ego's route leads over: x, y of
+            the centre [m], the route's heading [rad], half the extent along and across the route
+            [m]; NaN where a road network has fewer.
         messages: by row, what else there is to say of its failure.
         incidents: by row, what the simulator noticed by itself, if it does: metrics know more.
         derived: what several metrics start from, worked out once; see `metrics.metric.shared`.
@@ -116,6 +122,9 @@ class Rollout:
     detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
     stop_lights: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    stop_entities: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    claims: Int = field(default_factory=lambda: np.zeros((0, 0, 0), np.int64))
+    crosswalks: Float = field(default_factory=lambda: np.zeros((0, 0, 5)))
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -150,7 +159,7 @@ class Rollout:
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
-    "stop_lines", "present",
+    "stop_lines", "present", "claims", "crosswalks",
 )  # fmt: skip
 
 
@@ -165,6 +174,11 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     whole: dict[str, Any] = {}
     for name in _BY_ROW:
         arrays = [getattr(one, name) for _, one in parts]
+        if name == "present" and any(len(array) for array in arrays):
+            arrays = [
+                array if len(array) else np.ones(one.shape, np.bool_)
+                for array, (_, one) in zip(arrays, parts, strict=True)
+            ]
         if len(arrays[0]):  # else nobody records it
             whole[name] = np.concatenate(arrays)[order]
     messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}

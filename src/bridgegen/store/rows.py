@@ -10,17 +10,20 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.cause import Cause
+from bridgegen.conflict.findings import COLUMNS, Findings, unpacked
 from bridgegen.errors import InputError
 
 FIRST = ("id", "batch", "seconds", "u")
-LAST = ("status", "critical", "cause")
+LAST = ("status", "critical", "cause", *COLUMNS)
+LAST_OF_SCHEMA = {1: LAST[:2], 2: LAST[:3], 3: LAST}
+"""The last columns by the schema of the store."""
 
 
 class Evaluated(Protocol):
     """What an evaluation of n rows hands over; any object with these arrays will do.
 
-    It may have another one, ``cause``: ``(n,)`` integers, a `Cause` each; where it has none, or
-    None, no cause is recorded.
+    It may have others: ``cause``, ``(n,)`` integers, a `Cause` each, and ``findings``, the
+    `Findings` of n rows; where it has none, or None, none are recorded.
     """
 
     @property
@@ -59,6 +62,7 @@ class Rows:
         status: ``(n,)`` int64, 0 is success.
         critical: ``(n,)`` bool.
         cause: ``(n,)`` int8, a `Cause` each; NONE, too, of a run that did not seek causes.
+        findings: the decisive conflict of each row; empty, too, of a run that recorded none.
     """
 
     id: Int
@@ -71,6 +75,7 @@ class Rows:
     status: Int
     critical: Bool
     cause: npt.NDArray[np.int8]
+    findings: Findings
 
     def __len__(self) -> int:
         return len(self.id)
@@ -83,7 +88,11 @@ class Rows:
     @classmethod
     def join(cls, parts: Sequence["Rows"]) -> "Rows":
         """Return the rows of several parts, at least one, in their order."""
-        return cls(*(np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(cls)))
+        names = [one.name for one in fields(cls) if one.name != "findings"]
+        return cls(
+            **{name: np.concatenate([getattr(p, name) for p in parts]) for name in names},
+            findings=Findings.join([part.findings for part in parts]),
+        )
 
     def digest(self) -> str:
         """Return SHA-256 of all that was evaluated and came of it, times left out.
@@ -93,11 +102,16 @@ class Rows:
         digest = sha256()
         for array in (self.U, self.X, self.metrics, self.F, self.status, self.critical, self.cause):
             digest.update(array.astype(array.dtype.newbyteorder("<")).tobytes())
+        for texts in self.findings.columns().values():
+            digest.update("\0".join(texts.tolist()).encode())
         return digest.hexdigest()
 
     def take(self, at: Int) -> "Rows":
         """Return the rows at some positions, in that order."""
-        return Rows(*(getattr(self, one.name)[at] for one in fields(self)))
+        names = [one.name for one in fields(self) if one.name != "findings"]
+        return Rows(
+            **{name: getattr(self, name)[at] for name in names}, findings=self.findings.take(at)
+        )
 
 
 @dataclass(frozen=True)
@@ -112,7 +126,7 @@ class Columns:
         X: the column of each parameter.
         metrics: the column of each metric.
         F: the column of each objective: f0, f1 …
-        last: those that come last; a run of the first schema has no cause.
+        last: those that come last, see ``LAST_OF_SCHEMA``.
     """
 
     n_var: int
@@ -129,7 +143,7 @@ class Columns:
         metrics: Sequence[str],
         n_obj: int,
         *,
-        has_cause: bool = True,
+        schema: int = max(LAST_OF_SCHEMA),
     ) -> "Columns":
         """Choose the columns' names.
 
@@ -147,7 +161,7 @@ class Columns:
         if problems:
             raise InputError(*problems)
         F = tuple(f"f{i}" for i in range(n_obj))
-        last = LAST if has_cause else LAST[:-1]
+        last = LAST_OF_SCHEMA[schema]
         taken = {name.lower() for name in (*FIRST, *F, *last)}
         X = _free(parameters, "parameter", taken)
         return cls(n_var, X, _free(metrics, "metric", taken), F, last)
@@ -161,7 +175,7 @@ class Columns:
         """Return the statement that makes the table."""
         kinds = {"id": "INTEGER PRIMARY KEY", "batch": "INTEGER NOT NULL", "u": "BLOB NOT NULL"}
         kinds |= {"status": "INTEGER NOT NULL", "critical": "INTEGER NOT NULL"}
-        kinds |= {"cause": "TEXT"}
+        kinds |= dict.fromkeys(("cause", *COLUMNS), "TEXT")
         columns = ", ".join(f"{quoted(name)} {kinds.get(name, 'REAL')}" for name in self.all)
         return f"CREATE TABLE evaluations ({columns})"
 
@@ -194,12 +208,16 @@ class Columns:
         for name, array in (("status", status), ("critical", critical), ("cause", cause)):
             if array.shape != (n,):
                 raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
+        said = getattr(result, "findings", None) or Findings.none(n)
+        if len(said) != n:
+            raise ValueError(f"findings must be those of {n} rows, got {len(said)}")
         parts = zip(
             blobs,
             numbers.tolist(),
             status.astype(np.int64).tolist(),
             critical.astype(np.int64).tolist(),
             [Cause(one).label or None for one in cause.tolist()],
+            *([one or None for one in texts.tolist()] for texts in said.columns().values()),
             strict=True,
         )
         width = len(self.last)
@@ -237,6 +255,9 @@ class Columns:
             status=_column(rows, last, np.int64),
             critical=_column(rows, last + 1, np.bool_),
             cause=np.array([Cause.named(one) if one else Cause.NONE for one in causes], np.int8),
+            findings=unpacked([row[last + 3 :] for row in rows])
+            if len(self.last) > 3
+            else Findings.none(n),
         )
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from bridgegen.errors import StorageError
-from bridgegen.store.rows import Columns
+from bridgegen.store.rows import LAST_OF_SCHEMA, Columns
 from bridgegen.store.sqlite import storage_errors, transaction
 
-SCHEMA = 2
-READABLE = (1, 2)
-"""The schemas that can be read and gone on with; the first has no column for the cause."""
+SCHEMA = 3
+READABLE = tuple(LAST_OF_SCHEMA)
+"""The schemas that can be read and resumed."""
 
 FILE = "run.sqlite"
 LOCK = "run.lock"
@@ -67,7 +67,7 @@ def columns_of(run: Mapping[str, Any]) -> Columns:
         KeyError: a key is missing.
     """
     names = (run["n_var"], run["parameters"], run["metrics"], run["n_obj"])
-    return Columns.named(*names, has_cause=run["schema"] > 1)
+    return Columns.named(*names, schema=run["schema"])
 
 
 def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:

@@ -40,9 +40,9 @@ class Store:
     """A run's settings and its evaluations, in the order of recording; nothing is ever changed.
 
     Table ``evaluations``: id, batch, seconds, u (the unit-cube row, float64 little endian), one
-    column per parameter, metric and objective (f0, f1 …), status, critical, cause. NaN is NULL,
-    and so is the cause of what is not critical. SQLite keeps no sign of zero: −0.0 comes back as
-    0.0; every other float64 comes back bit for bit.
+    column per parameter, metric and objective (f0, f1 …), status, critical, cause, and those of
+    `Findings`. NaN is NULL, and so is the cause of what is not critical. SQLite keeps no sign of
+    zero: −0.0 comes back as 0.0; every other float64 comes back bit for bit.
     Table ``run``: key and value (JSON); what the algorithm learnt is under "notes".
     Table ``failures``, where there is something to say: id, message.
     Table ``checkpoint``, where the algorithm can be saved: its state after its newest batch.
@@ -358,14 +358,19 @@ class Store:
         data = {name: np.empty(n) for name in names}
         data |= {"batch": np.empty(n, np.int64), "status": np.empty(n, np.int64)}
         data |= {"critical": np.empty(n, np.bool_)}
-        if "cause" in columns.last:
-            data["cause"] = np.empty(n, dtype=object)
+        texts = columns.last[2:]
+        data |= {name: np.empty(n, dtype=object) for name in texts}
         for rows in self.rows(0, n):
             at = slice(int(rows.id[0]), int(rows.id[-1]) + 1)
             for name in ("batch", "seconds", "status", "critical"):
                 data[name][at] = getattr(rows, name)
-            if "cause" in columns.last:
-                data["cause"][at] = [Cause(one).label or None for one in rows.cause.tolist()]
+            said: dict[str, Any] = {
+                name: [text or None for text in one.tolist()]
+                for name, one in rows.findings.columns().items()
+            }
+            said["cause"] = [Cause(one).label or None for one in rows.cause.tolist()]
+            for name in texts:
+                data[name][at] = said[name]
             for part, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
                                  (columns.F, rows.F)):  # fmt: skip
                 for name, column in zip(part, values.T, strict=True):

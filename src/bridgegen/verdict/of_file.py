@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridgegen.metrics import METRICS
+from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.simulate import FileResult
 from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
 from bridgegen.verdict.junit import Suite, case_of, refuse_junit, write_junit
@@ -34,7 +34,7 @@ class FileGate:
             InputError: no criterion, or an unknown metric.
             StorageError: no JUnit XML can be written there.
         """
-        gate = cls(read_criteria(texts, METRICS), junit)
+        gate = cls(read_criteria(texts, QUANTITIES), junit)
         if junit is not None:
             refuse_junit(junit)
         return gate
@@ -59,7 +59,7 @@ class FileGate:
         )
         outcomes = (ran, *(one.judge(result.metrics) for one in self.criteria))
         if self.junit is not None:
-            units = {name: METRICS[name].unit for name in result.metrics}
+            units = {name: QUANTITIES[name].unit for name in result.metrics}
             metrics = {
                 name: f"{value:.6g}" + ("" if units[name] in ("1", "count") else f" {units[name]}")
                 for name, value in result.metrics.items()

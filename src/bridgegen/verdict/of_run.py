@@ -15,10 +15,18 @@ from bridgegen.cause import CAUSES
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError
 from bridgegen.store import Store
+from bridgegen.triage.words import mode_in_words
 from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
 
-_CAUSES = {one.label: "critical scenarios of this cause" for one in CAUSES}
+_CAUSES = {one.label: "critical scenarios of this cause (quick: one replay)" for one in CAUSES}
+
+_TRIAGE = {
+    "modes": "failure modes",
+    "robust": "failure modes that persist in at least half of the neighbours",
+    "worst_severity": "the worst probability of MAIS3+ in a failure mode; 0 if there is none",
+    "harmful.upper": "upper end of the 95 % interval of the harmful share of the space",
+}
 
 FIGURES = {
     "r_critic": "critical evaluations / all evaluations",
@@ -33,10 +41,11 @@ FIGURES = {
     "v_d_median": "the median of v_d [m/s]",
     "seconds": "of search, compilation not included [s]",
     **_CAUSES,
+    **_TRIAGE,
 }
 """What ``--fail-if`` can name of a run."""
 
-_OF_THE_RUN = ("evaluations", "failed", "seconds")
+_OF_THE_RUN = ("evaluations", "failed", "seconds", "harmful.upper")
 """No single critical scenario is to blame for these."""
 
 
@@ -117,10 +126,25 @@ def figures_of(run: Run) -> dict[str, float]:
         "v_d_best": s.v_d_best,
         "v_d_median": s.v_d_median,
         **{name: s.causes.get(name, 0) if sought else nan for name in _CAUSES},
+        **_of_triage(run),
     }
     if s.failed == s.evaluations:
         figures = dict.fromkeys(figures, nan)
     return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
+
+
+def _of_triage(run: Run) -> dict[str, float]:
+    """Return the figures of a run's triage; NaN where there is none, or nothing was estimated."""
+    found, nan = run.triage, float("nan")
+    if found is None:
+        return dict.fromkeys(_TRIAGE, nan)
+    space = found.bound.space
+    return {
+        "modes": len(found.modes) + found.unrecorded_modes,
+        "robust": found.robust + found.unrecorded_modes if found.neighbours else nan,
+        "worst_severity": max((one.severity for one in found.modes), default=0.0),
+        "harmful.upper": space.high if space.drawn and space.rows else nan,
+    }
 
 
 def _searched(run: Run) -> Outcome:
@@ -147,6 +171,9 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
         "command": settings.command(run.folder),
         "report": str(run.report),
     } | {key: f"{value:.6g}" for key, value in figures_of(run).items()}
+    if run.triage is not None:
+        facts |= {"found": run.triage.bound.sentence}
+        facts |= {f"mode {one.number}": mode_in_words(one, run.triage) for one in run.modes}
     cases = [case_of(group, one) for one in outcomes]
     broken = [one for one in outcomes if one.verdict == "failed"]
     scenarios = [_scenario(run, path, name, group, broken) for path in run.scenarios]
@@ -156,7 +183,7 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
 def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
     """Return a handed-over scenario as a test, failed if it is to blame for a criterion."""
     facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
-    blamed = [one.test for one in broken if _is_to_blame(facts["cause"], one.figures)]
+    blamed = [one.test for one in broken if _is_to_blame(facts, one.figures)]
     values = {key: _told(one) for key, one in facts["metrics"].items()}
     cause = f", cause: {facts['cause']}" if facts["cause"] else ""
     what = "collision" if facts["metrics"]["n_collision"]["value"] else "near miss"
@@ -177,11 +204,14 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
     case = Case(group, f"critical {path.stem}", "failure" if blamed else None, message, text)
     properties = values | {key: _told(one) for key, one in facts["parameters"].items()}
     properties |= {"cause": facts["cause"] or "", "evaluation": str(facts["evaluation"])}
+    if facts.get("robustness") is not None:
+        properties |= {"mode": str(facts["mode"]), "robustness": f"{facts['robustness']:.6g}"}
     return Suite(f"{name} {path.stem}", [case], properties)
 
 
-def _is_to_blame(cause: str | None, figures: Sequence[str]) -> bool:
-    """Say whether a critical scenario of that cause speaks for a broken criterion."""
+def _is_to_blame(facts: dict[str, Any], figures: Sequence[str]) -> bool:
+    """Say whether a critical scenario speaks for a broken criterion, by its quick cause."""
+    cause = facts.get("quick_cause", facts["cause"])
     return any(name == cause if name in _CAUSES else name not in _OF_THE_RUN for name in figures)
 
 

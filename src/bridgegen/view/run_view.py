@@ -7,7 +7,7 @@ from typing import Any
 
 from bridgegen.campaign.handover import Kept, handed_over
 from bridgegen.campaign.regions import OWL_FILE
-from bridgegen.campaign.report import run_data
+from bridgegen.campaign.report import minimal_files, run_data
 from bridgegen.campaign.restored import pipeline_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.confirmation.record import file_name, read_records
@@ -19,6 +19,7 @@ from bridgegen.report.page import report_page
 from bridgegen.report.payload import news
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice
 from bridgegen.store import Rows, Store
+from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 
 
 class RunView:
@@ -103,6 +104,7 @@ class RunView:
         """Return a handed-over file, or a record of what came later; None of any other name."""
         names = {name for one in self._kept() for name in one.files} | {JSON_FILE, OWL_FILE}
         names |= {file_name(name) for name in SIMULATORS}
+        names |= {TRIAGE_FILE, *minimal_files(self.folder)}
         try:
             return (self.folder / name).read_bytes() if name in names else None
         except FileNotFoundError:

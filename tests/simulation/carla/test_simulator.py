@@ -50,7 +50,7 @@ def middle_of(actor):
     [
         ("crossroads-s4", "route-follower"),
         ("cut-in", "reference"),
-        ("pedestrian-at-night", "un-r157"),
+        ("pedestrian-at-night", "careful"),
     ],
 )
 def test_an_ego_that_is_moved_is_the_embedded_one(made, machine, name, driver):

@@ -69,7 +69,9 @@ def test_a_row_is_the_same_to_the_last_bit_whatever_its_batch(contender, driver)
             assert (getattr(part, name) == getattr(whole, name)[rows]).all(), name
 
 
-@pytest.mark.parametrize("driver", ["route-follower", "reference", "un-r157", "fsm"])
+@pytest.mark.parametrize(
+    "driver", ["route-follower", "reference", "un-r157", "fsm", "careful", "careful-fsm"]
+)
 def test_metrics_are_those_of_the_embedded_one(contender, driver):
     """Where the bodies are within 0.2 m of each other's place, so are the distances."""
     values = some()

@@ -155,17 +155,21 @@ def friction(factor: float | str) -> str:
 frictionScaleFactor="{factor}"/></Environment></EnvironmentAction></GlobalAction>"""
 
 
-def simulator(text: str, ego: str | None = "route-follower") -> EmbeddedSimulator:
+def simulator(
+    text: str, ego: str | None = "route-follower", others: str | None = None
+) -> EmbeddedSimulator:
     driver = DRIVERS[ego] if ego else None
-    return EmbeddedSimulator(read(text.encode(), "test.xosc"), "test.xosc", driver=driver)
+    file = read(text.encode(), "test.xosc")
+    return EmbeddedSimulator(file, "test.xosc", driver=driver, others=others)
 
 
 def run(
     text: str,
     ego: str | None = "route-follower",
     roads: OpenDrive | None = None,
+    others: str | None = None,
     **values: list[float],
 ) -> Rollout:
-    made = simulator(text, ego)
+    made = simulator(text, ego, others)
     n = len(next(iter(values.values()))) if values else 1
     return made.run(made.roads([roads or crossroads()]), np.zeros(n, dtype=np.int64), values)

@@ -252,3 +252,65 @@ def test_who_is_aside_in_a_bend_moves_as_fast_as_it_says(metres):
     off = np.abs(np.delete(steps, k) - 8.0 * 0.05)
     assert np.sort(off)[-5] < 1e-3  # but for the step across, and those in which the bend begins
     assert off.max() < 0.03
+
+
+# -- lane changes are driven -------------------------------------------------------------------
+
+LOCK = math.tan(0.6) / 2.8  # 1/m, of the tests' car
+
+
+def tilts(rollout, e=1):
+    """The turn of the nose from south, where the lane leads."""
+    return np.array([math.remainder(h + math.pi / 2, math.tau) for h in rollout.h[0, e]])
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 3.0, 4.0])
+@pytest.mark.parametrize("dynamics", ["sinusoidal time 2", "cubic time 2", "sinusoidal distance 3"])
+def test_a_slow_car_changes_lane_as_its_steering_lets_it(speed, dynamics):
+    """The path never bends tighter than full lock, and the speed stays that along the line."""
+    rollout = driven(speed, ("e", "bv", lateral(1, dynamics), after(0.0)), lane_id=2)
+    tilt = tilts(rollout)
+    steps = np.hypot(np.diff(rollout.x[0, 1]), np.diff(rollout.y[0, 1]))
+    np.testing.assert_allclose(steps, speed * rollout.time_step, rtol=1e-2)
+    bends = np.abs(np.diff(tilt)) / steps
+    assert bends.max() <= 1.1 * LOCK
+    assert np.abs(tilt).max() < math.radians(45.0)
+    aside = rollout.x[0, 1] - rollout.x[0, 1, 0]
+    assert (np.diff(aside) >= -1e-12).all()
+    length = math.sqrt(6.0 * 3.5 / LOCK)  # of a cubic one; a sinusoidal one is shorter
+    if speed * 10.0 > 1.3 * length:
+        assert aside[-1] == pytest.approx(3.5, abs=1e-6)
+        assert tilt[-1] == 0.0
+
+
+def test_who_stops_while_it_changes_lane_keeps_its_heading_and_place():
+    rows = (
+        ("e", "bv", lateral(1, "sinusoidal time 4"), after(0.0)),
+        ("stop", "bv", speeding(0.0, "linear rate 4"), after(1.0)),
+        ("go", "bv", speeding(5.0, "linear rate 2"), after(5.0)),
+    )
+    rollout = driven(6.0, *rows, lane_id=2)
+    tilt, aside = tilts(rollout), rollout.x[0, 1] - rollout.x[0, 1, 0]
+    stands = rollout.v[0, 1] == 0.0
+    assert stands.sum() > 40
+    assert 0.1 < aside[stands][0] < 3.4
+    assert np.ptp(aside[stands]) == 0.0
+    assert np.ptp(tilt[stands][1:]) == 0.0
+    assert tilt[stands][-1] > 0.1
+    moves = np.hypot(np.diff(rollout.x[0, 1]), np.diff(rollout.y[0, 1]))
+    assert (np.abs(np.diff(tilt)) <= 2.0 * LOCK * moves + 1e-9).all()
+    assert aside[-1] == pytest.approx(3.5, abs=1e-6)
+
+
+def test_who_stands_does_not_begin_to_turn():
+    rollout = driven(0.0, ("e", "bv", lateral(1, "sinusoidal time 4"), after(0.0)), lane_id=2)
+    assert np.ptp(rollout.x[0, 1]) == np.ptp(rollout.y[0, 1]) == np.ptp(rollout.h[0, 1]) == 0.0
+
+
+def test_a_walker_may_go_sideways():
+    """It has no wheels: 3.5 m in 4 s are its speed, and it goes straight across."""
+    walker = start("walker", lane(3, 2, 90.0), 0.5)
+    rows = events(("e", "walker", lateral(1, "linear time 4", "walker"), after(0.0)))
+    rollout = run(scenario(("ego", "walker"), EGO + walker, rows))
+    assert rollout.x[0, 1, 60] - rollout.x[0, 1, 0] == pytest.approx(1.5)
+    assert np.ptp(rollout.y[0, 1, :60]) == pytest.approx(0.0, abs=1e-9)

@@ -64,7 +64,7 @@ def test_a_speed_changes_by_its_shape(dynamics, speed):
 
 def test_there_and_back():
     rollout = driven(
-        5.0,
+        8.0,
         ("out", "bv", lateral(-1, "sinusoidal time 2"), after(1.0)),
         ("back", "bv", lateral(1, "sinusoidal time 2"), ended("out", delay=1.0)),
     )

@@ -18,7 +18,7 @@ from .storyboards import (
     start,
 )
 
-CAREFUL = ("un-r157", "fsm")
+CAREFUL = ("careful", "careful-fsm")
 SOUTHBOUND = start("ego", lane(3, 1, 80.0), 10.0, lane(3, 1, 80.0), lane(1, -1, 90.0))
 WAITING = start("bv", lane(2, 1, 40.0), 0.0, lane(2, 1, 40.0), lane(4, -1, 90.0))
 CROSSES = event("bv", speed_action(8.0, "linear rate 4.0"), after(2.0))
@@ -59,7 +59,7 @@ def test_a_cut_in_is_braked_for_after_the_regulations_delay():
     cuts = events(("cut", "bv", lateral(1, "linear time 3"), after(1.0)))
     ego = start("ego", lane(3, 1, 90.0), 15.0, lane(3, 1, 90.0), lane(1, -1, 90.0))
     bv = start("bv", lane(3, 2, 62.0), 6.0, lane(3, 2, 62.0), lane(1, -2, 90.0))
-    rollout = run(scenario(("ego", "bv"), ego + bv, cuts), "un-r157")
+    rollout = run(scenario(("ego", "bv"), ego + bv, cuts), "careful")
     centre = rollout.x[0, 1] + 1.4 * np.cos(rollout.h[0, 1])  # leg C leads south
     told = int(np.argmax(np.abs(centre - centre[0]) > 0.375)) * 0.05
     brakes = int(np.argmax(rollout.a[0, 0] < -0.3)) * 0.05

@@ -46,13 +46,13 @@ def test_a_driver_that_does_not_look_plans_badly():
     assert cause(scenario(("ego", "bv"), ego(10.0) + STANDS), "route-follower") is Cause.PLANNING
 
 
-@pytest.mark.parametrize("driver", ["reference", "un-r157", "fsm"])
+@pytest.mark.parametrize("driver", ["reference", "careful", "careful-fsm"])
 def test_ice_is_a_matter_of_control(driver):
     text = scenario(("ego", "bv"), ego(15.0) + STANDS, environment=friction(0.1))
     assert cause(text, driver) is Cause.CONTROL
 
 
-@pytest.mark.parametrize("driver", ["route-follower", "reference", "un-r157", "fsm"])
+@pytest.mark.parametrize("driver", ["route-follower", "reference", "careful", "careful-fsm"])
 def test_who_steps_out_three_metres_ahead_cannot_be_avoided(driver):
     text = scenario(("ego", "walker"), ego(10.0) + STEPS_OUT)
     assert cause(text, driver) is Cause.UNAVOIDABLE

@@ -41,7 +41,7 @@ def driven(joint, between=lambda joint, k: None):
         ("crossroads-s1", "route-follower"),
         ("cut-in", "reference"),
         ("red-light-runner", "reference"),
-        ("pedestrian-at-night", "un-r157"),
+        ("pedestrian-at-night", "careful"),
         ("crossroads-s3", f"{EGO / 'drivers.py'}:LooksAhead"),
         ("crossroads-s3", f"{EGO / 'compiled_drivers.py'}:looks_ahead"),
     ],
@@ -56,7 +56,7 @@ def test_alone_it_is_the_embedded_simulator_to_the_bit(scenario, ego):
 
 
 @pytest.mark.parametrize(
-    ("scenario", "ego"), [("cut-in", "reference"), ("crossroads-s4", "un-r157")]
+    ("scenario", "ego"), [("cut-in", "reference"), ("crossroads-s4", "careful")]
 )
 def test_imposing_what_is_so_changes_nothing(scenario, ego):
     """What is worked out anew (stations, distances) differs by roundings."""

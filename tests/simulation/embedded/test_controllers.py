@@ -59,27 +59,27 @@ def test_a_controller_that_is_not_known_is_not_switched_on():
 
 
 def test_a_driver_of_ours_takes_the_place_of_any_controller_of_the_ego():
-    rollout = told(first=(assign("pilot somebody"), BOTH_ON), ego="un-r157")
+    rollout = told(first=(assign("pilot somebody"), BOTH_ON), ego="careful")
     assert rollout.v[0, 0, -1] < 1.0  # it stops behind bv
-    mine = told(first=(assign("driver un-r157"), BOTH_ON), ego=None)
+    mine = told(first=(assign("driver careful"), BOTH_ON), ego=None)
     assert (mine.v == rollout.v).all()
 
 
 def test_a_driver_that_is_switched_on_in_an_event_drives_from_then_on():
-    rollout = told(("on", BOTH_ON, after(2.0)), ego="un-r157")
+    rollout = told(("on", BOTH_ON, after(2.0)), ego="careful")
     assert (rollout.v[0, 0, :41] == 10.0).all()
-    always = told(ego="un-r157")
+    always = told(ego="careful")
     assert always.v[0, 0, 40] < 10.0  # it would have braked by then
     assert rollout.v[0, 0, 60] < 10.0
-    from_the_start = told(("on", BOTH_ON, after(2.0)), first=(BOTH_ON,), ego="un-r157")
+    from_the_start = told(("on", BOTH_ON, after(2.0)), first=(BOTH_ON,), ego="careful")
     assert (from_the_start.v == always.v).all()
 
 
 def test_the_storyboard_takes_over_where_the_ego_is_and_as_fast_as_it_is():
-    """un-r157 brakes; at 2 s the storyboard takes over and, from 3 s on, adds 1 m/s each second."""
+    """careful brakes; at 2 s the storyboard takes over and, from 3 s on, adds 1 m/s each second."""
     rows = ("off", BOTH_OFF, after(2.0)), ("faster", speeding(20.0, "linear rate 1"), after(3.0))
-    rollout = told(*rows, ego="un-r157")
-    always = told(ego="un-r157")
+    rollout = told(*rows, ego="careful")
+    always = told(ego="careful")
     v = rollout.v[0, 0]
     assert (v[:41] == always.v[0, 0, :41]).all()
     assert v[40:61] == pytest.approx(v[40])
@@ -92,22 +92,22 @@ def test_the_driver_sets_the_speed_and_the_storyboard_steers():
     """It changes to the lane to the right while the driver slows down for bv."""
     rows = ("over", lateral(-1, "linear time 2", "ego"), after(1.0))
     first = (switch(lateral="false", longitudinal="true"),)
-    rollout = told(rows, first=first, ego="un-r157", speed=18.0)
+    rollout = told(rows, first=first, ego="careful", speed=18.0)
     x = rollout.x[0, 0] - rollout.x[0, 0, 0]
     assert x[[20, 40, 60, 80]] == pytest.approx([0.0, -1.75, -3.5, -3.5], abs=1e-9)
-    always = told(ego="un-r157", speed=18.0)
+    always = told(ego="careful", speed=18.0)
     assert rollout.v[0, 0, :21] == pytest.approx(always.v[0, 0, :21])
     assert rollout.v[0, 0, 21] < 17.9
 
 
 def test_the_driver_steers_and_the_storyboard_sets_the_speed():
-    """un-r157 would stop; the storyboard goes on at 10 m/s, and straight through bv."""
+    """careful would stop; the storyboard goes on at 10 m/s, and straight through bv."""
     first = (switch(lateral="true", longitudinal="false"),)
-    rollout = told(first=first, ego="un-r157")
+    rollout = told(first=first, ego="careful")
     assert rollout.v[0, 0] == pytest.approx(10.0)
     assert rollout.distance[0, 1].min() == 0.0
     rows = ("slower", speeding(4.0, "step time 0"), after(2.0))
-    assert told(rows, first=first, ego="un-r157").v[0, 0, 60] == pytest.approx(4.0)
+    assert told(rows, first=first, ego="careful").v[0, 0, 60] == pytest.approx(4.0)
 
 
 def test_what_moves_the_ego_across_while_its_driver_steers_is_over_at_once():
@@ -119,7 +119,7 @@ def test_what_moves_the_ego_across_while_its_driver_steers_is_over_at_once():
     rollout = told(over, ("off", BOTH_OFF, after(3.0)), speed=5.0)
     assert rollout.x[0, 0] == pytest.approx(rollout.x[0, 0, 0], abs=1e-6)
     later = ("over", lateral(-1, "linear time 2", "ego"), after(3.0))
-    rollout = told(("off", BOTH_OFF, after(3.0)), later, speed=5.0)
+    rollout = told(("off", BOTH_OFF, after(3.0)), later, speed=8.0)
     assert rollout.x[0, 0, 100] - rollout.x[0, 0, 0] == pytest.approx(-3.5, abs=1e-6)
 
 
@@ -132,15 +132,15 @@ def test_pedals_that_are_held_are_refused_by_name():
 def test_which_of_several_controllers_is_meant():
     named = switch(objectControllerRef="other", lateral="true", longitudinal="true")
     with pytest.raises(UnsupportedError, match="switching on a controller of 'ego'"):
-        told(first=(assign("driver un-r157"), named), ego=None)
+        told(first=(assign("driver careful"), named), ego=None)
     off = named.replace("true", "false")
-    always = told(first=(assign("driver un-r157"),), ego=None)
-    assert (told(first=(assign("driver un-r157"), off), ego=None).v == always.v).all()
+    always = told(first=(assign("driver careful"),), ego=None)
+    assert (told(first=(assign("driver careful"), off), ego=None).v == always.v).all()
 
 
 def test_another_driver_than_at_the_start_is_refused():
     with pytest.raises(UnsupportedError, match="another driver than at the start"):
-        told(("other", assign("driver fsm"), after(1.0)), ego="un-r157")
+        told(("other", assign("driver fsm"), after(1.0)), ego="careful")
 
 
 def test_an_ego_with_a_driver_is_put_where_the_storyboard_says():

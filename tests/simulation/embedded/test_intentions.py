@@ -62,7 +62,7 @@ def test_with_ideal_control_it_does_what_it_planned(name):
 
 @pytest.mark.parametrize(
     ("name", "ego"),
-    [("crossroads-s2", "reference"), ("crossroads-s4", "route-follower"), ("cut-in", "un-r157")],
+    [("crossroads-s2", "reference"), ("crossroads-s4", "route-follower"), ("cut-in", "careful")],
 )
 def test_it_is_beside_its_way_by_its_offset(name, ego):
     _, _, replay = replayed(name, ego)

@@ -345,7 +345,9 @@ def test_synchronising_at_positions_of_all_kinds(target):
     assert rollout.y[0, 1, 100] == pytest.approx(63.0, abs=0.2)
 
 
-@pytest.mark.parametrize("driver", ["route-follower", "reference", "un-r157", "fsm"])
+@pytest.mark.parametrize(
+    "driver", ["route-follower", "reference", "un-r157", "fsm", "careful", "careful-fsm"]
+)
 def test_an_ego_with_a_driver_is_put_elsewhere_and_goes_on(driver):
     """From leg A's inbound lane to leg C's, where it goes on south at the speed that it had."""
     act = f"<TeleportAction>{lane(3, 1, 80.0)}</TeleportAction>"

@@ -152,7 +152,7 @@ def test_drivers_do_not_mind_who_is_gone():
     privates = start("ego", lane(3, 1, 95.0), 15.0) + start("bv", lane(3, 1, 45.0), 0.0)
     privates += start("cv", lane(3, 2, 20.0), 0.0)
     gone = ("gone", (delete("bv"),), after(1.0))
-    for ego in ("un-r157", "fsm", "reference"):
+    for ego in ("careful", "careful-fsm", "reference"):
         with_it = scene(privates=privates, ego=ego)
         without = scene(gone, privates=privates, ego=ego)
         assert with_it.v[0, 0, -1] < 1.0, ego

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.simulation.rollout import STATUS_MESSAGES
+from bridgegen.simulation.rollout import STATUS_MESSAGES, joined
 
 from .storyboards import (
     after,
@@ -115,13 +115,52 @@ def test_it_stops_where_the_stop_trigger_says_and_repeats_the_last_state():
     assert (near_end.y[0, 0, last:] == near_end.y[0, 0, last]).all()
 
 
-def test_the_route_s_end_ends_the_ego_s_scenario_and_halts_the_others():
+def test_the_route_s_end_ends_the_ego_s_scenario_and_the_others_leave_at_the_road_s():
     short = start("ego", lane(1, -1, 70.0), 10.0)
     assert run(scenario(("ego",), short)).n_steps[0] == round(30.0 / 10.0 / DT) + 1
     bv = start("bv", lane(4, -1, 80.0), 10.0)
     rollout = run(scenario(("ego", "bv"), SOUTHBOUND + bv))
+    # 20 m to the road's end at 10 m/s: from instant 40 on it is gone, and never slower
+    assert rollout.present[0, 1].tolist() == [True] * 40 + [False] * 161
+    assert rollout.x[0, 1, 39] == pytest.approx(113.0 - 0.5)
+    assert (rollout.v[0, 1] == 10.0).all()
+    assert (rollout.a[0, 1] == 0.0).all()
+    assert np.isinf(rollout.distance[0, 1, 40:]).all()
+
+
+def test_others_stand_at_the_road_s_end_where_the_file_says_so():
+    bv = start("bv", lane(4, -1, 80.0), 10.0)
+    text = scenario(("ego", "bv"), SOUTHBOUND + bv)
+    said = '<FileHeader{}><Properties><Property name="road_end" value="{}"/></Properties>'
+    head = text[text.index("<FileHeader") + 11 : text.index("/>", text.index("<FileHeader"))]
+    stays = text.replace(f"<FileHeader{head}/>", said.format(head, "stand") + "</FileHeader>")
+    rollout = run(stays)
+    assert rollout.present.size == 0
     assert rollout.x[0, 1, -1] == pytest.approx(113.0)
     assert rollout.v[0, 1, -1] == 0.0
+    with pytest.raises(InputError, match=r"road_end \(FileHeader\) must be 'stand', got 'fly'"):
+        run(stays.replace('"stand"', '"fly"'))
+
+
+def test_who_stands_at_the_road_s_end_from_the_start_does_not_leave():
+    bv = start("bv", lane(4, -1, 100.0), 0.0)
+    assert run(scenario(("ego", "bv"), SOUTHBOUND + bv)).present.size == 0
+
+
+def test_where_some_leave_and_others_do_not_rows_are_as_they_are_alone():
+    bv = start("bv", lane(4, -1, "$s"), 10.0)
+    text = scenario(
+        ("ego", "bv"), SOUTHBOUND + bv,
+        parameters='<ParameterDeclaration name="s" parameterType="double" value="80"/>',
+    )  # fmt: skip
+    both = run(text, s=[80.0, 0.0])
+    for row, s in enumerate((80.0, 0.0)):
+        alone = run(text, s=[s])
+        assert (both.x[row] == alone.x[0]).all()
+        there = alone.present[0] if alone.present.size else np.ones_like(both.present[row])
+        assert (both.present[row] == there).all()
+    parts = [(np.array([1]), run(text, s=[0.0])), (np.array([0]), run(text, s=[80.0]))]
+    assert (joined(parts).present == both.present).all()
 
 
 @given(st.floats(0.2, 1.0), st.floats(4.0, 15.0))

@@ -51,7 +51,8 @@ TEXT = scenario(
 def written(tmp_path, ego="ego", values=None, course=None):
     storyboard = read(TEXT.encode(), "test.xosc")
     out = tmp_path / "row.xosc"
-    template = ScenarioFile(storyboard, ego).on(tmp_path / "map.xodr", course or {})
+    driven = (ego,) if ego else ()
+    template = ScenarioFile(storyboard, driven).on(tmp_path / "map.xodr", course or {})
     template.write(out, {"v": 1.0, "n": 1.0} | (values or {}))
     return etree.parse(out).getroot()
 
@@ -84,7 +85,7 @@ def test_values_and_expressions_are_written_in_full(tmp_path):
 
 def test_rows_of_one_template_do_not_stain_each_other(tmp_path):
     storyboard = read(TEXT.encode(), "test.xosc")
-    template = ScenarioFile(storyboard, "ego").on(tmp_path / "map.xodr", {})
+    template = ScenarioFile(storyboard, ("ego",)).on(tmp_path / "map.xodr", {})
     data = []
     for v in (1.0, 2.0, 1.0, float("inf")):
         template.write(tmp_path / "row.xosc", {"v": v, "n": 1.0})
@@ -106,7 +107,7 @@ def test_a_course_takes_the_place_of_the_trajectory(tmp_path):
 
 def test_events_have_esmini_s_names(tmp_path):
     storyboard = read(TEXT.encode(), "test.xosc")
-    assert ScenarioFile(storyboard, "ego").event_paths() == [
+    assert ScenarioFile(storyboard, ("ego",)).event_paths() == [
         "s::a::gone::m::one", "s::a::gtwo::m::two", "s::a::gway::m::way",
     ]  # fmt: skip
 
@@ -130,7 +131,8 @@ def test_a_map_goes_without_scenery_and_place_on_the_globe():
 def test_a_text_that_looks_like_an_expression_stays(tmp_path):
     text = TEXT.replace('Event name="one"', 'Event name="${one + _ + $v}"')
     out = tmp_path / "row.xosc"
-    ScenarioFile(read(text.encode(), "t"), "ego").on(tmp_path / "m.xodr", {}).write(out, {"v": 1.0})
+    file = ScenarioFile(read(text.encode(), "t"), ("ego",))
+    file.on(tmp_path / "m.xodr", {}).write(out, {"v": 1.0})
     assert b'name="${one + _ + $v}"' in out.read_bytes()
 
 
@@ -169,5 +171,5 @@ def test_an_event_s_action_on_speed_stays(tmp_path):
         ("ego",), start("ego", lane(3, 1, 40), 5), event("ego", speed_action(3), after(1))
     )
     out = tmp_path / "row.xosc"
-    ScenarioFile(read(text.encode(), "t"), "ego").on(tmp_path / "m.xodr", {}).write(out, {})
+    ScenarioFile(read(text.encode(), "t"), ("ego",)).on(tmp_path / "m.xodr", {}).write(out, {})
     assert len([*etree.parse(out).getroot().iter("SpeedAction")]) == 2

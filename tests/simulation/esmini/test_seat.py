@@ -46,9 +46,11 @@ TEXT = scenario(
 )
 
 
-def made(library, steps=1, seconds=30.0):
+def made(library, steps=1, seconds=30.0, others=None):
     storyboard = read(TEXT.encode(), "test.xosc")
-    embedded = EmbeddedSimulator(storyboard, "test.xosc", driver=DRIVERS["route-follower"])
+    embedded = EmbeddedSimulator(
+        storyboard, "test.xosc", driver=DRIVERS["route-follower"], others=others
+    )
     return EsminiSimulator(embedded, storyboard, library, steps=steps, seconds=seconds)
 
 
@@ -79,6 +81,20 @@ def test_what_it_plays_is_what_is_recorded(library, steps):
         np.testing.assert_allclose(
             getattr(out, name), getattr(expected, name), atol=1e-6, err_msg=name
         )
+
+
+def test_an_attentive_participant_is_driven_as_the_ego_is(library):
+    """The stand-in moves it as its script says; what is recorded is what our driver does."""
+    simulator = made(library, others="attentive")
+    roads = simulator.roads([crossroads()])
+    rows, values = np.zeros(2, dtype=np.int64), {"v": [8.0, 11.0]}
+    found = simulator.run(roads, rows, values)
+    expected = simulator.embedded.run(roads.network, rows, values)
+    scripted = made(library, others="scripted").embedded.run(roads.network, rows, values)
+    assert found.status.tolist() == [0, 0], found.messages
+    for name in ("x", "y", "h", "v", "began", "n_steps"):
+        assert np.array_equal(getattr(found, name), getattr(expected, name)), name
+    assert np.abs(scripted.x[:, 1] - expected.x[:, 1]).max() > 1.0
 
 
 def test_what_goes_wrong_costs_the_row(library):

@@ -23,6 +23,19 @@ DEFAULT_TIME_STEP = 0.05
 CAUSE = "cause"
 """The header's property for what a critical scenario's harm is put down to."""
 
+ROAD_END, STAND = "road_end", "stand"
+"""The header's property for what entities other than the ego do where their road ends: they stand
+there. Without it they leave the scenario, unless a condition waits for the end of the road."""
+
+CONFLICT_TYPE = "conflict_type"
+"""The header's property for the type of a critical scenario's decisive conflict."""
+
+RESPONSIBLE = "responsible"
+"""The header's property for who is responsible for it: ego, other, shared or none."""
+
+SEVERITY = "severity"
+"""The header's property for its severity, the probability of a MAIS3+ injury."""
+
 DRIVER = "driver"
 """Property of a controller: the driver's name."""
 

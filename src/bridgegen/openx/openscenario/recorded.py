@@ -7,7 +7,7 @@ Where nothing moves, vertices between the first and the last are left out; all o
 a smallest distance that moves by a rounding can move a first contact by a step.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -59,6 +59,25 @@ class Recording:
         there = np.ones(k, np.bool_) if self.present is None else self.present[e]
         edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0))
         return [(first, end - 1) for first, end in edges.reshape(-1, 2).tolist()]
+
+    def until_left(self, but: Collection[str] = ()) -> "Recording":
+        """Return the recording in which an entity that leaves for good stands where it left.
+
+        Args:
+            but: names of entities that leave all the same.
+        """
+        if self.present is None:
+            return self
+        states = {name: getattr(self, name).copy() for name in ("x", "y", "h", "v")}
+        present = self.present.copy()
+        for e in range(len(self.names)):
+            stays = self.stays(e)
+            if self.names[e] not in but and len(stays) == 1 and stays[0][0] == 0:
+                last = stays[0][1]
+                for name, state in states.items():
+                    state[e, last + 1 :] = 0.0 if name == "v" else state[e, last]
+                present[e] = True
+        return replace(self, present=None if present.all() else present, **states)
 
 
 def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenario:

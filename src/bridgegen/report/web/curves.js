@@ -215,6 +215,16 @@ class Curves {
       c.lineTo(x(k), bottom);
       c.stroke();
     }
+    const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
+    for (const [k, colour] of found ? [[found.decided, palette.ink], ...(contacts.length ? [] : [[found.instant, palette.hit]])] : []) {
+      c.strokeStyle = colour;
+      c.setLineDash([4, 3]);
+      c.beginPath();
+      c.moveTo(x(k), top);
+      c.lineTo(x(k), bottom);
+      c.stroke();
+      c.setLineDash([]);
+    }
     if (closest === null || panel !== this.panels[0]) return;
     const hit = contacts.length > 0;
     const [px, py] = [x(closest), y(Math.min(distance[closest], panel.high))];

@@ -99,8 +99,9 @@ class Elsewhere {
   }
 
   card(one) {
-    const head = ["Scenario", "There", "d_min", "v_d", "First contact", "Parts first"];
-    const units = ["", "", "m", "m/s", "s", `by over ${one.parted_at} m`];
+    const byHarm = one.rule === "harm";
+    const head = ["Scenario", "There", ...(byHarm ? ["harm", "d_min"] : ["d_min", "v_d"]), "First contact", "Parts first"];
+    const units = ["", "", ...(byHarm ? ["", "m"] : ["m", "m/s"]), "s", `by over ${one.parted_at} m`];
     const cells = head.map((name, k) => element("th", { scope: "col" }, name, element("small", {}, units[k] || "\u00a0")));
     const table = element("table", {}, element("caption", { class: "hidden" }, `Scenarios in ${one.label}`),
       element("thead", {}, element("tr", {}, ...cells)), element("tbody", {}, ...one.scenarios.map((scenario) => this.row(one, scenario))));
@@ -123,6 +124,6 @@ class Elsewhere {
     const why = element("details", {}, element("summary", {}, first), element("span", {}, scenario.text));
     why.open = verdict !== 1;
     return element("tr", {}, element("td", {}, button), element("td", { class: `verdict-${verdict}` }, words),
-      change("d_min", "∞"), change("v_d", "–"), change("contact", "none"), element("td", { class: "why" }, why));
+      ...(one.rule === "harm" ? [change("harm", "–"), change("d_min", "∞")] : [change("d_min", "∞"), change("v_d", "–")]), change("contact", "none"), element("td", { class: "why" }, why));
   }
 }

@@ -4,6 +4,7 @@ class Filters {
   constructor() {
     this.ranges = new Map(); // column's name → [low, high]
     this.region = null; // index in data.regions.regions
+    this.mode = null; // number of a failure mode
   }
 
   // Of a column: numbers of the rows, null where there is none.
@@ -13,7 +14,7 @@ class Filters {
   }
 
   get any() {
-    return this.ranges.size > 0 || this.region !== null;
+    return this.ranges.size > 0 || this.region !== null || this.mode !== null;
   }
 
   // Sets or, without numbers, lifts the filter on a column.
@@ -24,6 +25,11 @@ class Filters {
     this.tell();
   }
 
+  inMode(mode) {
+    this.mode = mode;
+    this.tell();
+  }
+
   inRegion(region) {
     this.region = region;
     this.tell();
@@ -31,7 +37,7 @@ class Filters {
 
   clear() {
     this.ranges.clear();
-    this.region = null;
+    this.region = this.mode = null;
     this.tell();
   }
 
@@ -40,6 +46,7 @@ class Filters {
       const value = this.values(name)[i];
       if (value === null || value < low || value > high) return false;
     }
+    if (this.mode !== null && !isInMode(i, this.mode)) return false;
     return this.region === null || isInRegion(i, this.region);
   }
 

@@ -49,7 +49,7 @@ class Live {
   }
 
   take(told) {
-    const shape = () => [rows.critical.includes(1), rows.cause === null, data.regions === null, data.confirmations.map(({ simulator }) => simulator)].join();
+    const shape = () => [rows.critical.includes(1), Boolean(rows.findings), Boolean(data.triage), rows.cause === null, data.regions === null, data.confirmations.map(({ simulator }) => simulator)].join();
     const before = shape();
     if (told.whole) ["evaluation", "iteration", "critical", "cause"].forEach((name) => { if (rows[name]) rows[name].length = 0; });
     for (const name of ["evaluation", "iteration", "critical"]) append(rows[name], told.rows[name]);
@@ -61,12 +61,29 @@ class Live {
       if (told.whole) column.values.length = 0;
       append(column.values, values);
     }
+    takeFindings(told);
     const { n, n_failed, n_critical, rank, front } = told.rows;
     Object.assign(rows, { n, n_failed, n_critical, rank, front });
-    Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions, confirmations: told.confirmations });
+    Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions, confirmations: told.confirmations, implausible: told.implausible });
     if (shape() !== before) location.reload(); // there is something that the page has no place for yet
     else this.grown();
   }
+}
+
+// The findings of new rows under the numbers that the page has for them.
+function takeFindings({ whole, rows: { findings } }) {
+  if (!findings || !rows.findings || whole) {
+    rows.findings = findings ?? rows.findings;
+    return;
+  }
+  const known = rows.findings.keys, texts = known.map((key) => key.join("\n"));
+  const numbers = findings.keys.map((key) => {
+    const k = texts.indexOf(key.join("\n"));
+    if (k >= 0) return k;
+    texts.push(key.join("\n"));
+    return known.push(key) - 1;
+  });
+  append(rows.findings.at, findings.at.map((k) => numbers[k]));
 }
 
 // Pushing in one call would need too many arguments.

@@ -84,6 +84,7 @@ function fillSummary() {
   $("description").hidden = !s.description;
   fillTable($("figures"), s.table);
   $("figures-note").textContent = s.note;
+  fillImplausible();
   const failed = data.rows.n_failed;
   fillTable($("settings"), failed ? [...s.provenance, ["Failed evaluations", `${failed}, counted but not drawn`]] : s.provenance);
   $("command").textContent = s.command;
@@ -109,9 +110,11 @@ function fillDetails(kept) {
     return box;
   };
   const lines = (values) => Object.entries(values).map(([name, value]) => line(name, value, columns.get(name)));
-  const name = element("h3", {}, `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"} ${number(kept.evaluation + 1)}`);
-  const cause = kept.cause ? [element("div", { title: CAUSE_HELP[data.causes.labels.indexOf(kept.cause)] }, element("span", { class: "name" }, "cause"), element("b", {}, kept.cause))] : [];
-  $("measures").replaceChildren(name, ...cause, ...lines(kept.metrics));
+  const heading = kept.minimal ? `Scenario ${kept.name}, simplest form of evaluation` : `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"}`;
+  const name = element("h3", {}, `${heading} ${number(kept.evaluation + 1)}`);
+  const cause = kept.cause ? [element("div", { title: `Quick label, of one replay: ${CAUSE_HELP[data.causes.labels.indexOf(kept.cause)]}` }, element("span", { class: "name" }, "cause (quick label)"), element("b", {}, kept.cause))] : [];
+  const metrics = kept.conflict ? [element("h3", {}, "Its metrics")] : [];
+  $("measures").replaceChildren(name, ...cause, ...conflictLines(kept.conflict), ...metrics, ...lines(kept.metrics));
   const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
   if (kept.files.length) {
     const links = kept.files.map(fileLink);
@@ -147,6 +150,7 @@ function start() {
   const causes = data.causes ? new Causes(data.causes, hook) : null;
   if (data.regions) new Regions(data.regions);
   const others = new Elsewhere((evaluation, seconds) => hook.show?.(evaluation, seconds));
+  const modes = new Modes((evaluation) => hook.show?.(evaluation, 0, true), (evaluation) => hook.showMinimal?.(evaluation));
   darkScheme.addEventListener("change", readPalette);
   let table = null;
   if (rows.critical.includes(1) || data.kept.length) {
@@ -157,14 +161,23 @@ function start() {
     $("copy-no-motion").addEventListener("click", (event) => copy($("no-motion-command").textContent, event.currentTarget));
     darkScheme.addEventListener("change", () => opener.made?.redraw());
   } else {
-    $("kept").hidden = $("made-of").hidden = true;
+    const nearest = nearestToHarm();
+    $("kept").hidden = $("made-of").hidden = nearest === null;
     $("no-scenarios").hidden = false;
-    $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.`;
+    $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.${nearest === null ? "" : " Below is the scenario that came nearest to harm."}`;
+    if (nearest !== null) {
+      $("kept").classList.add("alone");
+      $("list").hidden = true;
+      const opener = new Opener(hook);
+      opener.begin();
+      darkScheme.addEventListener("change", () => opener.made?.redraw());
+    }
   }
   if (!data.live) return;
   new Live(() => {
     fillSummary();
     causes?.fill(data.causes);
+    modes.fill();
     takeRegions();
     takeElsewhere();
     others.fill();

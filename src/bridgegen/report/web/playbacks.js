@@ -30,12 +30,13 @@ class Playbacks {
   }
 }
 const playbacks = new Playbacks();
+const minimals = new Packed(data.minimal); // simplest forms of failure modes, by the evaluation that stands for the mode
 
 // What is known of a row of the page without its motion, in a playback's shape.
 function factsOf(i) {
   const values = (group) => Object.fromEntries(rows.columns.filter((c) => c.group === group).map((c) => [c.name, c.values[i]]));
   const cause = rows.cause?.[i] ? data.causes.labels[rows.cause[i]] : "";
-  return { name: "", evaluation: rows.evaluation[i], parameters: values("parameter"), metrics: values("metric"), files: [], cause, picture: null };
+  return { name: "", conflict: null, evaluation: rows.evaluation[i], parameters: values("parameter"), metrics: values("metric"), files: [], cause, picture: null };
 }
 
 // Shows scenarios in the player, whatever their motion comes from.
@@ -45,7 +46,8 @@ class Opener {
     this.wanted = null;
     hook.select = (k) => this.kept(k);
     hook.open = (evaluation) => this.row(rows.evaluation.indexOf(evaluation));
-    hook.show = (evaluation, seconds) => this.moment(evaluation, seconds);
+    hook.show = (evaluation, seconds, play) => this.moment(evaluation, seconds, play);
+    hook.showMinimal = (evaluation) => this.minimal(evaluation);
   }
 
   get player() {
@@ -94,9 +96,20 @@ class Opener {
     document.dispatchEvent(new CustomEvent("shown", { detail: one.evaluation }));
   }
 
-  // A scenario at a time [s], brought into sight.
-  async moment(evaluation, seconds) {
-    await this.row(rows.evaluation.indexOf(evaluation));
+  // The simplest form of a failure mode, which is no row of the run.
+  async minimal(evaluation) {
+    this.wanted = `minimal ${evaluation}`;
+    const playback = await minimals.get(evaluation);
+    if (this.wanted !== `minimal ${evaluation}`) return;
+    playback.minimal = true;
+    this.show(playback, true);
+    $("player").scrollIntoView({ block: "nearest" });
+  }
+
+  // A scenario at a time [s], brought into sight; or played.
+  async moment(evaluation, seconds, play = false) {
+    await this.row(rows.evaluation.indexOf(evaluation), play);
+    if (play) return void $("player").scrollIntoView({ block: "nearest" });
     if (seconds !== null && this.made?.kept.evaluation === evaluation) this.player.seek(Math.round(seconds / this.player.kept.time_step));
     $("player").scrollIntoView({ block: "nearest" });
   }
@@ -107,6 +120,7 @@ class Opener {
     if (await this.go()) return;
     if (data.kept.length) this.kept(0);
     else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
+    else if (nearestToHarm() !== null) await this.row(rows.evaluation.indexOf(nearestToHarm()));
   }
 
   // Shows what the page's address names, at that time; says whether it names one.

@@ -33,7 +33,8 @@ class Player {
     this.scene.show(this.kept);
     this.curves.show(this.kept);
     this.showLegend();
-    this.seek(this.kept.closest ?? 0, false);
+    fillConflict(this.kept);
+    this.seek(this.kept.conflict?.instant ?? this.kept.closest ?? 0, false);
     if (!andPlay) return;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     if ($("player").getBoundingClientRect().bottom > innerHeight) {
@@ -63,7 +64,7 @@ class Player {
 
   // The page's address with the present scenario and time, to the instant.
   address() {
-    return addressOf(this.kept, this.chosen >= 0, Math.round(this.position));
+    return this.kept.minimal ? location.hash || "#" : addressOf(this.kept, this.chosen >= 0, Math.round(this.position));
   }
 
   copyLink() {
@@ -78,7 +79,7 @@ class Player {
   }
 
   showLegend() {
-    const has = { motion: true, sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
+    const has = { motion: true, conflict: ZONED.includes(this.kept.conflict?.conflict), sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
     for (const item of $("legend").children) {
       const shown = this.scene.layers[item.dataset.layer], button = item.querySelector("button");
       item.hidden = !has[item.dataset.layer] || (!button && !shown);
@@ -166,10 +167,11 @@ class Player {
   drawFlag(state) {
     const flag = $("flag");
     const contact = this.kept.contacts.some((k) => state.index >= k && state.index < k + 1 / this.kept.time_step);
-    const closest = state.index === this.kept.closest;
-    flag.hidden = !contact && !closest;
+    const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
+    const told = contact ? "collision" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "smallest gap" : "";
+    flag.hidden = !told;
     flag.className = contact ? "" : "near";
-    flag.textContent = contact ? "collision" : "smallest gap";
+    flag.textContent = told;
   }
 
   connect() {
@@ -184,6 +186,7 @@ class Player {
     $("copy-link").addEventListener("click", () => this.copyLink());
     for (const item of $("legend").children) item.querySelector("button")?.addEventListener("click", () => this.toggleLayer(item.dataset.layer));
     $("to-closest").addEventListener("click", () => this.jump(this.kept.closest));
+    $("to-decided").addEventListener("click", () => this.jump(this.kept.conflict.decided));
     $("to-contact").addEventListener("click", () => this.jump(this.kept.contacts[0]));
     document.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => {
@@ -228,6 +231,7 @@ class Player {
       g: () => this.toggleLayer("elsewhere"),
       l: () => this.copyLink(), e: () => this.follow(), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.fit(),
       d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.kept.contacts.length) this.jump(this.kept.contacts[0]); },
+      t: () => { if (!$("to-decided").hidden) this.jump(this.kept.conflict.decided); },
       "+": () => this.scene.view.zoom(1.4), "=": () => this.scene.view.zoom(1.4), "-": () => this.scene.view.zoom(1 / 1.4),
       "[": () => faster(-1), "]": () => faster(1),
     };

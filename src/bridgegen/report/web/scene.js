@@ -15,7 +15,7 @@ class Scene {
     this.canvas = canvas;
     this.view = new View(canvas, changed);
     this.atmosphere = new Atmosphere();
-    this.layers = { motion: true, sensed: true, course: true, weather: true, elsewhere: true }; // the first cannot be hidden
+    this.layers = { motion: true, conflict: true, sensed: true, course: true, weather: true, elsewhere: true }; // the first cannot be hidden
   }
 
   show(kept) {
@@ -74,8 +74,10 @@ class Scene {
     drawLamps(c, this.kept.lamps, state.index, scale);
     if (this.layers.course) drawCourse(c, this.kept, state, scale);
     for (const e of playersOf(this.kept)) this.drawTrail(c, e, state.index, scale);
+    drawDecided(c, this.kept, this.centres, scale);
     this.drawGhosts(c, state, scale);
     state.entities.forEach((s, e) => { if (isPlaced(s)) drawBody(c, this.kept.entities[e], s, colourOf(this.kept, e), scale); });
+    drawZones(c, this.kept, state, scale);
     if (this.layers.elsewhere) drawElsewhere(c, this.kept, state, scale);
     if (this.layers.sensed) drawDetections(c, this.kept, state, scale);
     pixels();

@@ -1,7 +1,11 @@
 // The table of all critical scenarios: sorted, filtered; only the rows in sight are in the document.
 
 const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
-const SHORT = { n_collision: "hits" };
+const LISTED_OF_HARM = ["severity", "harm", "d_min", "v_d"];
+const TEXTS = ["conflict", "type", "responsible", "partner"]; // of a row's finding
+const PLACE_OF = { conflict: 0, type: 1, responsible: 2, partner: 4 };
+const SHORT = { n_collision: "hits", responsible: "by", cause: "cause" };
+const UNDER = { cause: "quick label", responsible: "responsible", severity: "MAIS3+" };
 const ROW_HEIGHT = 32; // as in table.css
 const SPARE = 6; // rows above and below those in sight
 
@@ -15,6 +19,7 @@ class Table {
     this.body = $("list-body");
     this.shown = null; // evaluation in the player
     this.first = this.last = -1;
+    $("kept").classList.toggle("conflicts", Boolean(rows.findings));
     this.fillHead();
     this.connect();
     this.refill();
@@ -22,27 +27,29 @@ class Table {
 
   get columns() {
     const metrics = rows.columns.filter((column) => column.group === "metric").map((column) => column.name);
-    const listed = LISTED.filter((name) => metrics.includes(name));
-    const chosen = listed.length ? listed : metrics.slice(0, 4);
+    const listed = (data.summary.harm ? LISTED_OF_HARM : [...LISTED, "severity", "harm"]).filter((name) => metrics.includes(name));
+    const chosen = listed.length ? listed : metrics.slice(0, 4), texts = rows.findings ? TEXTS : [];
     if (this.only && !chosen.includes(this.only)) chosen.push(this.only);
-    return ["rank", ...chosen, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : []), ...elsewhere.map(({ column }) => column)];
+    const told = data.summary.harm ? [...texts, ...chosen] : [...chosen, ...texts];
+    return ["rank", ...told, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : []), ...elsewhere.map(({ column }) => column)];
   }
 
   value(name, i) {
     if (name === "rank") return rows.rank[i] || null;
     if (name === "cause") return rows.cause[i];
+    if (name in PLACE_OF) return findingOf(i)[PLACE_OF[name]] || null;
     return name === "region" ? regionOf(i) : (columns.get(name) ?? elsewhereBy(name)).values[i];
   }
 
   fillHead() {
     const cells = this.columns.map((name) => {
       const unit = unitText(columns.get(name)?.unit ?? "");
-      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? elsewhereBy(name)?.simulator ?? name, element("small", {}, unit || "\u00a0"));
+      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? elsewhereBy(name)?.simulator ?? name, element("small", {}, UNDER[name] ?? (unit || "\u00a0")));
       button.addEventListener("click", () => {
         this.sorting = { by: name, down: this.sorting.by === name && !this.sorting.down };
         this.refill();
       });
-      return element("th", { scope: "col", "data-by": name, "aria-sort": "none" }, button);
+      return element("th", { scope: "col", class: name in PLACE_OF ? "text" : "", "data-by": name, "aria-sort": "none" }, button);
     });
     $("list-head").replaceChildren(element("tr", {}, ...cells));
   }
@@ -59,7 +66,7 @@ class Table {
     const order = (a, b) => {
       const [x, y] = [key.get(a), key.get(b)];
       // What does not exist sorts last, whichever way.
-      return (x === null) - (y === null) || sign * (x - y) || (rows.rank[a] || Infinity) - (rows.rank[b] || Infinity) || a - b;
+      return (x === null) - (y === null) || sign * (typeof x === "string" ? x.localeCompare(y) : x - y) || (rows.rank[a] || Infinity) - (rows.rank[b] || Infinity) || a - b;
     };
     this.order = there.sort(order);
     for (const th of $("list-head").querySelectorAll("th")) {
@@ -73,7 +80,7 @@ class Table {
   note() {
     const here = rows.critical.reduce((a, b) => a + b, 0), all = rows.n_critical, n = this.order.length;
     const some = filters.any || $("only-kept").checked;
-    const which = here < all ? `${number(here)} of ${number(all)} critical scenarios, evenly chosen` : `${number(all)} critical scenarios`;
+    const which = here < all ? `${number(here)} of ${number(all)} critical scenarios, evenly chosen` : `${number(all)} critical ${all === 1 ? "scenario" : "scenarios"}`;
     $("list-note").textContent = some ? `${number(n)} of ${which}` : which;
     $("list-clear").hidden = !some;
   }
@@ -112,9 +119,12 @@ class Table {
   cell(name, i) {
     const value = this.value(name, i);
     if (name === "cause") return element("td", {}, value ? data.causes.labels[value] : "–");
+    if (name in PLACE_OF) return element("td", { class: `text${value === "ego" ? " blamed" : ""}`, title: name === "type" && value ? `${value}; ${findingOf(i)[3]}` : value ?? "" }, value?.replace("vulnerable road user", "VRU") ?? "–");
+    if (name === "severity" && value !== null) return element("td", {}, value > 0 ? shareText(value) : "–");
     if (name === "region") return element("td", {}, value === null ? "–" : `${value}`);
     if (elsewhereBy(name)) return verdictCell(value);
-    const cell = element("td", {}, measured(value, columns.get(name)?.unit, 3));
+    const digits = name === "harm" || name === "harm_any" ? 4 : 3; // collisions differ by their severity, in the third decimal
+    const cell = element("td", {}, measured(value, columns.get(name)?.unit, digits));
     if (name === "n_collision" && value > 0) cell.className = "hit";
     return cell;
   }

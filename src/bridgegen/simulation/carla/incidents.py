@@ -82,7 +82,7 @@ def red_lights(rollout: Rollout) -> list[Incident]:
     x = rollout.x[0, 0, :n] + front * np.cos(h)
     y = rollout.y[0, 0, :n] + front * np.sin(h)
     found = []
-    for j in range(len(rollout.stop_lights)):
+    for j in np.flatnonzero(rollout.stop_entities == 0).tolist():
         line_x, line_y, line_h = rollout.stop_lines[0, j]
         c, s = np.cos(line_h), np.sin(line_h)
         past = (x - line_x) * c + (y - line_y) * s

@@ -4,7 +4,10 @@
 """
 
 from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.ego._attentive_kernels import gap_is_free
+from bridgegen.ego._conflict_kernels import LEAST_PACE
 from bridgegen.ego._path_kernels import project
+from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._lane_kernels import (
     LANE,
     T_LEAVE,
@@ -17,9 +20,13 @@ from bridgegen.simulation.embedded._lane_kernels import (
     span_at,
     station_of,
 )
-from bridgegen.simulation.embedded._lateral_kernels import lane_change_lasts, offset_lasts
+from bridgegen.simulation.embedded._lateral_kernels import (
+    lane_change_lasts,
+    least_length,
+    offset_lasts,
+)
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE
-from bridgegen.simulation.embedded._motion_kernels import nearest
+from bridgegen.simulation.embedded._motion_kernels import DISTANCE, STEP, nearest
 from bridgegen.simulation.embedded._place_kernels import (
     GROUND,
     LANES,
@@ -43,6 +50,8 @@ def stop_lateral(j, plan, state):
     e = plan.actions[j, 0]
     if state.lateral_action[e] == j:
         state.lateral_action[e] = state.to[e] = -1
+    if state.waits[e] == j:
+        state.waits[e] = -1
 
 
 @inlined_kernel
@@ -88,7 +97,10 @@ def _lane_of(e, k, roads, state, record):
 
 @kernel
 def begin_lane_change(j, k, plan, roads, state, record):
-    """Begin action j, a LaneChangeAction: onto the other lane's way, still aside of it."""
+    """Begin action j, a LaneChangeAction: onto the other lane's way, still aside of it.
+
+    An attentive driver waits until the gap there is free.
+    """
     e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
     node, s, _ = take_lane(e, k, roads, state, record)
     if node < 0:
@@ -109,9 +121,13 @@ def begin_lane_change(j, k, plan, roads, state, record):
     p = way_from(state.route[e], target, roads, state)
     if p < 0:
         return
+    station = station_of(roads.spans[p], roads.span_counts[p], target, s)
+    if plan.attends and plan.others[e] == ATTENTIVE:
+        if _waits(j, k, p, station, way, plan, roads, state, record):
+            return
+        state.waits[e] = -1
     left, left_at = state.on[e], state.station[e]
     end_lateral(e, state)
-    station = station_of(roads.spans[p], roads.span_counts[p], target, s)
     state.on[e], state.turn[e] = p, 0.0
     state.station[e], state.aside[e] = project(
         roads.paths[p], roads.counts[p], roads.steps[p], station, record.x[e, k], record.y[e, k]
@@ -125,8 +141,36 @@ def begin_lane_change(j, k, plan, roads, state, record):
     state.lateral_lasts[e] = lane_change_lasts(
         plan.actions[j, 2], plan.actions[j, 3], value, metres
     )
+    if plan.actions[j, 3] == DISTANCE and plan.actions[j, 2] != STEP:
+        least = least_length(plan.actions[j, 2], plan.bodies[e, 6], metres)
+        state.lateral_lasts[e] = max(state.lateral_lasts[e], least)
     state.lateral_passed[e] = 0.0
     state.lateral_origin[e], state.lateral_target[e] = state.aside[e], offset
+
+
+@kernel
+def _waits(j, k, p, station, way, plan, roads, state, record):
+    """Return whether action j, a change to the lane of path p, waits for a gap; then it is noted.
+
+    The entity is about abreast of ``station`` of that path, whose lane goes ``way`` along its road.
+    """
+    e, path, n, ds = plan.actions[j, 0], roads.paths[p], roads.counts[p], roads.steps[p]
+    s, aside = project(path, n, ds, station, record.x[e, k], record.y[e, k])
+    target = way * state.slots[plan.actions[j, 4]]
+    lasts = lane_change_lasts(
+        plan.actions[j, 2], plan.actions[j, 3], state.slots[plan.actions[j, 5]], target - aside
+    )
+    if plan.actions[j, 3] == DISTANCE:
+        lasts /= max(record.v[e, k], LEAST_PACE)
+    if gap_is_free(
+        e, k, path, n, ds, s, target, lasts, state.present, record.x, record.y, record.h, record.v,
+        plan.bodies,
+    ):  # fmt: skip
+        return False
+    if state.waits[e] >= 0 and state.waits[e] != j:
+        state.action_ended[state.waits[e]] = True
+    state.waits[e] = j
+    return True
 
 
 @kernel

@@ -30,6 +30,7 @@ from bridgegen.simulation.embedded._pursuit_kernels import seen_at
 REACHED = 0.01  # m, a distance that is missed by less is reached
 CROSSING = 0.1  # who is turned from another by so little of a right angle has no side of it
 MOST_ACROSS = 0.999  # of a step: some of it is always ahead
+MOST_ACROSS_ON_WHEELS = 0.5  # of a step: wheels turn a body by 30 degrees from its lane at most
 
 
 @kernel
@@ -80,7 +81,8 @@ def keep_aside(j, k, step, plan, roads, state, record):
     across, speed = approach(
         left, state.lateral_passed[e], _limit(row, 2, state), acceleration, deceleration, plan.dt
     )
-    most = MOST_ACROSS * step
+    on_wheels = plan.bodies[e, 6] < math.inf
+    most = (MOST_ACROSS_ON_WHEELS if on_wheels else MOST_ACROSS) * step
     if abs(across) > most:
         across = math.copysign(most, across)
         speed = across / plan.dt

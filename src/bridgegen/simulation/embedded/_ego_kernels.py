@@ -3,6 +3,8 @@
 import math
 
 from bridgegen.compiled import inlined_kernel
+from bridgegen.ego._careful_fsm_kernels import drive_careful_fsm
+from bridgegen.ego._careful_kernels import drive_careful
 from bridgegen.ego._fsm_kernels import drive_fsm
 from bridgegen.ego._lights_kernels import stop_at_lights
 from bridgegen.ego._path_kernels import project
@@ -42,6 +44,20 @@ def demand(k, plan, roads, state, record):
     planned = bend_speed(path, n, ds, s, v, state.command[0], state.weather[FRICTION])
     if plan.driver == 2:
         demanded = drive_un_r157(
+            k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, planned,
+            state.present, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
+            state.attention,
+        )  # fmt: skip
+        return min(demanded, asked), curvature
+    if plan.driver == 4:
+        demanded = drive_careful(
+            k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
+            planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
+            state.attention,
+        )  # fmt: skip
+        return min(demanded, asked), curvature
+    if plan.driver == 5:
+        demanded = drive_careful_fsm(
             k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
             planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
             state.attention,
@@ -49,7 +65,7 @@ def demand(k, plan, roads, state, record):
         return min(demanded, asked), curvature
     demanded = drive_fsm(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
-        planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
+        planned, state.present, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
         state.attention,
     )  # fmt: skip
     return min(demanded, asked), curvature

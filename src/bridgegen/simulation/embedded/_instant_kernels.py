@@ -3,7 +3,7 @@
 import math
 
 from bridgegen.compiled import inlined_kernel
-from bridgegen.ego.drivers import NOBODY
+from bridgegen.ego.drivers import ATTENTIVE, NOBODY
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._control_kernels import is_steered, move_paced, move_steered
 from bridgegen.simulation.embedded._follow_kernels import arrive, move_by_timetable
@@ -14,6 +14,7 @@ from bridgegen.simulation.embedded._memory_kernels import (
     STATUS,
     STOPS,
 )
+from bridgegen.simulation.embedded._others_kernels import begin_waiting, heed, move_heeding
 from bridgegen.simulation.embedded._place_kernels import fail
 from bridgegen.simulation.embedded._presence_kernels import stay_away
 from bridgegen.simulation.embedded._signal_kernels import run_controllers
@@ -34,6 +35,8 @@ def before_driver(k, plan, roads, state, record):
     finish(k, plan, state)
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)
+    if plan.attends:
+        begin_waiting(k, plan, roads, state, record)
     command_speed(0, k, plan, roads, state, record)
     drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
     if plan.driver != NOBODY and drives and state.on[0] < 0:  # drivers keep to lanes
@@ -47,6 +50,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move everybody on to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
+    if plan.attends:
+        heed(k, plan, roads, state, record)
     if is_steered(plan, state):
         x, y, h = move_steered(k, demanded, curvature, plan, roads, state, record)
         first = 1
@@ -64,9 +69,13 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         if not state.present[e]:
             stay_away(e, k, record)
             continue
+        before = state.command[e]
         if e > 0:
             command_speed(e, k, plan, roads, state, record)
-        move_along_path(e, k, plan, roads, state, record)
+        if plan.attends and plan.others[e] == ATTENTIVE:
+            move_heeding(e, before, k, plan, roads, state, record)
+        else:
+            move_along_path(e, k, plan, roads, state, record)
     for e in range(record.present.shape[0] if k < record.x.shape[1] - 1 else 0):
         record.present[e, k + 1] = state.present[e]
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):

@@ -1,7 +1,8 @@
 """How bodies move across their path while they move along it.
 
 A body's speed is along the line that it draws: what it moves sideways, it does not move ahead, and
-who stands does not slide.
+a body that stands does not slide. A body with wheels needs some metres of road to change its lane,
+however long the change may take: it moves across no faster than its steering allows.
 """
 
 import math
@@ -53,8 +54,24 @@ def offset_lasts(shape, most, metres):
 
 
 @kernel
-def glide(shape, dimension, lasts, passed, origin, target, step, dt):
+def least_length(shape, curvature, metres):
+    """Return how many metres of road a body with wheels at full lock needs to move across [m].
+
+    The steepest bend of a shape over a length L is 6/L² (cubic) or pi²/(2·L²) (sinusoidal) of the
+    way across, as in ``offset_lasts``; a linear one has kinks, and is given as long as a cubic one.
+    0 for who can go sideways (infinite curvature).
+    """
+    if curvature == math.inf:
+        return 0.0
+    return offset_lasts(shape, curvature, metres)
+
+
+@kernel
+def glide(shape, dimension, lasts, passed, origin, target, step, dt, curvature):
     """Return (aside, ahead, passed, tilt) of a body one step on, on its way across.
+
+    Where a body with wheels is too slow for the time that the change is to take, it goes by
+    distance over ``least_length``, and the change takes longer.
 
     Args:
         shape: of the change.
@@ -65,6 +82,7 @@ def glide(shape, dimension, lasts, passed, origin, target, step, dt):
         target: how far left of the path it ends [m].
         step: how far the body moves [m], ≥ 0.
         dt: [s].
+        curvature: of its path at full lock [1/m]; inf: it can go sideways.
 
     Returns:
         how far left of the path it is then, how far along the path it has come [m], what has
@@ -74,19 +92,25 @@ def glide(shape, dimension, lasts, passed, origin, target, step, dt):
         return target, step, passed, 0.0
     span = target - origin
     before = origin + span * progress(shape, passed / lasts)[0]
+    if dimension == DISTANCE and (step > SLOWEST or curvature == math.inf):
+        if step <= SLOWEST:
+            return before, 0.0, passed, 0.0
+        return _by_distance(shape, lasts, passed, origin, span, before, step)
+    length = least_length(shape, curvature, span)
     if step <= SLOWEST:
-        return before, 0.0, passed, 0.0
-    if dimension == DISTANCE:
-        ahead = step
-        share, slope = progress(shape, (passed + ahead) / lasts)
-        for _ in range(3):  # towards ahead² + across² = step²
-            across = origin + span * share - before
-            ahead = step / math.sqrt(1.0 + (across / ahead) ** 2)
-            share, slope = progress(shape, (passed + ahead) / lasts)
-        passed = min(passed + ahead, lasts)
-        return origin + span * share, ahead, passed, math.atan(span * slope / lasts)
+        if length == 0.0 or passed <= 0.0:
+            return before, 0.0, passed, 0.0
+        length = max(length, lasts) if dimension == DISTANCE else length
+        return before, 0.0, passed, math.atan(span * progress(shape, passed / lasts)[1] / length)
     share, slope = progress(shape, (passed + dt) / lasts)
     across = origin + span * share - before
+    if length > 0.0:
+        forward = math.sqrt(max(step * step - across * across, 0.0))
+        if forward * lasts < length * dt:  # too slow to be across in time
+            aside, ahead, come, tilt = _by_distance(
+                shape, length, passed / lasts * length, origin, span, before, step
+            )
+            return aside, ahead, lasts if come >= length else come / length * lasts, tilt
     if abs(across) >= step:  # faster than it moves: straight across, as fast as it can
         moved = math.copysign(step, across)
         if (target - before - moved) * span <= 0.0:
@@ -103,6 +127,19 @@ def glide(shape, dimension, lasts, passed, origin, target, step, dt):
     ahead = math.sqrt(step * step - across * across)
     tilt = math.asin(min(max(sideways / step, -1.0), 1.0))
     return origin + span * share, ahead, passed, tilt
+
+
+@kernel
+def _by_distance(shape, lasts, passed, origin, span, before, step):
+    """Do what ``glide`` does, of a change that goes by the distance along the path."""
+    ahead = step
+    share, slope = progress(shape, (passed + ahead) / lasts)
+    for _ in range(3):  # towards ahead² + across² = step²
+        across = origin + span * share - before
+        ahead = step / math.sqrt(1.0 + (across / ahead) ** 2)
+        share, slope = progress(shape, (passed + ahead) / lasts)
+    passed = min(passed + ahead, lasts)
+    return origin + span * share, ahead, passed, math.atan(span * slope / lasts)
 
 
 @kernel

@@ -59,9 +59,12 @@ class Plan(NamedTuple):
     time_passes: int
     absent: Int
     comes_and_goes: int
+    leaves: int
     drives: Int
     weathers: Int
     scene: Float
+    others: Int
+    attends: int
     driver: int
     driver_code: int
     ideal_perception: int
@@ -105,6 +108,11 @@ class Roads(NamedTuple):
     hypothesis_ranks: Int
     hypothesis_first: Int
     path_ranks: Int
+    claims: Int
+    meets: Int
+    meetings: Float
+    lines: Float
+    signs: Float
 
 
 class State(NamedTuple):
@@ -167,6 +175,11 @@ class State(NamedTuple):
         course: ``(E, 6)`` what a course by another entity keeps; see ``_codes``,
         profile: ``(E, R, 4)`` the course of a speed profile; see ``_course_kernels``,
         profile_rows: ``(E,)`` int64, how many rows of it count.
+        waits: ``(E,)`` int64, the change of lane that waits for a gap; -1: none,
+        allowed: ``(E,)`` [m/s²], what its driver allows at most; +inf: what the storyboard says,
+        minds: ``(E, MIND)`` what that driver keeps in mind; see `bridgegen.ego._attentive_kernels`.
+        seen: ``(SEEN, E)`` what those drivers see; likewise,
+        far: ``(E,)`` room for one to work in.
         attention: ``(E, 3)``, what a careful driver keeps of each body; see its kernel.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
@@ -236,6 +249,11 @@ class State(NamedTuple):
     course: Float
     profile: Float
     profile_rows: Int
+    waits: Int
+    allowed: Float
+    minds: Float
+    seen: Float
+    far: Float
     attention: Float
     key: npt.NDArray[np.uint64]
     sensors: Float

@@ -78,7 +78,9 @@ def end_lateral(e, state):
     """End the action that moves an entity across its path, if any."""
     if state.lateral_action[e] >= 0:
         state.action_ended[state.lateral_action[e]] = True
-    state.lateral_action[e] = state.to[e] = -1
+    if state.waits[e] >= 0:
+        state.action_ended[state.waits[e]] = True
+    state.lateral_action[e] = state.to[e] = state.waits[e] = -1
 
 
 @inlined_kernel

@@ -1,7 +1,8 @@
 """Entities that come and go: who is not there is not moved, seen, met or looked at.
 
-It is there, or not, from the instant on at which it is added or deleted. While it is not, its
-states are those of its last instant, and its actions are over before they begin.
+It is there, or not, from the instant on at which it is added or deleted; where its road ends, it is
+not there any more from the next instant on, unless the scenario has bodies stand there. While it is
+not, its states are those of its last instant, and its actions are over before they begin.
 """
 
 from bridgegen.compiled import inlined_kernel, kernel
@@ -81,8 +82,15 @@ def begin_delete(j, k, plan, roads, state, record):
     state.action_ended[j] = True
     if not state.present[gone]:
         return
-    state.present[gone] = record.present[gone, k] = False
-    for e in range(record.x.shape[0]):
+    record.present[gone, k] = False
+    leave(gone, plan, roads, state)
+
+
+@kernel
+def leave(gone, plan, roads, state):
+    """Let an entity be there no more: what it does is over, and nobody goes by it any more."""
+    state.present[gone] = False
+    for e in range(state.present.shape[0]):
         running = state.speed_action[e]
         if running >= 0 and (e == gone or goes_by(running, plan) == gone):
             stop_longitudinal(running, plan, state)
@@ -91,6 +99,9 @@ def begin_delete(j, k, plan, roads, state, record):
         if running >= 0 and (e == gone or goes_by(running, plan) == gone):
             stop_lateral(running, plan, state)
             state.action_ended[running] = True
+    if state.waits[gone] >= 0:
+        state.action_ended[state.waits[gone]] = True
+        state.waits[gone] = -1
     end_follow(gone, state)
     end_quest(gone, state)
     state.stood[gone] = 0.0
@@ -105,10 +116,16 @@ def begin_delete(j, k, plan, roads, state, record):
 @inlined_kernel
 def stay_away(e, k, record):
     """Let an entity that is not there keep its states at the instant after k."""
+    keep_place(e, k, record)
+    record.a[e, k] = 0.0
+
+
+@kernel
+def keep_place(e, k, record):
+    """Repeat an entity's place and speed at the instant after k."""
     if k < record.x.shape[1] - 1:
         for array in (record.x, record.y, record.h, record.v, record.offset):
             array[e, k + 1] = array[e, k]
-    record.a[e, k] = 0.0
 
 
 @kernel

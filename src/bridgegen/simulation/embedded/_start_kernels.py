@@ -28,7 +28,7 @@ def start(plan, roads, state, record):
     for e in range(record.x.shape[0]):
         state.on[e], state.to[e], state.route[e] = e, -1, plan.routes[e]
         state.lateral_action[e] = state.speed_action[e] = state.follow_action[e] = -1
-        state.goal_action[e] = -1
+        state.goal_action[e] = state.waits[e] = -1
         state.rate[e], state.follow[e] = math.inf, plan.follows[e]
         state.present[e] = plan.absent[e] == 0
         if plan.comes_and_goes:

@@ -16,6 +16,7 @@ from bridgegen.simulation.embedded._place_kernels import (
     put_in_world,
     way_from,
 )
+from bridgegen.simulation.embedded._presence_kernels import keep_place, leave
 
 ENDS, ASKS, LANDS = -1, -2, -3
 """What ``roads.follows`` says of a path that no node goes on from: the road ends; the lanes of the
@@ -37,6 +38,7 @@ def move_along_path(e, k, plan, roads, state, record):
         state.aside[e], ahead, state.lateral_passed[e], tilt = glide(
             plan.actions[j, 2], plan.actions[j, 3], state.lateral_lasts[e],
             state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], step, dt,
+            plan.bodies[e, 6],
         )  # fmt: skip
         state.foot[e] += ahead
     p = state.on[e]
@@ -48,6 +50,11 @@ def move_along_path(e, k, plan, roads, state, record):
         length = (roads.counts[p] - 1) * roads.steps[p]
         if pass_end(e, station - length, roads, state):
             station = state.station[e]
+        elif plan.leaves and e > 0 and ahead > 0.0 and roads.follows[p] == ENDS:
+            record.a[e, k] = (state.command[e] - before) / dt
+            leave(e, plan, roads, state)
+            keep_place(e, k, record)
+            return
         else:
             station, step = length, 0.5 * before * dt
             state.command[e] = state.target[e] = 0.0

@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.ego._attentive_kernels import MIND as HEED
+from bridgegen.ego._attentive_kernels import SEEN
 from bridgegen.ego._perception_kernels import MEMORY
 from bridgegen.ego._prediction_kernels import LOST, PASSAGE
 from bridgegen.ego._reference_kernels import MIND
@@ -41,6 +43,7 @@ class Batch:
         rows: ``(N,)`` int64 in 0..P-1, the road network of each row.
         values: ``(N,)`` float64 per parameter; see `Simulator.run`.
         own_memory: how many numbers a compiled driver of the user's own keeps; None without one.
+        noise: ``(N,)`` uint64, keys of the rows' random numbers; see `noise_keys`.
 
     Attributes:
         record: x, y, h, v, a, offset ``(N, E, T)`` and more, up to the present instant.
@@ -57,6 +60,7 @@ class Batch:
         rows: Int,
         values: Mapping[str, npt.ArrayLike],
         own_memory: int | None = None,
+        noise: npt.NDArray[np.uint64] | None = None,
     ) -> None:
         n = len(rows)
         if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
@@ -64,9 +68,7 @@ class Batch:
         self._program, self._roads, self._rows = program, roads, rows
         self._plan = _plan(program)
         slots = program.fill(values, n)
-        key = np.full(n, program.noise_key or 0, dtype=np.uint64)
-        if program.noise_key is None:
-            key = noise_key({**program.parameters, **_known(program, values)}, n)
+        key = noise_keys(program, values, n) if noise is None else noise
         state = _state(program, roads, rows, slots, key, own_memory)
         self._block, self.state = _packed(state)
         self.record = _record(program, n)
@@ -192,8 +194,7 @@ class Batch:
 
     def rollout(self) -> Rollout:
         """Return what is recorded; all rows must have ended."""
-        program, record = self._program, self.record
-        stop_lights, stop_lines = self._roads.stop_lines()
+        program, roads, record = self._program, self._roads, self.record
         return Rollout(
             time_step=program.time_step,
             names=program.names,
@@ -204,10 +205,13 @@ class Batch:
             lights=record.lights,
             event_names=program.event_names,
             began=record.began,
-            present=record.present,
+            present=NO_PRESENCE if record.present.all() else record.present,
             detections=record.detections if record.detections.size else NO_DETECTIONS,
-            stop_lines=stop_lines[self._rows],
-            stop_lights=stop_lights,
+            stop_lines=roads.stop_lines[self._rows],
+            stop_lights=roads.stop_lights,
+            stop_entities=roads.stop_entities,
+            claims=roads.scene.claims[self._rows],
+            crosswalks=roads.crosswalks[self._rows],
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,
@@ -217,6 +221,23 @@ class Batch:
 ALIGNED = 64  # bytes, a line of the processor's cache
 
 NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
+
+NO_PRESENCE = np.zeros((0, 0, 0), dtype=np.bool_)
+
+
+def noise_keys(
+    program: Program, values: Mapping[str, npt.ArrayLike], n: int
+) -> npt.NDArray[np.uint64]:
+    """Return the keys of N rows' random numbers, ``(N,)``: the file's, or a hash of the values.
+
+    Args:
+        program: the compiled storyboard.
+        values: ``(N,)`` float64 per parameter; see `Simulator.run`.
+        n: N.
+    """
+    if program.noise_key is not None:
+        return np.full(n, program.noise_key, dtype=np.uint64)
+    return noise_key({**program.parameters, **_known(program, values)}, n)
 
 
 def _known(program: Program, values: Mapping[str, npt.ArrayLike]) -> dict[str, npt.ArrayLike]:
@@ -260,9 +281,12 @@ def _plan(program: Program) -> memory.Plan:
         time_passes=program.time_passes,
         absent=program.absent,
         comes_and_goes=int(program.comes_and_goes),
+        leaves=int(program.leaves),
         drives=program.drives,
         weathers=program.weathers,
         scene=_scene(program),
+        others=program.others,
+        attends=int(program.attends.size > 0),
         driver=program.driver.code,
         driver_code=0,
         ideal_perception=int("perception" in program.driver.ideal),
@@ -379,6 +403,8 @@ def _state(
         speed_action=numbers(e), speed_began=zeros(e), speed_lasts=zeros(e),
         command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
         course=zeros(e, COURSE_MEMORY), profile=zeros(e, profile_size, 4), profile_rows=numbers(e),
+        waits=numbers(e), allowed=zeros(e), minds=zeros(e, HEED),
+        seen=zeros(SEEN, e), far=zeros(e),
         attention=zeros(e, 3),
         key=key[:, None], sensors=zeros(e, MEMORY), tracks=zeros(e, TRACK), around=zeros(e, AROUND),
         passages=zeros(2 * e + n_ways, PASSAGE), feet=np.full((n, n_ways), LOST),

@@ -5,7 +5,7 @@ their answers it takes is its own affair: one that runs the storyboard itself ta
 motion, one that does not takes everybody's.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,7 @@ class CoSimulation:
         names: of the E entities; the ego is the first.
         time_step: [s].
         n_steps: T, instants at most.
+        actors: of each of V events, the numbers of the entities that it moves.
         wheel: makes what asks the driver, once the first instant is set; the compiled one by
             default.
 
@@ -51,9 +52,11 @@ class CoSimulation:
         names: Sequence[str],
         time_step: float,
         n_steps: int,
+        actors: Sequence[Collection[int]],
         wheel: Callable[[Batch], Demand] | None = None,
     ) -> None:
         self.names, self.time_step, self.n_steps = tuple(names), time_step, n_steps
+        self._acting = tuple(map(frozenset, actors))
         self._batch = batch
         batch.start()
         self.events: Int = batch.record.began[0]
@@ -98,6 +101,16 @@ class CoSimulation:
         """``(WEATHER,)`` as sensors and tyres feel it, see ``ego._weather_columns``."""
         weather: Float = self._batch.state.weather[0].copy()
         return weather
+
+    def is_ours(self, event: int, driven: Sequence[int]) -> bool:
+        """Say whether an event moves other entities than the ego, and only some that are driven.
+
+        Args:
+            event: its number.
+            driven: the numbers of the entities that drivers drive.
+        """
+        actors = self._acting[event]
+        return bool(actors) and 0 not in actors and actors <= set(driven)
 
     def states(self, k: int) -> Float:
         """Return ``(E, 4)`` x, y [m], heading [rad], speed [m/s] at an instant that is reached."""

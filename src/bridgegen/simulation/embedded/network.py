@@ -1,20 +1,20 @@
 """The roads of a compiled storyboard: P road networks, and the paths on them that are known."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
 from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from bridgegen.arrays import Float, Int
-from bridgegen.ego.scene import Scene, beside, stacked, survey
+from bridgegen.ego.scene import Scene, beside, stacked, stop_lines, survey
 from bridgegen.openx.opendrive.lane_graph import Cells, Ground
 from bridgegen.openx.opendrive.lanes import section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Stretch
 from bridgegen.simulation.embedded._memory_kernels import Roads
 from bridgegen.simulation.embedded.compiler.trajectories import timetable
+from bridgegen.simulation.embedded.meetings import meetings
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.ways import UNKNOWN, Ways, padded, position
 
@@ -35,6 +35,11 @@ class Network:
         sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
             against it; what is to its left, then, of what is to the road's.
         scene: what a driver with stages knows of them.
+        stop_entities: ``(L,)`` int64, whose first route crosses each stop line of a light.
+        stop_lights: ``(L,)`` int64, the light of each.
+        stop_lines: ``(P, L, 3)`` float64, where: x, y [m] and heading [rad], NaN in a road network
+            where the route does not cross it.
+        crosswalks: ``(P, C, 5)`` float64 of the ego's first route; see `Rollout.crosswalks`.
     """
 
     def __init__(
@@ -60,6 +65,11 @@ class Network:
         self._zones: list[list[Float]] = [[] for _ in models]
         pairs = zip(models, self._ways, strict=True)
         self.scene = stacked([_scene(program, model, ways) for model, ways in pairs])
+        self._meetings = meetings(program, models, self._ways)
+        self.stop_entities, self.stop_lights, self.stop_lines = _stop_lines(
+            program, models, self._ways
+        )
+        self.crosswalks = _crosswalks(self.scene, self._ways)
         self.tables = self._tables()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -79,6 +89,26 @@ class Network:
         """Return the samples x, y of a way on road network p, ``(n, 2)`` float64 [m]."""
         way: Float = self.tables.paths[p, number, : self.tables.counts[p, number], :2]
         return way
+
+    def in_junctions(self, p: int) -> Float:
+        """Return where the ego's first path leads through junctions on road network p.
+
+        Returns:
+            ``(J, 2)`` float64 [m], stations along the path, in its order; without rows where it
+            leads through none, or along no lanes.
+        """
+        found: list[list[float]] = []
+        ways, at = self._ways[p], 0.0
+        route = ways.routes[0]
+        for step in route.steps if route is not None else ():
+            end = at + abs(step.s_end - step.s)
+            if ways.is_in_junction(step.road_id):
+                if found and found[-1][1] == at:
+                    found[-1][1] = end
+                else:
+                    found.append([at, end])
+            at = end
+        return np.array(found, dtype=np.float64).reshape(len(found), 2)
 
     def amend(self, name: str, first: int, part: Float) -> None:
         """Change a stretch of an entity's timed trajectory on each road network.
@@ -163,6 +193,7 @@ class Network:
             cells=_stacked([each.corners for each in cells]),
             cell_nodes=_stacked([each.nodes for each in cells]),
             **self.scene._asdict(),
+            **self._meetings._asdict(),
         )
 
     def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
@@ -186,26 +217,56 @@ class Network:
             whole[p, : len(found)] = found
         return whole
 
-    def stop_lines(self) -> tuple[Int, Float]:
-        """Return the stop lines of lights that the ego's route crosses.
 
-        Returns:
-            ``(L,)`` int64, each line's light; ``(P, L, 3)`` float64, where the route crosses it: x,
-            y [m] and heading [rad], NaN in a road network where it does not.
-        """
-        tables = self.tables
-        lights = np.flatnonzero(np.isfinite(self.scene.stops).any(axis=0))
-        found = np.full((self.n_networks, len(lights), 3), np.nan)
-        for p, (light, line) in product(range(self.n_networks), enumerate(lights)):
-            station = self.scene.stops[p, line]
-            if np.isfinite(station):
-                n = tables.counts[p, 0]
-                stations = np.arange(n) * tables.steps[p, 0]
-                found[p, light] = [
-                    np.interp(station, stations, tables.paths[p, 0, :n, column])
-                    for column in range(3)
-                ]
-        return lights, found
+def _stop_lines(
+    program: Program, models: Sequence[OpenDrive], each: Sequence[Ways]
+) -> tuple[Int, Int, Float]:
+    """Return the stop lines of lights that the participants' first routes cross, the ego's first.
+
+    Returns:
+        ``(L,)`` int64, whose route crosses each; ``(L,)`` int64, its light; ``(P, L, 3)`` float64,
+        where: x, y [m] and heading [rad], NaN in a road network where it does not.
+    """
+    found: list[dict[tuple[int, int], Float]] = []
+    for model, ways in zip(models, each, strict=True):
+        lines: dict[tuple[int, int], Float] = {}
+        for entity, route in enumerate(ways.routes if program.lights else ()):
+            if route is None:
+                continue
+            path = ways.paths[entity]
+            stations = np.arange(len(path.table)) * path.step
+            for line in reversed(stop_lines(model, route, program.lights)):
+                pose = [np.interp(line.station, stations, path.table[:, i]) for i in range(3)]
+                lines[entity, program.lights.index(line.light)] = np.array(pose)
+        found.append(lines)
+    keys = sorted({key for lines in found for key in lines})
+    poses = np.full((len(found), len(keys), 3), np.nan)
+    for p, lines in enumerate(found):
+        for j, key in enumerate(keys):
+            poses[p, j] = lines.get(key, np.nan)
+    entities, lights = np.array(keys, dtype=np.int64).reshape(len(keys), 2).T
+    return entities, lights, poses
+
+
+def _crosswalks(scene: Scene, each: Sequence[Ways]) -> Float:
+    """Return the crosswalks that the ego's route leads over, see `Rollout.crosswalks`; ``(P, …)``.
+
+    What pads has NaN.
+    """
+    found = np.full((*scene.crosswalks.shape[:2], 5), np.nan)
+    for p, ways in enumerate(each):
+        path = ways.paths[0]
+        stations = np.arange(len(path.table)) * path.step
+        for j, (enters, leaves, right, left) in enumerate(scene.crosswalks[p]):
+            if np.isfinite(enters):
+                middle = 0.5 * (enters + leaves)
+                x, y, c, s = (np.interp(middle, stations, path.table[:, i]) for i in (0, 1, 3, 4))
+                aside = 0.5 * (left + right)
+                half = 0.5 * (leaves - enters + path.step)
+                found[p, j] = (
+                    x - aside * s, y + aside * c, np.arctan2(s, c), half, 0.5 * (left - right)
+                )  # fmt: skip
+    return found
 
 
 def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:

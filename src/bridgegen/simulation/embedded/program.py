@@ -15,18 +15,26 @@ import numpy.typing as npt
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import STORYBOARD, Driver
 from bridgegen.ego._weather_columns import FRICTION_SCALE
+from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded._codes import (
     ANGLE,
     CLEARANCE,
+    EVENT,
+    EVENT_NUMBER,
+    FIRST,
+    FIRST_GLOBAL,
     FOLLOW,
+    KIND,
+    LAST,
     OFFROAD,
     PROBE,
     RELATIVE_ANGLE,
     ROAD_SYSTEM,
     SYSTEM,
+    WHOM,
 )
 
 UNSAID = -1  # the slot of what an environment leaves as it was
@@ -232,11 +240,14 @@ class Program:
         first_time: slot of the start's date [s], -1 if it states none.
         time_passes: whether that date passes.
         absent: ``(E,)`` 1 for who is not there before it is added, else 0.
-        comes_and_goes: whether there are such, or somebody is deleted.
+        comes_and_goes: whether there are such, or somebody is deleted or leaves.
+        leaves: whether others than the ego are gone where their road ends; else they stand there.
         drives: ``(2,)`` whether the driver steers, and sets the speed, at the start.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
+        others: ``(E,)`` who drives each of the others, ``SCRIPTED`` or ``ATTENTIVE`` of
+            `bridgegen.ego.drivers`; the ego's is not looked at.
         time_step: [s].
         n_steps: recorded instants at most.
         fixed: parameters that rows may not vary, and what they are used for.
@@ -290,13 +301,31 @@ class Program:
     time_passes: int
     absent: Int
     comes_and_goes: bool
+    leaves: bool
     drives: Int
     driver: Driver
+    others: Int
     time_step: float
     n_steps: int
     fixed: Mapping[str, str]
     event_names: tuple[str, ...] = ()
     noise_key: int | None = None
+
+    @property
+    def attends(self) -> Int:
+        """The numbers of the participants that an attentive driver drives."""
+        return np.flatnonzero(self.others == ATTENTIVE)
+
+    @property
+    def actors(self) -> list[frozenset[int]]:
+        """The entities that each of the V events moves."""
+        found: list[set[int]] = [set() for _ in self.event_names]
+        for element in self.elements:
+            if element[KIND] == EVENT:
+                for action in self.actions[element[FIRST] : element[LAST]]:
+                    if action[1] < FIRST_GLOBAL:
+                        found[element[EVENT_NUMBER]].add(int(action[WHOM]))
+        return [frozenset(one) for one in found]
 
     @property
     def looks_at_lanes(self) -> bool:

@@ -43,6 +43,8 @@ class EmbeddedSimulator:
         place: its name, for messages.
         driver: who drives the ego; what the file says by default.
         ideal: stages of the driver that are ideal; what the driver says by default.
+        others: "attentive" or "scripted": who drives all other participants; what the file says by
+            default.
         time_step: [s]; what the file says by default.
         skipped: takes a sentence for each thing that it cannot run, which is left out then instead
             of refused, with the event, action, entity or condition group that it is part of.
@@ -62,11 +64,18 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         ideal: Iterable[str] | None = None,
+        others: str | None = None,
         time_step: float | None = None,
         skipped: list[str] | None = None,
     ) -> None:
         self.program = compile_storyboard(
-            storyboard, place, driver=driver, ideal=ideal, time_step=time_step, skipped=skipped
+            storyboard,
+            place,
+            driver=driver,
+            ideal=ideal,
+            others=others,
+            time_step=time_step,
+            skipped=skipped,
         )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -136,8 +145,17 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        noise: npt.NDArray[np.uint64] | None = None,
     ) -> Rollout:
         """See `Simulator`; runs without the GIL.
+
+        Args:
+            roads: see `Simulator`, as for those that follow.
+            rows: row i's road network.
+            values: by parameter.
+            driver: another one.
+            dry: the road.
+            noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
 
         Raises:
             InputError: see `Simulator`; or a user's driver that cannot be made, or a driver that
@@ -149,13 +167,16 @@ class EmbeddedSimulator:
                 f"the driver '{chosen.driver.name}' drives in {chosen.driver.home} alone"
             )
         if not chosen.driver.is_own:
-            return self.batch(roads, rows, values, driver=driver, dry=dry).run()
+            return self.batch(roads, rows, values, driver=driver, dry=dry, noise=noise).run()
         own, memory = self._own, self._own.memory
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
-            return self.batch(roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory)
+            key = None if noise is None else noise[at]
+            return self.batch(
+                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key
+            )
 
         return own.drive(chosen.changed(dry=dry), some, len(rows))
 
@@ -190,7 +211,9 @@ class EmbeddedSimulator:
             own_memory=own.memory if own else None,
         )  # fmt: skip
         wheel = partial(own.wheel, program.changed(dry=dry)) if own else None
-        return CoSimulation(batch, program.names, program.time_step, program.n_steps, wheel)
+        return CoSimulation(
+            batch, program.names, program.time_step, program.n_steps, program.actors, wheel
+        )
 
     def failed(
         self, roads: Network, row: int, values: Mapping[str, float], status: int, message: str
@@ -226,6 +249,12 @@ class EmbeddedSimulator:
         """Return one row's weather as a rollout went through it; see `weathers.weathers`."""
         return weathers(self.program, values, rollout, row)
 
+    def noise_keys(self, values: Mapping[str, npt.ArrayLike], n: int) -> npt.NDArray[np.uint64]:
+        """Return the keys of n rows' random numbers, see `batch.noise_keys`."""
+        from bridgegen.simulation.embedded.batch import noise_keys  # numba is slow to import
+
+        return noise_keys(self.program, values, n)
+
     def intentions(
         self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike], rollout: Rollout
     ) -> Intentions:
@@ -241,6 +270,7 @@ class EmbeddedSimulator:
         driver: Driver | None = None,
         dry: bool = False,
         own_memory: int | None = None,
+        noise: npt.NDArray[np.uint64] | None = None,
     ) -> "Batch":
         """Set N rows up, for a driver that is asked at every instant.
 
@@ -251,7 +281,9 @@ class EmbeddedSimulator:
             driver: another one.
             dry: the road.
             own_memory: see `Batch`.
+            noise: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
-        return Batch(self.program.changed(driver=driver, dry=dry), roads, rows, values, own_memory)
+        program = self.program.changed(driver=driver, dry=dry)
+        return Batch(program, roads, rows, values, own_memory, noise)

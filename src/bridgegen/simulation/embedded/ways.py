@@ -102,6 +102,10 @@ class Ways:
             if path is not None:
                 self.paths.append(path)
 
+    def is_in_junction(self, road_id: str) -> bool:
+        """Say whether a road of the network is part of a junction."""
+        return self._model.road(road_id).is_connecting
+
     def _learn_lanes(self) -> None:
         """Make the tables of all lanes, and tell which ones the known paths lead along."""
         if self.lanes is not None:

@@ -1,13 +1,13 @@
 """What esmini reads: the scenario as it is handed over, with the values of a row written into it.
 
-An ego that a driver of ours drives has esmini's ExternalController there, from the start on: it
+Whoever a driver of ours drives has esmini's ExternalController there, from the start on: it
 stays where it is told that it is. No other entity has a controller, for esmini does not know
 those that our files name. Expressions are worked out here: esmini keeps six digits of theirs.
 """
 
 import tempfile
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -84,15 +84,15 @@ class ScenarioFile:
 
     Args:
         storyboard: as it is handed over.
-        ego: the name of the ego, if a driver of ours drives it; else None.
+        driven: the names of the entities that drivers of ours drive.
     """
 
-    def __init__(self, storyboard: OpenScenario, ego: str | None) -> None:
+    def __init__(self, storyboard: OpenScenario, driven: Collection[str]) -> None:
         root = etree.fromstring(to_xml(storyboard))
         for controller in [*root.iterfind("./Entities/ScenarioObject/ObjectController")]:
             _remove(controller)
-        if ego is not None:
-            _drive_from_outside(root, ego)
+        for name in driven:
+            _drive_from_outside(root, name)
         self._data = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
 
     def event_paths(self) -> list[str]:
@@ -194,17 +194,17 @@ def _named(event: Node) -> list[Node]:
     ]
 
 
-def _drive_from_outside(root: Node, ego: str) -> None:
-    """Give the ego the controller that waits to be told, whatever else the file does to its own."""
+def _drive_from_outside(root: Node, name: str) -> None:
+    """Give an entity the controller that waits to be told, whatever the file does to its own."""
     for private in root.iterfind("./Storyboard/Init/Actions/Private"):
-        if private.get("entityRef") == ego:
+        if private.get("entityRef") == name:
             for action in [*private.iterfind("./PrivateAction/ControllerAction")]:
                 parent = action.getparent()
                 assert parent is not None
                 _remove(parent)
             place = 1 if len(private) else 0
             private.insert(place, _assigned())
-    for group in _groups_of(root, ego):
+    for group in _groups_of(root, name):
         for action in [*group.iter("ControllerAction")]:
             for below in [*action]:
                 action.remove(below)

@@ -42,13 +42,13 @@ class Job(NamedTuple):
     Attributes:
         embedded: the storyboard and the driver, as ours.
         scenario: the storyboard, as esmini's.
-        drives: whether our driver drives the ego.
+        driven: the numbers of the entities that drivers of ours drive.
         steps: of esmini's that make one of ours.
     """
 
     embedded: "EmbeddedSimulator"
     scenario: "ScenarioFile"
-    drives: bool
+    driven: tuple[int, ...]
     steps: int
 
 
@@ -237,7 +237,7 @@ class Answers:
             if joint.runs:
                 run_together(
                     self._library, scenario, log, joint,
-                    drives=job.drives, boxes=program.box, events=self._events,
+                    driven=job.driven, boxes=program.box, events=self._events,
                     steps=job.steps, alive=self._alive,
                 )  # fmt: skip
         except EsminiError as error:

@@ -85,7 +85,7 @@ class EsminiRoads(NamedTuple):
 
 
 class EsminiSimulator(AroundEmbedded):
-    """A `Simulator` that has esmini run the storyboard, and our driver the ego.
+    """A `Simulator` that has esmini run the storyboard, and our drivers whom they drive.
 
     Where the storyboard moves the ego, esmini's own controller does.
 
@@ -117,9 +117,11 @@ class EsminiSimulator(AroundEmbedded):
         super().__init__(embedded)
         driver = embedded.program.driver
         self._drives = driver != STORYBOARD
-        ego = embedded.program.names[0] if self._drives else None
+        program = embedded.program
+        driven = (*((0,) if self._drives else ()), *program.attends.tolist())
+        names = [program.names[e] for e in driven]
         slow = driver.time_limit if driver.is_own else 0.0
-        self._job = Job(embedded, ScenarioFile(storyboard, ego), self._drives, steps)
+        self._job = Job(embedded, ScenarioFile(storyboard, names), driven, steps)
         self._library, self._seconds = library, seconds + slow
         self._lock, self._is_stopped = threading.Lock(), threading.Event()
         self._seats: list[Seat] = []

@@ -1,9 +1,12 @@
-"""One row: esmini runs the storyboard, and a driver of ours drives the ego in it.
+"""One row: esmini runs the storyboard, and drivers of ours drive the ego and others in it.
 
-At instant k esmini's participants are where they are, and so is the ego. The driver is asked, and
-the ego's next place is known; esmini looks at its conditions at k, ego and all, and moves everybody
-on, in steps that may be finer than ours. In between, the ego is where a line from its place to the
-next one leads.
+At instant k esmini's participants are where they are, and so are those that we drive. The drivers
+are asked, and the next places of those are known; esmini looks at its conditions at k, with all of
+them, and moves everybody on, in steps that may be finer than ours. In between, who is driven is
+where a line from its place to the next one leads.
+
+What the storyboard has a driven participant do, our reading of the storyboard does: esmini takes
+such an action to be over at once.
 """
 
 import math
@@ -33,7 +36,7 @@ def run_together(
     log: Path,
     joint: CoSimulation,
     *,
-    drives: bool,
+    driven: Sequence[int],
     boxes: Float,
     events: Sequence[str],
     steps: int,
@@ -46,7 +49,7 @@ def run_together(
         scenario: the row's file.
         log: to be written.
         joint: the row, at its first instant.
-        drives: whether our driver drives the ego; else esmini does.
+        driven: the numbers of the entities that our drivers drive; esmini moves the others.
         boxes: ``(E, 3)`` [m]: length and width of each entity, and more.
         events: what esmini calls each event.
         steps: how many of esmini's make one of ours.
@@ -64,11 +67,13 @@ def run_together(
     try:
         if not library.begin(scenario, log, begins):
             raise EsminiError("esmini did not take the scenario")
-        _Row(library, joint, drives, boxes, steps).run(alive)
+        _Row(library, joint, driven, boxes, steps).run(alive)
     finally:
         library.close()
     last = int(joint.rollout().n_steps[0]) - 1
     for i, path in enumerate(events):
+        if joint.is_ours(i, driven):
+            continue
         joint.events[i] = -1
         if path in began:
             k = math.ceil(began[path] / joint.time_step - SOON)
@@ -77,14 +82,19 @@ def run_together(
 
 class _Row:
     def __init__(
-        self, library: Library, joint: CoSimulation, drives: bool, boxes: Float, steps: int
+        self,
+        library: Library,
+        joint: CoSimulation,
+        driven: Sequence[int],
+        boxes: Float,
+        steps: int,
     ) -> None:
         self._library, self._joint = library, joint
-        self._drives, self._steps = drives, steps
+        self._driven, self._drives, self._steps = driven, 0 in driven, steps
         self._numbers = [library.number(name) for name in joint.names]
         self._ego = self._numbers[0]
         self._own_step = joint.time_step / steps
-        self._before = joint.states(0)[0]
+        self._before = joint.states(0)
         for name, number, is_there in zip(
             joint.names, self._numbers, joint.present(0), strict=True
         ):
@@ -110,8 +120,7 @@ class _Row:
             if is_through or library.is_over:
                 joint.end()
             elif k < joint.n_steps - 1:
-                if self._drives:
-                    self._report(joint.states(k)[0])
+                self._report(k, joint.states(k))
                 library.step(self._own_step)
                 if library.is_over:
                     joint.end()
@@ -123,9 +132,10 @@ class _Row:
         """Tell the driver where esmini's participants are."""
         bodies, states, present = [], [], []
         late = k * self._joint.time_step - self._library.time if self._library.is_over else 0.0
+        there = self._joint.present(k)
         for e, name in enumerate(self._joint.names):
-            if e == 0 and self._drives:
-                present.append(True)
+            if e in self._driven:
+                present.append(bool(there[e]))
                 continue
             state = self._library.state(self._numbers[e]) if self._numbers[e] >= 0 else None
             if state is None:
@@ -145,17 +155,20 @@ class _Row:
 
     def _move_on(self, k: int) -> None:
         """Take esmini the rest of the way to the next instant; it has made one step."""
-        here, there = self._joint.states(k)[0], self._joint.states(k + 1)[0]
+        here, there = self._joint.states(k), self._joint.states(k + 1)
         for i in range(1, self._steps):
-            if self._drives:
-                self._report(here + i / self._steps * (there - here))
+            self._report(k, here + i / self._steps * (there - here))
             self._library.step(self._own_step)
             if self._library.is_over:
                 return  # seen at the next instant
 
-    def _report(self, state: Float) -> None:
-        x, y, h, v = state.tolist()
-        *_, before_h, before_v = self._before.tolist()
-        a, turn = (v - before_v) / self._own_step, (h - before_h) / self._own_step
-        self._library.report(self._ego, x, y, h, v, a, turn)
-        self._before = state
+    def _report(self, k: int, states: Float) -> None:
+        """Tell esmini where those are that we drive, ``(E, 4)``."""
+        there = self._joint.present(k)
+        for e in self._driven:
+            if there[e] and self._numbers[e] >= 0:
+                x, y, h, v = states[e].tolist()
+                *_, before_h, before_v = self._before[e].tolist()
+                a, turn = (v - before_v) / self._own_step, (h - before_h) / self._own_step
+                self._library.report(self._numbers[e], x, y, h, v, a, turn)
+        self._before = states

@@ -6,6 +6,7 @@ about, which one, and what is said of it; what may be said several times is numb
 
 ====================================  ============================================================
 ``time_step``                         step of the evaluation [s]
+``road_end``                          ``stand``: others stand where their road ends; else they leave
 ``parameter.NAME.axis``               of the search space
 ``parameter.NAME.unit``               of its value and its range
 ``parameter.NAME.expression``         that derives it from others, if any does
@@ -20,6 +21,9 @@ about, which one, and what is said of it; what may be said several times is numb
 ``event.NAME.time``                   when it happens [s]
 ``signals.NAME.offset``               of a controller: time of its first phase that has passed [s]
 ``cause``                             of its harm: perception, planning, control or unavoidable
+``conflict_type``                     of its decisive conflict
+``responsible``                       for it: ego, other, shared or none
+``severity``                          of it: probability of a MAIS3+ injury
 ====================================  ============================================================
 """
 
@@ -31,15 +35,29 @@ from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import CAUSE, TIME_STEP
+from bridgegen.openx.openscenario.declarations import (
+    CAUSE,
+    CONFLICT_TYPE,
+    RESPONSIBLE,
+    ROAD_END,
+    SEVERITY,
+    TIME_STEP,
+)
 from bridgegen.openx.openscenario.from_owl.entities import plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.values import format_double
 
-CHANGES = ("TrafficJam", "RoadWorks", "TrafficAccident", "TemporaryChange")
+CHANGES = ("TrafficJam", "RoadWorks", "TrafficAccident", "NearMiss", "TemporaryChange")
 """The classes of temporary changes, a class before those above it."""
+
+FINDINGS = {
+    CAUSE: "has_cause",
+    CONFLICT_TYPE: "has_conflict_type",
+    RESPONSIBLE: "has_responsibility",
+}
+"""The header's texts on why a scenario is critical, with the scenario's data properties."""
 
 PARAMETER, EVENT, SIGNALS = "parameter", "event", "signals"
 
@@ -69,13 +87,19 @@ class Notes:
         step = self._individuals.optional_number(self._scenario, "has_time_step")
         if step is not None:
             yield osc.Property(TIME_STEP, format_double(step))
+        if self._individuals.optional_text(self._scenario, "has_road_end") is not None:
+            said = plain_text(self._individuals, self._scenario, "has_road_end")
+            yield osc.Property(ROAD_END, said)
         yield from self._parameters()
         yield from self._changes()
         for name, passed in signals.offsets.items():
             yield osc.Property(f"{SIGNALS}.{name}.offset", format_double(passed))
-        if self._individuals.optional_text(self._scenario, "has_cause") is not None:
-            said = plain_text(self._individuals, self._scenario, "has_cause")
-            yield osc.Property(CAUSE, said)
+        for name, term in FINDINGS.items():
+            if self._individuals.optional_text(self._scenario, term) is not None:
+                yield osc.Property(name, plain_text(self._individuals, self._scenario, term))
+        severity = self._individuals.optional_number(self._scenario, "has_severity")
+        if severity is not None:
+            yield osc.Property(SEVERITY, format_double(severity))
 
     def _parameters(self) -> Iterator[osc.Property]:
         ind = self._individuals

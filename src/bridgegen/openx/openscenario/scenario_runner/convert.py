@@ -52,6 +52,8 @@ def for_scenario_runner(
 ) -> osc.OpenScenario:
     """Return a scenario that ScenarioRunner runs as it was recorded, whoever drives the ego.
 
+    Who leaves where the road ends stands there instead: ScenarioRunner cannot delete an entity.
+
     Args:
         scenario: without parameters (`resolve.resolved`), of version 1.2.
         recording: its own; entity 0 is the ego.
@@ -61,6 +63,8 @@ def for_scenario_runner(
     Raises:
         UnsupportedError: what ScenarioRunner or CARLA cannot do, by name, all of it at once.
     """
+    deleted = {one.entity_ref for one in walk(scenario) if isinstance(one, osc.EntityAction)}
+    recording = recording.until_left(but={str(one) for one in deleted})
     by_name = {str(one.name): one.entity_object for one in scenario.entities.scenario_objects}
     bodies = [by_name[one] for one in recording.names]
     if wrong := list(_impossible(recording, bodies)):

@@ -13,8 +13,8 @@ import pyoxigraph as ox
 from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.vocabulary import bg, tbox
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import CAUSE, TIME_STEP
-from bridgegen.openx.openscenario.from_owl.notes import EVENT, PARAMETER, SIGNALS
+from bridgegen.openx.openscenario.declarations import ROAD_END, SEVERITY, TIME_STEP
+from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, PARAMETER, SIGNALS
 from bridgegen.openx.openscenario.from_owl.weather import PROPERTIES
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
 from bridgegen.openx.openscenario.to_owl.entities import as_number
@@ -30,13 +30,17 @@ class Notes:
 
     Attributes:
         time_step: the property of it, if there is one.
-        cause: likewise.
+        road_end: likewise.
+        severity: likewise.
+        findings: by name, the properties that say why it is critical.
         of: per kind (``parameter``, ``event``, ``signals``) and name, what is said, by its name.
     """
 
     def __init__(self, builder: StoryBuilder, header: osc.FileHeader) -> None:
         self.time_step: osc.Property | None = None
-        self.cause: osc.Property | None = None
+        self.road_end: osc.Property | None = None
+        self.severity: osc.Property | None = None
+        self.findings: dict[str, osc.Property] = {}
         self.of: dict[str, Facts] = {PARAMETER: {}, EVENT: {}, SIGNALS: {}}
         for one in () if header.properties is None else header.properties.properties:
             name = builder.text(one.name)
@@ -46,8 +50,12 @@ class Notes:
                 which, _, what = which.rpartition(".")
             if name == TIME_STEP:
                 self.time_step = self.time_step or one
-            elif name == CAUSE:
-                self.cause = self.cause or one
+            elif name == ROAD_END:
+                self.road_end = self.road_end or one
+            elif name == SEVERITY:
+                self.severity = self.severity or one
+            elif name in FINDINGS:
+                self.findings.setdefault(name, one)
             elif kind in self.of and which:
                 about = self.of[kind].setdefault(which, defaultdict(list))
                 about[what].append(one)

@@ -30,7 +30,7 @@ from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
-from bridgegen.openx.openscenario.from_owl.notes import EVENT, SIGNALS
+from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder
@@ -171,9 +171,16 @@ class _Importer:
             with builder.attempt():
                 step = as_number(builder, notes.time_step.value, notes.time_step)
         builder.put(node, "has_time_step", step)
-        if notes.cause is not None:
+        if notes.road_end is not None:
             with builder.attempt():
-                builder.put(node, "has_cause", builder.text(notes.cause.value))
+                builder.put(node, "has_road_end", builder.text(notes.road_end.value))
+        for name, found in notes.findings.items():
+            with builder.attempt():
+                builder.put(node, FINDINGS[name], builder.text(found.value))
+        if notes.severity is not None:
+            with builder.attempt():
+                severity = as_number(builder, notes.severity.value, notes.severity)
+                builder.put(node, "has_severity", severity)
         stop = self.scenario.storyboard.stop_trigger
         for group in () if stop is None else stop.condition_groups:
             if (time := _time_alone(group)) is not None:

@@ -1,19 +1,28 @@
 """From an OpenSCENARIO file to a `Program`, or to all that the rollout cannot do with it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from bridgegen.arrays import Int
 from bridgegen.ego import STORYBOARD, Driver
+from bridgegen.ego.drivers import ATTENTIVE, SCRIPTED
+from bridgegen.ego.kinds import MOTORBIKE
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.resolve import texts_resolved
-from bridgegen.simulation.embedded._codes import COURSE_WIDTH, DELAY, EVENT
+from bridgegen.simulation.embedded._codes import (
+    COURSE_WIDTH,
+    DELAY,
+    END_OF_ROAD,
+    EVENT,
+    PROBE,
+)
 from bridgegen.simulation.embedded.compiler import declared
 from bridgegen.simulation.embedded.compiler.actions import Actions
-from bridgegen.simulation.embedded.compiler.bodies import kind, measures
+from bridgegen.simulation.embedded.compiler.bodies import Body, kind, measures
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
 from bridgegen.simulation.embedded.compiler.positions import Positions
@@ -37,6 +46,7 @@ def compile_storyboard(
     *,
     driver: Driver | None = None,
     ideal: Iterable[str] | None = None,
+    others: str | None = None,
     time_step: float | None = None,
     skipped: list[str] | None = None,
 ) -> Program:
@@ -47,6 +57,8 @@ def compile_storyboard(
         place: its name, for messages.
         driver: who drives the ego, whatever the file says.
         ideal: its stages that are ideal, whatever the driver or the file says.
+        others: "attentive" or "scripted": who drives all other participants, whatever the file
+            says; attentive are those that can be.
         time_step: [s], whatever the file says.
         skipped: takes a sentence for each thing that the rollout cannot do, which is left out then
             instead of refused, with what it is part of; never the ego.
@@ -58,7 +70,7 @@ def compile_storyboard(
     while True:
         compiler = _Compiler(scenario, place)
         try:
-            return compiler.compile(driver, ideal, time_step)
+            return compiler.compile(driver, ideal, others, time_step)
         except InputError as error:
             left = compiler.without_culprits(scenario)
             if skipped is None or left is scenario or not compiler.has_ego(left):
@@ -100,7 +112,11 @@ class _Compiler:
         return self.tables.names[:1] == Tables(left, self.place).names[:1]
 
     def compile(
-        self, driver: Driver | None, ideal: Iterable[str] | None, time_step: float | None
+        self,
+        driver: Driver | None,
+        ideal: Iterable[str] | None,
+        others: str | None,
+        time_step: float | None,
     ) -> Program:
         if not self.tables.objects:
             raise InputError(f"{self.place}: a scenario needs at least one entity, got none")
@@ -137,6 +153,7 @@ class _Compiler:
         follows = [
             trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
         ]
+        others_drivers = self._others(objects, others)
         n_steps = round(duration / step) + 1
         if not 2 <= n_steps <= MAX_STEPS:
             self.tables.problems.append(
@@ -150,6 +167,8 @@ class _Compiler:
         everywhere, signals = self.everywhere, self.everywhere.signals
         time = everywhere.first_time
         first_time = -1 if time is None else self.tables.slot(time[0])
+        waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
+        leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
         return Program(
             place=self.place,
             names=self.tables.names,
@@ -201,9 +220,11 @@ class _Compiler:
             first_time=first_time,
             time_passes=int(time is not None and time[1]),
             absent=np.array([e in self.start.absent for e in range(len(objects))], dtype=np.int64),
-            comes_and_goes=bool(self.start.absent) or self.actions.has_comings_and_goings,
+            comes_and_goes=bool(self.start.absent) or self.actions.has_comings_and_goings or leaves,
+            leaves=leaves,
             drives=np.array(self.controllers.drives, dtype=np.int64),
             driver=chosen if ideal is None else chosen.idealised(ideal),
+            others=others_drivers,
             time_step=step,
             n_steps=n_steps,
             fixed=self.tables.fixed,
@@ -216,6 +237,35 @@ class _Compiler:
         if not isinstance(path, AlongLanes) or path.aside == 0.0:
             return -1
         return self.tables.slot(path.aside)
+
+    def _others(self, objects: Sequence[Body], others: str | None) -> Int:
+        """Return who drives each participant but the ego, see ``Program.others``."""
+        found = np.full(len(objects), SCRIPTED, dtype=np.int64)
+        for e, (name, body) in enumerate(zip(self.tables.names, objects, strict=True)):
+            if e == 0:
+                continue
+            said = declared.other_driver(self.controllers, self.place, e, name)
+            lacks = self._lacks_for_attention(e, body)
+            if others is not None:
+                found[e] = ATTENTIVE if others == "attentive" and not lacks else SCRIPTED
+            elif said == ATTENTIVE and lacks:
+                self.tables.problems.append(
+                    f"{self.place}: '{name}' cannot have the driver 'attentive': {lacks}"
+                )
+            elif said is not None:
+                found[e] = said
+        return found
+
+    def _lacks_for_attention(self, e: int, body: Body) -> str:
+        """Return why a participant cannot have an attentive driver; empty if it can."""
+        if isinstance(body, osc.MiscObject | osc.ExternalObjectReference):
+            return "it is an object, which does not move by itself"
+        if self.actions.is_timed(e):
+            return "it follows a trajectory with times"
+        drives = kind(body) <= MOTORBIKE
+        if drives and isinstance(self.paths[e], AlongTrajectory):
+            return "it follows a trajectory, and is on no lane"
+        return ""
 
     def _declared_driver(self) -> Driver:
         """Return the file's driver; the storyboard, where the ego follows a timetable."""

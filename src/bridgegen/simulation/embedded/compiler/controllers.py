@@ -1,7 +1,8 @@
 """Who moves the ego, where a file switches controllers on and off: the storyboard, or its driver.
 
 The ego's driver is the controller that names it (`declarations.DRIVER`); one that the user names
-takes the place of whatever controller the file gives the ego. No other controller is known here:
+takes the place of whatever controller the file gives the ego. Other entities' drivers are named in
+the same way, and drive all the time. No other controller is known here:
 it may be given to an entity, but not switched on. An entity without one that is on is moved by the
 storyboard, as by the standard's default controller.
 """
@@ -59,13 +60,13 @@ class Controllers:
         """Say whether the driver does not steer, or set the speed, at some time."""
         return not self.drives[which] or 0 in self._later[which]
 
-    def of_ego(self) -> Iterator[osc.Controller]:
-        """Yield the controllers that the ego has from the start on, in the order of the file."""
-        ego = self._tables.objects[0]
-        for one in ego.object_controllers:
+    def of(self, entity: int) -> Iterator[osc.Controller]:
+        """Yield an entity's controllers from the start on, in the order of the file."""
+        owner = self._tables.objects[entity]
+        for one in owner.object_controllers:
             yield one.controller
         for private in self._scenario.storyboard.init.actions.privates:
-            for wrapped in private.private_actions if private.entity_ref == ego.name else ():
+            for wrapped in private.private_actions if private.entity_ref == owner.name else ():
                 for part in _parts(wrapped.action):
                     if isinstance(part, osc.AssignControllerAction):
                         yield _controller(part)
@@ -106,6 +107,11 @@ class Controllers:
                 on = self._tables.truth(value)
                 if is_drivers:
                     found[which] = int(on)
+                elif entity > 0 and self._is_of_driver(part, entity):
+                    if not on:
+                        name = self._tables.names[entity]
+                        self._tables.unsupported(part, f"switching off the driver of '{name}'")
+                        break
                 elif on:
                     self._refuse(part, entity)
                     break
@@ -118,11 +124,19 @@ class Controllers:
         if isinstance(part, osc.AssignControllerAction):
             return _names_driver(_controller(part))
         wanted = part.object_controller_ref or part.controller_ref
-        mine = {str(one.name) for one in self.of_ego() if _names_driver(one)}
+        mine = {str(one.name) for one in self.of(0) if _names_driver(one)}
         for one in self._tables.objects[0].object_controllers:
             if _names_driver(one.controller) and one.name is not None:
                 mine.add(str(one.name))
         return wanted is None or self._tables.text(wanted) in mine
+
+    def _is_of_driver(self, part: Switching, entity: int) -> bool:
+        """Say whether an action is on the controller that is an entity's driver."""
+        if isinstance(part, osc.AssignControllerAction):
+            return _names_driver(_controller(part))
+        wanted = part.object_controller_ref or part.controller_ref
+        mine = {str(one.name) for one in self.of(entity) if _names_driver(one)}
+        return self._tables.text(wanted) in mine if wanted is not None else bool(mine)
 
     def _refuse(self, part: Element, entity: int) -> None:
         what = f"switching on a controller of '{self._tables.names[entity]}' that is not known here"

@@ -1,6 +1,7 @@
-"""What a file's properties declare: the time step, the ego's driver, the key of its noise."""
+"""What a file's properties declare: the time step, who drives, the key of the ego's noise."""
 
 from bridgegen.ego import DRIVERS, GUESTS, STORYBOARD, Driver, is_spec, split
+from bridgegen.ego.drivers import ATTENTIVE, OTHERS, SCRIPTED
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -8,6 +9,8 @@ from bridgegen.openx.openscenario.declarations import (
     DRIVER,
     IDEAL,
     NOISE_KEY,
+    ROAD_END,
+    STAND,
     TIME_STEP,
 )
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
@@ -38,9 +41,28 @@ def _number(text: str) -> float | None:
         return None
 
 
+def stands(scenario: osc.OpenScenario, place: str) -> bool:
+    """Return whether bodies stand where their road ends, instead of leaving.
+
+    Raises:
+        InputError: the header's property says something else.
+    """
+    properties = scenario.file_header.properties
+    said = properties.get(ROAD_END) if properties else None
+    if said is not None and str(said) != STAND:
+        raise InputError(f"{place}: {ROAD_END} (FileHeader) must be '{STAND}', got '{said}'")
+    return said is not None
+
+
 def driver(controllers: Controllers, place: str) -> Driver:
-    """Return the driver that the ego's controllers name; the storyboard, if none does."""
-    for controller in controllers.of_ego():
+    """Return the driver that the ego's controllers name; the storyboard, if none does.
+
+    Raises:
+        UnsupportedError: it is unknown, or the user's own; or there are two.
+        InputError: stages that it has not.
+    """
+    _refuse_two(controllers, place)
+    for controller in controllers.of(0):
         properties = controller.properties
         name = properties.get(DRIVER) if properties else None
         if name is not None:
@@ -65,9 +87,50 @@ def driver(controllers: Controllers, place: str) -> Driver:
     return STORYBOARD
 
 
+def _refuse_two(controllers: Controllers, place: str) -> None:
+    """Refuse an ego whose controllers name two drivers."""
+    found = None
+    for controller in controllers.of(0):
+        said = controller.properties.get(DRIVER) if controller.properties else None
+        if found is not None and said is not None and str(said) != found:
+            raise UnsupportedError(
+                f"{place}, line {controller.line}: the ego has two drivers, '{found}' and "
+                f"'{said}' (choose one with --ego)"
+            )
+        found = found if said is None else str(said)
+
+
+def other_driver(controllers: Controllers, place: str, entity: int, name: str) -> int | None:
+    """Return the code of the driver that an entity's controllers name, None if none does.
+
+    Raises:
+        UnsupportedError: it is no driver of participants other than the ego, or there are two.
+    """
+    found: dict[str, osc.Controller] = {}
+    for controller in controllers.of(entity):
+        said = controller.properties.get(DRIVER) if controller.properties else None
+        if said is None:
+            continue
+        where = f"{place}, line {controller.line}: "
+        if str(said) not in OTHERS:
+            known = ", ".join(OTHERS)
+            what = f"unknown driver '{said}' of '{name}'"
+            if str(said) in DRIVERS | GUESTS or is_spec(str(said)):
+                what = f"the driver '{said}' is for the ego, not for '{name}'"
+            raise UnsupportedError(f"{where}{what}; drivers of other participants: {known}")
+        if found and str(said) not in found:
+            raise UnsupportedError(
+                f"{where}'{name}' has two drivers, '{next(iter(found))}' and '{said}'"
+            )
+        found[str(said)] = controller
+    if not found:
+        return None
+    return ATTENTIVE if "attentive" in found else SCRIPTED
+
+
 def noise_key(controllers: Controllers, place: str) -> int | None:
     """Return the key of the ego's random numbers that its controllers name, if one does."""
-    for controller in controllers.of_ego():
+    for controller in controllers.of(0):
         properties = controller.properties
         text = properties.get(NOISE_KEY) if properties else None
         if text is not None:

@@ -1,11 +1,16 @@
 """What a rollout brought about, as individuals of the scenario (layer 4 brings about layer 3)."""
 
+from collections.abc import Mapping
+
 import pyoxigraph as ox
 
+from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, Conflicts, analyse
+from bridgegen.conflict.summary import ConflictSummary, of_pair
+from bridgegen.conflict.types import Responsible
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import NAMED_INDIVIDUAL, TYPE, Subject, bg
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.simulation.accidents import accidents
+from bridgegen.simulation.accidents import Accident, accidents
 from bridgegen.simulation.queues import queues
 from bridgegen.simulation.rollout import Rollout
 
@@ -15,9 +20,11 @@ def with_outcomes(
 ) -> Individuals:
     """Return a scenario's individuals with what a rollout of it brought about.
 
-    A collision makes a ``TrafficAccident``, a queue a ``TrafficJam``; the scenario has them by
-    ``has_outcome``, and the converters leave them aside. A queue that the scenario itself declares
-    is none that behaviour brought about, unless others have joined it.
+    A collision makes a ``TrafficAccident``, a near miss of the ego a ``NearMiss``, a queue a
+    ``TrafficJam``; the scenario has them by ``has_outcome``, and the converters leave them aside.
+    Near misses and the ego's first collision have the type, the responsible participant and the
+    rule of the conflict analysis. A queue that the scenario itself declares is no outcome, unless
+    other participants have joined it.
 
     Args:
         individuals: of the scenario.
@@ -34,6 +41,7 @@ def with_outcomes(
     }
     writer = _Writer(individuals, scenario)
     standing = [name for name in rollout.names if name not in participants]
+    conflicts = analyse(rollout)
     for accident in accidents(rollout, row, standing):
         node = writer.node("accident", "TrafficAccident")
         for name, number in (
@@ -43,6 +51,20 @@ def with_outcomes(
         for name in accident.who:
             if name in participants:
                 writer.put(node, "has_who", participants[name])
+        found = _conflict_of(conflicts, row, accident)
+        if found is not None:
+            _put_conflict(writer, node, found, rollout.names[0], participants)
+            writer.put(node, "has_severity", ox.Literal(found.severity))
+            writer.put(node, "has_delta_v", ox.Literal(found.delta_v_ego))
+    for other in (conflicts.kind[row] == NEAR_MISS).nonzero()[0].tolist():
+        found = of_pair(conflicts, row, other)
+        node = writer.node("near_miss", "NearMiss")
+        writer.put(node, "has_time", ox.Literal(found.time))
+        writer.put(node, "has_time_to_collision", ox.Literal(found.ttc))
+        for name in (rollout.names[0], found.partner):
+            if name in participants:
+                writer.put(node, "has_who", participants[name])
+        _put_conflict(writer, node, found, rollout.names[0], participants)
     vehicles = [name for name, node in participants.items() if individuals.is_a(node, "Vehicle")]
     lanes = _lanes(individuals)
     declared = [
@@ -61,6 +83,39 @@ def with_outcomes(
         for name in queue.who:
             writer.put(node, "has_who", participants[name])
     return Individuals([*individuals.quads, *writer.quads])
+
+
+def _conflict_of(conflicts: Conflicts, row: int, accident: Accident) -> ConflictSummary | None:
+    """Return the conflict that an accident is the contact of; None if it was not analysed."""
+    ego, *_ = conflicts.names
+    if ego not in accident.who:
+        return None
+    other = conflicts.names.index(next(name for name in accident.who if name != ego))
+    step = round(accident.time / conflicts.time_step)
+    if conflicts.kind[row, other] != CONTACT or conflicts.instant[row, other] != step:
+        return None
+    return of_pair(conflicts, row, other)
+
+
+def _put_conflict(
+    writer: "_Writer",
+    node: Subject,
+    found: ConflictSummary,
+    ego: str,
+    participants: Mapping[str, Subject],
+) -> None:
+    """State type, responsibility and rule of an accident or a near miss."""
+    writer.put(node, "has_conflict_type", ox.Literal(found.type))
+    writer.put(node, "has_responsibility", ox.Literal(found.responsible))
+    writer.put(node, "has_responsibility_rule", ox.Literal(found.rule))
+    names = {
+        Responsible.EGO.label: [ego],
+        Responsible.OTHER.label: [found.partner],
+        Responsible.SHARED.label: [ego, found.partner],
+    }.get(found.responsible, [])
+    for name in names:
+        if name in participants:
+            writer.put(node, "has_responsible", participants[name])
 
 
 def _lanes(individuals: Individuals) -> dict[tuple[str, int], Subject]:

@@ -1,0 +1,1 @@
+"""A rollout → its conflicts: contacts, near misses, their type, responsibility, severity."""

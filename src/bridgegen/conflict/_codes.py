@@ -1,0 +1,46 @@
+"""The numbers of what the conflict analysis tells apart: the one place where they are.
+
+``types`` gives them names and words, ``analysis`` and the kernels use them. A store keeps them:
+append, never renumber. The module is private because compiled code is built anew when a private
+module changes (``bridgegen.compiled``).
+"""
+
+NO_CONFLICT, COURSE, NEAR_MISS, CONTACT = range(4)
+"""Kinds of conflicts."""
+
+(
+    NONE, REAR_END_STRIKING, REAR_END_STRUCK, CROSSING, TURNING, SIDE_SWIPE, HEAD_ON, EGO_STANDING,
+    VRU_BY_FRONT, VRU_INTO_SIDE, OBJECT,
+) = range(11)  # fmt: skip
+"""Types of conflicts."""
+
+(
+    NO_ZONE, FRONT, FRONT_LEFT, LEFT, REAR_LEFT, REAR, REAR_RIGHT, RIGHT, FRONT_RIGHT,
+) = range(9)  # fmt: skip
+"""Edges and corners of a body, counter-clockwise from its front."""
+
+NOBODY, EGO, OTHER, SHARED = range(4)
+"""Who is responsible."""
+
+(
+    NO_RULE, STRUCK_STANDING, RED_LIGHT, REAR_DISTANCE, BRAKED_WITHOUT_REASON, CUT_IN,
+    CUT_IN_PREVENTABLE, REVEALED_LATE, MAP_PRIORITY, SIGNS, RIGHT_BEFORE_LEFT, ONCOMING_FIRST,
+    TURNING_GIVES_WAY, JUNCTION_OCCUPIED, LEFT_ITS_LANE, CROSSWALK, STEPPED_OUT,
+    COULD_HAVE_STOPPED, INTO_THE_SIDE, STANDING_AHEAD, ASSUMED_RIGHT_BEFORE_LEFT, UNSAFE_START,
+    BRAKED_HARD_AHEAD,
+) = range(23)  # fmt: skip
+"""Rules of responsibility. The four from MAP_PRIORITY on are in the order of the claims of
+`bridgegen.ego.right_of_way`."""
+
+(
+    KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE,
+) = range(9)  # fmt: skip
+INTEGERS = 9
+"""Columns of a pair's row of whole numbers, and how many."""
+
+(
+    TTC, NEEDED, ACROSS, ALONG, V_EGO, V_OTHER, STOOD_EGO, STOOD_OTHER, OVERLAP, NEARNESS,
+    LEFT_TO_ACT,
+) = range(11)  # fmt: skip
+FLOATS = 11
+"""Columns of a pair's row of floats, and how many."""

@@ -1,0 +1,114 @@
+"""The limits of the conflict analysis, each with its unit and source: the one place where they are.
+
+"Ours" marks what no source gives. Private for the reason that ``_codes`` tells.
+"""
+
+import math
+
+# --- Collision course and near miss -------------------------------------------------------------
+
+HORIZON = 4.0
+"""[s] A collision course counts if it leads to contact within this time. Source: van der Horst and
+Hogema (1993), Time-to-collision and collision avoidance systems: 4 s separates drivers who find
+themselves in danger from those who are in control."""
+SERIOUS_TTC = 1.5
+"""[s] A near miss has no more time left. Source: van der Horst and Hogema (1993)."""
+SERIOUS_DECELERATION = 3.35
+"""[m/s²] A near miss needs so much deceleration. Source: Archer (2005), Indicators for traffic
+safety assessment and prediction, KTH: deceleration rate to avoid a crash (DRAC) above the
+3.35 m/s² (11 ft/s²) of AASHTO."""
+MOVES = 0.5
+"""[m/s] An ego that is slower has no near miss of its own: others pass it. Ours."""
+GUIDANCE = 6.0
+"""[s] How far ahead the closest encounter at constant velocity is looked for. Ours."""
+GUIDANCE_STEP = 5
+"""Every so many instants. Ours."""
+NEAR, SOON = 5.0, 3.0
+"""[m], [s] Scales of nearness in space and time. Ours."""
+FINEST = 0.05
+"""[s] The shortest step of a prediction along paths. Ours."""
+HALVINGS = 10
+"""Times that the last step of a prediction is halved: 0.05 ms. Ours."""
+JUMPS = 5.0
+"""[m/s] A body whose positions imply a motion that is so much faster than its speed was relocated:
+lane changes of scripted bodies reach 3 m/s sideways. Ours."""
+
+# --- Contact and type ---------------------------------------------------------------------------
+
+FLUSH = math.sin(math.radians(8.0))
+"""[1] Edges at a smaller angle meet flush; at a larger one a corner meets an edge. Ours."""
+STANDS = 0.1
+"""[m/s] A slower body stands. Ours: below the resolution of recorded speeds, 0.36 km/h."""
+STOOD = 0.5
+"""[s] A body that has stood for so long has not stopped in the very moment of the conflict. Ours.
+"""
+SAME_WAY = math.cos(math.radians(35.0))
+"""[1] Cosine of the angle between headings of bodies that go the same way; its negative: against
+each other. Ours: lane changes reach 25° at walking speed, turns begin at 60°."""
+TURNS = math.radians(10.0)
+"""[rad] A body whose heading has changed by more within ``TURN_TIME`` turns. Ours."""
+TURN_BEGINS = math.radians(3.0)
+"""[rad] A body whose heading has changed by more, and will change by twice ``TURNS`` in all within
+half of ``TURN_TIME``, turns, too. Ours."""
+TURN_TIME = 4.0
+"""[s] A quarter turn of 8 m radius takes 4 s at 3 m/s. Ours."""
+PUSHES = 0.3
+"""[m/s] A body that moves into another more slowly does not strike it. Ours."""
+
+# --- The careful driver -------------------------------------------------------------------------
+
+REACTION = 0.75
+"""[s] From the risk until braking begins. Source: UN R157, Annex 3, performance model."""
+BRAKING = 0.774 * 9.81
+"""[m/s²] Source: UN R157, Annex 3, performance model: 0.774 g."""
+JERK = 12.65
+"""[m/s³] 0.774 g in 0.6 s. Source: UN R157, Annex 3, performance model."""
+COMFORT = 3.0
+"""[m/s²] Braking that one may ask of others. Source: UN R79, 5.6.4.7: a lane change must not force
+the vehicle behind to more than 3 m/s²."""
+AHEAD_BY = 0.01
+"""[m] A body that brakes and is farther ahead than without braking, by more, has not avoided the
+other by braking. Ours: rounding."""
+BRAKES_FOR = 20.0
+"""[s] A driver that brakes is followed for at most this time: 60 m/s at ``COMFORT``. Ours."""
+
+# --- Who is in whose way ------------------------------------------------------------------------
+
+MARGIN = 0.5
+"""[m] A body that reaches so near to the strip that another sweeps is in its lane. A car of 1.9 m
+on a lane of 3.5 m has 0.8 m to each side, and a cut-in counts from 0.3 m beyond the marking on.
+Source: UN R157, 5.2.5.2."""
+MARGIN_ON_FOOT = 1.0
+"""[m] Likewise of pedestrians, cyclists, animals. Source: StVO § 26, ECE pedestrian test protocols
+brake for who is about to step into the path; the metre is ours."""
+HARD = 6.0
+"""[m/s²] Braking that needs a reason. Source: UN R13-H, Annex 3: 6.43 m/s² is what the service
+brakes must give, so that nobody brakes so hard by the way."""
+JUST_NOW = 3.0
+"""[s] What a body has done so long before a contact counts as its doing. Ours: lane changes take 3
+to 6 s."""
+ASIDE = 0.7
+"""[m] A body that has moved so far across its route within ``JUST_NOW`` has changed its course.
+Ours: about the room to the marking."""
+ALIKE = 0.7
+"""[1] Least cosine, in size, between two approaches of the same road. Ours: 45°."""
+AHEAD_TIME, AHEAD = 2.0, 10.0
+"""[s], [m] A participant that is nearer ahead than 2 s of travel and 10 m is a reason to brake.
+Source: StVO § 4; the 2 s are the usual rule of thumb of safe distance, the 10 m are ours."""
+
+# --- Lights and crosswalks ----------------------------------------------------------------------
+
+LINE_REACH = 3.5
+"""[m] A body that passes a stop line's prolongation farther aside crosses another lane's line.
+Ours: a lane's width."""
+SIGHT = 60.0
+"""[m] A light holds a body that is at most so far before its stop line. Ours."""
+LOOKED_BACK = 10.0
+"""[s] Red lights are looked for so long before a conflict. Ours."""
+JUNCTION = 40.0
+"""[m] A light decides on conflicts up to so far behind its stop line. Ours: the size of a large
+junction."""
+CROSSWALK_MARGIN = 0.5
+"""[m] By so much crosswalks are wider, along the route. Ours."""
+KERB = 1.0
+"""[m] By so much they are longer, across the route: who stands at the kerb to cross. Ours."""

@@ -1,0 +1,107 @@
+"""Compiled typology of a conflict; the types are those of ``types.ConflictType``."""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.conflict._codes import (
+    CROSSING,
+    EGO_STANDING,
+    FRONT,
+    FRONT_LEFT,
+    FRONT_RIGHT,
+    HEAD_ON,
+    OBJECT,
+    REAR,
+    REAR_END_STRIKING,
+    REAR_END_STRUCK,
+    SIDE_SWIPE,
+    TURNING,
+    VRU_BY_FRONT,
+    VRU_INTO_SIDE,
+)
+from bridgegen.conflict._geometry_kernels import turned
+from bridgegen.conflict._limits import (
+    PUSHES,
+    SAME_WAY,
+    TURN_BEGINS,
+    TURN_TIME,
+    TURNS,
+)
+from bridgegen.ego.kinds import ANIMAL, BICYCLE, OTHER, PEDESTRIAN
+
+
+@kernel
+def is_vulnerable(kind):
+    """Say whether a kind of body is a vulnerable road user, or an animal."""
+    return kind in (PEDESTRIAN, BICYCLE, ANIMAL)
+
+
+@kernel
+def strikes_with_front(own, own_part):
+    """Say whether the ego moves into the other with its front edge or a front corner."""
+    return own in (FRONT, FRONT_LEFT, FRONT_RIGHT) and own_part > PUSHES
+
+
+@kernel
+def turning_of(c, s, first, n, k, dt):
+    """Return by how much a body has turned up to instant k, and by how much until a while later."""
+    steps = int(TURN_TIME / dt)
+    before = turned(c, s, first, k, steps)
+    later = min(k + steps // 2, n - 1)
+    return before, before + turned(c, s, k, later, later - k)
+
+
+@kernel
+def is_turning(before, later, limit):
+    """Say whether a body turns off: it has turned by more than a limit [rad], or begins to."""
+    begins = abs(before) > TURN_BEGINS and before * later > 0.0 and abs(later) > 2.0 * TURNS
+    return abs(before) > limit or (begins and abs(later) > limit)
+
+
+@kernel
+def turns(c, s, e, first, n, k, dt):
+    """Say whether the ego, and whether body e, turns off; bends that both follow are none.
+
+    Of two that go the same way all the time, who changes lane does not turn off: it must leave the
+    common direction.
+    """
+    j = max(k - int(TURN_TIME / dt), first)
+    mine, my_all = turning_of(c[0], s[0], first, n, k, dt)
+    its, its_all = turning_of(c[e], s[e], first, n, k, dt)
+    now = c[0, k] * c[e, k] + s[0, k] * s[e, k]
+    before = c[0, j] * c[e, j] + s[0, j] * s[e, j]
+    limit = TURNS
+    if now >= SAME_WAY and before >= SAME_WAY:
+        limit = math.acos(SAME_WAY)
+    one, other = is_turning(mine, my_all, limit), is_turning(its, its_all, limit)
+    if now >= SAME_WAY and before >= SAME_WAY and one == other:
+        return False, False
+    if now <= -SAME_WAY and before <= -SAME_WAY and one and other and mine * its < 0.0:
+        return False, False
+    return one, other
+
+
+@kernel
+def type_of(e, first, n, k, dt, kinds, c, s, own, its, own_part, stood):
+    """Return the type of the conflict of the ego and body e, which meet after instant k.
+
+    ``own`` and ``its`` are the zones that meet; ``own_part`` [m/s] is the ego's share of the
+    closing speed; ``stood`` [s] for how long the ego has been standing.
+    """
+    cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
+    if stood > 0.0:
+        return EGO_STANDING
+    if is_vulnerable(kinds[e]):
+        return VRU_BY_FRONT if strikes_with_front(own, own_part) else VRU_INTO_SIDE
+    if kinds[e] == OTHER:
+        return OBJECT
+    mine, theirs = turns(c, s, e, first, n, k, dt)
+    if cosine >= SAME_WAY:
+        if own == REAR or (its == FRONT and own_part <= PUSHES):
+            return REAR_END_STRUCK
+        if own == FRONT or (its == REAR and own_part > PUSHES):
+            return REAR_END_STRIKING
+        return TURNING if mine or theirs else SIDE_SWIPE
+    if mine or theirs:
+        return TURNING
+    return HEAD_ON if cosine <= -SAME_WAY else CROSSING

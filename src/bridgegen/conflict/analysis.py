@@ -1,0 +1,209 @@
+"""The conflict analysis of rollouts: what happened between the ego and each other participant."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.conflict import _codes as codes
+from bridgegen.conflict import severity as injury
+from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
+from bridgegen.conflict.types import ConflictType, Responsible, Rule, Zone
+from bridgegen.ego.kinds import OTHER
+from bridgegen.metrics.metric import recorded, shared
+from bridgegen.metrics.motion import motion
+from bridgegen.simulation.rollout import Rollout
+
+_DIRECTION = np.array(
+    [injury.SIDE, injury.FRONT, injury.FRONT, injury.SIDE, injury.REAR, injury.REAR, injury.REAR,
+     injury.SIDE, injury.FRONT]
+)  # fmt: skip
+"""The direction of the force by `Zone`; a corner counts as the end that it belongs to."""
+
+
+_FRONT = (Zone.FRONT, Zone.FRONT_LEFT, Zone.FRONT_RIGHT)
+_BY_OTHERS = (
+    ConflictType.REAR_END_STRUCK,
+    ConflictType.SIDE_SWIPE,
+    ConflictType.EGO_STANDING,
+    ConflictType.VRU_INTO_SIDE,
+)
+"""Types in which the other drives, rides or walks into the ego."""
+
+
+@dataclass(frozen=True)
+class Conflicts:
+    """The conflicts of N scenarios, pair by pair; the ego is entity 0, whose own column is empty.
+
+    Only what happens up to the ego's first contact counts. Two bodies are on a collision course
+    where two predictions agree that they touch within 4 s: constant velocity, and constant speed
+    along the paths that both drive in the rollout (straight on beyond their ends). Where paths do
+    not meet, passing is no conflict, however near. A near miss is a collision course with at most
+    1.5 s left and a needed deceleration of at least 3.35 m/s². Of all instants of a collision
+    course the most urgent one counts, a near miss first; see ``harm``. Types, zones,
+    responsibility and what belongs to them are found of near misses and contacts.
+
+    Attributes:
+        names: E participants.
+        time_step: [s].
+        kind: ``(N, E)`` NO_CONFLICT, COURSE, NEAR_MISS or CONTACT.
+        type: ``(N, E)`` of `ConflictType`.
+        responsible: ``(N, E)`` of `Responsible`.
+        rule: ``(N, E)`` of `Rule`.
+        instant: ``(N, E)`` of contact, or the most urgent of the collision course.
+        decided: ``(N, E)`` instant at which the risk arose that decides on responsibility.
+        zone_ego: ``(N, E)`` of `Zone`, on the ego.
+        zone_other: ``(N, E)`` of `Zone`, on the other.
+        preventable: ``(N, E)`` bool: the careful driver of UN R157, Annex 3 (0.75 s, 0.774 g),
+            braking on the ego's path since the other was visibly in its way (or since the vehicle
+            ahead braked), would have avoided the contact, or the near miss.
+        ttc: ``(N, E)`` [s], time to collision at ``instant``; 0 of a contact, +inf without a
+            conflict.
+        needed: ``(N, E)`` [m/s²], the deceleration that the ego needed then; of a contact, as if
+            one time step had been left.
+        closing_normal: ``(N, E)`` [m/s], closing speed across the surfaces that meet.
+        closing_tangential: ``(N, E)`` [m/s], along them.
+        v_ego: ``(N, E)`` [m/s], speed of the ego then; just before a contact.
+        v_other: ``(N, E)`` [m/s], of the other.
+        stood_ego: ``(N, E)`` [s], for how long the ego had been standing.
+        stood_other: ``(N, E)`` [s], the other.
+        overlap: ``(N, E)``, share of the ego's extent across the contact's normal that meets.
+        left: ``(N, E)`` [s], from the instant ``decided`` to the contact, or to the one ahead.
+        nearness: ``(N, E)`` in [0, 1], how near they come at constant velocity; see
+            ``_conflict_kernels.nearness``.
+        severity: ``(N, E)`` probability of MAIS3+ of the party at the higher risk; 0 unless they
+            touch.
+        delta_v_ego: ``(N, E)`` [m/s], change of the ego's velocity; 0 unless they touch.
+        delta_v_other: ``(N, E)`` [m/s], of the other's.
+        ok: ``(N,)`` bool, False where the scenario failed; its rows are empty.
+    """
+
+    names: tuple[str, ...]
+    time_step: float
+    kind: Int
+    type: Int
+    responsible: Int
+    rule: Int
+    instant: Int
+    decided: Int
+    zone_ego: Int
+    zone_other: Int
+    preventable: Bool
+    ttc: Float
+    needed: Float
+    closing_normal: Float
+    closing_tangential: Float
+    v_ego: Float
+    v_other: Float
+    stood_ego: Float
+    stood_other: Float
+    overlap: Float
+    left: Float
+    nearness: Float
+    severity: Float
+    delta_v_ego: Float
+    delta_v_other: Float
+    ok: Bool
+
+    @cached_property
+    def at_fault(self) -> Bool:
+        """``(N, E)``: the ego has failed.
+
+        It is responsible, alone or with the other; or its front meets another in a contact that it
+        could have prevented.
+        """
+        blamed = (self.responsible == Responsible.EGO) | (self.responsible == Responsible.SHARED)
+        by_front = np.isin(self.zone_ego, _FRONT) & ~np.isin(self.type, _BY_OTHERS)
+        fault: Bool = blamed | ((self.kind == CONTACT) & self.preventable & by_front)
+        return fault
+
+
+def analyse(rollout: Rollout) -> Conflicts:
+    """Return the conflicts of a rollout, worked out once.
+
+    Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md tells the rules.
+    """
+    return shared(rollout, _analyse)
+
+
+def _analyse(rollout: Rollout) -> Conflicts:
+    from bridgegen.conflict import _conflict_kernels as kernels
+
+    n, e, t = rollout.shape
+    moving = motion(rollout)
+    whole = np.zeros((n, e, codes.INTEGERS), dtype=np.int64)
+    real = np.zeros((n, e, codes.FLOATS))
+    claims = rollout.claims if rollout.claims.size else np.zeros((n, e, e), np.int64)
+    crosswalks = rollout.crosswalks
+    if not crosswalks.size:
+        crosswalks = np.zeros((n, 0, 5))
+    lines = rollout.stop_lines if rollout.stop_entities.size else np.zeros((n, 0, 3))
+    kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
+    kernels.analyse_rows(
+        moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
+        moving.cosine, moving.sine, moving.v, recorded(rollout, "a"), recorded(rollout, "offset"),
+        moving.distance, moving.n_steps, rollout.time_step,
+        np.ascontiguousarray(claims, dtype=np.int64), np.ascontiguousarray(crosswalks),
+        np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
+        np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
+        np.ascontiguousarray(rollout.lights), _is_routed(rollout), np.empty((e, t)), whole, real,
+    )  # fmt: skip
+    ok = np.asarray(rollout.status) == 0
+    whole[~ok], real[~ok] = 0, 0.0
+    real[~ok, :, codes.TTC] = np.inf
+    real[:, :1, codes.TTC] = np.inf
+    own, other = np.broadcast_arrays(kinds[0], kinds)
+    touched = whole[:, :, codes.KIND] == CONTACT
+    rows, entities = np.nonzero(touched)
+    harm, dv_ego, dv_other = (np.zeros((n, e)) for _ in range(3))
+    if len(rows):
+        kind_a, kind_b = own[entities], other[entities]
+        normal = real[rows, entities, codes.ACROSS]
+        tangential = real[rows, entities, codes.ALONG]
+        fixed = (kind_b == OTHER) & _never_moves(rollout)[rows, entities]
+        harm[rows, entities] = injury.severity(
+            kind_a, kind_b, normal, tangential,
+            _DIRECTION[whole[rows, entities, codes.ZONE_EGO]],
+            _DIRECTION[whole[rows, entities, codes.ZONE_OTHER]], True, ~fixed,
+        )  # fmt: skip
+        dv_ego[rows, entities], dv_other[rows, entities] = injury.delta_v(
+            kind_a, kind_b, normal, tangential, True, ~fixed
+        )
+    columns = {
+        "kind": codes.KIND, "type": codes.TYPE, "responsible": codes.RESPONSIBLE,
+        "rule": codes.RULE, "instant": codes.INSTANT, "decided": codes.DECIDED,
+        "zone_ego": codes.ZONE_EGO, "zone_other": codes.ZONE_OTHER,
+    }  # fmt: skip
+    numbers = {
+        "ttc": codes.TTC, "needed": codes.NEEDED, "closing_normal": codes.ACROSS,
+        "closing_tangential": codes.ALONG, "v_ego": codes.V_EGO, "v_other": codes.V_OTHER,
+        "stood_ego": codes.STOOD_EGO, "stood_other": codes.STOOD_OTHER,
+        "overlap": codes.OVERLAP, "left": codes.LEFT_TO_ACT, "nearness": codes.NEARNESS,
+    }  # fmt: skip
+    found: dict[str, Any] = {name: whole[:, :, column] for name, column in columns.items()}
+    found |= {name: real[:, :, column] for name, column in numbers.items()}
+    return Conflicts(
+        names=rollout.names, time_step=rollout.time_step, **found,
+        preventable=whole[:, :, codes.PREVENTABLE] > 0,
+        severity=harm, delta_v_ego=dv_ego, delta_v_other=dv_other, ok=ok,
+    )  # fmt: skip
+
+
+def _is_routed(rollout: Rollout) -> bool:
+    """Say whether offsets are known: in a rollout on a map, or where a recording has them."""
+    return bool(rollout.claims.size) or bool(rollout.offset.any())
+
+
+def _never_moves(rollout: Rollout) -> Bool:
+    """``(N, E)``: which participants stand all the time, as barriers do."""
+    still: npt.NDArray[np.bool_] = (rollout.v == 0.0).all(axis=2)
+    return still
+
+
+__all__ = [
+    "CONTACT", "COURSE", "NEAR_MISS", "NO_CONFLICT", "ConflictType", "Conflicts", "Responsible",
+    "Rule", "Zone", "analyse",
+]  # fmt: skip

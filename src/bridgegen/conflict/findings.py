@@ -1,0 +1,100 @@
+"""What the conflict analysis says of each row, in words that a table can hold."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Int
+from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, Conflicts
+from bridgegen.conflict.harm import Count, decisive
+from bridgegen.conflict.types import ConflictType, Responsible, Rule
+
+KINDS = {COURSE: "collision course", NEAR_MISS: "near miss", CONTACT: "contact"}
+"""What people and files call `Conflicts.kind`."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The decisive conflict of each of N rows; empty texts where there is none.
+
+    Attributes:
+        conflict: ``(N,)`` of "contact", "near miss", "collision course".
+        conflict_type: ``(N,)`` of `ConflictType`'s labels.
+        responsible: ``(N,)`` of `Responsible`'s labels.
+        rule: ``(N,)`` of `Rule`'s labels.
+        partner: ``(N,)`` name of the other participant.
+        implausible: ``(N,)`` why the row's traffic could not happen.
+    """
+
+    conflict: npt.NDArray[np.object_]
+    conflict_type: npt.NDArray[np.object_]
+    responsible: npt.NDArray[np.object_]
+    rule: npt.NDArray[np.object_]
+    partner: npt.NDArray[np.object_]
+    implausible: npt.NDArray[np.object_]
+
+    def __len__(self) -> int:
+        return len(self.conflict)
+
+    @classmethod
+    def none(cls, n: int) -> Self:
+        """Return the findings of N rows of which nothing is known."""
+        return cls(*(np.full(n, "", dtype=object) for _ in fields(cls)))
+
+    @classmethod
+    def of(cls, conflicts: Conflicts, implausible: Sequence[str], count: Count = "ego") -> Self:
+        """Return the findings of a rollout's conflicts.
+
+        Args:
+            conflicts: of N rows.
+            implausible: ``(N,)`` why the row's traffic could not happen; "" where it could.
+            count: whose conflicts decide; see `harm.decisive`.
+        """
+        other, _ = decisive(conflicts, count)
+        rows = np.arange(len(other))
+
+        def words(codes: Int, labels: Sequence[str]) -> npt.NDArray[np.object_]:
+            return np.array(labels, dtype=object)[codes[rows, other]]
+
+        serious = conflicts.kind[rows, other] >= NEAR_MISS
+        names = np.array(["", *conflicts.names[1:]], dtype=object)
+        return cls(
+            words(conflicts.kind, [KINDS.get(kind, "") for kind in range(CONTACT + 1)]),
+            words(conflicts.type, [one.label for one in ConflictType]),
+            np.where(serious, words(conflicts.responsible, [one.label for one in Responsible]), ""),
+            words(conflicts.rule, [one.label for one in Rule]),
+            np.where(conflicts.kind[rows, other] >= COURSE, names[other], ""),
+            np.array(implausible, dtype=object).reshape(len(other)),
+        )
+
+    @classmethod
+    def join(cls, parts: Sequence["Findings"]) -> "Findings":
+        """Return the findings of several parts, at least one, in their order."""
+        return cls(*(np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(cls)))
+
+    def take(self, at: Int | Bool | slice) -> Self:
+        """Return those of some rows."""
+        return type(self)(*(getattr(self, one.name)[at] for one in fields(self)))
+
+    def columns(self) -> dict[str, npt.NDArray[np.object_]]:
+        """Return the columns by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    def row(self, i: int) -> dict[str, str | None]:
+        """Return one row's texts by name; None where there is nothing to say."""
+        return {name: texts[i] or None for name, texts in self.columns().items()}
+
+
+COLUMNS = tuple(one.name for one in fields(Findings))
+"""The names of a table's columns of findings."""
+
+
+def unpacked(rows: Sequence[Sequence[Any]]) -> Findings:
+    """Return findings from rows of texts or None, in the order of ``COLUMNS``."""
+    texts = [[str(one or "") for one in column] for column in zip(*rows, strict=True)]
+    if not texts:
+        return Findings.none(0)
+    return Findings(*(np.array(column, dtype=object) for column in texts))

@@ -1,0 +1,116 @@
+"""A conflict in one sentence: what met what, who is responsible and by which rule, what was left.
+
+The sentence is built from the numbers of `Conflicts` alone.
+"""
+
+from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, Conflicts
+from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
+
+_BEARS = {
+    Responsible.EGO: "the ego is responsible: it {rule}",
+    Responsible.OTHER: "{other} is responsible: it {rule}",
+    Responsible.SHARED: "both are responsible: the ego {rule}",
+    Responsible.NONE: "nobody is responsible: {rule}",
+}
+
+_BY_NOBODY = {
+    Rule.STEPPED_OUT: "{other} came into the path when stopping was no longer possible",
+    Rule.LEFT_ITS_LANE: "neither has changed its course",
+    Rule.INTO_THE_SIDE: "{other} moved into the side of the ego",
+}
+"""The rule where nobody is responsible, if its words are those of somebody's fault."""
+
+_BY_BOTH = {
+    Rule.RED_LIGHT: "they crossed their stop lines at red",
+    Rule.TURNING_GIVES_WAY: "both turned",
+}
+
+
+def sentence(conflicts: Conflicts, row: int, other: int) -> str:
+    """Return one English sentence on the conflict of the ego and another participant.
+
+    It is empty where there is none.
+
+    Args:
+        conflicts: of N scenarios and E participants.
+        row: of the scenario.
+        other: the other participant, 1 to E − 1.
+
+    Raises:
+        IndexError: there is no such row or participant.
+    """
+    n, e = conflicts.kind.shape
+    if not 0 <= row < n or not 1 <= other < e:
+        raise IndexError(
+            f"row must be 0 to {n - 1} and other 1 to {e - 1}, got row={row}, other={other}"
+        )
+    name = f"'{conflicts.names[other]}'"
+    kind = conflicts.kind[row, other]
+    if kind == NO_CONFLICT:
+        return ""
+    if kind == COURSE:
+        return (
+            f"The ego and {name} were on a collision course with "
+            f"{conflicts.ttc[row, other]:.1f} s left, which needed "
+            f"{conflicts.needed[row, other]:.1f} m/s² of braking."
+        )
+    parts = [_event(conflicts, row, other, name), _responsibility(conflicts, row, other, name)]
+    parts.append(_time_left(conflicts, row, other))
+    return "; ".join(part for part in parts if part) + "."
+
+
+def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
+    """Return what happened, with which edges and at what speed."""
+    closing = conflicts.closing_normal[row, other]
+    own = Zone(int(conflicts.zone_ego[row, other])).label
+    its = Zone(int(conflicts.zone_other[row, other])).label
+    kind = ConflictType(int(conflicts.type[row, other]))
+    if conflicts.kind[row, other] == NEAR_MISS:
+        return (
+            f"The ego's {own} came within {conflicts.ttc[row, other]:.1f} s of the {its} of {name} "
+            f"at {closing:.1f} m/s closing speed, which needed "
+            f"{conflicts.needed[row, other]:.1f} m/s² of braking"
+        )
+    speed = f"at {closing:.1f} m/s closing speed"
+    if kind == ConflictType.EGO_STANDING:
+        stood = conflicts.stood_ego[row, other]
+        return (
+            f"The {its} of {name} struck the {own} of the ego, which had stood for {stood:.1f} s, "
+            f"{speed}"
+        )
+    if kind in (ConflictType.REAR_END_STRUCK, ConflictType.VRU_INTO_SIDE):
+        return f"The {its} of {name} struck the ego's {own} {speed}"
+    verb = "met" if kind == ConflictType.SIDE_SWIPE else "struck"
+    return f"The ego's {own} {verb} the {its} of {name} {speed}"
+
+
+def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> str:
+    """Return who is responsible, why, and by which source."""
+    who = Responsible(int(conflicts.responsible[row, other]))
+    rule = Rule(int(conflicts.rule[row, other]))
+    words, source = RULES[rule]
+    if who == Responsible.NONE:
+        words = _BY_NOBODY.get(rule, words).format(other=name)
+    elif who == Responsible.SHARED and rule in _BY_BOTH:
+        return f"both are responsible: {_BY_BOTH[rule]} ({source})"
+    words = words.replace("the other", "the ego" if who == Responsible.OTHER else name)
+    return f"{_BEARS[who].format(rule=words, other=name)} ({source})"
+
+
+def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
+    """Return how long before the risk arose, and what the careful driver would have achieved."""
+    kind = ConflictType(int(conflicts.type[row, other]))
+    rule = Rule(int(conflicts.rule[row, other]))
+    by_others = (
+        ConflictType.EGO_STANDING, ConflictType.REAR_END_STRUCK, ConflictType.SIDE_SWIPE,
+        ConflictType.VRU_INTO_SIDE,
+    )  # fmt: skip
+    arose = f"the risk arose {conflicts.left[row, other]:.1f} s before"
+    if rule == Rule.UNSAFE_START or kind == ConflictType.EGO_STANDING:
+        return ""
+    blamed = conflicts.responsible[row, other] == Responsible.EGO
+    if kind in by_others and not (blamed and conflicts.preventable[row, other]):
+        return arose
+    would = "would" if conflicts.preventable[row, other] else "would not"
+    avoided = "it" if conflicts.kind[row, other] == CONTACT else "the near miss"
+    return f"{arose}, and a careful driver (UN R157, Annex 3) {would} have avoided {avoided}"

@@ -1,0 +1,90 @@
+"""The fuzzy safety model (FSM) extended to any road: a careful driver that sees everybody.
+
+It brakes by the model's two measures (``_fsm_kernels``), as that driver does, but it looks through
+the vehicles ahead, keeps more room, and knows who crosses. What holds here:
+
+- who comes onto the ego's way counts if it will be there before the ego is past it (their lateral
+  check), of who crosses, if the two bodies meet (``_conflict_kernels``): a leader that stands where
+  they do;
+- the critical measure would have it stop when it touches: it counts from 1 m before that;
+- without any risk the driver keeps the speed that its path allows.
+
+The driver sees everybody. ``attention`` has a row per body: where it is beside the ego's way
+(``_conflict_kernels``); row 0 is the ego's: the instant since when there is a risk, counted from 1,
+0 if there is none, and the acceleration asked for [m/s²].
+
+Source: Mattas et al., Accident Analysis & Prevention 148 (2020) 105794 (PFS, CFS) and 174 (2022)
+106743 (the driver); its parameters are those of UN Regulation 157, 01 series, annex 3.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._conflict_kernels import LEADER, NOBODY, foresee
+from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
+from bridgegen.ego._fsm_kernels import (
+    COMFORT_BRAKING,
+    HORIZON,
+    JERK,
+    REACTION,
+    SAFE_MARGIN,
+    SHORT,
+    SLACK,
+    STANDSTILL,
+    braking,
+)
+from bridgegen.ego._route_follower_kernels import hold_speed
+
+RISK, ASKED = 0, 1
+
+
+@kernel
+def drive_careful_fsm(
+    k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
+    attention,
+):  # fmt: skip
+    """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
+
+    The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
+    ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
+    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
+    ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; and ``attention``
+    ``(E, 3)``, zeros before the first instant, changed in place.
+    """
+    v, own = speed[0, k], on[0]
+    wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
+    reach = v * REACTION + v * v / (2.0 * COMFORT_BRAKING) + STANDSTILL + SAFE_MARGIN
+    horizon = min(reach / max(v, 1.0), HORIZON)
+    needed = 0.0
+    for e in range(1, len(speed)):
+        if not present[e]:
+            continue
+        p, w, turn = on[e], speed[e, k], 0.0
+        if k > 0:
+            turn = (h[e, k] - h[e, k - 1]) / dt
+        what, _, gap, along, lateral = foresee(
+            k, dt, paths[own], path_n[own], path_ds[own], station[0], v, bodies[0], to[e] < 0,
+            paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
+            bodies[e], horizon, reach + 15.0, attention[e],
+        )  # fmt: skip
+        if what == NOBODY:
+            continue
+        if what == LEADER and lateral > 0.0:
+            past = math.inf
+            if v > along:
+                past = (gap + bodies[0, 0] + bodies[e, 0]) / (v - along)
+            if lateral > min(past + SLACK, HORIZON):
+                continue
+        given = max(attention[0, ASKED], -COMFORT_BRAKING)
+        needed = max(needed, braking(gap, v, along, given, SHORT))
+    asked = wanted
+    if needed == 0.0:
+        attention[0, RISK] = 0.0
+    else:
+        if attention[0, RISK] == 0.0:
+            attention[0, RISK] = k + 1.0
+        asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
+        if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
+            asked = min(wanted, max(asked - JERK * dt, -needed))
+    attention[0, ASKED] = asked
+    return asked

@@ -1,0 +1,112 @@
+"""A careful driver: the human driver of UN Regulation 157 (ALKS), annex 3, extended to any road.
+
+The regulation says how a competent and careful human driver reacts to three disturbances on a
+motorway: somebody cuts in, cuts out, or brakes (`_un_r157_kernels` is that driver). This one also
+brakes for who crosses its way, on wheels or on foot, and for who stands on it. The risk is
+perceived 0.4 s after the other has come 0.375 m nearer to the ego's lane, or when it brakes by more
+than 5 m/s² (0.4 s as well); it is reacted to if the time to collision is below 2 s; braking begins
+0.75 s later, and grows by 12.65 m/s³ up to 0.774 g. Who reappears before somebody that cuts out is
+a body like any other here.
+
+Its extensions:
+
+- of who crosses, the time to collision is that until the two bodies meet (``_conflict_kernels``);
+- who has been known to lead, or crosses, is a risk, too, once it takes more than comfortable
+  braking not to meet there;
+- the driver brakes until nobody will be met within 4 s;
+- without a risk, it keeps the speed that its path allows, and follows whom it knows of by the
+  intelligent driver model, braking no harder than comfortably.
+
+The driver sees everybody. ``attention`` has a row of three per body: where it is beside the ego's
+way (``_conflict_kernels``), and the instant since when it is known, counted from 1, 0 if it is not;
+row 0 is the ego's: the instant since when there is a risk, likewise, the acceleration asked for
+[m/s²], and 1 while it brakes for the risk.
+
+Source: UN Regulation 157, 01 series of amendments, annex 3; Mattas et al., Accident Analysis &
+Prevention 174 (2022) 106743, who call it the CC human driver.
+"""
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._conflict_kernels import (
+    ASIDE,
+    CROSSING,
+    FARTHEST,
+    LEADER,
+    NOBODY,
+    WANDERING,
+    foresee,
+)
+from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
+from bridgegen.ego._route_follower_kernels import hold_speed
+
+EVALUATION = 0.4  # s, until the risk is perceived
+BRAKES_HARD = 5.0  # m/s², of who drives ahead
+CRITICAL_TTC = 2.0  # s
+REACTION = 0.75  # s, from the risk until braking begins
+BRAKING = 0.774 * 9.81  # m/s²
+JERK = 12.65  # m/s³
+
+HARD_TO_STOP = 3.0  # m/s² that it takes, after the reaction, not to meet somebody: a risk …
+EASY_TO_STOP = 1.0  # … and up to which it has ceased to be one
+CLEAR = 4.0  # s, within which nobody may be met when the brake is let go
+ALWAYS = -1e9  # the instant since when those are known who were there from the start
+KNOWN = 2
+RISK, ASKED, BRAKES = 0, 1, 2
+
+
+@kernel
+def drive_careful(
+    k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
+    attention,
+):  # fmt: skip
+    """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
+
+    The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
+    ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
+    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
+    ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; and ``attention``
+    ``(E, 3)``, zeros before the first instant, changed in place.
+    """
+    v, own = speed[0, k], on[0]
+    wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
+    reach = 15.0 + (EVALUATION + REACTION) * v + v * v / (2.0 * COMFORT_DECELERATION)
+    risk, brakes = False, attention[0, BRAKES] > 0.0
+    limit, hard = (CLEAR, EASY_TO_STOP) if brakes else (CRITICAL_TTC, HARD_TO_STOP)
+    for e in range(1, len(speed)):
+        if not present[e]:
+            continue
+        p, w, turn, slowing = on[e], speed[e, k], 0.0, 0.0
+        if k > 0:
+            turn, slowing = (h[e, k] - h[e, k - 1]) / dt, (speed[e, k - 1] - w) / dt
+        what, ttc, gap, along, lateral = foresee(
+            k, dt, paths[own], path_n[own], path_ds[own], station[0], v, bodies[0], to[e] < 0,
+            paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
+            bodies[e], CLEAR, reach, attention[e],
+        )  # fmt: skip
+        wanders = lateral > 0.0 and attention[e, FARTHEST] - attention[e, ASIDE] <= WANDERING
+        if what == NOBODY or (what == LEADER and wanders):
+            attention[e, KNOWN] = 0.0
+            continue
+        if attention[e, KNOWN] == 0.0:
+            attention[e, KNOWN] = k + 1.0 if k > 0 else ALWAYS
+        known_for = (k + 1.0 - attention[e, KNOWN]) * dt + 1e-9
+        if known_for < EVALUATION:
+            continue
+        risk = risk or ttc < limit or (what == LEADER and slowing > BRAKES_HARD)
+        if what == CROSSING or known_for >= EVALUATION + REACTION:
+            closing = max(v - along, 0.0)
+            left = max(gap - (0.0 if brakes else closing * REACTION), 0.1)
+            risk = risk or closing * closing / (2.0 * left) > hard
+        if what == LEADER and known_for >= EVALUATION + REACTION:
+            wanted = min(wanted, max(idm(gap, v, along), -COMFORT_DECELERATION))
+    if not risk:
+        attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
+        return wanted
+    if attention[0, RISK] == 0.0:
+        attention[0, RISK] = k + 1.0
+    asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
+    if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
+        attention[0, BRAKES] = 1.0
+        asked = max(asked - JERK * dt, -BRAKING)
+    attention[0, ASKED] = asked
+    return asked

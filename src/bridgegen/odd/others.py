@@ -1,0 +1,69 @@
+"""Who drives the participants other than the ego: their script alone, or an attentive driver."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from bridgegen.errors import UnknownNameError
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.story import EventSpec, Participant
+
+ATTENTIVE, SCRIPTED = "attentive", "scripted"
+
+DRIVERS = (ATTENTIVE, SCRIPTED)
+"""What a participant other than the ego may have as its driver."""
+
+EGO = "ego"
+ABLE = ("vehicle", "bicycle", "pedestrian")
+"""The kinds of participants that get the driver which a scenario states for all."""
+
+
+def require(name: str) -> str:
+    """Return the name of a driver of other participants.
+
+    Raises:
+        UnknownNameError: it is none.
+    """
+    if name not in DRIVERS:
+        raise UnknownNameError("driver of other participants", name, DRIVERS)
+    return name
+
+
+def driven(
+    participants: Iterable[Participant], events: Sequence[EventSpec], others: str
+) -> tuple[Participant, ...]:
+    """Return participants with one driver for all that have none of their own.
+
+    The ego, animals, objects and whoever never moves stay as they are.
+    """
+    acting = {event.participant for event in events}
+    return tuple(
+        replace(one, driver=others)
+        if not one.driver
+        and one.name != EGO
+        and one.kind in ABLE
+        and (one.speed != 0.0 or one.name in acting)
+        else one
+        for one in participants
+    )
+
+
+def with_others(scenario: LogicalScenario, others: str) -> LogicalScenario:
+    """Return a scenario in which one driver drives all participants but the ego.
+
+    Args:
+        scenario: of five layers.
+        others: "attentive" or "scripted", whatever the scenario says. A participant that an
+            adversary drives keeps it.
+
+    Raises:
+        UnknownNameError: no such driver.
+    """
+    require(others)
+    adversary = scenario.adversary.participant if scenario.adversary else None
+    story = scenario.story
+    bare = [
+        one if one.name in (EGO, adversary) else replace(one, driver="")
+        for one in story.participants
+    ]
+    changed = driven(bare, story.events, others)
+    return replace(scenario, story=replace(story, participants=changed))

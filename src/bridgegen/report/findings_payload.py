@@ -1,0 +1,109 @@
+"""Conflicts of the rows, and the failure modes of the run, as the page has them."""
+
+from collections import Counter
+from typing import Any
+
+from bridgegen.arrays import Bool
+from bridgegen.conflict.findings import Findings
+from bridgegen.report.playback import Conflict
+from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
+
+TOLD = ("conflict", "conflict_type", "responsible", "rule", "partner")
+"""The texts of a row's finding, in the order in which the page has them."""
+
+MOST_REASONS = 5
+"""Reasons of implausible rows that are named."""
+
+MOST_MODES = 12
+"""Failure modes that the page shows."""
+
+
+def findings_payload(findings: Findings, shown: Bool) -> dict[str, Any]:
+    """Return the findings of the rows that the page holds.
+
+    ``keys`` are the different findings, five texts each, see ``TOLD``; ``at`` is the number of each
+    row's.
+    """
+    columns = findings.columns()
+    texts = list(zip(*(columns[name][shown].tolist() for name in TOLD), strict=True))
+    keys = {key: number for number, key in enumerate(dict.fromkeys(texts))}
+    return {"keys": [list(key) for key in keys], "at": [keys[key] for key in texts]}
+
+
+def implausible_payload(findings: Findings | None) -> dict[str, Any]:
+    """Return how many rows could not happen, and why, the most frequent reason first."""
+    if findings is None:
+        return {"count": 0, "reasons": []}
+    reasons = Counter(one for one in findings.implausible.tolist() if one)
+    return {
+        "count": sum(reasons.values()),
+        "reasons": [[text, n] for text, n in reasons.most_common(MOST_REASONS)],
+    }
+
+
+def conflict_payload(one: Conflict) -> dict[str, Any]:
+    """Return a scenario's conflict; numbers are rounded to what a page can show."""
+    facts = one.summary.to_dict()
+    numbers = {name: value for name, value in facts.items() if isinstance(value, dict)}
+    return {
+        **{name: value for name, value in facts.items() if name not in numbers},
+        "numbers": {
+            name: [None if v["value"] is None else float(f"{v['value']:.4g}"), v["unit"]]
+            for name, v in numbers.items()
+        },
+        "partner_number": one.partner,
+        "instant": one.instant,
+        "decided": one.decided,
+        "zones": list(one.zones),
+    }
+
+
+def triage_payload(found: Triage) -> dict[str, Any]:
+    """Return the failure modes, or what is known where there is none."""
+    return {
+        "ego": found.ego,
+        "modes": [_mode(one, found.neighbourhood(one.shown)) for one in found.modes[:MOST_MODES]],
+        "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
+        "robust": found.robust,
+        "neighbours": found.neighbours,
+        "radius": found.radius,
+        "untested": found.untested,
+        "bound": {
+            "sentence": found.bound.sentence,
+            "evaluations": found.bound.evaluations,
+            "failed": found.bound.failed,
+            "implausible": found.bound.implausible,
+            "least": [one.model_dump() for one in found.bound.least],
+        },
+    }
+
+
+def _mode(one: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
+    facts = one.model_dump(
+        include={
+            "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
+            "place", "cause", "tested", "count", "harm", "severity", "shown", "worst",
+            "robustness", "space",
+        }
+    )  # fmt: skip
+    return facts | {
+        "knife_edge": one.knife_edge,
+        "exports": list(one.exports[:5]),
+        "rows": tested.rows if tested else 0,
+        "harmful": tested.harmful if tested else 0,
+        "fix": _fix(tested.fix) if tested else None,
+        "placebo": _fix(tested.placebo) if tested else None,
+        "minimal": _minimal(one.minimal),
+    }
+
+
+def _fix(one: Treatment | None) -> dict[str, Any] | None:
+    return None if one is None else one.model_dump(include={"name", "drop", "low", "high", "rows"})
+
+
+def _minimal(one: Minimal | None) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    return one.model_dump(
+        include={"name", "sentence", "rows", "harmful", "robustness", "harm", "severity"}
+    ) | {"knife_edge": one.knife_edge}

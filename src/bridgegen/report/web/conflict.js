@@ -1,0 +1,92 @@
+// The decisive conflict of the scenario in the player: its sentence, its instants, where the bodies meet.
+
+// Zones of a body by number, see bridgegen.conflict.types: edges are stretches, corners are points; shares of half length and width.
+const ZONES = {
+  1: [[1, 1], [1, -1]], 2: [[1, 1]], 3: [[1, 1], [-1, 1]], 4: [[-1, 1]],
+  5: [[-1, 1], [-1, -1]], 6: [[-1, -1]], 7: [[1, -1], [-1, -1]], 8: [[1, -1]],
+};
+const ZONE_SHOWN = 1; // s, before and after the instant
+
+const INSTANTS = { contact: "contact", "near miss": "least time to collision", "collision course": "least time to collision" };
+const ZONED = ["contact", "near miss"];
+
+function fillConflict(kept) {
+  const found = kept.conflict, words = $("conflict");
+  words.hidden = !found;
+  $("to-decided").hidden = !found || !ZONED.includes(found.conflict);
+  $("ticks").replaceChildren();
+  if (!found) return;
+  words.replaceChildren(found.sentence);
+  const last = Math.max(1, kept.n_steps - 1);
+  const tick = (k, name, kind) => {
+    const mark = element("i", { class: kind, title: `${name} at ${(k * kept.time_step).toFixed(2)} s` });
+    mark.style.left = `${(100 * k) / last}%`;
+    $("ticks").append(mark);
+  };
+  if (ZONED.includes(found.conflict)) tick(found.decided, "decided", "decided");
+  tick(found.instant, INSTANTS[found.conflict], "instant");
+}
+
+// The figures of the conflict as lines of the details.
+function conflictLines(found) {
+  if (!found) return [];
+  const line = (name, value, title = "") => element("div", { title }, element("span", { class: "name" }, name), element("b", {}, value));
+  const told = (name) => quantity(...found.numbers[name], 3);
+  const lines = [element("h3", {}, "Its conflict"), line("conflict", found.conflict)];
+  if (ZONED.includes(found.conflict)) {
+    lines.push(
+      line("type", found.type, found.type_source), line("partner", found.partner), line("responsible", found.responsible, found.rule_says ?? ""),
+      line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", told("decided")),
+      line("preventable (UN R157)", found.preventable ? "yes" : "no", "whether the careful driver of UN R157 would have avoided it"),
+      line("where the ego is met", found.zone_ego), line(`where ${found.partner} is met`, found.zone_other),
+    );
+  }
+  if (found.conflict === "contact") lines.push(line("severity", shareText(found.numbers.severity[0]), "probability of a MAIS3+ injury"), line("delta-v of the ego", told("delta_v_ego")), line(`delta-v of ${found.partner}`, told("delta_v_other")));
+  else lines.push(line("least TTC", told("ttc")), line("needed deceleration", told("needed_deceleration")));
+  lines.push(line("closing speed", told("closing_normal"), "across the surfaces that meet"), line("harm", told("harm")));
+  return lines;
+}
+
+// The edges or corners that meet, near the instant at which they do.
+function drawZones(c, kept, state, scale) {
+  const found = kept.conflict;
+  if (!found || !ZONED.includes(found.conflict)) return;
+  if (Math.abs(state.index - found.instant) * kept.time_step > ZONE_SHOWN) return;
+  [[0, found.zones[0]], [found.partner_number, found.zones[1]]].forEach(([e, zone]) => {
+    const s = state.entities[e], body = kept.entities[e];
+    if (!ZONES[zone] || !isPlaced(s)) return;
+    const [cx, cy] = boxCentre(body, s.x, s.y, s.h), ux = Math.cos(s.h), uy = Math.sin(s.h);
+    const points = ZONES[zone].map(([a, b]) => {
+      const p = (a * body.length) / 2, q = (b * body.width) / 2;
+      return [cx + p * ux - q * uy, cy + p * uy + q * ux];
+    });
+    for (const [colour, width] of [[palette.card, 7], [palette.hit, 4]]) {
+      c.strokeStyle = c.fillStyle = colour;
+      c.lineWidth = width / scale;
+      c.lineCap = "round";
+      c.beginPath();
+      if (points.length > 1) points.forEach((p, i) => c[i ? "lineTo" : "moveTo"](...p));
+      else c.arc(...points[0], width / 2 / scale, 0, 2 * Math.PI);
+      if (points.length > 1) c.stroke();
+      else { c.stroke(); c.fill(); }
+    }
+    c.lineCap = "butt";
+  });
+}
+
+// A ring on both ways where they were at the instant that decided.
+function drawDecided(c, kept, centres, scale) {
+  const found = kept.conflict;
+  if (!found || !ZONED.includes(found.conflict)) return;
+  for (const e of [0, found.partner_number]) {
+    const at = centres[e]?.[found.decided];
+    if (!at) continue;
+    for (const [colour, width] of [[palette.card, 5], [palette.ink, 2.5]]) {
+      c.strokeStyle = colour;
+      c.lineWidth = width / scale;
+      c.beginPath();
+      c.arc(...at, 7 / scale, 0, 2 * Math.PI);
+      c.stroke();
+    }
+  }
+}

@@ -1,0 +1,127 @@
+// The failure modes: the ways in which the driver comes to harm, or what is known where there is none.
+
+const CAUSES_SAID = {
+  perception: "perception", planning: "planning", control: "control",
+  unavoidable: "unavoidable: no fix removes the harm", sensitive: "sensitive: small changes of the parameters alone remove most of the harm",
+};
+
+// A share of 1 in per cent, with two significant digits.
+function shareText(value) {
+  if (value === null || value === undefined) return "–";
+  const p = 100 * value;
+  return `${p === 0 || p >= 10 ? Math.round(p) : p >= 0.1 ? p.toPrecision(2) : p.toPrecision(1)}${NARROW}%`;
+}
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+class Modes {
+  // show(evaluation), showMinimal(evaluation): play a row of the page, or the minimal form of it.
+  constructor(show, showMinimal) {
+    this.show = show;
+    this.showMinimal = showMinimal;
+    this.chosen = null;
+    document.addEventListener("filters", () => this.mark());
+    this.fill();
+  }
+
+  fill() {
+    const found = data.triage;
+    $("modes").hidden = !found;
+    if (!found) return;
+    const n = found.modes.length + found.more;
+    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} comes to harm` : "No failure found";
+    $("modes-lead").textContent = found.bound.sentence;
+    this.buttons = [];
+    $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));
+    $("modes-list").hidden = !n;
+    const notes = [];
+    if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that come to harm too.`);
+    if (found.more) notes.push(`${number(found.more)} more not shown.`);
+    $("modes-note").textContent = notes.join(" ");
+    const nearest = nearestToHarm();
+    $("modes-nearest").hidden = n > 0 || nearest === null;
+    $("modes-nearest").onclick = () => this.show(nearest);
+  }
+
+  card(mode) {
+    const fact = (strong, text, title = "") => element("li", { title }, element("b", {}, strong), ` ${text}`);
+    const share = mode.space.share === null ? [] : [fact(shareText(mode.space.share), `of the space (95${NARROW}%: ${shareText(mode.space.low)} to ${shareText(mode.space.high)})`, `${mode.space.harmful} of ${mode.space.rows} ${mode.space.drawn} scenarios`)];
+    const robust = mode.robustness === null ? fact("not tested", "for robustness") : fact(`${mode.harmful} of ${mode.rows}`, "neighbours harmful", "robustness");
+    const severity = mode.severity > 0 ? [fact(shareText(mode.severity), "worst severity", "highest probability of a MAIS3+ injury")] : [];
+    const name = data.kept.find(({ evaluation }) => evaluation === mode.shown)?.name ?? `evaluation ${number(mode.shown + 1)}`;
+    const play = element("button", { type: "button", class: "primary", "aria-label": `Play ${name}, mode ${mode.number}` }, `▶ ${name}`);
+    play.addEventListener("click", () => this.show(mode.shown));
+    const only = element("button", { type: "button", class: "quiet", "aria-pressed": "false", title: "Show only scenarios of this conflict, responsibility and rule below" }, "Its scenarios");
+    only.addEventListener("click", () => filters.inMode(filters.mode === mode.number ? null : mode.number));
+    this.buttons.push([mode.number, only]);
+    return element(
+      "li", { class: `card mode${mode.knife_edge ? " edge" : ""}` },
+      element("div", { class: "mode-head" }, element("span", { class: "mode-number", "aria-hidden": "true" }, `${mode.number}`), element("h3", {}, capital(mode.title))),
+      element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...severity, robust, ...share),
+      ...(mode.knife_edge ? [element("p", { class: "mode-edge" }, "Knife-edge: fewer than half of its neighbours are harmful.")] : []),
+      this.cause(mode),
+      element("p", { class: "mode-buttons" }, play, only),
+      ...this.minimal(mode),
+    );
+  }
+
+  // The cause, with what the fix made of the neighbours; or the quick label where nothing was tested.
+  cause(mode) {
+    const words = element("p", { class: "mode-cause" }, element("span", { class: "name" }, mode.tested ? "Cause: " : "Cause (quick label, not tested): "));
+    words.append(element("b", {}, CAUSES_SAID[mode.cause] ?? "not known"));
+    const { fix, placebo } = mode;
+    if (fix) {
+      const points = (value) => number(Math.round(100 * value));
+      const less = placebo ? `; after a random move of the same size by ${points(placebo.drop)}` : "";
+      words.append(`. If ${fix.name}, the harmful share of its neighbours drops by ${points(fix.drop)} percentage points (95${NARROW}%: ${points(fix.low)} to ${points(fix.high)})${less}.`);
+    }
+    return words;
+  }
+
+  minimal(mode) {
+    const one = mode.minimal;
+    if (!one) return [];
+    const text = element("p", {}, element("span", { class: "name" }, "Simplest form: "), one.sentence.replaceAll(">=", "≥").replaceAll("<=", "≤"), ".");
+    if (one.knife_edge) text.append(` Knife-edge: ${one.harmful} of ${one.rows} neighbours harmful.`);
+    const parts = [text];
+    if (minimals.has(mode.shown)) {
+      const play = element("button", { type: "button", class: "quiet", "aria-label": `Play the simplest form of mode ${mode.number}` }, `▶ ${one.name || "simplest form"}`);
+      play.addEventListener("click", () => this.showMinimal(mode.shown));
+      parts.push(element("p", { class: "mode-buttons" }, play));
+    }
+    return [element("div", { class: "mode-minimal" }, ...parts)];
+  }
+
+  mark() {
+    for (const [k, button] of this.buttons ?? []) button.setAttribute("aria-pressed", `${filters.mode === k}`);
+  }
+}
+
+// The evaluation that came nearest to harm where no failure was found and the page holds its motion; else null.
+function nearestToHarm() {
+  if (!data.triage || data.triage.modes.length) return null;
+  const found = data.triage.bound.least.find(({ evaluation }) => evaluation !== null && rows.evaluation.includes(evaluation));
+  return found && (data.live || data.packed.evaluations.includes(found.evaluation)) ? found.evaluation : null;
+}
+
+// How many rows have traffic that could not happen, and why.
+function fillImplausible() {
+  const { count, reasons } = data.implausible;
+  $("implausible").hidden = !count;
+  if (!count) return;
+  const share = shareText(count / Math.max(1, rows.n));
+  $("implausible").textContent = `Left out as implausible: ${number(count)} of ${number(rows.n)} (${share}): ${reasons.map(([text, n]) => `${text} (${number(n)})`).join("; ")}.`;
+}
+
+// Whether a row has the conflict of a failure mode; its cause and place are not compared.
+function isInMode(i, k) {
+  const mode = data.triage?.modes.find((one) => one.number === k), finding = findingOf(i);
+  if (!mode || !finding) return false;
+  const [conflict, type, responsible, rule] = finding;
+  return conflict === mode.conflict && type === mode.conflict_type && responsible === mode.responsible && rule === mode.rule && Boolean(rows.critical[i]);
+}
+
+// Conflict, type, responsible, rule and partner of a row of the page; null where none are recorded.
+function findingOf(i) {
+  return rows.findings ? rows.findings.keys[rows.findings.at[i]] : null;
+}

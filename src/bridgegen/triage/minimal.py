@@ -1,0 +1,350 @@
+"""The simplest form of a finding: all parameters as near to nominal as the harm allows.
+
+Each searched parameter of a harmful row has a ladder of values from where it is to nominal, in
+steps of 2.5 % of its range. A parameter may jump down its ladder by the whole of what is left, a
+half, a quarter, an eighth, or one step, where the scenario then still fails in the same mode; all
+parameters of all modes are tried in one batch, then what they allow together. Where none may
+jump any more, the parameters that are not nominal move back by as few steps as make the scenario
+robust. Where no such move does, all begins anew, by the whole or a half alone, and each jump must
+leave half of the neighbours harmful. What is needed of each parameter is then found by moving that
+one alone. All scenarios have the random numbers of the row that it began with: what is needed is
+needed of the parameters.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.evaluation import Trials
+from bridgegen.odd.space import SearchSpace
+from bridgegen.pipeline import Pipeline
+from bridgegen.triage.modes import Key, keys_of
+from bridgegen.triage.moves import around, nearest, ranges, searched
+from bridgegen.triage.neighbours import NEIGHBOURS, RADIUS, ROBUST
+from bridgegen.triage.record import Condition, Minimal
+
+BACK = (0, 1, 2, 4, 8)
+"""Steps by which the parameters that are not nominal move back to make the scenario robust."""
+
+SHARES, MOST_ROUNDS = (1, 2, 4, 8, 10_000_000), 40
+"""Jumps: by the whole of what is left of a ladder, a half, …, one step; and how often."""
+
+ROBUST_SHARES, MOST_ROBUST_ROUNDS = (1, 2), 6
+"""The same where each jump must leave the scenario robust."""
+
+_AHEAD = 6  # steps that are tried at a time to find what is needed of a parameter
+Holds = Callable[[Sequence["Ladder"], Sequence[Key], Sequence[Int]], list[Bool]]
+"""Of the ladders and keys of modes and rungs ``(n, n_var)`` of each: where harm persists."""
+
+_UNITLESS = ("1", "count", "?")
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The values of each searched parameter from a row's to nominal.
+
+    Attributes:
+        start: ``(n_var,)``.
+        nominal: ``(n_var,)``.
+        step: ``(n_var,)`` > 0; at least 1 of a whole number.
+        rungs: ``(n_var,)`` int64, steps from start to nominal; the last may be shorter.
+    """
+
+    start: Float
+    nominal: Float
+    step: Float
+    rungs: Int
+
+    @classmethod
+    def of(cls, space: SearchSpace, x: Float) -> "Ladder":
+        """Return the ladder of a row of X."""
+        step = RADIUS * ranges(space)
+        for k, name in enumerate(space.variables):
+            if space.scenario.parameters[name].kind == "integer":
+                step[k] = max(1.0, np.floor(step[k] + 0.5))
+        start = searched(space, x[np.newaxis])[0]
+        nominal = searched(space, space.row({})[np.newaxis])[0]
+        rungs = np.ceil(np.abs(nominal - start) / step - 1e-9).astype(np.int64)
+        return cls(start, nominal, step, rungs)
+
+    def values(self, at: Int) -> Float:
+        """Return the wanted values at rungs ``(…, n_var)``."""
+        way = np.sign(self.nominal - self.start)
+        return np.where(at >= self.rungs, self.nominal, self.start + way * at * self.step)
+
+
+class Minimiser:
+    """Finds the minimal scenarios of modes, all at once.
+
+    Args:
+        pipeline: the run's, one that ``tries``.
+        seed: of the run.
+    """
+
+    def __init__(self, pipeline: Pipeline, seed: int) -> None:
+        self._pipeline, self._space, self._seed = pipeline, pipeline.space, seed
+        self._bases: Float = np.empty((0, len(pipeline.space.names)))
+
+    def find(self, X: Float, ways: Sequence[Key], names: Sequence[str]) -> list[Minimal | None]:
+        """Return the minimal scenario of each mode; None where its row fails otherwise.
+
+        Args:
+            X: ``(K, len(space.names))``, a row of each mode.
+            ways: ``(K,)`` keys of the modes, without causes.
+            names: ``(K,)`` of their files.
+        """
+        space = self._space
+        ladders = [Ladder.of(space, x) for x in X]
+        self._bases = X
+        here = [np.zeros(space.n_var, dtype=np.int64) for _ in X]
+        alive = self._holds(ladders, ways, [at[np.newaxis] for at in here])
+        modes = [m for m in range(len(X)) if alive[m][0]]
+        self._descend(ladders, ways, here, modes, SHARES, MOST_ROUNDS, self._holds)
+        frail = self._move_back(ladders, ways, here, modes)
+        start = [np.zeros((int(m in frail), space.n_var), dtype=np.int64) for m in range(len(X))]
+        robust = self._holds_robustly(ladders, ways, start)
+        frail = [m for m in frail if robust[m][0]]
+        for m in frail:  # again, by jumps that keep it robust: they cost more, so they are fewer
+            here[m] = start[m][0]
+        self._descend(
+            ladders, ways, here, frail, ROBUST_SHARES, MOST_ROBUST_ROUNDS, self._holds_robustly
+        )
+        limits = self._limits(ladders, ways, here, modes)
+        return self._described(ladders, here, limits, modes, names)
+
+    def _descend(
+        self,
+        ladders: Sequence[Ladder],
+        ways: Sequence[Key],
+        here: list[Int],
+        modes: Sequence[int],
+        shares: Sequence[int],
+        rounds: int,
+        holds: Holds,
+    ) -> None:
+        """Move the modes' parameters towards nominal until none may jump any more.
+
+        Args:
+            ladders: of all modes.
+            ways: likewise.
+            here: the rung of each parameter of each mode; changed.
+            modes: those to move.
+            shares: a parameter may jump by one of these parts of what is left of its ladder.
+            rounds: at most.
+            holds: tells where the harm persists.
+        """
+        active = list(modes)
+        for _ in range(rounds):
+            if not active:
+                return
+            jumps: list[list[tuple[int, int]]] = [[] for _ in ladders]
+            tried: list[Int] = [np.empty((0, self._space.n_var), np.int64) for _ in ladders]
+            for m in active:
+                left = ladders[m].rungs - here[m]
+                for i in np.flatnonzero(left).tolist():
+                    sizes = {max(1, int(left[i]) // share) for share in shares}
+                    jumps[m] += [(i, size) for size in sorted(sizes, reverse=True)]
+                tried[m] = np.array([_jumped(here[m], [one]) for one in jumps[m]], dtype=np.int64)
+                tried[m] = tried[m].reshape(len(jumps[m]), self._space.n_var)
+            alone = holds(ladders, ways, tried)
+            allowed: dict[int, list[tuple[int, int]]] = {}
+            for m in active:
+                best: dict[int, int] = {}
+                for (i, size), fine in zip(jumps[m], alone[m].tolist(), strict=True):
+                    if fine:
+                        best.setdefault(i, size)  # the largest comes first
+                if best:
+                    reach = ladders[m].step / ranges(self._space)
+                    order = sorted(best, key=lambda i: (-best[i] * reach[i], i))
+                    allowed[m] = [(i, best[i]) for i in order]
+            together: list[Int] = [np.empty((0, self._space.n_var), np.int64) for _ in ladders]
+            for m, moves in allowed.items():
+                prefixes = [_jumped(here[m], moves[:k]) for k in range(1, len(moves) + 1)]
+                together[m] = np.array(prefixes, dtype=np.int64)
+            fine = holds(ladders, ways, together)
+            for m in allowed:
+                fine[m][0] = True  # known from above
+                here[m] = together[m][int(np.flatnonzero(fine[m])[-1])]
+            active = list(allowed)
+
+    def _move_back(
+        self, ladders: Sequence[Ladder], ways: Sequence[Key], here: list[Int], modes: Sequence[int]
+    ) -> list[int]:
+        """Move the parameters that are not nominal back until it is robust; return where not."""
+        tried: list[Int] = [np.empty((0, self._space.n_var), np.int64) for _ in ladders]
+        for m in modes:
+            bound = here[m] < ladders[m].rungs
+            tried[m] = np.array(
+                [np.where(bound, np.maximum(here[m] - b, 0), here[m]) for b in BACK]
+            )
+        fine = self._holds(ladders, ways, tried)
+        shares = self._robustness([(m, at) for m in modes for at in tried[m]], ladders)
+        frail = []
+        for k, m in enumerate(modes):
+            of = np.array([share for share, _, _ in shares[k * len(BACK) : (k + 1) * len(BACK)]])
+            of[~fine[m]] = -1.0
+            robust = np.flatnonzero(of >= ROBUST)
+            here[m] = tried[m][int(robust[0]) if len(robust) else int(np.argmax(of))]
+            if not len(robust):
+                frail.append(m)
+        return frail
+
+    def _limits(
+        self, ladders: Sequence[Ladder], ways: Sequence[Key], here: list[Int], modes: Sequence[int]
+    ) -> dict[int, dict[int, int]]:
+        """Return per mode and parameter the last rung at which harm persists, all else as it is.
+
+        A parameter of which nothing is needed after all is put to nominal.
+        """
+        found: dict[int, dict[int, int]] = {m: {} for m in modes}
+        ends = {m: {i: int(here[m][i]) for i in _needed(ladders[m], here[m])} for m in modes}
+        while any(ends.values()):
+            asked = {m: [(i, end) for i, end in each.items()] for m, each in ends.items()}
+            tried: list[Int] = [np.empty((0, self._space.n_var), np.int64) for _ in ladders]
+            for m, each in asked.items():
+                rows = [
+                    _put(here[m], i, min(end + j, int(ladders[m].rungs[i])))
+                    for i, end in each
+                    for j in range(1, _AHEAD + 1)
+                ]
+                if rows:
+                    tried[m] = np.array(rows, dtype=np.int64)
+            fine = self._holds(ladders, ways, tried)
+            for m, each in asked.items():
+                for k, (i, end) in enumerate(each):
+                    ahead = fine[m][k * _AHEAD : (k + 1) * _AHEAD]
+                    reached = _AHEAD if ahead.all() else int(np.argmin(ahead))
+                    last = int(ladders[m].rungs[i])
+                    if end + reached >= last:  # nominal will do: begin anew with that
+                        here[m] = _put(here[m], i, last)
+                        found[m] = {}
+                        ends[m] = {j: int(here[m][j]) for j in _needed(ladders[m], here[m])}
+                        break
+                    ends[m][i] = end + reached
+                    if reached < _AHEAD:
+                        found[m][i] = end + reached
+                        del ends[m][i]
+        return found
+
+    def _described(
+        self,
+        ladders: Sequence[Ladder],
+        here: Sequence[Int],
+        limits: dict[int, dict[int, int]],
+        modes: Sequence[int],
+        names: Sequence[str],
+    ) -> list[Minimal | None]:
+        space, found = self._space, list[Minimal | None]([None] * len(ladders))
+        if not modes:
+            return found
+        X = np.concatenate([self._rows(ladders[m], here[m][np.newaxis]) for m in modes])
+        shares = self._robustness([(m, here[m]) for m in modes], ladders)
+        tried = self._pipeline.try_all(X, noise=self._bases[list(modes)])
+        noise = self._pipeline.noise_keys(self._bases[list(modes)])
+        for k, m in enumerate(modes):
+            conditions = [
+                _condition(space, ladders[m], here[m], i, limit) for i, limit in limits[m].items()
+            ]
+            width = dict(zip(space.variables, ranges(space).tolist(), strict=True))
+            conditions.sort(
+                key=lambda one: (-abs(one.value - one.nominal) / width[one.name], one.name)
+            )
+            share, hits, rows = shares[k]
+            found[m] = Minimal(
+                name=names[m], x=tuple(X[k].tolist()), noise_key=str(noise[k]),
+                values=self._pipeline.facts(X[k]),
+                conditions=tuple(conditions), sentence=sentence(conditions),
+                rows=rows, harmful=hits, robustness=share if rows else None,
+                harm=float(tried.harm[k]), severity=float(tried.severity[k]),
+            )  # fmt: skip
+        return found
+
+    def _rows(self, ladder: Ladder, at: Int) -> Float:
+        return nearest(self._space, ladder.values(at))
+
+    def _holds(
+        self, ladders: Sequence[Ladder], ways: Sequence[Key], tried: Sequence[Int]
+    ) -> list[Bool]:
+        """Return, per mode, at which of some rungs ``(n, n_var)`` it still comes to its harm."""
+        parts = [self._rows(ladder, at) for ladder, at in zip(ladders, tried, strict=True)]
+        noise = np.repeat(self._bases, [len(part) for part in parts], axis=0)
+        came = self._pipeline.try_all(np.concatenate(parts), noise=noise)
+        keys = keys_of(came.findings, self._pipeline.kinds, came.place.tolist(), [""] * len(came))
+        fine, start = [], 0
+        for part, way in zip(parts, ways, strict=True):
+            stop = start + len(part)
+            same = np.array([key == way for key in keys[start:stop]], dtype=np.bool_)
+            fine.append(came.harmful[start:stop] & same)
+            start = stop
+        return fine
+
+    def _holds_robustly(
+        self, ladders: Sequence[Ladder], ways: Sequence[Key], tried: Sequence[Int]
+    ) -> list[Bool]:
+        """Return where it comes to its harm, and half of the neighbours do."""
+        fine = self._holds(ladders, ways, tried)
+        asked = [(m, int(k)) for m, each in enumerate(fine) for k in np.flatnonzero(each)]
+        shares = self._robustness([(m, tried[m][k]) for m, k in asked], ladders)
+        for (m, k), (share, _, _) in zip(asked, shares, strict=True):
+            fine[m][k] = share >= ROBUST
+        return fine
+
+    def _robustness(
+        self, asked: Sequence[tuple[int, Int]], ladders: Sequence[Ladder]
+    ) -> list[tuple[float, int, int]]:
+        """Return the harmful share of the neighbours of rungs, how many, of how many."""
+        if not asked:
+            return []
+        bases = np.concatenate([self._rows(ladders[m], at[np.newaxis]) for m, at in asked])
+        space = self._space
+        rows = [around(space, x, self._seed, 0, NEIGHBOURS, RADIUS)[0] for x in bases]
+        noise = np.repeat(self._bases[[m for m, _ in asked]], NEIGHBOURS, axis=0)
+        came: Trials = self._pipeline.try_all(np.concatenate(rows), noise=noise)
+        ok = came.ok.reshape(-1, NEIGHBOURS).sum(axis=1)
+        hits = came.harmful.reshape(-1, NEIGHBOURS).sum(axis=1)
+        return [(int(h) / max(int(n), 1), int(h), int(n)) for h, n in zip(hits, ok, strict=True)]
+
+
+def sentence(conditions: Sequence[Condition]) -> str:
+    """Return what a minimal scenario needs, in words."""
+    if not conditions:
+        return "the nominal scenario itself"
+    said = [
+        f"{one.name} {one.sign} {one.limit:.3g}" + ("" if one.unit in _UNITLESS else f" {one.unit}")
+        for one in conditions
+    ]
+    return f"needs {_listed(said)}; all else nominal"
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
+
+
+def _needed(ladder: Ladder, at: Int) -> list[int]:
+    return np.flatnonzero(at < ladder.rungs).tolist()
+
+
+def _jumped(at: Int, jumps: Sequence[tuple[int, int]]) -> Int:
+    there = at.copy()
+    for i, size in jumps:
+        there[i] += size
+    return there
+
+
+def _put(at: Int, i: int, rung: int) -> Int:
+    there = at.copy()
+    there[i] = rung
+    return there
+
+
+def _condition(space: SearchSpace, ladder: Ladder, at: Int, i: int, limit: int) -> Condition:
+    name = space.variables[i]
+    values, last = ladder.values(at), ladder.values(_put(at, i, limit))
+    return Condition(
+        name=name, unit=space.scenario.parameters[name].unit,
+        sign=">=" if values[i] > ladder.nominal[i] else "<=",
+        limit=float(last[i]), step=float(ladder.step[i]), value=float(values[i]),
+        nominal=float(ladder.nominal[i]),
+    )  # fmt: skip

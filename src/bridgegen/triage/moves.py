@@ -1,0 +1,79 @@
+"""Rows near a row: values moved by little, or towards nominal, and kept feasible."""
+
+import numpy as np
+
+from bridgegen.arrays import Float, as_float
+from bridgegen.odd.space import SearchSpace
+
+_STREAM = 17  # keeps these random numbers apart from others of the same seed
+
+
+def nearest(space: SearchSpace, V: Float) -> Float:
+    """Return the rows of X whose searched parameters are as near to wanted values as is feasible.
+
+    The parameters are taken in the decoder's order, each moved into the interval that the earlier
+    ones leave to it; whole numbers are rounded. Feasible values are kept to the last bit.
+
+    Args:
+        space: what is searched.
+        V: ``(N, n_var)`` wanted values of the searched parameters.
+
+    Returns:
+        ``(N, len(space.names))``, feasible.
+
+    Raises:
+        ValueError: wrong shape, NaN or inf.
+    """
+    wanted = as_float("V", V, (None, space.n_var))
+    number = {name: k for k, name in enumerate(space.variables)}
+    table: dict[str, Float | float] = {}
+    X = np.empty((len(wanted), len(space.names)))
+    for name in space.order:
+        if name in space.derived:
+            value: Float | float = space.derived[name].value.evaluate(table)
+        else:
+            lo, hi = space.interval(name, table)
+            if name in number:
+                value = wanted[:, number[name]]
+                if space.scenario.parameters[name].kind == "integer":
+                    value = np.floor(value + 0.5)
+            else:
+                value = space.defaults[name]
+            value = np.minimum(np.maximum(value, lo), hi)
+        table[name] = value
+        X[:, space.index(name)] = value
+    return X + 0.0  # no −0.0: what is simulated is what would be recorded
+
+
+def searched(space: SearchSpace, X: Float) -> Float:
+    """Return the searched columns of X, ``(N, n_var)``."""
+    return X[:, [space.index(name) for name in space.variables]]
+
+
+def ranges(space: SearchSpace) -> Float:
+    """Return high − low of every searched parameter, ``(n_var,)``, > 0."""
+    parameters = (space.scenario.parameters[name] for name in space.variables)
+    return np.array([one.high - one.low for one in parameters])
+
+
+def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius: float) -> Float:
+    """Return two sets of n neighbours of a row: the second is one more random move of the first.
+
+    Each searched parameter moves by at most ``radius`` of its range, uniformly; whole numbers
+    move only where that is half of one or more.
+
+    Args:
+        space: what is searched.
+        x: ``(len(space.names),)``, feasible.
+        seed: of the run.
+        number: of the row: other rows move otherwise.
+        n: neighbours.
+        radius: a share of each parameter's range.
+
+    Returns:
+        ``(2, n, len(space.names))``, feasible.
+    """
+    random = np.random.Generator(np.random.PCG64([seed, _STREAM, number]))
+    by = (2.0 * random.random((2, n, space.n_var)) - 1.0) * radius * ranges(space)
+    first = nearest(space, searched(space, x[np.newaxis]) + by[0])
+    return np.stack([first, nearest(space, searched(space, first) + by[1])])

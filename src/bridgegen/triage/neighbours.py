@@ -1,0 +1,158 @@
+"""The neighbours of a row: is its harm robust, and which fix removes it beyond what chance does?
+
+Each searched parameter of a neighbour lies within ±2.5 % of its range around the row's. All
+neighbours of a row, with and without a fix, get the random numbers of that row: the noise of the
+driver's sensors follows from a key, a hash of parameter values, and the row's own values are
+hashed for all of them (`bridgegen.ego.noise`). So a neighbour differs from the row by its
+parameters alone, and a fix changes nothing but what it puts right.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.cause import Cause, Counterfactual
+from bridgegen.pipeline import Pipeline
+from bridgegen.regions.evidence import wilson
+from bridgegen.triage.moves import around
+from bridgegen.triage.record import Neighbourhood, Treatment
+from bridgegen.triage.statistics import paired_drop
+
+NEIGHBOURS = 32
+RADIUS = 0.025
+"""By which each searched parameter moves at most, a share of its range."""
+
+ROBUST = 0.5
+"""The share of harmful neighbours below which a finding is on a knife's edge."""
+
+PLACEBO = "random move"
+_AS_IS, _MOVED = -1, -2
+
+
+AsIs = dict[int, tuple[Bool, Bool]]
+"""By evaluation: which of its neighbours are harmful as they are, and which have a result."""
+
+
+def neighbourhoods(
+    pipeline: Pipeline,
+    X: Float,
+    evaluations: Int,
+    seed: int,
+    *,
+    fixes: bool = True,
+    sampled: bool = False,
+    as_is: AsIs | None = None,
+) -> list[Neighbourhood]:
+    """Drive the neighbours of rows, all in one batch; a row's result depends on that row alone.
+
+    Args:
+        pipeline: the run's, one that ``tries``.
+        X: ``(K, len(space.names))``, the rows.
+        evaluations: ``(K,)`` their ids in the store.
+        seed: of the run.
+        fixes: whether to drive them with every fix and the placebo, too.
+        sampled: whether the rows were drawn at random.
+        as_is: what is known of neighbours as they are; what is found is added.
+    """
+    known: AsIs = {} if as_is is None else as_is
+    ids = evaluations.tolist()
+    new = np.array([k for k, one in enumerate(ids) if one not in known], dtype=np.int64)
+    harmful, ok = _drive(pipeline, X[new], evaluations[new], seed, [_AS_IS])
+    known |= {ids[k]: (harmful[j, :, 0], ok[j, :, 0]) for j, k in enumerate(new.tolist())}
+    tried = pipeline.fixes if fixes else ()
+    variants = [_MOVED, *range(len(tried))] if tried else []
+    harmful, ok = _drive(pipeline, X, evaluations, seed, variants)
+    return [
+        _neighbourhood(
+            one,
+            np.concatenate([known[one][0][:, np.newaxis], harmful[k]], axis=1),
+            np.concatenate([known[one][1][:, np.newaxis], ok[k]], axis=1),
+            tried, sampled,
+        )
+        for k, one in enumerate(ids)
+    ]  # fmt: skip
+
+
+def _drive(
+    pipeline: Pipeline, X: Float, evaluations: Int, seed: int, variants: Sequence[int]
+) -> tuple[Bool, Bool]:
+    """Return which neighbours are harmful, and have a result, ``(K, NEIGHBOURS, variants)``."""
+    space, shape = pipeline.space, (len(X), NEIGHBOURS, len(variants))
+    if not len(X) or not variants:
+        return np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+    near = np.array(
+        [
+            around(space, x, seed, i, NEIGHBOURS, RADIUS)
+            for x, i in zip(X, evaluations.tolist(), strict=True)
+        ]
+    )  # (K, 2, NEIGHBOURS, n)
+    # Neighbour by neighbour, so that those of one road network are driven by one worker.
+    rows = np.stack([near[:, int(one == _MOVED)] for one in variants], axis=2)
+    noise = np.broadcast_to(X[:, np.newaxis, np.newaxis], rows.shape)
+    fix = np.broadcast_to(np.maximum(variants, _AS_IS), shape)
+    n = len(space.names)
+    came = pipeline.try_all(rows.reshape(-1, n), fix.reshape(-1), noise.reshape(-1, n))
+    return came.harmful.reshape(shape), came.ok.reshape(shape)
+
+
+def _neighbourhood(
+    evaluation: int, harmful: Bool, ok: Bool, fixes: Sequence[Counterfactual], sampled: bool
+) -> Neighbourhood:
+    """Return what neighbours came to; ``harmful`` and ``ok`` are ``(NEIGHBOURS, variants)``."""
+    rows, hits = int(ok[:, 0].sum()), int(harmful[:, 0].sum())
+    low, high = wilson(hits, rows)
+    placebo, treatments = None, []
+    if fixes:
+        placebo = treatment(PLACEBO, "", harmful[:, [0, 1]], ok[:, [0, 1]])
+        for k, fix in enumerate(fixes, start=2):
+            pair = [0, k]
+            treatments.append(
+                treatment(fix_name(fix), fix.cause.label, harmful[:, pair], ok[:, pair])
+            )
+    return Neighbourhood(
+        evaluation=evaluation, rows=rows, harmful=hits,
+        robustness=hits / rows if rows else None, low=low, high=high,
+        cause=cause_of(hits, rows, treatments, placebo), fixes=tuple(treatments), placebo=placebo,
+        sampled=sampled,
+    )  # fmt: skip
+
+
+def treatment(name: str, cause: str, harmful: Bool, ok: Bool) -> Treatment:
+    """Return what a change made of neighbours.
+
+    Args:
+        name: of the change.
+        cause: that it stands for.
+        harmful: ``(n, 2)`` bool, as is and with the change.
+        ok: ``(n, 2)`` bool, which have a result; only neighbours with both count.
+    """
+    known = ok.all(axis=1)
+    before, after = harmful[known].T
+    gone, new = int((before & ~after).sum()), int((~before & after).sum())
+    both, n = int((before & after).sum()), int(known.sum())
+    drop, low, high = paired_drop(both, gone, new, n - both - gone - new)
+    return Treatment(
+        name=name, cause=cause, rows=n, gone=gone, new=new, drop=drop, low=low, high=high
+    )
+
+
+def cause_of(harmful: int, rows: int, fixes: Sequence[Treatment], placebo: Treatment | None) -> str:
+    """Return the cause of a row's harm, by its neighbours; see `Neighbourhood.cause`."""
+    if placebo is None or not rows:
+        return ""
+    if harmful < ROBUST * rows:
+        return "sensitive"
+    for one in fixes:
+        if one.works and one.exceeds(placebo):
+            return one.cause
+    return Cause.UNAVOIDABLE.label
+
+
+def fix_name(fix: Counterfactual) -> str:
+    """Return what a fix does, in words."""
+    if fix.cause is Cause.PERCEPTION:
+        return "perception is ideal"
+    if fix.cause is Cause.PLANNING:
+        return f"{fix.driver.name} drives"
+    return "the road is dry" if fix.dry else "control is ideal"

@@ -1,0 +1,389 @@
+"""The triage of a run as ``triage.json`` in its folder: written from these models, checked by them.
+
+Every list has a limit, so that the size of the record does not depend on the length of the run.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from bridgegen.disk import write_whole
+from bridgegen.errors import FileFormatError, StorageError
+
+JSON_FILE = "triage.json"
+"""Its name in a run's folder."""
+
+MOST_MODES = 50
+"""Failure modes that are recorded; those that hold the most harmful rows."""
+
+MOST_EXAMPLES = 20
+"""Evaluations that are named of a mode, worst first."""
+
+MOST_NEIGHBOURHOODS = 2000
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Change = Annotated[float, Field(ge=-1.0, le=1.0)]
+Count = Annotated[int, Field(ge=0, le=10**8)]
+Text = Annotated[str, Field(max_length=2000)]
+Drawn = Literal["random", "sobol", "fresh", ""]
+"""Where rows come from whose share is an estimate: the run's own, drawn at random or from a Sobol
+sequence; fresh random ones; "" where there are none and nothing is estimated."""
+
+CauseLabel = Literal["perception", "planning", "control", "unavoidable", "sensitive", ""]
+"""Labels of `bridgegen.cause.Cause`; "sensitive": a small change of the parameters alone makes
+most of the harm vanish, so that no fix can be credited; "" where it is not known."""
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Estimate(_Model):
+    """A share of the search space, estimated from rows that no algorithm chose.
+
+    Attributes:
+        drawn: where the rows come from.
+        rows: that have a result.
+        harmful: of them.
+        share: harmful / rows; None where there are no rows.
+        low: lower end of the 95 % Clopper-Pearson interval.
+        high: its upper end; the one-sided 95 % upper bound where no row is harmful.
+    """
+
+    drawn: Drawn
+    rows: Count
+    harmful: Count
+    share: Share | None
+    low: Share
+    high: Share
+
+
+class Treatment(_Model):
+    """What one change made of the neighbours of a row; each neighbour is its own comparison.
+
+    Attributes:
+        name: "perception is ideal", "un-r157 drives", "the road is dry", …; "random move" is the
+            placebo.
+        cause: that the change stands for; "" for the placebo.
+        rows: neighbours that have a result with and without the change.
+        gone: neighbours that are harmful as is and harmless with the change.
+        new: neighbours that are harmless as is and harmful with the change.
+        drop: (gone - new) / rows.
+        low: lower end of its 95 % interval (Newcombe 1998, paired proportions, method 10).
+        high: its upper end.
+    """
+
+    name: Text
+    cause: CauseLabel
+    rows: Count
+    gone: Count
+    new: Count
+    drop: Change
+    low: Change
+    high: Change
+
+    @property
+    def works(self) -> bool:
+        """Whether the drop is significantly above zero."""
+        return self.low > 0.0
+
+    def exceeds(self, placebo: "Treatment") -> bool:
+        """Whether it helps more neighbours than a placebo, and lowers the share by more."""
+        return self.gone > placebo.gone and self.drop > placebo.drop
+
+
+class Neighbourhood(_Model):
+    """What the neighbours of one row came to.
+
+    Attributes:
+        evaluation: the row's id in the store.
+        rows: neighbours that have a result.
+        harmful: of them, driven as is.
+        robustness: harmful / rows; None where no neighbour has a result.
+        low: lower end of its 95 % interval (Wilson).
+        high: its upper end.
+        cause: the first fix whose drop is significantly above zero and exceeds the placebo's;
+            "unavoidable" where no fix has one; "sensitive" of a knife-edge row; "" where no fix
+            was tried.
+        fixes: in the order in which causes are sought; empty where they were not tried.
+        placebo: one more random move of the same size for each neighbour.
+        sampled: whether the row was drawn at random from those that are not exported.
+    """
+
+    evaluation: Count
+    rows: Count
+    harmful: Count
+    robustness: Share | None
+    low: Share
+    high: Share
+    cause: CauseLabel = ""
+    fixes: Annotated[tuple[Treatment, ...], Field(max_length=20)] = ()
+    placebo: Treatment | None = None
+    sampled: bool = False
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of the neighbours are harmful."""
+        return self.robustness is not None and self.robustness < 0.5
+
+    @property
+    def fix(self) -> Treatment | None:
+        """The fix that the cause was found by, if one was."""
+        if self.placebo is None or self.cause in ("sensitive", "unavoidable", ""):
+            return None
+        works = (one for one in self.fixes if one.works and one.exceeds(self.placebo))
+        return next(works, None)
+
+
+class Condition(_Model):
+    """What a minimal scenario needs of one parameter.
+
+    Attributes:
+        name: of the parameter.
+        unit: of it.
+        sign: ">=" where the parameter lies above its nominal value, "<=" below it.
+        limit: the harm persists as far as here when this parameter alone is moved on towards its
+            nominal value, and not one step further.
+        step: of that parameter.
+        value: in the minimal scenario.
+        nominal: value of the parameter in the nominal scenario.
+    """
+
+    name: Text
+    unit: Text
+    sign: Literal[">=", "<="]
+    limit: Number
+    step: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    value: Number
+    nominal: Number
+
+
+class Minimal(_Model):
+    """The scenario of a mode that differs least from the nominal one.
+
+    Attributes:
+        name: of its files in ``critical``, "minimal-01"; "" where none are written.
+        x: the row of X, all parameters and derived quantities in the run's order.
+        noise_key: of its random numbers: those of the row that it was made from.
+        values: the parameters that its scenario depends on, by name.
+        conditions: the parameters that must differ from nominal, those furthest from it first.
+        sentence: they in words.
+        rows: neighbours that have a result.
+        harmful: of them.
+        robustness: harmful / rows.
+        harm: of the scenario.
+        severity: probability of MAIS3+.
+    """
+
+    name: Text
+    x: Annotated[tuple[Number, ...], Field(max_length=10_000)]
+    noise_key: Annotated[str, Field(pattern=r"^[0-9]{1,20}$")]
+    values: Annotated[dict[Text, Number], Field(max_length=10_000)]
+    conditions: Annotated[tuple[Condition, ...], Field(max_length=1000)]
+    sentence: Annotated[str, Field(max_length=100_000)]
+    rows: Count
+    harmful: Count
+    robustness: Share | None
+    harm: Share
+    severity: Share
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of its neighbours are harmful."""
+        return self.robustness is not None and self.robustness < 0.5
+
+
+class Mode(_Model):
+    """A way in which the driver comes to harm.
+
+    Attributes:
+        number: 1, 2, … in the order of the record: robust ones first, then by worst harm.
+        title: in words.
+        conflict: "contact" or "near miss".
+        conflict_type: label of `ConflictType`.
+        responsible: label of `Responsible`.
+        rule: label of `Rule`.
+        cause: tested by the neighbours of ``shown``; else the quick one of the rows.
+        tested: whether the neighbours gave the cause.
+        partner: kind of the other participant: "car", "pedestrian", …; "" if there is none.
+        place: "before the junction", "in the junction", "between junctions", "after the
+            junction"; "" where the ego's route crosses none, or it is not known.
+        count: harmful evaluations of the run.
+        space: share of the search space.
+        harm: the worst.
+        severity: the worst, probability of MAIS3+.
+        worst: the evaluation of the worst harm.
+        shown: the evaluation that stands for it: the worst robust one of those that were tested.
+        robustness: of ``shown``; None where it was not tested.
+        examples: evaluations, the worst first; not all of them.
+        exports: names of the exported scenarios, the one that stands for it first.
+        minimal: its minimal scenario, if one was sought and found.
+    """
+
+    number: Annotated[int, Field(ge=1, le=10**6)]
+    title: Text
+    conflict: Text
+    conflict_type: Text
+    responsible: Text
+    rule: Text
+    cause: CauseLabel
+    tested: bool
+    partner: Text
+    place: Text
+    count: Annotated[int, Field(ge=1, le=10**8)]
+    space: Estimate
+    harm: Share
+    severity: Share
+    worst: Count
+    shown: Count
+    robustness: Share | None
+    examples: Annotated[tuple[Count, ...], Field(max_length=MOST_EXAMPLES)]
+    exports: Annotated[tuple[Text, ...], Field(max_length=1000)] = ()
+    minimal: Minimal | None = None
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of the neighbours of ``shown`` are harmful."""
+        return self.robustness is not None and self.robustness < 0.5
+
+
+class Least(_Model):
+    """The row that comes nearest to harm in one quantity.
+
+    Attributes:
+        quantity: "harm", "course_ttc" or "course_braking".
+        value: its most critical value; None where no row has one (no collision course).
+        unit: of it.
+        evaluation: where; None where no row has one.
+    """
+
+    quantity: Text
+    value: Number | None
+    unit: Text
+    evaluation: Count | None
+
+
+class Bound(_Model):
+    """What a run says of the space as a whole, whether or not it found a failure.
+
+    Attributes:
+        evaluations: of the run.
+        failed: of them, simulations without a result.
+        implausible: of them, traffic that could not happen.
+        harmful: of them.
+        space: the harmful share of the search space.
+        least: the smallest margins reached.
+        sentence: in words.
+    """
+
+    evaluations: Count
+    failed: Count
+    implausible: Count
+    harmful: Count
+    space: Estimate
+    least: Annotated[tuple[Least, ...], Field(max_length=20)]
+    sentence: Text
+
+
+class Triage(_Model):
+    """The triage of a run.
+
+    Attributes:
+        schema_version: 1.
+        scenario: its name.
+        ego: label of its driver.
+        count: whose conflicts count as harm, "ego" or "any".
+        results: digest of the evaluations that it was made from, `Rows.digest`.
+        seed: of the run; all chance comes from it.
+        neighbours: of each row that was tested; 0 where none were (see ``untested``).
+        radius: by which each searched parameter moves at most, a share of its range.
+        sampled: rows that were drawn from those not exported.
+        bound: what is known of the space.
+        modes: the failure modes, at most ``MOST_MODES``.
+        unrecorded_modes: further modes.
+        neighbourhoods: of the exported rows, in their order, then of the others.
+        untested: why no neighbours were tested; "" where they were.
+    """
+
+    schema_version: Literal[1] = 1
+    scenario: Text
+    ego: Text
+    count: Literal["ego", "any"]
+    results: Text
+    seed: Annotated[int, Field(ge=0)]
+    neighbours: Count
+    radius: Share
+    sampled: Count
+    bound: Bound
+    modes: Annotated[tuple[Mode, ...], Field(max_length=MOST_MODES)]
+    unrecorded_modes: Count = 0
+    neighbourhoods: Annotated[tuple[Neighbourhood, ...], Field(max_length=MOST_NEIGHBOURHOODS)]
+    untested: Text = ""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Triage":
+        if [one.number for one in self.modes] != list(range(1, len(self.modes) + 1)):
+            raise ValueError("modes must be numbered 1, 2, …")
+        if sum(one.count for one in self.modes) > self.bound.harmful:
+            raise ValueError("modes must not hold more rows than are harmful")
+        named = [i for one in self.modes for i in (one.worst, one.shown, *one.examples)]
+        named += [one.evaluation for one in self.neighbourhoods]
+        if max(named, default=-1) >= self.bound.evaluations:
+            raise ValueError(f"evaluation {max(named)} must be one of the run's")
+        return self
+
+    def neighbourhood(self, evaluation: int) -> Neighbourhood | None:
+        """Return what the neighbours of an evaluation came to, if they were tested."""
+        found = (one for one in self.neighbourhoods if one.evaluation == evaluation)
+        return next(found, None)
+
+    @property
+    def robust(self) -> int:
+        """How many modes are not knife-edge; those that were not tested count."""
+        return sum(not one.knife_edge for one in self.modes)
+
+
+def write_record(folder: Path, triage: Triage) -> Path:
+    """Write the record into a run's folder, whole; return its path.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    path = folder / JSON_FILE
+    write_whole(path, [triage.model_dump_json(indent=1).encode(), b"\n"])
+    return path
+
+
+def read_record(path: Path, results: str | None = None) -> Triage | None:
+    """Return what `write_record` wrote; None where there is no file.
+
+    Args:
+        path: of the record.
+        results: digest of the run's evaluations, `Rows.digest`, if it is known.
+
+    Raises:
+        FileFormatError: it is something else, or another run's.
+        StorageError: it cannot be read.
+    """
+    try:
+        record = Triage.model_validate_json(path.read_bytes(), strict=True)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        first = error.errors(include_input=False, include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise _not_ours(path, f"{place}: {first['msg']}" if place else first["msg"]) from None
+    if results is not None and record.results != results:
+        raise _not_ours(path, "it was made from other evaluations than the run's")
+    return record
+
+
+def _not_ours(path: Path, why: str) -> FileFormatError:
+    return FileFormatError(
+        f"{path}: must be the triage of this run, as 'bridgegen resume {path.parent}' writes it: "
+        f"{why}"
+    )

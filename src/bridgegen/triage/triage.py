@@ -1,0 +1,412 @@
+"""From a run's rows to findings: modes, their neighbours, minimal scenarios, and a bound."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.cause import Cause
+from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.pipeline import Pipeline
+from bridgegen.triage.bound import UNBIASED, bound, estimate, least_margins
+from bridgegen.triage.distinct import distinct
+from bridgegen.triage.minimal import Minimiser
+from bridgegen.triage.modes import Group, Key, by_harm, group, keys_of, rekeyed, title, where
+from bridgegen.triage.moves import searched
+from bridgegen.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods
+from bridgegen.triage.record import (
+    MOST_EXAMPLES,
+    MOST_MODES,
+    Drawn,
+    Estimate,
+    Minimal,
+    Mode,
+    Neighbourhood,
+    Triage,
+)
+
+SAMPLED = 8
+"""Harmful rows besides the exported ones whose neighbours are driven, drawn at random."""
+
+PER_MODE = 3
+"""Rows of a mode, the worst that differ, among which one that is robust is looked for."""
+
+FRESH = 256
+"""Random rows from which shares of the space are estimated, where an algorithm chose the run's."""
+
+MOST_PLACED = 4096
+"""Harmful rows, the worst, that are driven again to see where on the route they fail; a further
+one counts as failing where the nearest of these does that agrees in all else."""
+
+MOST_TESTED, MOST_MINIMAL = 20, 10
+"""Modes whose cause is tested, and for which a minimal scenario is sought."""
+
+_SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
+
+
+class Evaluations(Protocol):
+    """The rows of a run; `bridgegen.store.Rows` is one."""
+
+    @property
+    def id(self) -> Int:
+        """``(N,)``."""
+
+    @property
+    def U(self) -> Float:
+        """``(N, n_var)``."""
+
+    @property
+    def X(self) -> Float:
+        """``(N, len(space.names))``."""
+
+    @property
+    def metrics(self) -> Float:
+        """``(N, M)``."""
+
+    @property
+    def status(self) -> Int:
+        """``(N,)``, 0 is success."""
+
+    @property
+    def critical(self) -> Bool:
+        """``(N,)``."""
+
+    @property
+    def cause(self) -> npt.NDArray[np.int8]:
+        """``(N,)``, a `Cause` each."""
+
+    @property
+    def findings(self) -> Findings:
+        """Of N rows."""
+
+    def digest(self) -> str:
+        """Return what tells them from others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triaged:
+    """What the triage of a run gives.
+
+    Attributes:
+        record: all that is known, but for the names of files.
+        exports: positions of the rows to export, best first.
+    """
+
+    record: Triage
+    exports: tuple[int, ...]
+
+
+def triage(
+    pipeline: Pipeline, rows: Evaluations, *, algorithm: str, seed: int, keep: int
+) -> Triaged:
+    """Group a run's harmful rows into failure modes, and find out how sure each finding is.
+
+    One seed gives one result, to the last bit, whoever simulates.
+
+    Args:
+        pipeline: the run's.
+        rows: all of it.
+        algorithm: that chose them; only rows of "random" and "sobol" tell shares of the space.
+        seed: of the run.
+        keep: how many scenarios to export.
+    """
+    return _Triage(pipeline, rows, algorithm, seed, keep).run()
+
+
+def harmful_rows(
+    metrics: Float, names: Sequence[str], harm: str, status: npt.NDArray[Any], findings: Findings
+) -> tuple[Bool, Float]:
+    """Return which rows are a failure of the ego, ``(N,)``, and the harm of each, ``(N,)``.
+
+    Whatever the objective: a row is harmful with a harm of at least 0.3, a result, and traffic
+    that could happen. No row is where the run did not record its harm.
+
+    Args:
+        metrics: ``(N, M)``.
+        names: of the M columns.
+        harm: the quantity that counts, "harm" or "harm_any".
+        status: ``(N,)``, 0 is success.
+        findings: of N rows.
+    """
+    if harm not in names:
+        return np.zeros(len(metrics), np.bool_), np.zeros(len(metrics))
+    values = np.nan_to_num(metrics[:, list(names).index(harm)], nan=0.0)
+    plausible: Bool = np.array(findings.implausible == "", dtype=np.bool_).reshape(len(values))
+    return (status == 0) & plausible & (values >= NEAR_MISS), values
+
+
+class _Triage:
+    """One call of `triage`; positions count among all rows unless they are said to be others."""
+
+    def __init__(
+        self, pipeline: Pipeline, rows: Evaluations, algorithm: str, seed: int, keep: int
+    ) -> None:
+        self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
+        self._algorithm, self._seed, self._keep = algorithm, seed, keep
+        name = pipeline.objective.harm
+        harmful, self._harm = harmful_rows(
+            rows.metrics, pipeline.metrics, name, rows.status, rows.findings
+        )
+        if pipeline.cause is not None:  # harm of another cause does not count
+            harmful &= rows.critical
+        self._at = np.flatnonzero(harmful)
+        self._found: dict[int, Neighbourhood] = {}
+        self._as_is: AsIs = {}
+        self._unrecorded = 0
+
+    def run(self) -> Triaged:
+        """Go through the stages."""
+        rows, tries = self._rows, self._pipeline.tries
+        U, harm = rows.U[self._at], self._harm[self._at]
+        place = self._places(U) if tries else [""] * len(self._at)
+        quick = [Cause(one).label for one in rows.cause[self._at].tolist()]
+        kinds = self._pipeline.kinds
+        keys = keys_of(rows.findings.take(self._at), kinds, place, quick)
+        every = group(keys, harm, U)
+        self._unrecorded = len(every[MOST_MODES:])
+        groups = every[:MOST_MODES]
+        shown = [int(one.rows[0]) for one in groups]
+        if tries:
+            shown = self._test_robustness(groups, U, harm)
+        exports = self._choose(shown, U, harm)
+        tested = list(dict.fromkeys([*exports, *shown[:MOST_TESTED]]))
+        sample = self._sample(tested) if tries else []
+        if tries:
+            self._test(tested, sampled=False)
+            self._test(sample, sampled=True)
+        groups, shown = self._by_tested_cause(groups, shown, U, harm)
+        order = sorted(range(len(groups)), key=lambda k: self._rank(shown[k], harm))
+        groups, shown = [groups[k] for k in order], [shown[k] for k in order]
+        minimal = self._minimal(groups, shown) if tries else [None] * len(groups)
+        record = self._record(groups, shown, exports, tested, sample, minimal)
+        return Triaged(record, tuple(self._at[exports].tolist()))
+
+    # Stages; positions count among the harmful rows.
+
+    def _places(self, U: Float) -> list[str]:
+        """Return where on its route each harmful row fails."""
+        order = by_harm(self._harm[self._at], U)
+        first, rest = order[:MOST_PLACED], order[MOST_PLACED:]
+        place = np.full(len(order), "", dtype=object)
+        place[first] = self._pipeline.try_all(self._rows.X[self._at[first]]).place
+        if len(rest):
+            from scipy.spatial import cKDTree
+
+            findings = self._rows.findings.take(self._at)
+            kinds, blank = self._pipeline.kinds, [""] * len(order)
+            keys = keys_of(findings, kinds, blank, blank)
+            known: dict[Key, list[int]] = {}
+            for i in first.tolist():
+                known.setdefault(keys[i], []).append(i)
+            trees = {key: cKDTree(U[members]) for key, members in known.items()}
+            for i in rest.tolist():
+                if keys[i] in trees:
+                    place[i] = place[known[keys[i]][int(trees[keys[i]].query(U[i])[1])]]
+        return place.tolist()
+
+    def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
+        """Drive neighbours of the worst rows as they are; return the row that shows each mode."""
+        worst = [distinct(U, one.rows, PER_MODE) for one in groups]
+        every = by_harm(harm, U)
+        several = distinct(U, every, max(2 * self._keep, 1))
+        self._drive(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
+        return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
+
+    def _choose(self, shown: Sequence[int], U: Float, harm: Float) -> list[int]:
+        """Return the rows to export: one of each mode, then others; robust ones first."""
+        critical = self._rows.critical[self._at]
+        first = sorted((i for i in shown if critical[i]), key=lambda i: self._rank(i, harm))
+        first = first[: self._keep]
+        every = by_harm(harm, U)
+        known = [i for i in every.tolist() if i in self._found and critical[i]]
+        known.sort(key=lambda i: self._rank(i, harm))
+        more = distinct(U, np.array(known, dtype=np.int64), self._keep, first)
+        if len(first) + len(more) < self._keep:  # those whose robustness is not known
+            kept = [*first, *more]
+            more += distinct(U, every[critical[every]], self._keep, kept)
+            self._drive(
+                [i for i in more if self._pipeline.tries and i not in self._found], fixes=False
+            )
+        both = [*first, *more]
+        return sorted(both, key=lambda i: (self._is_knife_edge(i), both.index(i)))
+
+    def _sample(self, tested: Sequence[int]) -> list[int]:
+        """Return some of the harmful rows that are not tested yet, drawn at random."""
+        rest = np.setdiff1d(np.arange(len(self._at)), tested)
+        rest = rest[np.argsort(self._rows.id[self._at[rest]])]
+        random = np.random.Generator(np.random.PCG64([self._seed, _SAMPLE]))
+        drawn = random.permutation(len(rest))[:SAMPLED]
+        return rest[np.sort(drawn)].tolist()  # type: ignore[no-any-return]
+
+    def _test(self, at: Sequence[int], *, sampled: bool) -> None:
+        """Drive neighbours with every fix, if causes are sought."""
+        if self._pipeline.seeks_causes:
+            self._drive(at, fixes=True, sampled=sampled)
+        else:
+            self._drive([i for i in at if i not in self._found], fixes=False, sampled=sampled)
+
+    def _drive(self, at: Any, *, fixes: bool, sampled: bool = False) -> None:
+        rows = self._at[np.array(list(at), dtype=np.int64)]
+        came = neighbourhoods(
+            self._pipeline, self._rows.X[rows], self._rows.id[rows], self._seed,
+            fixes=fixes, sampled=sampled, as_is=self._as_is,
+        )  # fmt: skip
+        self._found |= dict(zip(at, came, strict=True))
+
+    def _is_knife_edge(self, i: int) -> bool:
+        return i in self._found and self._found[i].knife_edge
+
+    def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
+        """Return what orders findings: robust ones first, then the worst."""
+        return self._is_knife_edge(i), -float(harm[i]), *self._rows.U[self._at[i]].tolist()
+
+    def _by_tested_cause(
+        self, groups: Sequence[Group], shown: Sequence[int], U: Float, harm: Float
+    ) -> tuple[list[Group], list[int]]:
+        """Give modes the cause that neighbours tell; those that then agree in all are one."""
+        keys = []
+        for one, i in zip(groups, shown, strict=True):
+            cause = self._found[i].cause if i in self._found else ""
+            keys.append(
+                one.key._replace(cause=cause) if cause not in ("", "sensitive") else one.key
+            )
+        joined = rekeyed(groups, keys, harm, U)
+        held = np.zeros(len(harm), dtype=np.int64)
+        for k, one in enumerate(joined):
+            held[one.rows] = k
+        of_each: list[list[int]] = [[] for _ in joined]
+        for i in shown:
+            of_each[int(held[i])].append(i)
+        return joined, [min(some, key=lambda i: self._rank(i, harm)) for some in of_each]
+
+    def _minimal(self, groups: Sequence[Group], shown: Sequence[int]) -> list[Minimal | None]:
+        """Return the minimal scenarios of the first modes; one of those that differ in cause alone.
+
+        None is sought where an adversary decides: its decisions have no nominal values of use.
+        """
+        found: list[Minimal | None] = [None] * len(groups)
+        first: dict[Any, int] = {}
+        for k, one in enumerate(groups if not self._space.decisions else ()):
+            first.setdefault((one.key.way, one.part), k)
+        at = list(first.values())[:MOST_MINIMAL]
+        if at:
+            X = self._rows.X[self._at[np.array([shown[k] for k in at], dtype=np.int64)]]
+            ways, names = [groups[k].key.way for k in at], [f"minimal-{k + 1:02d}" for k in at]
+            came = Minimiser(self._pipeline, self._seed).find(X, ways, names)
+            for k, minimal in zip(at, came, strict=True):
+                found[k] = minimal
+        return found
+
+    def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate]]:
+        """Return the harmful share of the space, and that of each mode."""
+        rows = self._rows
+        fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
+        if self._algorithm in UNBIASED:
+            drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
+            each = [estimate(drawn, len(one.rows), fit) for one in groups]
+            return estimate(drawn, len(self._at), fit), each
+        if not self._pipeline.tries or self._pipeline.cause is not None or not self._space.n_var:
+            return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups]
+        random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
+        U = random.random((FRESH, self._space.n_var))
+        came = self._pipeline.try_all(self._space.decode(U) + 0.0)
+        keys = keys_of(came.findings, self._pipeline.kinds, came.place.tolist(), [""] * FRESH)
+        held = [0] * len(groups)
+        own = rows.U[self._at]
+        for i in np.flatnonzero(came.harmful).tolist():
+            same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
+            if same:  # several where they differ in cause: the one with the nearest row
+                gaps = [float(((own[groups[k].rows] - U[i]) ** 2).sum(axis=1).min()) for k in same]
+                held[same[int(np.argmin(gaps))]] += 1
+        n = int(came.ok.sum())
+        return estimate("fresh", int(came.harmful.sum()), n), [
+            estimate("fresh", k, n) for k in held
+        ]
+
+    def _record(
+        self,
+        groups: Sequence[Group],
+        shown: Sequence[int],
+        exports: Sequence[int],
+        tested: Sequence[int],
+        sample: Sequence[int],
+        minimal: Sequence[Minimal | None],
+    ) -> Triage:
+        rows, pipeline = self._rows, self._pipeline
+        space, shares = self._shares(groups)
+        ids = rows.id[self._at]
+        names = {i: f"{k:04d}" for k, i in enumerate(exports, start=1)}
+        modes = []
+        for k, (one, i) in enumerate(zip(groups, shown, strict=True), start=1):
+            members = set(one.rows.tolist())
+            kept = [names[j] for j in exports if j in members and j != i]
+            near = self._found.get(i)
+            sensitive = near is not None and near.cause == "sensitive"
+            modes.append(
+                Mode(
+                    number=k, title=self._title(one, groups),
+                    **{name: getattr(one.key, name) for name in Key._fields if name != "cause"},
+                    cause="sensitive" if sensitive else one.key.cause,
+                    tested=near is not None and near.cause != "",
+                    count=len(one.rows), space=shares[k - 1],
+                    harm=float(self._harm[self._at[one.rows]].max()),
+                    severity=self._severity(one), worst=int(ids[one.rows[0]]), shown=int(ids[i]),
+                    robustness=None if near is None else near.robustness,
+                    examples=tuple(ids[one.rows[:MOST_EXAMPLES]].tolist()),
+                    exports=(*([names[i]] if i in names else []), *kept),
+                    minimal=minimal[k - 1],
+                )
+            )  # fmt: skip
+        ok = rows.status == 0
+        implausible = _implausible(rows)
+        known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
+        untested = ""
+        if not pipeline.tries:
+            untested = "neighbours are driven in the embedded simulator alone"
+        return Triage(
+            scenario=pipeline.scenario.name, ego=pipeline.driver.label,
+            count=pipeline.objective.count, results=rows.digest(), seed=self._seed,
+            neighbours=NEIGHBOURS if pipeline.tries else 0, radius=RADIUS, sampled=len(sample),
+            bound=bound(
+                evaluations=len(ok), failed=int((~ok).sum()),
+                implausible=int((ok & implausible).sum()), harmful=len(self._at), space=space,
+                least=least_margins(
+                    rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
+                ),
+                modes=len(modes), ego=pipeline.driver.label,
+            ),
+            modes=tuple(modes), unrecorded_modes=self._unrecorded,
+            neighbourhoods=tuple(known), untested=untested,
+        )  # fmt: skip
+
+    def _severity(self, one: Group) -> float:
+        names = self._pipeline.metrics
+        if "severity" not in names:
+            return 0.0
+        column = self._rows.metrics[self._at[one.rows], names.index("severity")]
+        return float(np.nan_to_num(column, nan=0.0).max())
+
+    def _title(self, one: Group, groups: Sequence[Group]) -> str:
+        """Return a mode in words; a cluster also by the parameter that parts it from the others."""
+        text = title(one.key, self._pipeline.objective.count)
+        others = [g.rows for g in groups if g is not one and g.key == one.key]
+        if not one.part or not others:
+            return text
+        X = searched(self._space, self._rows.X[self._at])
+        names = self._space.variables
+        found = where(X[one.rows], X[np.concatenate(others)], names)
+        if found is None:
+            return text
+        k, low, high = found
+        unit = self._space.scenario.parameters[names[k]].unit
+        said = "" if unit in ("1", "count", "?") else f" {unit}"
+        return f"{text}, {names[k]} {low:.3g} to {high:.3g}{said}"
+
+
+def _implausible(rows: Evaluations) -> Bool:
+    marked: Bool = np.array(rows.findings.implausible != "", dtype=np.bool_).reshape(len(rows.id))
+    return marked

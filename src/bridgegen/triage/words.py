@@ -1,0 +1,55 @@
+"""A run's triage in lines of text, for the terminal."""
+
+from bridgegen.regions.words import percent
+from bridgegen.triage.record import Mode, Triage
+
+
+def headline(found: Triage) -> str:
+    """Return in how many ways the driver fails, or how near it came, and what of the space."""
+    return found.bound.sentence
+
+
+def mode_in_words(mode: Mode, found: Triage) -> str:
+    """Return a failure mode in one line: count, title, worst severity, robustness, cause, share."""
+    parts = [f"{mode.count:>5} × {mode.title}"]
+    if mode.conflict == "contact":
+        parts.append(f"MAIS3+ {percent(mode.severity)}")
+    else:
+        parts.append(f"harm {mode.harm:.2f}")
+    if mode.robustness is not None:
+        robust = "knife-edge" if mode.knife_edge else "robust"
+        parts.append(f"{robust} ({percent(mode.robustness)} of its neighbours)")
+    parts.append(cause_in_words(mode, found))
+    if mode.space.drawn and mode.space.share is not None:
+        low, high = percent(mode.space.low), percent(mode.space.high)
+        seen = f"{percent(mode.space.share)} of the space ({low} to {high})"
+        parts.append(seen if mode.space.harmful else f"at most {high} of the space")
+    return "; ".join(part for part in parts if part)
+
+
+def cause_in_words(mode: Mode, found: Triage) -> str:
+    """Return a mode's cause, with the fix that shows it and by how much it lowers harm.
+
+    The drop is that of the harmful share of the neighbours, with its 95 % interval, beside the
+    drop by a random move of the same size, the placebo.
+    """
+    near = found.neighbourhood(mode.shown)
+    if not mode.cause:
+        return ""
+    if not mode.tested or near is None or near.placebo is None:
+        return f"{mode.cause} (quick)"
+    if mode.cause == "sensitive":
+        return "sensitive: a small change alone removes the harm"
+    fix = near.fix
+    if fix is None:
+        return "unavoidable: no fix removes it"
+    return (
+        f"{mode.cause}: {_drop(fix.drop)} if {fix.name} ({_drop(fix.low)} to {_drop(fix.high)}; "
+        f"placebo {_drop(near.placebo.drop)})"
+    )
+
+
+def _drop(share: float) -> str:
+    """Return by how much a share drops, in points of per cent: −50 where half of it is gone."""
+    points = round(-100.0 * share)
+    return f"{'−' if points < 0 else '+' if points > 0 else '±'}{abs(points)}"

@@ -1,0 +1,452 @@
+"""Each rule of responsibility in a rollout that shows it, and in its counter-case."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
+from bridgegen.conflict.harm import decisive
+from bridgegen.conflict.types import RULES, Responsible, Rule
+from bridgegen.ego.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
+from bridgegen.ego.right_of_way import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING
+
+DT = 0.05
+RIGHT_ANGLE = np.pi / 2
+MAN = (0.5, 0.5, 0.0)
+EGO, BV, NOBODY, SHARED = Responsible.EGO, Responsible.OTHER, Responsible.NONE, Responsible.SHARED
+
+
+def verdict(rollout, e=1):
+    """(responsible, rule) of the ego and one other, who must be in conflict."""
+    found = analyse(rollout)
+    assert found.kind[0, e] >= NEAR_MISS
+    return Responsible(found.responsible[0, e]), Rule(found.rule[0, e])
+
+
+def at_fault(rollout, e=1):
+    return bool(analyse(rollout).at_fault[0, e])
+
+
+def stopping_distance(v):
+    """Of the careful driver [m]: 0.75 s, then up to 0.774 g at 12.65 m/s³; UN R157, Annex 3."""
+    g, jerk = 0.774 * 9.81, 12.65
+    rise = g / jerk
+    left = v - 0.5 * jerk * rise**2
+    return 0.75 * v + v * rise - jerk * rise**3 / 6.0 + left**2 / (2.0 * g)
+
+
+def test_every_rule_has_words_and_a_source():
+    assert set(RULES) == set(Rule)
+    assert all(words and source for rule, (words, source) in RULES.items() if rule)
+
+
+# What stands ahead.
+
+
+@pytest.mark.parametrize("v", [8.0, 14.0, 20.0, 30.0])
+def test_a_standing_obstacle_is_the_egos_from_the_stopping_distance_on(track, meeting, v):
+    enough = meeting(track(v=v), track(x=4.0 + stopping_distance(v) + 0.3))
+    assert verdict(enough) == (EGO, Rule.STANDING_AHEAD)
+    assert analyse(enough).preventable[0, 1]
+    short = meeting(track(v=v), track(x=4.0 + stopping_distance(v) - 0.3))
+    assert verdict(short) == (NOBODY, Rule.UNSAFE_START)
+    assert not at_fault(short)
+
+
+def test_a_barrier_ahead_is_the_egos(track, meeting):
+    rollout = meeting(track(v=20.0), track(x=60.0), kinds=[CAR, OTHER])
+    assert verdict(rollout) == (EGO, Rule.STANDING_AHEAD)
+
+
+def test_a_parked_car_that_the_ego_scrapes_is_the_egos(track, meeting):
+    # its side is 0.2 m in the ego's way: corners or sides meet, and it has not moved at all
+    ego = track(v=10.0, h=0.03)
+    rollout = meeting(ego, track(x=60.0, y=3.5), claims=[0])
+    assert verdict(rollout) == (EGO, Rule.STANDING_AHEAD)
+
+
+def test_an_obstacle_that_is_revealed_too_late_is_nobodys(track, meeting, course):
+    # a van between ego and obstacle leaves the lane when the ego is 30 m away from the obstacle
+    aside = course((0.0, 0.0), (2.95, 0.0), (3.0, 8.0), (3.5, 8.0), (3.55, 0.0), (6.0, 0.0))
+    van = track(x=15.0, v=20.0, slide=aside)
+    late = meeting(track(v=20.0), track(x=100.0), van)
+    assert verdict(late) == (NOBODY, Rule.REVEALED_LATE)
+    early = meeting(track(v=20.0), track(x=100.0), {**van, "y": np.full(121, 8.0)})
+    assert verdict(early) == (EGO, Rule.STANDING_AHEAD)
+
+
+# The vehicle ahead, the vehicle behind.
+
+
+def test_the_vehicle_ahead_brakes_and_the_ego_does_not(track, meeting, course):
+    # RSS: 20 m/s, 40 m apart; it brakes with 5 m/s² from 1 s on
+    lead = track(x=44.0, v=course((0.0, 20.0), (1.0, 20.0), (5.0, 0.0), (6.0, 0.0)))
+    rollout = meeting(track(v=20.0), lead)
+    assert verdict(rollout) == (EGO, Rule.REAR_DISTANCE)
+    found = analyse(rollout)
+    assert found.decided[0, 1] == 20
+    assert found.preventable[0, 1]
+
+
+def test_the_vehicle_behind_keeps_no_distance(track, meeting):
+    rollout = meeting(track(v=10.0), track(x=-20.0, v=20.0), claims=[0])
+    assert verdict(rollout) == (BV, Rule.REAR_DISTANCE)
+
+
+def brakes_hard(course):
+    return course((0.0, 20.0), (1.0, 20.0), (3.5, 0.0), (6.0, 0.0))  # 8 m/s²
+
+
+def test_braking_hard_without_a_reason_is_shared(track, meeting, course):
+    ego = track(v=brakes_hard(course))
+    behind = track(x=-12.0, v=20.0)
+    assert verdict(meeting(ego, behind)) == (SHARED, Rule.BRAKED_WITHOUT_REASON)
+    reason = track(x=48.0)
+    assert verdict(meeting(ego, behind, reason)) == (BV, Rule.REAR_DISTANCE)
+    gently = track(v=course((0.0, 20.0), (1.0, 20.0), (5.0, 0.0), (6.0, 0.0)))
+    assert verdict(meeting(gently, behind)) == (BV, Rule.REAR_DISTANCE)
+
+
+def test_a_red_light_is_a_reason_to_brake(track, meeting, course):
+    rollout = meeting(track(v=brakes_hard(course)), track(x=-12.0, v=20.0))
+    rollout = with_line(rollout, 55.0, 0.0, 0.0, entity=0, states=1)
+    assert verdict(rollout) == (BV, Rule.REAR_DISTANCE)
+
+
+def test_the_ego_cuts_in_before_one_who_comes_from_behind(track, meeting, course):
+    # to the left within 1.75 s; the other is 10 m/s faster
+    slide = course((0.0, 2.0), (1.75, 2.0), (1.8, 0.0), (6.0, 0.0))
+    ego = track(v=15.0, slide=slide)
+    ego["offset"] = ego["y"].copy()
+    near = meeting(ego, track(x=-18.0, y=3.5, v=25.0), claims=[0])
+    assert analyse(near).type[0, 1] == ConflictType.REAR_END_STRUCK
+    assert verdict(near) == (EGO, Rule.CUT_IN)
+    assert decisive(analyse(near))[1][0] >= 0.6
+    # 45 m: 0.75 s and 3 m/s² suffice to lose 10 m/s: 7.5 + 16.7 m and the rise
+    far = meeting(ego, track(x=-49.0, y=3.5, v=25.0), claims=[0])
+    assert verdict(far) == (BV, Rule.REAR_DISTANCE)
+
+
+def careful_driver_collides(ego, other, since):
+    """UN R157, Annex 3, driven in plain NumPy along y = 0: does its box meet the other's?"""
+    g, jerk, dt = 0.774 * 9.81, 12.65, 0.001
+    v0 = ego["v"][0]
+    t = dt * np.arange(round(12.0 / dt))
+    slowed = np.clip((t - 0.75) * jerk, 0.0, g)
+    v = np.maximum(v0 - dt * np.cumsum(slowed), 0.0)
+    x = ego["x"][since] + dt * np.cumsum(v)
+    times = DT * (np.arange(len(other["x"])) - since)
+    there = t <= times[-1]
+    ox, oy = np.interp(t, times, other["x"]), np.interp(t, times, other["y"])
+    return bool(((np.abs(x - ox) < 4.0) & (np.abs(oy) < 2.0) & there).any())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_cut_ins_are_preventable_where_the_careful_driver_says_so(track, meeting, seed):
+    rng = np.random.default_rng(seed)
+    agree, preventable = 0, 0
+    for _ in range(40):
+        v, slower, gap = rng.uniform(8, 30), rng.uniform(2, 10), rng.uniform(2, 40)
+        lateral = rng.uniform(0.5, 2.0)
+        n = 161
+        slide = np.where(np.arange(n) * DT < 3.5 / lateral, -lateral, 0.0)
+        ego = track(v=v, t=8.0)
+        other = track(x=4.0 + gap, y=3.5, v=max(v - slower, 0.5), slide=slide, t=8.0)
+        found = analyse(meeting(ego, other, claims=[0]))
+        if found.type[0, 1] != ConflictType.REAR_END_STRIKING or found.kind[0, 1] != CONTACT:
+            continue
+        # in the lane from half a metre beside the ego on: its side at y = 1.5
+        since = int(np.argmax(other["y"] < 2.5))
+        assert found.decided[0, 1] == since
+        avoided = not careful_driver_collides(ego, other, since)
+        agree += avoided == found.preventable[0, 1]
+        preventable += avoided
+        expected = (EGO, Rule.CUT_IN_PREVENTABLE) if found.preventable[0, 1] else (BV, Rule.CUT_IN)
+        assert (found.responsible[0, 1], found.rule[0, 1]) == expected
+        assert found.at_fault[0, 1] == found.preventable[0, 1]
+    assert agree >= 0.95 * max(agree, 1)
+
+
+def test_a_careful_ego_is_not_blamed_for_a_near_miss_after_a_cut_in(track, meeting, course):
+    # it brakes as the careful driver does, yet comes near
+    slide = course((0.0, -2.0), (1.75, -2.0), (1.8, 0.0), (6.0, 0.0))
+    since = 10
+    braked = np.maximum(20.0 - 7.593 * DT * np.arange(121 - since - 15), 10.0)
+    v = np.concatenate([np.full(since + 15, 20.0), braked])
+    rollout = meeting(track(v=v), track(x=24.5, y=3.5, v=10.0, slide=slide), claims=[0])
+    found = analyse(rollout)
+    assert found.kind[0, 1] == NEAR_MISS
+    assert verdict(rollout) == (BV, Rule.CUT_IN)
+    assert decisive(found)[1][0] == 0.0
+    assert decisive(found, "any")[1][0] >= 0.3
+
+
+# Sideways.
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_who_moves_sideways_is_responsible(track, meeting, side):
+    ego = track(v=15.0, slide=side)
+    ego["offset"] = ego["y"].copy()
+    rollout = meeting(ego, track(y=3.5 * side, v=15.0), claims=[0])
+    assert verdict(rollout) == (EGO, Rule.LEFT_ITS_LANE)
+    rollout = meeting(track(v=15.0), track(y=3.5 * side, v=15.0, slide=-side), claims=[0])
+    assert verdict(rollout) == (BV, Rule.LEFT_ITS_LANE)
+    assert not at_fault(rollout)
+
+
+@pytest.mark.parametrize(("side", "bend"), [(1.0, 0.0), (-1.0, 0.0), (1.0, 0.01), (-1.0, -0.01)])
+def test_without_offsets_the_tracks_tell_who_moved(track, meeting, side, bend):
+    h = bend * 15.0 * DT * np.arange(121)
+    steers = h + side * np.interp(DT * np.arange(121), [0.0, 0.5, 3.0], [0.0, 0.1, 0.1])
+    ego, other = track(v=15.0, h=steers), track(y=3.5 * side, v=15.0, h=h)
+    assert verdict(meeting(ego, other)) == (EGO, Rule.LEFT_ITS_LANE)
+    ego, other = track(y=-3.5 * side, v=15.0, h=h), track(v=15.0, h=steers)
+    # the other comes from the ego's side that it steers away from
+    assert verdict(meeting({**ego, "y": ego["y"] + 7.0 * side}, other)) == (BV, Rule.LEFT_ITS_LANE)
+
+
+def test_who_leaves_its_side_of_the_road_meets_oncoming_traffic(track, meeting):
+    ego = track(v=10.0, slide=1.0)
+    ego["offset"] = ego["y"].copy()
+    rollout = meeting(ego, track(x=64.0, y=3.5, h=np.pi, v=10.0), claims=[0])
+    assert analyse(rollout).type[0, 1] == ConflictType.HEAD_ON
+    assert verdict(rollout) == (EGO, Rule.LEFT_ITS_LANE)
+    rollout = meeting(track(v=10.0), track(x=64.0, y=3.5, h=np.pi, v=10.0, slide=1.0), claims=[0])
+    assert verdict(rollout) == (BV, Rule.LEFT_ITS_LANE)
+    assert not at_fault(rollout)  # even if it had stopped, it would have been met
+
+
+# Right of way.
+
+
+def crossing(track, meeting, claim, other_from=-1.0):
+    """Both arrive at the same time, from a right angle; the other from the right if -1."""
+    other = track(y=30.0 * other_from, h=-other_from * RIGHT_ANGLE, v=10.0)
+    return meeting(track(x=-30.0, v=10.0), other, claims=claim and [claim])
+
+
+@pytest.mark.parametrize(
+    ("claim", "rule"),
+    [
+        (BY_MAP, Rule.MAP_PRIORITY),
+        (BY_SIGNS, Rule.SIGNS),
+        (FROM_THE_RIGHT, Rule.RIGHT_BEFORE_LEFT),
+        (ONCOMING, Rule.ONCOMING_FIRST),
+    ],
+)
+def test_the_claims_of_the_map_decide(track, meeting, claim, rule):
+    assert verdict(crossing(track, meeting, -claim)) == (EGO, rule)
+    assert verdict(crossing(track, meeting, claim)) == (BV, rule)
+    assert not at_fault(crossing(track, meeting, claim))
+
+
+def test_without_priorities_who_comes_from_the_right_goes_first(track, meeting):
+    from_right = crossing(track, meeting, None)
+    assert verdict(from_right) == (EGO, Rule.ASSUMED_RIGHT_BEFORE_LEFT)
+    from_left = crossing(track, meeting, None, other_from=1.0)
+    assert verdict(from_left) == (BV, Rule.ASSUMED_RIGHT_BEFORE_LEFT)
+
+
+def test_priority_does_not_allow_to_drive_into_what_has_long_been_in_the_way(track, meeting):
+    # the other creeps across at 1 m/s and is in the way 3 s before the ego arrives at 10 m/s
+    other = track(y=-6.0, h=RIGHT_ANGLE, v=1.0, t=8.0)
+    rollout = meeting(track(x=-62.0, v=10.0, t=8.0), other, claims=[BY_SIGNS])
+    assert verdict(rollout) == (EGO, Rule.JUNCTION_OCCUPIED)
+    # the other way round the ego creeps, and the other is the one who could have braked
+    ego, other = track(x=-6.0, v=1.0, t=8.0), track(y=-62.0, h=RIGHT_ANGLE, v=10.0, t=8.0)
+    rollout = meeting(ego, other, claims=[-BY_SIGNS])
+    assert verdict(rollout) == (BV, Rule.JUNCTION_OCCUPIED)
+    assert not at_fault(rollout)
+
+
+def test_who_turns_gives_way_to_who_comes_along_the_same_road(track, meeting, course):
+    h = course((0.0, 0.0), (1.0, 0.0), (4.0, RIGHT_ANGLE), (6.0, RIGHT_ANGLE))
+    ego = track(v=6.0, h=h)
+    at = 60
+    other = track(x=ego["x"][at] + 3.0 + 30.0, y=ego["y"][at] + 1.0, h=np.pi, v=10.0)
+    assert verdict(meeting(ego, other)) == (EGO, Rule.TURNING_GIVES_WAY)
+    assert verdict(meeting(ego, other, claims=[-ONCOMING])) == (EGO, Rule.ONCOMING_FIRST)
+    swapped = meeting(other, ego)
+    assert verdict(swapped) == (BV, Rule.TURNING_GIVES_WAY)
+
+
+def test_a_left_turn_that_has_only_begun_is_a_turn(track, meeting, course):
+    # 8 degrees at the contact, 90 in the end
+    h = course((0.0, 0.0), (2.6, 0.0), (5.6, RIGHT_ANGLE), (6.0, RIGHT_ANGLE))
+    ego = track(v=8.0, h=h)
+    rollout = meeting(ego, track(x=49.0, y=1.6, h=np.pi, v=8.0), claims=[-ONCOMING])
+    found = analyse(rollout)
+    assert found.type[0, 1] == ConflictType.TURNING
+    assert verdict(rollout) == (EGO, Rule.ONCOMING_FIRST)
+
+
+def test_an_ego_that_turns_in_front_of_another_takes_its_right_of_way(track, meeting, course):
+    # from a side road into the lane of one who is 3 m behind by then and much faster
+    h = course((0.0, RIGHT_ANGLE), (1.0, RIGHT_ANGLE), (3.0, 0.0), (6.0, 0.0))
+    ego = track(x=0.0, y=0.0, h=h, v=5.0)
+    end = 60
+    y = ego["y"][end]
+    other = track(x=ego["x"][end] - 8.0 - 15.0 * 3.0, y=y, v=15.0)
+    rollout = meeting(ego, other, claims=[-BY_SIGNS])
+    found = analyse(rollout)
+    assert found.type[0, 1] == ConflictType.REAR_END_STRUCK
+    assert verdict(rollout) == (EGO, Rule.SIGNS)
+
+
+# Lights.
+
+
+def with_line(rollout, x, y, h, entity, states):
+    """The rollout with a stop line on the route of an entity, and its light's state."""
+    lights = np.broadcast_to(np.asarray(states, np.int8), (1, 1, rollout.shape[2])).copy()
+    return replace(
+        rollout,
+        light_names=("light",),
+        lights=lights,
+        stop_lines=np.array([[[x, y, h]]]),
+        stop_lights=np.array([0]),
+        stop_entities=np.array([entity]),
+    )
+
+
+RED, GREEN = 1, 4
+
+
+def test_who_runs_a_red_light_is_responsible(track, meeting):
+    # even against one that must give way otherwise
+    plain = crossing(track, meeting, BY_SIGNS)
+    assert verdict(with_line(plain, -10.0, 0.0, 0.0, 0, RED)) == (EGO, Rule.RED_LIGHT)
+    assert verdict(with_line(plain, -10.0, 0.0, 0.0, 0, GREEN)) == (BV, Rule.SIGNS)
+    plain = crossing(track, meeting, -BY_SIGNS)
+    red = with_line(plain, 0.0, -9.8, RIGHT_ANGLE, 1, RED)
+    assert verdict(red) == (BV, Rule.RED_LIGHT)
+    found = analyse(red)
+    assert found.decided[0, 1] == 37  # its front, 2 m ahead, passes the line after 18.2 m
+
+
+def test_a_red_light_far_behind_does_not_decide(track, meeting):
+    plain = meeting(
+        track(x=-80.0, v=10.0, t=9.0), track(y=-80.0, h=RIGHT_ANGLE, v=10.0, t=9.0), claims=[BY_MAP]
+    )
+    assert verdict(with_line(plain, -60.0, 0.0, 0.0, 0, RED)) == (BV, Rule.MAP_PRIORITY)
+
+
+def test_who_stops_at_a_red_light_has_no_near_miss_behind_it(track, meeting, course):
+    # 10 m/s, the line 7 m ahead, hard braking; the other passes behind the line on green
+    v = course((0.0, 10.0), (0.5, 10.0), (1.75, 0.0), (6.0, 0.0))
+    ego = track(x=-18.0, v=v)
+    plain = meeting(ego, track(y=-14.0, h=RIGHT_ANGLE, v=8.0), claims=[-BY_MAP])
+    assert analyse(plain).kind[0, 1] == NEAR_MISS
+    stops = with_line(plain, -4.0, 0.0, 0.0, 0, RED)
+    assert analyse(stops).kind[0, 1] == COURSE
+
+
+# Pedestrians and cyclists.
+
+
+def walks_out(track, meeting, v, walk, **more):
+    """A pedestrian from the right whose centre is on the ego's axis when the ego arrives."""
+    time = 5.0
+    ego = track(x=-2.0 - v * time, v=v, t=8.0)
+    walker = track(y=-walk * time, h=RIGHT_ANGLE, v=walk, t=8.0)
+    return meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=[(4.0, 2.0, 0.0), MAN], **more)
+
+
+def test_a_pedestrian_who_was_in_the_path_for_long_enough(track, meeting):
+    # 1.25 m before the ego's side it is in the path: at 0.4 m/s 3.1 s before it would be hit
+    slow = walks_out(track, meeting, 10.0, 0.4)
+    assert verdict(slow) == (EGO, Rule.COULD_HAVE_STOPPED)
+    # at 3 m/s some 0.75 s before: no time to brake
+    fast = walks_out(track, meeting, 10.0, 3.0)
+    assert verdict(fast) == (BV, Rule.STEPPED_OUT)
+    assert not at_fault(fast)
+
+
+def test_a_crosswalk_obliges_from_where_it_is_entered(track, meeting):
+    walk = np.array([[[0.0, 0.0, 0.0, 2.0, 6.0]]])
+    fast = walks_out(track, meeting, 10.0, 3.0, crosswalks=walk)
+    # it is at the kerb, 7 m beside the axis, 2.3 s before: 23 m; 17 m suffice
+    assert verdict(fast) == (EGO, Rule.CROSSWALK)
+    assert stopping_distance(10.0) < 20.0
+    shift = [50.0, 0.0, 0.0, 0.0, 0.0]
+    elsewhere = walks_out(track, meeting, 10.0, 3.0, crosswalks=walk + shift)
+    assert verdict(elsewhere) == (BV, Rule.STEPPED_OUT)
+    quick = walks_out(track, meeting, 20.0, 3.0, crosswalks=walk)
+    assert stopping_distance(20.0) > 7.0 / 3.0 * 20.0
+    assert verdict(quick) == (NOBODY, Rule.STEPPED_OUT)
+
+
+def test_a_pedestrian_behind_a_parked_van_is_seen_late(track, meeting):
+    time, v, walk = 5.0, 10.0, 0.8
+    ego = track(x=-2.0 - v * time, v=v, t=8.0)
+    walker = track(y=-walk * time, h=RIGHT_ANGLE, v=walk, t=8.0)
+    van = track(x=-6.0, y=-2.2, t=8.0)
+    boxes = [(4.0, 2.0, 0.0), MAN, (9.0, 2.0, 0.0)]
+    rollout = meeting(ego, walker, van, kinds=[CAR, PEDESTRIAN, CAR], boxes=boxes)
+    alone = meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes[:2])
+    assert analyse(rollout).decided[0, 1] > analyse(alone).decided[0, 1]
+    assert verdict(rollout) == (BV, Rule.STEPPED_OUT)
+
+
+def test_a_pedestrian_who_walks_into_the_side(track, meeting):
+    ego = track(x=-20.0, v=10.0)
+    walker = track(y=-3.0, h=RIGHT_ANGLE, v=0.9)
+    rollout = meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=[(4.0, 2.0, 0.0), MAN])
+    assert verdict(rollout) == (BV, Rule.INTO_THE_SIDE)
+    assert not at_fault(rollout)
+
+
+def test_an_ego_that_turns_right_across_a_cyclist_is_responsible(track, meeting, course):
+    # the cyclist rides beside the ego, 0.9 m from its side, and straight on
+    h = course((0.0, 0.0), (2.0, 0.0), (4.5, -RIGHT_ANGLE), (6.0, -RIGHT_ANGLE))
+    ego = track(v=6.0, h=h)
+    box = (1.8, 0.6, 0.0)
+    rollout = meeting(
+        ego, track(x=-1.0, y=-2.2, v=6.0), kinds=[CAR, BICYCLE], boxes=[(4.0, 2.0, 0.0), box],
+        claims=[0],
+    )  # fmt: skip
+    found = analyse(rollout)
+    assert found.type[0, 1] == ConflictType.VRU_INTO_SIDE
+    assert verdict(rollout) == (EGO, Rule.TURNING_GIVES_WAY)
+    swerves = meeting(
+        track(v=6.0), track(x=1.0, y=-2.2, v=6.0, slide=0.5), kinds=[CAR, BICYCLE],
+        boxes=[(4.0, 2.0, 0.0), box], claims=[0],
+    )  # fmt: skip
+    assert verdict(swerves) == (BV, Rule.INTO_THE_SIDE)
+
+
+def test_a_cyclist_with_priority_counts_as_a_vehicle(track, meeting):
+    ego = track(x=-30.0, v=10.0)
+    cyclist = track(y=-15.0, h=RIGHT_ANGLE, v=5.0)
+    boxes = [(4.0, 2.0, 0.0), (1.8, 0.6, 0.0)]
+    rollout = meeting(ego, cyclist, kinds=[CAR, BICYCLE], boxes=boxes, claims=[-BY_SIGNS])
+    assert verdict(rollout) == (EGO, Rule.SIGNS)
+    rollout = meeting(ego, cyclist, kinds=[CAR, BICYCLE], boxes=boxes, claims=[BY_SIGNS])
+    assert verdict(rollout) == (BV, Rule.SIGNS)
+
+
+def test_an_ego_that_turns_waits_for_pedestrians(track, meeting, course):
+    # it turns left at 5 m/s; the pedestrian walks slowly along the road that it came on
+    h = course((0.0, 0.0), (1.0, 0.0), (4.0, RIGHT_ANGLE), (8.0, RIGHT_ANGLE))
+    ego = track(v=5.0, h=h, t=8.0)
+    walker = track(x=ego["x"][100] - 0.4 * 5.0, y=ego["y"][100] + 2.0, v=0.4, t=8.0)
+    more = {"kinds": [CAR, PEDESTRIAN], "boxes": [(4.0, 2.0, 0.0), MAN], "claims": [0]}
+    assert verdict(meeting(ego, walker, **more)) == (EGO, Rule.TURNING_GIVES_WAY)
+    straight = track(x=-25.0, v=5.0, t=8.0)
+    slow = track(y=-2.0, h=RIGHT_ANGLE, v=0.4, t=8.0)
+    assert verdict(meeting(straight, slow, **more)) == (EGO, Rule.COULD_HAVE_STOPPED)
+
+
+def test_offsets_of_another_road_are_no_lane_change(track, meeting, course):
+    # the ego turns left; its offset is told from the road that it comes from
+    h = course((0.0, 0.0), (1.0, 0.0), (4.0, RIGHT_ANGLE), (6.0, RIGHT_ANGLE))
+    ego = track(v=6.0, h=h)
+    ego["offset"] = ego["y"].copy()
+    at = 90
+    box = [(4.0, 2.0, 0.0), MAN]
+    walker = track(x=ego["x"][at] - 2.4, y=ego["y"][at], v=course((0, 0), (4, 0), (4.1, 2), (6, 2)))
+    rollout = meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=box, claims=[0])
+    assert analyse(rollout).type[0, 1] == ConflictType.VRU_INTO_SIDE
+    assert verdict(rollout)[1] != Rule.LEFT_ITS_LANE

@@ -1,0 +1,82 @@
+"""Sentences on conflicts whose numbers are worked by hand."""
+
+import numpy as np
+import pytest
+
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.sentences import sentence
+from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.ego.right_of_way import BY_SIGNS
+
+RIGHT_ANGLE = np.pi / 2
+
+
+def of(rollout):
+    return sentence(analyse(rollout), 0, 1)
+
+
+def test_the_ego_strikes_a_rear(track, meeting, course):
+    lead = track(x=44.0, v=course((0.0, 20.0), (1.0, 20.0), (5.0, 0.0), (6.0, 0.0)))
+    text = of(meeting(track(v=20.0), lead))
+    # 40 m close at 5 m/s² · t²/2 within 4 s; the mean speed of the last step is 19.875 m/s
+    assert text == (
+        "The ego's front struck the rear of 'bv' at 19.9 m/s closing speed; the ego is "
+        "responsible: it did not keep a safe distance to the vehicle ahead (RSS (Shalev-Shwartz et "
+        "al., 2017), definition 1; StVO § 4 (1)); the risk arose 4.0 s before, and a careful "
+        "driver (UN R157, Annex 3) would have avoided it."
+    )
+
+
+def test_a_standing_ego_is_struck(track, meeting):
+    text = of(meeting(track(), track(x=-30.0, v=10.0)))
+    assert text.startswith(
+        "The front of 'bv' struck the rear of the ego, which had stood for 2.6 s, at 10.0 m/s "
+        "closing speed; 'bv' is responsible: it drove into a standing vehicle (StVO"
+    )
+    assert "careful driver" not in text
+
+
+def test_signs_against_the_other(track, meeting):
+    rollout = meeting(
+        track(x=-30.0, v=10.0), track(y=-30.0, h=RIGHT_ANGLE, v=10.0), claims=[BY_SIGNS]
+    )
+    assert "'bv' is responsible: it disregarded signs of priority (Vienna Convention" in of(rollout)
+
+
+def test_a_pedestrian_steps_out(track, meeting):
+    ego, walker = track(x=-52.0, v=10.0, t=8.0), track(y=-15.0, h=RIGHT_ANGLE, v=3.0, t=8.0)
+    boxes = [(4.0, 2.0, 0.0), (0.5, 0.5, 0.0)]
+    text = of(meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes))
+    assert "'bv' is responsible: it came into the path when stopping was no longer" in text
+    assert text.endswith("a careful driver (UN R157, Annex 3) would not have avoided it.")
+
+
+def test_near_miss(track, meeting, course):
+    v = course((0.0, 20.0), (1.0, 20.0), (3.0, 0.0), (6.0, 0.0))
+    assert of(meeting(track(v=v), track(x=48.0))).startswith(
+        "The ego's front came within 1.2 s of the rear of 'bv' at 20.0 m/s closing speed, which "
+        "needed 8.3 m/s² of braking; "
+    )
+
+
+def test_collision_course_and_none(track, meeting, course):
+    v = course((0.0, 20.0), (0.5, 20.0), (5.5, 0.0), (6.0, 0.0))
+    assert of(meeting(track(v=v), track(x=74.0))).startswith(
+        "The ego and 'bv' were on a collision course with "
+    )
+    assert of(meeting(track(v=5.0), track(y=9.0, v=5.0))) == ""
+
+
+def test_who_moves_sideways(track, meeting):
+    ego = track(v=15.0, slide=1.0)
+    ego["offset"] = ego["y"].copy()
+    text = of(meeting(ego, track(y=3.5, v=15.0), claims=[0]))
+    assert "the ego is responsible: it moved sideways into the way of 'bv' (RSS" in text
+    text = of(meeting(track(v=15.0), track(y=3.5, v=15.0, slide=-1.0), claims=[0]))
+    assert "'bv' is responsible: it moved sideways into the way of the ego (RSS" in text
+
+
+@pytest.mark.parametrize(("row", "other"), [(0, 0), (0, 2), (1, 1), (-1, 1)])
+def test_no_such_pair(track, meeting, row, other):
+    with pytest.raises(IndexError, match=r"row must be 0 to 0 and other 1 to 1"):
+        sentence(analyse(meeting(track(), track(x=9.0))), row, other)

@@ -1,0 +1,122 @@
+"""Preventability, held against the Commission's code and against formulas.
+
+The counts are what the code of the European Commission's Joint Research Centre gives (JRC-FSM, its
+"CC human driver" and "FSM", cars of 4.3 m by 1.9 m) on the axes of its own comparison: for each
+pair of speeds all lateral speeds 0, 0.1 … 1.7 m/s and gaps 1, 2 … 59 m (above 60 km/h: 1, 3 … 119),
+constant lateral speed.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridgegen.ego.preventable import (
+    MODELS,
+    avoids_cut_in,
+    avoids_cut_out,
+    avoids_deceleration,
+)
+from bridgegen.errors import InputError, UnknownNameError
+
+BRAKING, JERK = 0.774 * 9.81, 12.65
+
+COUNTS = {  # (ego, other) [km/h]: crashes of un-r157, of fsm
+    (20, 10): (136, 38), (30, 10): (231, 85), (30, 20): (136, 38), (40, 10): (310, 121),
+    (40, 20): (231, 85), (40, 30): (136, 38), (50, 10): (378, 157), (50, 20): (310, 121),
+    (50, 30): (231, 85), (50, 40): (136, 38), (60, 10): (438, 212), (60, 20): (378, 157),
+    (60, 30): (310, 121), (60, 40): (231, 85), (60, 50): (136, 38), (70, 10): (310, 137),
+    (70, 40): (167, 57), (90, 10): (366, 231), (90, 40): (261, 103), (90, 70): (126, 41),
+    (110, 10): (406, 365), (110, 40): (345, 185), (110, 70): (212, 81), (110, 100): (73, 25),
+    (130, 10): (419, 475), (130, 40): (391, 294), (130, 70): (311, 137), (130, 100): (167, 57),
+}  # fmt: skip
+
+
+def crashes(ego: float, other: float, driver: str) -> int:
+    gaps = np.arange(1, 60) if ego <= 60 else np.arange(1, 120, 2)
+    lateral = np.arange(0.0, 1.8, 0.1)
+    found = ~avoids_cut_in(ego / 3.6, other / 3.6, gaps[:, None], lateral, driver=driver)
+    assert found.shape == (len(gaps), 18)
+    return int(found.sum())
+
+
+@pytest.mark.parametrize(("pair", "counts"), COUNTS.items())
+def test_it_counts_the_crashes_that_the_commissions_code_counts(pair, counts):
+    assert tuple(crashes(*pair, driver) for driver in MODELS) == counts
+
+
+def test_a_car_that_cuts_in_at_a_ttc_of_more_than_2_s_is_preventable_by_definition():
+    # The bodies overlap from the start on; 10 m/s faster.
+    gaps = [1.0, 10.0, 19.0, 22.0, 40.0]
+    assert avoids_cut_in(20.0, 10.0, gaps, 1.0, lateral_gap=0.0).tolist() == [
+        False, False, True, True, True,
+    ]  # fmt: skip
+
+
+def stopping_distance(v: float) -> float:
+    """Of the regulation's driver, by hand: 0.75 s at 0.4 m/s², 0.6 s of ramp, then 0.774 g."""
+    after = v - 0.4 * 0.75
+    ramp = (BRAKING - 0.4) / JERK
+    end = after - 0.5 * (0.4 + BRAKING) * ramp
+    return (
+        v * 0.75 - 0.5 * 0.4 * 0.75**2
+        + after * ramp - 0.5 * 0.4 * ramp**2 - JERK * ramp**3 / 6.0
+        + end * end / (2.0 * BRAKING)
+    )  # fmt: skip
+
+
+@given(st.floats(4.0, 40.0))
+def test_a_cut_out_leaves_the_driver_its_stopping_distance(v):
+    at = stopping_distance(v)
+    spare = 0.06 * v  # theirs reacts in whole steps of 0.1 s
+    assert avoids_cut_out(v, 0.0, at + spare)
+    assert not avoids_cut_out(v, 0.0, at - spare)
+
+
+@given(st.floats(4.0, 40.0), st.floats(0.1, 9.5), st.sampled_from(MODELS))
+def test_two_seconds_behind_every_deceleration_is_preventable(v, deceleration, driver):
+    gap = 2.0 * v if driver == "un-r157" else 2.0 * v + 0.75 * v + v * v / 8.0
+    assert avoids_deceleration(v, v, gap, deceleration, driver=driver)
+
+
+@given(
+    st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(0.0, 100.0), st.floats(0.0, 50.0),
+    st.sampled_from(MODELS),
+)  # fmt: skip
+def test_more_room_is_never_worse_where_the_other_is_ahead(v, w, gap, more, driver):
+    assert avoids_cut_out(v, w, gap + more, driver=driver) >= avoids_cut_out(
+        v, w, gap, driver=driver
+    )
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(0.0, 80.0), st.floats(0.0, 2.0)
+        ),
+        min_size=1,
+        max_size=6,
+    ),
+    st.sampled_from(MODELS),
+)
+def test_a_row_depends_on_itself_alone(rows, driver):
+    columns = np.array(rows).T
+    together = avoids_cut_in(*columns, driver=driver)
+    alone = [bool(avoids_cut_in(*row, driver=driver)) for row in rows]
+    assert together.tolist() == alone
+
+
+def test_who_is_not_slower_or_never_comes_in_is_no_collision():
+    assert avoids_cut_in(20.0, 25.0, 5.0, 1.0)
+    assert avoids_cut_in(20.0, 5.0, 5.0, 0.0)
+    for driver in MODELS:
+        assert avoids_cut_out(0.0, 0.0, 1.0, driver=driver)
+
+
+def test_it_refuses_what_is_no_scenario():
+    with pytest.raises(InputError, match="gap must be finite and >= 0, got -1"):
+        avoids_cut_in(20.0, 10.0, [3.0, -1.0], 1.0)
+    with pytest.raises(InputError, match="deceleration must be finite"):
+        avoids_deceleration(20.0, 10.0, 5.0, np.nan)
+    with pytest.raises(UnknownNameError, match="model of a careful driver"):
+        avoids_cut_out(20.0, 10.0, 5.0, driver="reference")

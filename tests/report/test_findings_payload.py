@@ -1,0 +1,318 @@
+"""Conflicts, failure modes and implausible rows, as the page has them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.summary import ConflictSummary
+from bridgegen.objective import Objective
+from bridgegen.report import payload, sentences
+from bridgegen.report.build import rule_in_words
+from bridgegen.report.data import Column
+from bridgegen.report.findings_payload import (
+    TOLD,
+    conflict_payload,
+    findings_payload,
+    implausible_payload,
+    triage_payload,
+)
+from bridgegen.report.playback import Conflict
+from bridgegen.triage.record import (
+    Bound,
+    Estimate,
+    Least,
+    Minimal,
+    Mode,
+    Neighbourhood,
+    Treatment,
+    Triage,
+)
+
+SPACE = Estimate(drawn="fresh", rows=200, harmful=10, share=0.05, low=0.024, high=0.09)
+
+
+def mode(number=1, shown=0, **changes):
+    facts = dict(  # noqa: C408
+        number=number, title="collides with a car at a crossing", conflict="contact",
+        conflict_type="crossing", responsible="ego", rule="signs", cause="planning", tested=True,
+        partner="car", place="in the junction", count=7, space=SPACE, harm=0.7, severity=0.25,
+        worst=shown, shown=shown, robustness=0.75, examples=(shown,), exports=("0001",),
+        minimal=Minimal(
+            name="minimal-01", x=(1.0,), noise_key="7", values={"a": 1.0}, conditions=(),
+            sentence="needs a >= 1 m; all else nominal", rows=32, harmful=20, robustness=0.625,
+            harm=0.6, severity=0.1,
+        ),
+    )  # fmt: skip
+    return Mode(**facts | changes)
+
+
+def treatment(name, cause, gone, low, high):
+    return Treatment(name=name, cause=cause, rows=32, gone=gone, new=0, drop=gone / 32,
+                     low=low, high=high)  # fmt: skip
+
+
+def triage(*modes, evaluations=120, harmful=40):
+    fixes = (
+        treatment("ideal perception", "perception", 1, -0.05, 0.1),
+        treatment("un-r157 drives", "planning", 24, 0.5, 0.9),
+    )
+    near = Neighbourhood(
+        evaluation=modes[0].shown if modes else 0, rows=32, harmful=24, robustness=0.75, low=0.6,
+        high=0.9, cause="planning", fixes=fixes, placebo=treatment("random move", "", 2, -0.1, 0.2),
+    )  # fmt: skip
+    return Triage(
+        scenario="crossroads-s4", ego="route-follower", count="ego", results="0" * 64, seed=0,
+        neighbours=32, radius=0.025, sampled=0,
+        bound=Bound(
+            evaluations=evaluations, failed=0, implausible=0, harmful=harmful, space=SPACE,
+            least=(Least(quantity="d_min", value=1.5, unit="m", evaluation=3),),
+            sentence="At most 2 % of the space is harmful (95 %).",
+        ),
+        modes=modes, neighbourhoods=(near,) if modes else (),
+    )  # fmt: skip
+
+
+def findings(n, **columns):
+    none = Findings.none(n)
+    return replace(none, **{k: np.array(v, dtype=object) for k, v in columns.items()})
+
+
+def test_findings_are_numbers_of_distinct_keys():
+    told = findings(4, conflict=["contact", "", "contact", "contact"], partner=["a", "", "b", "a"])
+    found = findings_payload(told, np.array([True, True, True, True]))
+    assert len(found["keys"]) == 3
+    back = [dict(zip(TOLD, found["keys"][k], strict=True)) for k in found["at"]]
+    assert [one["partner"] for one in back] == ["a", "", "b", "a"]
+    assert findings_payload(told, np.array([False, True, False, True]))["at"] == [0, 1]
+
+
+def test_implausible_rows_are_counted_by_reason():
+    told = findings(5, implausible=["", "overlap", "skid", "overlap", ""])
+    assert implausible_payload(told) == {"count": 3, "reasons": [["overlap", 2], ["skid", 1]]}
+    assert implausible_payload(None) == {"count": 0, "reasons": []}
+
+
+def test_a_mode_has_its_fix_and_its_placebo():
+    (told,) = triage_payload(triage(mode()))["modes"]
+    assert (told["rows"], told["harmful"]) == (32, 24)
+    assert told["fix"] == {"name": "un-r157 drives", "rows": 32, "drop": 0.75, "low": 0.5,
+                           "high": 0.9}  # fmt: skip
+    assert told["placebo"]["drop"] == 2 / 32
+    assert told["minimal"]["sentence"].startswith("needs a")
+    assert not told["knife_edge"]
+
+
+def test_nothing_found_has_its_bound(report):
+    told = triage_payload(triage())
+    assert told["modes"] == []
+    assert told["bound"]["least"][0]["value"] == 1.5
+    e = replace(report.evaluations, critical=np.zeros(120, bool))
+    quiet = replace(report, evaluations=e, triage=triage(harmful=0),
+                    summary=replace(report.summary, n_critical=0))  # fmt: skip
+    assert sentences.sentences(quiet)[-1] == "At most 2 % of the space is harmful (95 %)."
+
+
+@pytest.fixture
+def harmful(report):
+    """The report with harm: near misses first by F, contacts by harm."""
+    n = 120
+    conflict = ["contact" if k % 2 else "near miss" for k in range(n)]
+    harm = np.where(np.arange(n) % 2 == 1, 0.6 + np.arange(n) / 1000, 0.3 + np.arange(n) / 1000)
+    severity = np.where(np.arange(n) % 2 == 1, 0.25, 0.0)
+    e = replace(
+        report.evaluations, critical=np.arange(n) < 40,
+        metrics=(*report.evaluations.metrics, Column("harm", "1", harm),
+                 Column("severity", "1", severity)),
+        findings=findings(n, conflict=conflict, conflict_type=["crossing"] * n,
+                          responsible=["ego"] * n, rule=["signs"] * n, partner=["bv"] * n),
+    )  # fmt: skip
+    s = replace(report.summary, harm="harm", n_critical=40, critical_distance=None)
+    return replace(report, evaluations=e, summary=s, triage=triage(mode(shown=1)))
+
+
+def test_no_near_miss_ranks_above_a_contact(harmful):
+    told = payload.payload(harmful)["rows"]
+    rank = np.array(told["rank"])
+    conflict = [told["findings"]["keys"][k][0] for k in told["findings"]["at"]]
+    contacts = [r for r, kind in zip(rank, conflict, strict=True) if r and kind == "contact"]
+    near = [r for r, kind in zip(rank, conflict, strict=True) if r and kind == "near miss"]
+    assert sorted(contacts) == list(range(1, 21))
+    assert sorted(near) == list(range(21, 41))
+
+
+def test_by_thresholds_the_paper_s_rank_stays(harmful, report):
+    papers = replace(harmful, summary=replace(harmful.summary, harm=""))
+    F = report.evaluations.objectives[0].values
+    rank = np.array(payload.payload(papers)["rows"]["rank"])
+    order = np.argsort(F[:40], kind="stable")
+    assert (rank[:40][order] == np.arange(1, 41)).all()
+
+
+def test_the_text_names_modes_collisions_and_severity(harmful):
+    said = " ".join(sentences.sentences(harmful))
+    assert (
+        "One way in which route-follower comes to harm: collides with a car at a crossing (7)"
+        in said
+    )
+    assert "20 collisions, the most severe with a probability of 25.0\u202f% of a MAIS3+" in said
+    table = dict(sentences.summary_table(harmful))
+    assert table["Critical: collisions"] == "20"
+    assert table["Critical: near misses"] == "20"
+    assert not any("d_min" in name for name in table)
+
+
+def test_what_could_not_happen_is_said(harmful):
+    told = replace(harmful.evaluations.findings,
+                   implausible=np.array(["overlap"] * 12 + [""] * 108, dtype=object))  # fmt: skip
+    data = replace(harmful, evaluations=replace(harmful.evaluations, findings=told))
+    assert any(one.startswith("12 scenarios (10.0") for one in sentences.sentences(data))
+    assert payload.payload(data)["implausible"] == {"count": 12, "reasons": [["overlap", 12]]}
+
+
+def test_findings_are_as_many_as_rows(report):
+    with pytest.raises(ValueError, match="findings must be those of 120 rows, got 3"):
+        replace(report.evaluations, findings=Findings.none(3))
+
+
+def conflict(**changes):
+    facts = dict(  # noqa: C408
+        conflict="contact", sentence="A collision with bv.", partner="bv", type="crossing",
+        type_source="NHTSA", responsible="ego", rule="signs", rule_says="signs give priority",
+        rule_source="StVO § 8", zone_ego="front", zone_other="left side", preventable=True,
+        time=4.0, decided=2.5, left=1.5, ttc=0.0, needed_deceleration=float("inf"),
+        closing_normal=8.0, closing_tangential=1.0, v_ego=8.0, v_other=3.0, stood_ego=0.0,
+        stood_other=0.0, overlap=0.5, delta_v_ego=4.0, delta_v_other=4.0, severity=0.12, harm=0.65,
+    )  # fmt: skip
+    return Conflict(ConflictSummary(**facts | changes), 1, 80, 50, (1, 3))
+
+
+def test_a_scenario_s_conflict_has_its_instants_and_zones():
+    told = conflict_payload(conflict())
+    assert (told["instant"], told["decided"], told["zones"]) == (80, 50, [1, 3])
+    assert told["numbers"]["severity"] == [0.12, "1"]
+    assert told["numbers"]["needed_deceleration"] == [None, "m/s²"]
+    assert told["rule_source"] == "StVO § 8"
+
+
+def test_what_is_critical_in_words():
+    paper = Objective(("d_min",), (1.0,))
+    assert "d_min below 2 m" in rule_in_words(paper)
+    harm = Objective(("harm",), (1.0,), rule="harm")
+    assert "d_min" not in rule_in_words(harm)
+    assert "responsible" in rule_in_words(harm)
+    everybody = Objective(("harm_any",), (1.0,), rule="harm", count="any")
+    assert "whoever is responsible" in rule_in_words(everybody)
+
+
+# -- in a browser ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def page(browser, harmful, tmp_path):
+    from bridgegen.report.page import write_report
+
+    kept = tuple(replace(one, evaluation=k, conflict=conflict()) for k, one in
+                 enumerate(harmful.kept))  # fmt: skip
+    simplest = replace(kept[1], name="minimal-01")
+    found = triage(mode(shown=1), mode(number=2, shown=0, rule="red light"))
+    data = replace(harmful, kept=kept, minimal=(simplest,), triage=found)
+    write_report(tmp_path / "report.html", data)
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((tmp_path / "report.html").as_uri())
+    yield page
+    page.close()
+    assert errors == []
+
+
+@pytest.mark.browser
+def test_the_page_leads_with_the_failure_modes(page):
+    first = page.locator("main > section:visible").first
+    assert first.get_attribute("id") == "modes"
+    assert (
+        page.locator("#modes-title").inner_text() == "2 ways in which route-follower comes to harm"
+    )
+    card = page.locator(".mode").first.inner_text()
+    for words in ("7 scenarios", "25\u202f% worst severity", "24 of 32 neighbours harmful",
+                  "5.0\u202f% of the space", "If un-r157 drives, the harmful share",
+                  "drops by 75 percentage points",
+                  "Simplest form: needs a ≥ 1 m"):  # fmt: skip
+        assert words in card
+
+
+@pytest.mark.browser
+def test_a_mode_plays_its_worst_scenario_and_its_simplest_form(page):
+    page.locator(".mode").first.get_by_role("button", name="Play 0002, mode 1").click()
+    page.wait_for_function("document.getElementById('scene-name').textContent === '0002'")
+    page.locator(".mode").first.get_by_role("button", name="Play the simplest form").click()
+    page.wait_for_function("document.getElementById('scene-name').textContent === 'minimal-01'")
+    assert "simplest form" in page.locator("#measures h3").first.inner_text()
+
+
+@pytest.mark.browser
+def test_its_scenarios_narrows_the_table_and_lifts_again(page):
+    note = page.locator("#list-note")
+    assert note.inner_text() == "40 critical scenarios"
+    button = page.locator(".mode").first.get_by_role("button", name="Its scenarios")
+    button.click()
+    assert note.inner_text() == "20 of 40 critical scenarios"
+    assert button.get_attribute("aria-pressed") == "true"
+    button.click()
+    assert note.inner_text() == "40 critical scenarios"
+
+
+@pytest.mark.browser
+def test_the_playback_shows_sentence_and_instants(page):
+    page.evaluate("window.bridgegen.select(0)")
+    assert page.locator("#conflict").inner_text() == "A collision with bv."
+    titles = page.locator("#ticks i").evaluate_all("all => all.map((one) => one.title)")
+    assert titles == ["decided at 2.50 s", "contact at 4.00 s"]
+    assert page.evaluate("window.bridgegen.state().index") == 80
+    page.locator("#scene").focus()
+    page.keyboard.press("t")
+    assert page.evaluate("window.bridgegen.state().index") == 50
+    assert page.locator("#flag").inner_text() == "decided here"
+
+
+@pytest.mark.browser
+def test_the_table_has_the_conflict_s_columns(page):
+    heads = page.locator("#list-head th").evaluate_all("all => all.map((one) => one.dataset.by)")
+    assert heads[:7] == ["rank", "conflict", "type", "responsible", "partner", "severity", "harm"]
+    page.locator("#list-head th[data-by=severity] button").click()
+    page.locator("#list-head th[data-by=severity] button").click()
+    page.evaluate("document.getElementById('list-scroll').scrollTop = 0")
+    page.wait_for_function(
+        "document.querySelector('#list-body tr[data-i]').textContent.includes('contact')"
+    )
+    first = page.locator("#list-body tr[data-i]").first.inner_text()
+    assert "25\u202f%" in first
+    page.locator("#list-head th[data-by=conflict] button").click()
+    page.locator("#list-head th[data-by=conflict] button").click()
+    page.evaluate("document.getElementById('list-scroll').scrollTop = 0")
+    page.wait_for_function(
+        "document.querySelector('#list-body tr[data-i]').textContent.includes('near miss')"
+    )
+
+
+@pytest.mark.browser
+def test_where_nothing_was_found_the_nearest_scenario_can_be_played(browser, report, tmp_path):
+    from bridgegen.report.page import write_report
+
+    near = replace(report.kept[0], name="evaluation 4", evaluation=3, files=(), critical=False)
+    e = replace(report.evaluations, critical=np.zeros(120, bool))
+    quiet = replace(
+        report, evaluations=e, kept=(), more=(near,), triage=triage(harmful=0),
+        summary=replace(report.summary, n_critical=0),
+    )  # fmt: skip
+    write_report(tmp_path / "quiet.html", quiet)
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto((tmp_path / "quiet.html").as_uri())
+    assert page.locator("#modes-title").inner_text() == "No failure found"
+    assert "At most 2 % of the space" in page.locator("#modes-lead").inner_text()
+    page.locator("#modes-nearest").click()
+    page.wait_for_function("document.getElementById('scene-name').textContent === 'evaluation 4'")
+    assert page.locator("#list").is_hidden()
+    page.close()

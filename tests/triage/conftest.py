@@ -1,0 +1,113 @@
+"""A stand-in for a pipeline: what is harmful is a formula of the row and of the fix."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bridgegen.cause import Cause
+from bridgegen.conflict.findings import Findings
+from bridgegen.evaluation import Trials
+from bridgegen.odd.parameters import Axis
+from bridgegen.odd.reader import load
+from bridgegen.odd.space import SearchSpace
+
+METRICS = ("harm", "severity", "course_ttc", "course_braking")
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    id: np.ndarray
+    U: np.ndarray
+    X: np.ndarray
+    metrics: np.ndarray
+    status: np.ndarray
+    critical: np.ndarray
+    cause: np.ndarray
+    findings: Findings
+
+    def digest(self):
+        return "the rows"
+
+    def take(self, at):
+        return Rows(*(getattr(self, n)[at] for n in tuple(self.__dict__)[:-1]),
+                    self.findings.take(at))  # fmt: skip
+
+
+def fix(cause, name, dry=False):
+    return SimpleNamespace(cause=cause, driver=SimpleNamespace(name=name), dry=dry)
+
+
+class World:
+    """A pipeline whose harm is ``harm(values, fix)`` of the rows; ``label`` names their rule."""
+
+    cause, seeks_causes, tries, metrics = None, True, True, METRICS
+
+    def __init__(self, space, harm, fixes=(), label=None, fails=None):
+        self.space, self._harm, self.fixes, self._label = space, harm, tuple(fixes), label
+        self._fails, self.kinds = fails, {"ego": "car", "bv": "truck"}
+        self.scenario = SimpleNamespace(name="planted")
+        self.driver = SimpleNamespace(label="driver")
+        self.objective = SimpleNamespace(harm="harm", count="ego", rule="harm")
+        self.asked = []
+
+    def values(self, X):
+        return {name: X[:, k] for k, name in enumerate(self.space.names)}
+
+    def try_all(self, X, fix=None, noise=None):
+        n = len(X)
+        fix = np.full(n, -1) if fix is None else fix
+        self.asked.append((X, fix, noise))
+        v = self.values(X)
+        ok = np.ones(n, bool) if self._fails is None else ~self._fails(v)
+        harm = np.where(ok, self._harm(v, fix), 0.0)
+        rule = np.full(n, "rear distance", object)
+        if self._label is not None:
+            rule = np.asarray(self._label(v), object)
+        texts = [np.full(n, one, object) for one in
+                 ("contact", "front-to-rear striking", "ego", "bv", "")]  # fmt: skip
+        findings = Findings(*texts[:3], rule, *texts[3:])
+        return Trials(harm, 0.1 * harm, ok, findings, np.full(n, "", object))
+
+    def noise_keys(self, X):
+        return (1e6 * np.abs(X).sum(axis=1)).astype(np.uint64)
+
+    def facts(self, x):
+        return self.space.values(x)
+
+    def rows(self, n, seed=0, U=None):
+        if U is None:
+            U = np.random.default_rng(seed).random((n, self.space.n_var))
+        X = self.space.decode(U)
+        came = self.try_all(X)
+        metrics = np.stack([came.harm, came.severity, 4.0 - came.harm, came.harm], axis=1)
+        cause = np.where(came.harmful, Cause.PLANNING, Cause.NONE).astype(np.int8)
+        return Rows(np.arange(n), U, X, metrics, (~came.ok).astype(int), came.harmful, cause,
+                    came.findings)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def space() -> SearchSpace:
+    return load("crossroads-s4").space(("participants",))
+
+
+@pytest.fixture(scope="session")
+def every() -> SearchSpace:
+    """With whole numbers, and parameters that limit each other."""
+    return load("crossroads-s4").space(tuple(Axis))
+
+
+@pytest.fixture(scope="session")
+def world():
+    return World
+
+
+@pytest.fixture(scope="session")
+def fixed():
+    """The fixes by which causes are sought, as a driver with perception has them."""
+    return (
+        fix(Cause.PERCEPTION, "driver"),
+        fix(Cause.PLANNING, "un-r157"),
+        fix(Cause.CONTROL, "driver", dry=True),
+    )

@@ -1,0 +1,235 @@
+"""The triage of real runs: what is recorded, exported, shown and judged."""
+
+import json
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.restored import pipeline_of
+from bridgegen.campaign.settings import Settings
+from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.store import Store
+from bridgegen.triage import JSON_FILE
+from bridgegen.triage.minimal import Ladder
+from bridgegen.triage.modes import keys_of
+from bridgegen.triage.moves import nearest
+from bridgegen.verdict.of_run import figures_of
+
+GIVEN = {
+    "algorithm": "random", "budget": 150, "seed": 0, "ego": "route-follower", "keep": 4,
+    "objective": {"harm": None},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    place = tmp_path_factory.mktemp("runs") / "s3"
+    return bg.run_search("crossroads-s3", **GIVEN, workers=2, out=place)
+
+
+@pytest.fixture(scope="module")
+def pipeline(run):
+    with Store.open(run.folder) as store:
+        settings = Settings.from_dict(store.settings, run.folder)
+        return pipeline_of(settings, store.metrics, run.folder)
+
+
+def facts(path):
+    return json.loads(path.with_suffix(".json").read_text("utf-8"))
+
+
+def test_all_harmful_rows_are_in_a_mode(run):
+    frame = run.frame()
+    harmful = frame["harm"] >= NEAR_MISS
+    assert 20 < harmful.sum() < 140
+    assert sum(one.count for one in run.modes) == run.triage.bound.harmful == harmful.sum()
+    for one in run.modes:
+        worst = frame.loc[one.worst]
+        assert worst["harm"] == one.harm
+        for name in ("conflict", "conflict_type", "responsible", "rule"):
+            assert (frame.loc[list(one.examples), name] == getattr(one, name)).all()
+        assert one.place == "in the junction"
+        assert one.partner == "car"
+
+
+def test_one_seed_gives_one_record_whoever_simulates(run, tmp_path):
+    again = bg.run_search("crossroads-s3", **GIVEN, workers=1, out=tmp_path / "again")
+    mine, theirs = ((one.folder / JSON_FILE).read_bytes() for one in (again, run))
+    assert mine == theirs
+    for path in (*run.scenarios, *run.minimal_scenarios):
+        assert (again.folder / "critical" / path.name).read_bytes() == path.read_bytes()
+
+
+def test_resume_makes_it_again(run):
+    path = run.folder / JSON_FILE
+    before = path.read_bytes()
+    path.write_bytes(b"damaged")
+    assert bg.resume(run.folder, workers=2).triage == run.triage
+    assert path.read_bytes() == before
+
+
+def test_the_worst_of_each_mode_is_exported_first(run):
+    found = [facts(path) for path in run.scenarios]
+    assert len(found) == 4
+    robust = [one["robustness"] >= 0.5 for one in found]
+    assert robust == sorted(robust, reverse=True)
+    shown = {one.shown for one in run.modes}
+    assert found[0]["evaluation"] == run.modes[0].shown
+    assert {one["evaluation"] for one in found[: len(shown)]} <= shown or len(shown) < 4
+    for one in found:
+        near = run.triage.neighbourhood(one["evaluation"])
+        assert one["robustness"] == near.robustness
+        assert near.rows == 32
+        assert one["cause"] == near.cause
+        mode = run.modes[one["mode"] - 1]
+        assert one["name"] in mode.exports
+
+
+def test_minimal_scenarios_come_to_the_harm_of_their_mode(run, pipeline):
+    assert run.minimal_scenarios
+    by_name = {one.minimal.name: one for one in run.modes if one.minimal}
+    for path in run.minimal_scenarios:
+        mode = by_name[path.stem]
+        result = bg.simulate_file(path)
+        told = facts(path)
+        assert result.metrics["n_collision"] == told["metrics"]["n_collision"]["value"]
+        assert told["sentence"] == mode.minimal.sentence
+        assert told["metrics"]["harm"]["value"] == mode.minimal.harm >= NEAR_MISS
+        X = np.array([mode.minimal.x])
+        assert not pipeline.space.violations(X)
+        with Store.open(run.folder) as store:
+            base = store.read(mode.shown, mode.shown + 1).X
+        came = pipeline.try_all(X, noise=base)
+        (key,) = keys_of(came.findings, pipeline.kinds, came.place.tolist(), [""])
+        names = ("conflict", "conflict_type", "responsible", "rule", "partner", "place")
+        assert key[:6] == tuple(getattr(mode, name) for name in names)
+        for kind in ("owl", "xodr", "json"):
+            assert path.with_suffix(f".{kind}").is_file()
+
+
+def test_one_more_step_towards_nominal_removes_the_harm(run, pipeline):
+    space, tried = pipeline.space, 0
+    for mode in run.modes:
+        for one in mode.minimal.conditions if mode.minimal else ():
+            k = space.variables.index(one.name)
+            ladder = Ladder.of(space, np.array(mode.minimal.x))
+            wish = np.tile(ladder.start, (2, 1))
+            way = np.sign(one.nominal - one.value)
+            wish[:, k] = one.limit, one.limit + way * one.step
+            came = pipeline.try_all(nearest(space, wish))
+            keys = keys_of(came.findings, pipeline.kinds, came.place.tolist(), [""] * 2)
+            names = ("conflict", "conflict_type", "responsible", "rule", "partner", "place")
+            own = tuple(getattr(mode, name) for name in names)
+            same = [bool(h) and key[:6] == own for h, key in zip(came.harmful, keys, strict=True)]
+            assert same == [True, False], one
+            tried += 1
+    assert tried
+
+
+def test_rows_are_driven_again_as_they_were(run, pipeline):
+    with Store.open(run.folder) as store:
+        rows = store.read()
+        harm = rows.metrics[:, store.metrics.index("harm")]
+    came = pipeline.try_all(rows.X)
+    assert (came.harm == harm).all()
+    assert (pipeline.try_all(rows.X, noise=rows.X).harm == harm).all()
+    assert (came.findings.rule == rows.findings.rule).all()
+
+
+def test_the_summary_leads_with_the_modes(run, capsys):
+    from bridgegen.screen.search import print_summary
+
+    print_summary(run, 1.0)
+    out = capsys.readouterr().out
+    first, second, *_ = out.splitlines()
+    assert first.startswith(f"route-follower comes to harm in {len(run.modes)} ways: ")
+    assert second.startswith(f"{run.modes[0].count:>5} × {run.modes[0].title}; MAIS3+ ")
+    assert "quick causes" in out
+    assert "simplest: " in out
+
+
+def test_figures_of_the_triage_are_judged(run, tmp_path, cli):
+    figures = figures_of(run)
+    assert figures["modes"] == len(run.modes)
+    assert figures["robust"] == run.triage.robust
+    assert figures["worst_severity"] == max(one.severity for one in run.modes)
+    assert figures["harmful.upper"] == run.triage.bound.space.high
+    junit = tmp_path / "junit.xml"
+    code, _, _ = cli("resume", run.folder, "--fail-if", "harmful.upper > 0.99", "--junit", junit)
+    assert code == 0
+    assert run.triage.bound.sentence in junit.read_text("utf-8")
+    assert cli("resume", run.folder, "--fail-if", "modes > 0")[0] == 3
+
+
+def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, capsys):
+    from bridgegen.screen.search import print_summary
+
+    run = bg.run_search(
+        "crossroads-s1", ego="reference", objective={"harm": None}, algorithm="random", budget=60,
+        out=tmp_path / "run",
+    )  # fmt: skip
+    assert run.modes == ()
+    assert run.scenarios == run.minimal_scenarios == ()
+    assert run.triage.bound.space.high == pytest.approx(1.0 - 0.025 ** (1 / 60))
+    print_summary(run, 1.0)
+    assert capsys.readouterr().out.startswith("No failure found in 60 evaluations: least margin ")
+    assert figures_of(run)["modes"] == 0
+
+
+def test_with_the_paper_s_rule_its_scenarios_are_kept_behind_the_failures(tmp_path, capsys):
+    from bridgegen.screen.search import print_summary
+
+    run = bg.run_search(
+        "crossroads-s3", ego="route-follower", algorithm="random", budget=100, keep=8,
+        out=tmp_path / "run",
+    )  # fmt: skip
+    frame, found = run.frame(), [facts(path) for path in run.scenarios]
+    assert len(found) == 8
+    assert all(one["critical"] for one in found)
+    assert run.settings.objective["rule"] == "thresholds"
+    harmful = [bool(frame.loc[one["evaluation"], "harm"] >= NEAR_MISS) for one in found]
+    assert harmful == sorted(harmful, reverse=True)
+    shown = {one.shown for one in run.modes if frame.loc[one.shown, "critical"]}
+    assert shown <= {one["evaluation"] for one in found}
+    print_summary(run, 1.0)
+    out = capsys.readouterr().out
+    assert out.startswith("scenario")
+    assert run.triage.bound.sentence in out
+
+
+def test_neighbours_of_a_noisy_driver_have_its_random_numbers():
+    from bridgegen.odd.reader import load
+    from bridgegen.pipeline import Pipeline
+
+    scenario = load("crossroads-s4")
+    space = scenario.space()
+    pipeline = Pipeline(scenario, space, ego="reference")
+    X = space.decode(np.random.default_rng(0).random((2, space.n_var)))
+    one, other = ({n: X[[k], i] for i, n in enumerate(space.names)} for k in (0, 1))
+    simulator, roads = pipeline.simulator.embedded, pipeline._roads
+    rows = np.zeros(1, np.int64)
+
+    def keys(values, noise=None):
+        given = None if noise is None else simulator.noise_keys(noise, 1)
+        batch = simulator.batch(roads, rows, values, noise=given)
+        return batch.state.key.tolist()
+
+    assert keys(one) != keys(other)
+    assert keys(other, noise=one) == keys(one)
+
+
+def test_a_minimal_file_of_a_noisy_driver_gives_the_recorded_metrics_to_the_last_bit(tmp_path):
+    """Its storyboard states the key of the random numbers that it was found with."""
+    run = bg.run_search(
+        "crossroads-s3", ego="reference", objective={"harm": None}, budget=200, keep=1,
+        out=tmp_path / "run",
+    )  # fmt: skip
+    assert run.minimal_scenarios
+    for path in run.minimal_scenarios:
+        told, result = facts(path), bg.simulate_file(path)
+        assert told["noise_key"] in path.read_text("utf-8")
+        both = {*told["metrics"]} & {*result.metrics}
+        assert {"d_min", "v_d", "n_collision"} <= both
+        for name in both:
+            assert told["metrics"][name]["value"] in (result.metrics[name], None)

@@ -1,0 +1,157 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridgegen.triage.triage import FRESH, SAMPLED, triage
+from bridgegen.triage.words import headline, mode_in_words
+
+
+def two_ways(v, fix):
+    """The faster the worse; slow ones fail late and by a hair, whatever is put right."""
+    fast = np.where((v["ego_speed"] >= 7.9) & (fix != 1), 0.6 + 0.04 * v["ego_speed"], 0.0)
+    comb = np.abs(np.mod(v["ego_speed"], 0.4) - 0.2) <= 0.02
+    return np.where((v["ego_speed"] < 7.0) & comb, 0.99, fast)
+
+
+def label(v):
+    return np.where(v["ego_speed"] >= 7.0, "rear distance", "cut in")
+
+
+@pytest.fixture(scope="module")
+def made(space, world, fixed):
+    pipeline = world(space, two_ways, fixed, label=label)
+    rows = pipeline.rows(600)
+    return pipeline, rows, triage(pipeline, rows, algorithm="random", seed=0, keep=6)
+
+
+def test_robust_modes_come_before_those_on_a_knife_s_edge(made):
+    """The knife-edge mode has the worse harm, and ranks behind all the same."""
+    _, rows, (found) = made
+    robust, edge = found.record.modes
+    assert (robust.rule, robust.cause, robust.tested) == ("rear distance", "planning", True)
+    assert robust.robustness >= 0.5
+    assert (edge.rule, edge.cause) == ("cut in", "sensitive")
+    assert edge.knife_edge
+    assert edge.harm > robust.harm
+    assert found.record.robust == 1
+    assert robust.count + edge.count == rows.critical.sum()
+    assert "knife-edge" in mode_in_words(edge, found.record)
+    assert "planning: −100 if un-r157 drives" in mode_in_words(robust, found.record)
+
+
+def test_each_mode_is_exported_robust_rows_first(made):
+    _, rows, found = made
+    modes = {i: one.number for one in found.record.modes for i in one.examples}
+    robust, edge = found.record.modes
+    assert len(found.exports) == len(set(found.exports)) == 6
+    assert found.exports[0] == robust.shown
+    assert robust.exports[0] == "0001"
+    edges = [found.record.neighbourhood(i).knife_edge for i in found.exports]
+    assert edges == sorted(edges)
+    assert edge.shown in found.exports
+    assert {modes.get(i, 1) for i in found.exports} == {1, 2}
+    assert rows.critical[list(found.exports)].all()
+
+
+def test_a_stated_sample_of_the_others_is_tested_too(made):
+    _, _, found = made
+    sampled = [one.evaluation for one in found.record.neighbourhoods if one.sampled]
+    assert len(sampled) == found.record.sampled == SAMPLED
+    assert not {*sampled} & {*found.exports}
+    assert all(one.fixes for one in found.record.neighbourhoods)
+
+
+def test_shares_of_random_rows_are_the_run_s(made):
+    _, rows, found = made
+    space = found.record.bound.space
+    assert (space.drawn, space.rows, space.harmful) == ("random", 600, rows.critical.sum())
+    assert sum(one.space.harmful for one in found.record.modes) == space.harmful
+    # By hand: 1.0 of 4 m/s is fast, and a tenth of 2.1 m/s is on the comb's teeth.
+    assert space.low < 0.25 + 0.0525 < space.high
+    assert headline(found.record).startswith("driver comes to harm in 2 ways: ")
+
+
+def test_an_optimiser_s_rows_tell_no_share_fresh_ones_do(made):
+    pipeline, rows, _ = made
+    found = triage(pipeline, rows, algorithm="pso", seed=0, keep=6).record
+    assert (found.bound.space.drawn, found.bound.space.rows) == ("fresh", FRESH)
+    assert 0.15 < found.bound.space.share < 0.45
+    assert sum(one.space.harmful for one in found.modes) == found.bound.space.harmful
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_it_depends_on_rows_and_seed_alone(made, seed):
+    pipeline, rows, found = made
+    again = triage(pipeline, rows, algorithm="random", seed=seed, keep=6)
+    assert (again.record == found.record) == (seed == 0)
+    assert again.record.modes[0].count == found.record.modes[0].count
+
+
+def test_modes_do_not_depend_on_the_order_of_rows(made):
+    pipeline, rows, found = made
+    order = np.random.default_rng(5).permutation(len(rows.id))
+    mixed = triage(pipeline, rows.take(order), algorithm="random", seed=0, keep=6)
+    assert mixed.record == found.record
+    assert order[list(mixed.exports)].tolist() == list(found.exports)
+
+
+def test_a_driver_without_failures_exports_nothing_and_has_a_bound(space, world, fixed):
+    pipeline = world(space, lambda v, fix: 0.25 * v["ego_speed"] / 8.9, fixed)
+    rows = pipeline.rows(200)
+    found = triage(pipeline, rows, algorithm="sobol", seed=0, keep=10)
+    assert found.exports == ()
+    assert found.record.modes == ()
+    assert found.record.neighbourhoods == ()
+    assert found.record.bound.space.high == pytest.approx(1.0 - 0.025 ** (1 / 200))
+    assert found.record.bound.least[0].evaluation == int(np.argmax(rows.metrics[:, 0]))
+    assert headline(found.record).startswith("No failure found in 200 evaluations: least margin")
+
+
+def test_implausible_and_failed_rows_are_no_failures(made):
+    pipeline, rows, found = made
+    findings = replace(rows.findings, implausible=np.full(600, "others collide", object))
+    none = triage(pipeline, replace(rows, findings=findings), algorithm="pso", seed=0, keep=5)
+    assert none.exports == ()
+    assert none.record.bound.implausible == 600
+    status = np.where(np.arange(600) == found.exports[0], 20, 0)
+    fewer = triage(pipeline, replace(rows, status=status), algorithm="random", seed=0, keep=6)
+    assert found.exports[0] not in fewer.exports
+    assert fewer.record.bound.failed == 1
+
+
+def test_in_another_simulator_modes_are_found_and_nothing_is_tested(made, monkeypatch):
+    pipeline, rows, _ = made
+    monkeypatch.setattr(pipeline, "tries", False, raising=False)
+    monkeypatch.setattr(pipeline, "try_all", None)
+    found = triage(pipeline, rows, algorithm="pso", seed=0, keep=6)
+    assert [one.rule for one in found.record.modes] == ["cut in", "rear distance"]
+    assert [one.robustness for one in found.record.modes] == [None, None]
+    assert found.record.neighbours == 0
+    assert "embedded" in found.record.untested
+    assert found.record.bound.space.share is None
+    assert len(found.exports) == 6
+
+
+def test_without_causes_robustness_is_known_all_the_same(made, monkeypatch):
+    pipeline, rows, _ = made
+    monkeypatch.setattr(pipeline, "seeks_causes", False, raising=False)
+    found = triage(pipeline, rows, algorithm="random", seed=0, keep=3).record
+    assert not any(one.tested for one in found.modes)
+    assert all(one.robustness is not None for one in found.modes)
+    assert all(not one.fixes for one in found.neighbourhoods)
+
+
+def test_many_harmful_rows_are_placed_by_the_nearest(made, monkeypatch):
+    pipeline, rows, found = made
+    monkeypatch.setattr("bridgegen.triage.triage.MOST_PLACED", 10)
+    few = triage(pipeline, rows, algorithm="random", seed=0, keep=6)
+    assert few.record == found.record  # there is one place
+
+
+def test_no_room_to_export_still_shows_the_modes(made):
+    pipeline, rows, found = made
+    none = triage(pipeline, rows, algorithm="random", seed=0, keep=0)
+    assert none.exports == ()
+    assert [one.title for one in none.record.modes] == [one.title for one in found.record.modes]
+    assert all(one.tested for one in none.record.modes)
