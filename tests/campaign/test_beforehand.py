@@ -78,10 +78,10 @@ def test_an_adversary_s_scenario_is_tried_too(tmp_path):
 def test_what_cannot_be_exported_is_left_out_and_named(tmp_path, monkeypatch, capsys):
     write = handover.write_scenario
 
-    def refuse(pipeline, x, folder, name, cause):
+    def refuse(pipeline, x, folder, name, *cause, **given):
         if name == "0002":
             raise OntologyError(f"{name}.owl: no such lane", f"{name}.owl: nor road")
-        return write(pipeline, x, folder, name, cause)
+        return write(pipeline, x, folder, name, *cause, **given)
 
     monkeypatch.setattr(handover, "write_scenario", refuse)
     run = bg.run_search("crossroads-s3", budget=60, keep=3, out=tmp_path / "run")

@@ -130,7 +130,9 @@ def test_one_more_step_towards_nominal_removes_the_harm(run, pipeline):
 def test_rows_are_driven_again_as_they_were(run, pipeline):
     with Store.open(run.folder) as store:
         rows = store.read()
-        harm = rows.metrics[:, store.metrics.index("harm")]
+        could_happen = rows.findings.implausible == ""
+        harm = np.where(could_happen, rows.metrics[:, store.metrics.index("harm")], 0.0)
+    assert could_happen.any()
     came = pipeline.try_all(rows.X)
     assert (came.harm == harm).all()
     assert (pipeline.try_all(rows.X, noise=rows.X).harm == harm).all()

@@ -46,8 +46,8 @@ TEXT = scenario(
 )
 
 
-def made(library, steps=1, seconds=30.0, others=None):
-    storyboard = read(TEXT.encode(), "test.xosc")
+def made(library, steps=1, seconds=30.0, others=None, text=TEXT):
+    storyboard = read(text.encode(), "test.xosc")
     embedded = EmbeddedSimulator(
         storyboard, "test.xosc", driver=DRIVERS["route-follower"], others=others
     )
@@ -85,12 +85,14 @@ def test_what_it_plays_is_what_is_recorded(library, steps):
 
 def test_an_attentive_participant_is_driven_as_the_ego_is(library):
     """The stand-in moves it as its script says; what is recorded is what our driver does."""
-    simulator = made(library, others="attentive")
+    text = TEXT.replace("${$v / 2}", "${1.2 * $v}").replace('value="60.0"', 'value="200.0"')
+    simulator = made(library, others="attentive", text=text)
     roads = simulator.roads([crossroads()])
     rows, values = np.zeros(2, dtype=np.int64), {"v": [8.0, 11.0]}
     found = simulator.run(roads, rows, values)
     expected = simulator.embedded.run(roads.network, rows, values)
-    scripted = made(library, others="scripted").embedded.run(roads.network, rows, values)
+    scripted = made(library, others="scripted", text=text)
+    scripted = scripted.embedded.run(roads.network, rows, values)
     assert found.status.tolist() == [0, 0], found.messages
     for name in ("x", "y", "h", "v", "began", "n_steps"):
         assert np.array_equal(getattr(found, name), getattr(expected, name)), name
