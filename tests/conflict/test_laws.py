@@ -54,6 +54,7 @@ def drive_around(seed, n=6, e=4, t=90):
             [rng.uniform(-9, 9, (n, 1, 2)), rng.uniform(-3, 3, (n, 1, 1)), np.full((n, 1, 2), 3.0)],
             axis=2,
         ),
+        friction=rng.uniform(1, 9, n),
         present=rng.random((n, e, 1)) < 0.9 + np.zeros((n, e, t)),
     )
 
@@ -153,6 +154,7 @@ def test_a_rows_result_depends_on_that_row_alone(seed):
     whole = analyse(rollout)
     for i in (0, 3):
         names = (*STATES, "n_steps", "status", "lights", "stop_lines", "claims", "crosswalks",
+                 "friction",
                  "present")  # fmt: skip
         alone = analyse(replace(rollout, **{n: getattr(rollout, n)[i : i + 1] for n in names}))
         for field in fields(Conflicts):

@@ -28,9 +28,9 @@ def at_fault(rollout, e=1):
     return bool(analyse(rollout).at_fault[0, e])
 
 
-def stopping_distance(v):
+def stopping_distance(v, g=0.774 * 9.81):
     """Of the careful driver [m]: 0.75 s, then up to 0.774 g at 12.65 m/s³; UN R157, Annex 3."""
-    g, jerk = 0.774 * 9.81, 12.65
+    jerk = 12.65
     rise = g / jerk
     left = v - 0.5 * jerk * rise**2
     return 0.75 * v + v * rise - jerk * rise**3 / 6.0 + left**2 / (2.0 * g)
@@ -52,6 +52,35 @@ def test_a_standing_obstacle_is_the_egos_from_the_stopping_distance_on(track, me
     short = meeting(track(v=v), track(x=4.0 + stopping_distance(v) - 0.3))
     assert verdict(short) == (NOBODY, Rule.UNSAFE_START)
     assert not at_fault(short)
+
+
+@pytest.mark.parametrize("grip", [2.0, 5.0])
+def test_the_careful_driver_brakes_no_harder_than_the_tyres_allow(track, meeting, grip):
+    distance = stopping_distance(20.0, grip)
+    enough = meeting(track(v=20.0), track(x=4.0 + distance + 0.3))
+    assert verdict(replace(enough, friction=np.array([grip]))) == (EGO, Rule.STANDING_AHEAD)
+    short = meeting(track(v=20.0), track(x=4.0 + distance - 0.3))
+    assert verdict(short) == (EGO, Rule.STANDING_AHEAD)
+    slippery = replace(short, friction=np.array([grip]))
+    assert verdict(slippery) == (NOBODY, Rule.UNSAFE_START)
+    assert not at_fault(slippery)
+
+
+def test_what_a_bend_takes_from_the_tyres_is_not_left_to_brake(track, meeting):
+    """At 20 m/s on 100 m radius 4 of 5 m/s² hold the car: 3 are left at first."""
+    radius, v = 100.0, 20.0
+    way = np.arange(161) * DT * v
+    bend = {
+        "x": radius * np.sin(way / radius), "y": radius * (1 - np.cos(way / radius)),
+        "h": way / radius, "v": np.full(161, v),
+    }  # fmt: skip
+    distance = 4.0 + stopping_distance(v, 5.0) + 4.0
+    at = distance / radius
+    x, y = radius * np.sin(at), radius * (1 - np.cos(at))
+    stands = {"x": np.full(161, x), "y": np.full(161, y), "h": np.full(161, at)}
+    rollout = meeting({**track(t=8.0), **bend}, {**track(t=8.0), **stands})
+    assert analyse(replace(rollout, friction=np.array([9.0]))).preventable[0, 1]
+    assert not analyse(replace(rollout, friction=np.array([5.0]))).preventable[0, 1]
 
 
 def test_a_barrier_ahead_is_the_egos(track, meeting):

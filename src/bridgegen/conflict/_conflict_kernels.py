@@ -181,7 +181,7 @@ def is_serious(time, needed, v, k, dt):
 @kernel
 def analyse_pair(
     e, n, dt, end, half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks,
-    stop_entities, stop_lights, stop_lines, lights, routed, whole, real,
+    friction, stop_entities, stop_lights, stop_lines, lights, routed, whole, real,
 ):  # fmt: skip
     """Fill the rows of the ego and body e."""
     contact = end < n and distance[e, end] == 0.0
@@ -227,9 +227,9 @@ def analyse_pair(
     stood = stood_for(v[0], 0, k, dt)
     kind = type_of(e, first, until, k, dt, kinds, c, s, own, its, own_part, stood)
     scene = Scene(
-        half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks, stop_entities,
-        stop_lights, stop_lines, lights, routed, first, until, dt, until - 1 if contact else at,
-        at, near,
+        half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks, friction,
+        stop_entities, stop_lights, stop_lines, lights, routed, first, until, dt,
+        until - 1 if contact else at, at, near,
     )  # fmt: skip
     crosses = near and kind != REAR_END_STRIKING and kind != REAR_END_STRUCK
     if crosses and (stops_at_red(scene, 0, at, time) or stops_at_red(scene, e, at, time)):
@@ -243,7 +243,7 @@ def analyse_pair(
 
 @kernel
 def analyse_rows(
-    half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks,
+    half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks, friction,
     stop_entities, stop_lights, stop_lines, lights, routed, gone, whole, real,
 ):  # fmt: skip
     """Fill ``whole`` ``(N, E, INTEGERS)`` and ``real`` ``(N, E, FLOATS)`` of N rows.
@@ -263,6 +263,6 @@ def analyse_rows(
             )
             analyse_pair(
                 e, n, dt, end, half, kinds, x[i], y[i], c[i], s[i], v[i], a[i], offset[i],
-                distance[i], gone, claims[i, 0], crosswalks[i], stop_entities, stop_lights,
-                stop_lines[i], lights[i], routed, whole[i, e], real[i, e],
+                distance[i], gone, claims[i, 0], crosswalks[i], friction[i], stop_entities,
+                stop_lights, stop_lines[i], lights[i], routed, whole[i, e], real[i, e],
             )  # fmt: skip

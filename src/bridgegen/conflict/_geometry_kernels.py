@@ -34,7 +34,8 @@ class Scene(NamedTuple):
         distance: ``(E, T)`` from the ego's body [m], +inf where a body is absent.
         gone: ``(E, T)`` lengths of the tracks [m].
         claims: ``(E,)`` of the ego's route against each other's, see `right_of_way.claim`.
-        crosswalks: ``(C, 5)``, as in a rollout; so are the next four.
+        crosswalks: ``(C, 5)``, as in a rollout; so are the next five.
+        friction: [m/s²]; +inf where nobody says.
         stop_entities: ``(L,)``.
         stop_lights: ``(L,)``.
         stop_lines: ``(L, 3)``.
@@ -62,6 +63,7 @@ class Scene(NamedTuple):
     gone: Float
     claims: Int
     crosswalks: Float
+    friction: float
     stop_entities: Int
     stop_lights: Int
     stop_lines: Float

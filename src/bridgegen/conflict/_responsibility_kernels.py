@@ -103,11 +103,27 @@ def gains(speed, other, ca, sa, cb, sb):
 
 
 @kernel
+def gives(scene, a, i, speed):
+    """Return how hard body a can brake at instant i of its track at a speed [m/s²].
+
+    What the tyres need to hold it in the bend is not left to brake (the friction circle).
+    """
+    gone = scene.gone[a]
+    length = gone[i + 1] - gone[i] if i + 1 < scene.n else 0.0
+    if length <= 0.0 or scene.friction == math.inf:
+        return scene.friction
+    c, s = scene.c[a], scene.s[a]
+    bend = (c[i] * s[i + 1] - s[i] * c[i + 1]) / length
+    across = speed * speed * bend
+    return math.sqrt(max(scene.friction * scene.friction - across * across, 0.0))
+
+
+@kernel
 def braked(scene, a, b, k, braking):
     """Return what becomes of body a if it brakes on its own track from instant k on.
 
     It keeps its speed for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
-    [m/s²]. b moves as recorded up to ``scene.until``, then keeps its speed on its track. A body
+    [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its speed on its track. A body
     that stands when b runs into it has done all that braking can do: it counts as clear. One that
     crosses b's way and is ahead of its recorded place when they meet does not: it has escaped by
     not braking.
@@ -125,7 +141,7 @@ def braked(scene, a, b, k, braking):
         if m > k:
             harder = slowed
             if (m - k) * dt > REACTION + 1e-9:
-                harder = min(slowed + JERK * dt, braking)
+                harder = min(slowed + JERK * dt, braking, gives(scene, a, i, speed))
             after = max(speed - 0.5 * (slowed + harder) * dt, 0.0)
             slowed = harder
             at += 0.5 * (speed + after) * dt

@@ -57,9 +57,10 @@ class Conflicts:
         decided: ``(N, E)`` instant at which the risk arose that decides on responsibility.
         zone_ego: ``(N, E)`` of `Zone`, on the ego.
         zone_other: ``(N, E)`` of `Zone`, on the other.
-        preventable: ``(N, E)`` bool: the careful driver of UN R157, Annex 3 (0.75 s, 0.774 g),
-            braking on the ego's path since the other was visibly in its way (or since the vehicle
-            ahead braked), would have avoided the contact, or the near miss.
+        preventable: ``(N, E)`` bool: the careful driver of UN R157, Annex 3 (0.75 s, 0.774 g, or
+            what the tyres give on this road), braking on the ego's path since the other was
+            visibly in its way (or since the vehicle ahead braked), would have avoided the contact,
+            or the near miss.
         ttc: ``(N, E)`` [s], time to collision at ``instant``; 0 of a contact, +inf without a
             conflict.
         needed: ``(N, E)`` [m/s²], the deceleration that the ego needed then; of a contact, as if
@@ -140,6 +141,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
     crosswalks = rollout.crosswalks
     if not crosswalks.size:
         crosswalks = np.zeros((n, 0, 5))
+    friction = rollout.friction if rollout.friction.size else np.full(n, np.inf)
     lines = rollout.stop_lines if rollout.stop_entities.size else np.zeros((n, 0, 3))
     kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
     kernels.analyse_rows(
@@ -147,6 +149,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
         moving.cosine, moving.sine, moving.v, recorded(rollout, "a"), recorded(rollout, "offset"),
         moving.distance, moving.n_steps, rollout.time_step,
         np.ascontiguousarray(claims, dtype=np.int64), np.ascontiguousarray(crosswalks),
+        np.ascontiguousarray(friction),
         np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
         np.ascontiguousarray(rollout.lights), _is_routed(rollout), np.empty((e, t)), whole, real,

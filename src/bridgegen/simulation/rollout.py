@@ -97,6 +97,8 @@ class Rollout:
         crosswalks: ``(N, C, 5)`` float64, the crosswalks that the ego's route leads over: x, y of
             the centre [m], the route's heading [rad], half the extent along and across the route
             [m]; NaN where a road network has fewer.
+        friction: ``(N,)`` float64 [m/s²], what the tyres could give (mu g) as the scenario ended;
+            ``(0,)`` where nobody says.
         messages: by row, what else there is to say of its failure.
         incidents: by row, what the simulator noticed by itself, if it does: metrics know more.
         derived: what several metrics start from, worked out once; see `metrics.metric.shared`.
@@ -125,6 +127,7 @@ class Rollout:
     stop_entities: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     claims: Int = field(default_factory=lambda: np.zeros((0, 0, 0), np.int64))
     crosswalks: Float = field(default_factory=lambda: np.zeros((0, 0, 5)))
+    friction: Float = field(default_factory=lambda: np.zeros(0))
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -159,7 +162,7 @@ class Rollout:
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
-    "stop_lines", "present", "claims", "crosswalks",
+    "stop_lines", "present", "claims", "crosswalks", "friction",
 )  # fmt: skip
 
 

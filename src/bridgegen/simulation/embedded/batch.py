@@ -14,7 +14,7 @@ from bridgegen.ego._prediction_kernels import LOST, PASSAGE
 from bridgegen.ego._reference_kernels import MIND
 from bridgegen.ego._surroundings_kernels import AROUND
 from bridgegen.ego._tracking_kernels import TRACK
-from bridgegen.ego._weather_columns import WEATHER
+from bridgegen.ego._weather_columns import FRICTION, WEATHER
 from bridgegen.ego.detections import DETECTION
 from bridgegen.ego.interface import ROUTE_POINTS
 from bridgegen.ego.noise import noise_key
@@ -212,6 +212,7 @@ class Batch:
             stop_entities=roads.stop_entities,
             claims=roads.scene.claims[self._rows],
             crosswalks=roads.crosswalks[self._rows],
+            friction=self.state.weather[:, FRICTION].copy(),
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,
