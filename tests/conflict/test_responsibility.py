@@ -143,6 +143,26 @@ def test_a_red_light_is_a_reason_to_brake(track, meeting, course):
     assert verdict(rollout) == (BV, Rule.REAR_DISTANCE)
 
 
+def overtakes(track, meeting, course, behind, **more):
+    """The ego has changed to the left lane until 2 s; a slower car follows it there from 3 s on."""
+    there = course((0.0, 0.0), (0.3, 0.0), (0.35, 2.1), (2.0, 2.1), (2.05, 0.0), (6.0, 0.0))
+    ego = track(v=24.0, slide=there)
+    ego["offset"] = ego["y"].copy()
+    after = course((0.0, 0.0), (3.0, 0.0), (3.05, 1.75), (5.0, 1.75), (5.05, 0.0), (6.0, 0.0))
+    return meeting(ego, track(x=behind, v=12.0, slide=after), claims=[0], **more)
+
+
+def test_who_has_arrived_on_a_lane_may_go_straight_on_there(track, meeting, course):
+    in_front = overtakes(track, meeting, course, 54.0)
+    assert analyse(in_front).type[0, 1] == ConflictType.REAR_END_STRIKING
+    assert verdict(in_front) == (BV, Rule.CUT_IN)
+    assert not at_fault(in_front)
+    beside = overtakes(track, meeting, course, 44.0)
+    assert analyse(beside).type[0, 1] == ConflictType.SIDE_SWIPE
+    assert verdict(beside) == (BV, Rule.LEFT_ITS_LANE)
+    assert not at_fault(beside)
+
+
 def test_the_ego_cuts_in_before_one_who_comes_from_behind(track, meeting, course):
     # to the left within 1.75 s; the other is 10 m/s faster
     slide = course((0.0, 2.0), (1.75, 2.0), (1.8, 0.0), (6.0, 0.0))

@@ -87,6 +87,9 @@ brakes must give, so that nobody brakes so hard by the way."""
 JUST_NOW = 3.0
 """[s] What a body has done so long before a contact counts as its doing. Ours: lane changes take 3
 to 6 s."""
+LATELY = 1.0
+"""[s] Of two that have changed their course, the one who has steered more so long before their
+meeting came into the way of the other. Ours."""
 ASIDE = 0.7
 """[m] A body that has moved so far across its route within ``JUST_NOW`` has changed its course.
 Ours: about the room to the marking."""

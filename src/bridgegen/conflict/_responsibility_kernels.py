@@ -66,6 +66,7 @@ from bridgegen.conflict._limits import (
     JUNCTION,
     JUST_NOW,
     KERB,
+    LATELY,
     LINE_REACH,
     LOOKED_BACK,
     MARGIN,
@@ -123,10 +124,10 @@ def braked(scene, a, b, k, braking):
     """Return what becomes of body a if it brakes on its own track from instant k on.
 
     It keeps its speed for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
-    [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its speed on its track. A body
-    that stands when b runs into it has done all that braking can do: it counts as clear. One that
-    crosses b's way and is ahead of its recorded place when they meet does not: it has escaped by
-    not braking.
+    [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
+    speed on its track. A body that stands when b runs into it has done all that braking can do: it
+    counts as clear. One that crosses b's way and is ahead of its recorded place when they meet does
+    not: it has escaped by not braking.
     """
     half, x, y, c, s, v, gone = (
         scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone
@@ -301,15 +302,28 @@ def ego_moved(scene, k, way):
 
 
 @kernel
-def steering(scene, e, k):
+def ego_came_over(scene, e, k, way):
+    """Say whether it is the ego that has changed its course when it and body e meet at instant k.
+
+    It has moved, see `ego_moved`; and body e has not steered more ``LATELY``: who has arrived on a
+    lane has the right to go straight on there.
+    """
+    if not ego_moved(scene, k, way):
+        return False
+    mine, its = steering(scene, e, k, LATELY)
+    return mine >= its
+
+
+@kernel
+def steering(scene, e, k, within):
     """Return how much the ego and body e have steered besides what they have in common [m].
 
     Both are looked at over the same length of way before instant k, that of the slower one within
-    ``JUST_NOW``. A constant bend over a length L that turns a body by phi moves it aside by
+    so many seconds. A constant bend over a length L that turns a body by phi moves it aside by
     L phi / 2. The lesser bend, if both go the same way, is taken for that of the road.
     """
     x, y, c, s, gone = scene.x, scene.y, scene.c, scene.s, scene.gone
-    begin = max(k - int(JUST_NOW / scene.dt), scene.first)
+    begin = max(k - int(within / scene.dt), scene.first)
     length = min(gone[0, k] - gone[0, begin], gone[e, k] - gone[e, begin])
     aside_ego, bend_ego, aside_other, bend_other = 0.0, 0.0, 0.0, 0.0
     for b in (0, e):
@@ -408,7 +422,7 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
         mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
         if mine and not its and claim == 0 and same_road(scene, e, k):
             return EGO, TURNING_GIVES_WAY
-        one, other = steering(scene, e, k)
+        one, other = steering(scene, e, k, JUST_NOW)
         if kind == VRU_INTO_SIDE and claim == 0 and one > ASIDE and one > other:
             return EGO, LEFT_ITS_LANE
         if claim > 0 and not avoidable:
@@ -446,7 +460,7 @@ def of_struck(scene, e, k, whole):
     """Decide where the other drives into the rear of the ego."""
     since, side = entered(scene, e, 0, k, MARGIN)
     mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
-    moved = ego_moved(scene, since, 0)
+    moved = ego_came_over(scene, e, since, 0)
     if side != 0 and (mine or moved):
         whole[DECIDED] = since
         if braked(scene, e, 0, since, COMFORT) == CLEAR:
@@ -491,7 +505,7 @@ def of_striking(scene, e, k, risk, side, late, avoidable, whole):
         return NOBODY, REVEALED_LATE
     v = scene.v
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
-    moved = ego_moved(scene, min(risk + 1, k), 0)
+    moved = ego_came_over(scene, e, min(risk + 1, k), 0)
     claim = scene.claims[e]
     if mine and not its and claim < 0:  # the ego turned into the way of one that had priority
         return EGO, rule_of(claim)
@@ -521,13 +535,13 @@ def of_striking(scene, e, k, risk, side, late, avoidable, whole):
 def of_leaving(scene, e, k, kind, own, own_part, avoidable):
     """Decide where two meet side by side, or head on: who has left its lane?"""
     v, c, s = scene.v, scene.c, scene.s
-    if ego_moved(scene, k, side_of(scene, e, k)):
+    if ego_came_over(scene, e, k, side_of(scene, e, k)):
         return EGO, LEFT_ITS_LANE
     claim = scene.claims[e]
     if claim != 0:
         return (OTHER if claim > 0 else EGO), rule_of(claim)
     if not scene.routed:
-        mine, its = steering(scene, e, k)
+        mine, its = steering(scene, e, k, JUST_NOW)
         if max(mine, its) < ASIDE:
             return NOBODY, LEFT_ITS_LANE
         if mine > its:

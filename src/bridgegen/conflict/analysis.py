@@ -143,6 +143,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
         crosswalks = np.zeros((n, 0, 5))
     friction = rollout.friction if rollout.friction.size else np.full(n, np.inf)
     lines = rollout.stop_lines if rollout.stop_entities.size else np.zeros((n, 0, 3))
+    lights = rollout.lights if len(rollout.lights) else np.zeros((n, 0, 0), np.int8)
     kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
     kernels.analyse_rows(
         moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
@@ -152,7 +153,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
         np.ascontiguousarray(friction),
         np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
-        np.ascontiguousarray(rollout.lights), _is_routed(rollout), np.empty((e, t)), whole, real,
+        np.ascontiguousarray(lights), _is_routed(rollout), np.empty((e, t)), whole, real,
     )  # fmt: skip
     ok = np.asarray(rollout.status) == 0
     whole[~ok], real[~ok] = 0, 0.0

@@ -75,11 +75,10 @@ ON_FOOT_GAP = 0.5  # m, that somebody on foot keeps to what stands before them
 LEAST_REACH = 3.0  # m besides bodies and gaps, for what comes in from the side
 CALM = 2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)  # m/s²
 
-CUT_IN_DECELERATION = 6.0  # m/s², and …
-CUT_IN_DELAY = (
-    0.35  # s: what the one behind must need at most not to hit who changes lane; UN R157,
-)
-# 5.2.5.2
+# What the one behind may need at most not to hit who changes lane; UN R157, 5.2.5.2. The German
+# AFGBV, annex 1, has the same form, and scales it where the road allows less deceleration.
+CUT_IN_DECELERATION = 6.0  # m/s²
+CUT_IN_DELAY = 0.35  # s
 FARTHEST = 300.0  # m; who is farther along the other lane is no concern: at a closing speed of
 # 40 m/s over a change of 4 s, 226 m suffice
 LEAST_LANE_GAP = STANDSTILL_GAP  # m, to those ahead and behind on the other lane
@@ -257,29 +256,30 @@ def react(k, dt, asked, mind):
 
 
 @kernel
-def is_safe(gap, closing, lasts):
+def is_safe(gap, closing, lasts, grip):
     """Say whether a gap [m] on the other lane suffices when a change of lane begins.
 
     At the end of half of the time that the change ``lasts`` [s], when the line is crossed, who
-    closes in at ``closing`` [m/s] must still be able to brake (see `CUT_IN_DECELERATION`).
+    closes in at ``closing`` [m/s] must still be able to brake (see `CUT_IN_DECELERATION`), on a
+    road that allows ``grip`` [m/s²].
     """
     if gap < LEAST_LANE_GAP:
         return False
     if closing <= 0.0:
         return True
-    needed = closing * (closing / (2.0 * CUT_IN_DECELERATION) + CUT_IN_DELAY)
+    needed = closing * (closing / (2.0 * min(CUT_IN_DECELERATION, grip)) + CUT_IN_DELAY)
     return gap - 0.5 * lasts * closing >= needed
 
 
 @kernel
 def gap_is_free(
-    e, k, path, n, ds, s, target, lasts, present, x, y, h, speed, bodies
+    e, k, path, n, ds, s, target, lasts, grip, present, x, y, h, speed, bodies
 ):  # fmt: skip
     """Return whether participant e may begin to change lane at instant k.
 
     It is abreast of station ``s`` of the other lane's path and will be ``target`` [m] left of that
     after ``lasts`` [s]. Whoever is on that lane, in its way lengthwise, must be far enough ahead or
-    behind, see `is_safe`.
+    behind, see `is_safe`. The tyres give ``grip`` [m/s²].
 
     Source: UN Regulation 157, 01 series, 5.2.5.2: the cut-in that an automated vehicle must not
     collide with; a driver who leaves that much forces nobody to brake harder.
@@ -306,8 +306,8 @@ def gap_is_free(
         half_length = 0.5 * (bodies[o, 0] * abs(parallel) + bodies[o, 1] * across)
         along = speed[o, k] * parallel
         if q >= s + bodies[e, 2]:
-            if not is_safe(q - half_length - s - front, v - along, lasts):
+            if not is_safe(q - half_length - s - front, v - along, lasts, grip):
                 return False
-        elif not is_safe(s - rear - q - half_length, along - v, lasts):
+        elif not is_safe(s - rear - q - half_length, along - v, lasts, grip):
             return False
     return True

@@ -7,6 +7,7 @@ from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._attentive_kernels import gap_is_free
 from bridgegen.ego._conflict_kernels import LEAST_PACE
 from bridgegen.ego._path_kernels import project
+from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._lane_kernels import (
     LANE,
@@ -163,8 +164,8 @@ def _waits(j, k, p, station, way, plan, roads, state, record):
     if plan.actions[j, 3] == DISTANCE:
         lasts /= max(record.v[e, k], LEAST_PACE)
     if gap_is_free(
-        e, k, path, n, ds, s, target, lasts, state.present, record.x, record.y, record.h, record.v,
-        plan.bodies,
+        e, k, path, n, ds, s, target, lasts, state.weather[FRICTION], state.present, record.x,
+        record.y, record.h, record.v, plan.bodies,
     ):  # fmt: skip
         return False
     if state.waits[e] >= 0 and state.waits[e] != j:
