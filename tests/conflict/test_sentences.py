@@ -51,6 +51,16 @@ def test_a_pedestrian_steps_out(track, meeting):
     assert text.endswith("a careful driver (UN R157, Annex 3) would not have avoided it.")
 
 
+def test_what_stands_far_ahead_is_no_risk_for_so_long(track, meeting):
+    text = of(meeting(track(v=10.0, t=9.0), track(x=84.0, t=9.0)))
+    assert text.endswith(
+        "; it stood there, hidden by nobody, for 8.0 s before, and a careful driver (UN R157, "
+        "Annex 3) would have avoided it."
+    )
+    near = of(meeting(track(v=10.0), track(x=34.0)))
+    assert "; the risk arose 3.0 s before, and a careful driver" in near
+
+
 def test_near_miss(track, meeting, course):
     v = course((0.0, 20.0), (1.0, 20.0), (3.0, 0.0), (6.0, 0.0))
     assert of(meeting(track(v=v), track(x=48.0))).startswith(

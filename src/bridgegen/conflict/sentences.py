@@ -3,6 +3,7 @@
 The sentence is built from the numbers of `Conflicts` alone.
 """
 
+from bridgegen.conflict._limits import HORIZON
 from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, Conflicts
 from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
 
@@ -105,7 +106,10 @@ def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
         ConflictType.EGO_STANDING, ConflictType.REAR_END_STRUCK, ConflictType.SIDE_SWIPE,
         ConflictType.VRU_INTO_SIDE,
     )  # fmt: skip
-    arose = f"the risk arose {conflicts.left[row, other]:.1f} s before"
+    left = conflicts.left[row, other]
+    arose = f"the risk arose {left:.1f} s before"
+    if rule == Rule.STANDING_AHEAD and left > HORIZON:
+        arose = f"it stood there, hidden by nobody, for {left:.1f} s before"
     if rule == Rule.UNSAFE_START or kind == ConflictType.EGO_STANDING:
         return ""
     blamed = conflicts.responsible[row, other] == Responsible.EGO
