@@ -62,6 +62,8 @@ from bridgegen.conflict._limits import (
     COMFORT,
     CROSSWALK_MARGIN,
     HARD,
+    HEADWAY,
+    HEADWAY_RISE,
     JERK,
     JUNCTION,
     JUST_NOW,
@@ -71,7 +73,10 @@ from bridgegen.conflict._limits import (
     LOOKED_BACK,
     MARGIN,
     MARGIN_ON_FOOT,
+    MOST_HEADWAY,
     MOVES,
+    OPENING,
+    OPENS_TO,
     REACTION,
     SAME_WAY,
     SERIOUS_DECELERATION,
@@ -120,8 +125,20 @@ def gives(scene, a, i, speed):
 
 
 @kernel
-def braked(scene, a, b, k, braking):
-    """Return what becomes of body a if it brakes on its own track from instant k on.
+def follows(gap, speed, its):
+    """Return by how much a driver slows down who opens the gap to somebody ahead [m/s²].
+
+    It does so while the gap is shorter than UN R157 asks for, and it is not much slower already.
+    """
+    headway = min(HEADWAY + speed * HEADWAY_RISE, MOST_HEADWAY)
+    return OPENING if gap < headway * speed and speed > OPENS_TO * its else 0.0
+
+
+@kernel
+def braked(scene, a, b, k, start, braking):
+    """Return what becomes of body a on its own track if it brakes from instant ``start`` on.
+
+    From instant k to ``start`` it opens its gap to b as drivers do, see `follows`.
 
     It keeps its speed for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
     [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
@@ -138,10 +155,13 @@ def braked(scene, a, b, k, braking):
     k_meet = scene.at
     crosses = c[a, k_meet] * c[b, k_meet] + s[a, k_meet] * s[b, k_meet] < SAME_WAY
     at, speed, slowed, i, j = gone[a, k], v[a, k], 0.0, k, min(k, until)
-    for m in range(k, k + int(BRAKES_FOR / dt)):
+    apart = math.inf
+    for m in range(k, start + int(BRAKES_FOR / dt)):
         if m > k:
             harder = slowed
-            if (m - k) * dt > REACTION + 1e-9:
+            if m <= start:
+                harder = follows(apart, speed, v[b, min(m - 1, until)])
+            elif (m - start) * dt > REACTION + 1e-9:
                 harder = min(slowed + JERK * dt, braking, gives(scene, a, i, speed))
             after = max(speed - 0.5 * (slowed + harder) * dt, 0.0)
             slowed = harder
@@ -356,7 +376,7 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     on_foot = is_vulnerable(scene.kinds[e])
     entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk = visible_from(scene, e, entry, k)
-    level = braked(scene, 0, e, risk, BRAKING)
+    level = braked(scene, 0, e, risk, risk, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # to stand when the other comes is no help
         avoidable = scene.v[e, k] <= STANDS
@@ -412,7 +432,7 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
         since = on_crosswalk_since(scene, e, k)
         if since <= k:
             since = visible_from(scene, e, since, k)
-            could = braked(scene, 0, e, since, BRAKING) == CLEAR
+            could = braked(scene, 0, e, since, since, BRAKING) == CLEAR
             whole[DECIDED], whole[PREVENTABLE] = since, could
             return (EGO, CROSSWALK) if could else (NOBODY, STEPPED_OUT)
     if what == BICYCLE:
@@ -463,7 +483,7 @@ def of_struck(scene, e, k, whole):
     moved = ego_came_over(scene, e, since, 0)
     if side != 0 and (mine or moved):
         whole[DECIDED] = since
-        if braked(scene, e, 0, since, COMFORT) == CLEAR:
+        if braked(scene, e, 0, since, since, COMFORT) == CLEAR:
             return OTHER, REAR_DISTANCE
         claim = scene.claims[e]
         if claim < 0:
@@ -515,18 +535,25 @@ def of_striking(scene, e, k, risk, side, late, avoidable, whole):
             return EGO, STANDING_AHEAD
         return NOBODY, UNSAFE_START
     if side != 0 and not moved and not mine:
-        if avoidable:
+        begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
+        begins = visible_from(scene, e, begins, k)
+        could = braked(scene, 0, e, begins, begins, BRAKING) == CLEAR
+        whole[DECIDED], whole[PREVENTABLE] = begins, could
+        if could:
             return EGO, CUT_IN_PREVENTABLE
         return OTHER, (rule_of(claim) if its and claim > 0 else CUT_IN)
     start = max(slowing_since(v[e], scene.first, min(stands, k), scene.dt), risk)
-    level = braked(scene, 0, e, start, BRAKING)
+    level = braked(scene, 0, e, start, start, BRAKING)
     if level == CLEAR:
         whole[DECIDED], whole[PREVENTABLE] = start, True
         return EGO, REAR_DISTANCE
     if level == COMES_NEAR and scene.near and not moved:
         whole[DECIDED], whole[PREVENTABLE] = start, False
         return NOBODY, BRAKED_HARD_AHEAD
-    if avoidable or moved:  # the ego had closed up, or changed lane, before the other braked
+    # had it time to open the gap before the other braked, since that was ahead of it?
+    kept = braked(scene, 0, e, risk, start, BRAKING) == CLEAR
+    whole[PREVENTABLE] = kept
+    if kept or moved:
         return EGO, REAR_DISTANCE
     return NOBODY, UNSAFE_START
 
@@ -556,8 +583,8 @@ def of_leaving(scene, e, k, kind, own, own_part, avoidable):
 def of_crossing(scene, e, k, risk, whole):
     """Decide where two ways cross, or one turns into the other's."""
     since, _ = entered(scene, e, 0, k, 0.0)
-    it_could = braked(scene, e, 0, since, COMFORT) != COLLIDES
-    ego_could = braked(scene, 0, e, risk, COMFORT) != COLLIDES
+    it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
+    ego_could = braked(scene, 0, e, risk, risk, COMFORT) != COLLIDES
     if it_could and not ego_could:
         whole[DECIDED] = since
         return OTHER, JUNCTION_OCCUPIED
