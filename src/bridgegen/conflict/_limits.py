@@ -69,10 +69,9 @@ the vehicle behind to more than 3 m/s²."""
 HEADWAY, HEADWAY_RISE, MOST_HEADWAY = 1.0, 3.6 / 100.0, 2.0
 """[s], [s/(m/s)], [s] The time gap that a careful driver keeps: 1 s, and 0.1 s more per 10 km/h, up
 to 2 s. Source: UN R157, 5.2.3.3 (1.2 s at 20 km/h, 1.6 s at 60 km/h)."""
-OPENING = 2.0
-"""[m/s²] How a careful driver slows down to open a gap. Source: ISO 15622: comfort systems brake by
-no more than 3.5 to 5 m/s²; 2 m/s² are usual in traffic (Treiber and Kesting, Traffic Flow Dynamics,
-ch. 11)."""
+OPENING = 0.4
+"""[m/s²] How a careful driver opens a gap that is too short when a scenario begins, or when the
+other comes: with the foot off the accelerator. Source: European Commission, JRC-FSM."""
 OPENS_TO = 0.8
 """[1] … until it drives at this share of the speed of who is ahead. Ours."""
 AHEAD_BY = 0.01

@@ -64,6 +64,7 @@ from bridgegen.conflict._limits import (
     HARD,
     HEADWAY,
     HEADWAY_RISE,
+    HORIZON,
     JERK,
     JUNCTION,
     JUST_NOW,
@@ -376,22 +377,28 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     on_foot = is_vulnerable(scene.kinds[e])
     entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk = visible_from(scene, e, entry, k)
-    level = braked(scene, 0, e, risk, risk, BRAKING)
+    since = risk
+    if real[STOOD_OTHER] < STOOD:  # who moves is a risk only once the two are near in time
+        since = max(risk, k - int(HORIZON / scene.dt))
+    level = braked(scene, 0, e, since, since, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # to stand when the other comes is no help
         avoidable = scene.v[e, k] <= STANDS
-    whole[DECIDED], whole[PREVENTABLE] = risk, avoidable
+    whole[DECIDED], whole[PREVENTABLE] = since, avoidable
     if appears:
         whole[RESPONSIBLE], whole[RULE] = NOBODY, UNSAFE_START
     else:
         whole[RESPONSIBLE], whole[RULE] = decide(
-            scene, e, k, kind, own, own_part, risk, side, risk > entry, avoidable, whole, real
+            scene, e, k, kind, own, own_part, risk, since, side, risk > entry, avoidable, whole,
+            real,
         )
     real[LEFT_TO_ACT] = max(at - whole[DECIDED], 0) * scene.dt + real[TTC]
 
 
 @kernel
-def decide(scene, e, k, kind, own, own_part, risk, side, late, avoidable, whole, real):
+def decide(
+    scene, e, k, kind, own, own_part, risk, since, side, late, avoidable, whole, real
+):  # fmt: skip
     """Return who is responsible, and by which rule."""
     if kind == EGO_STANDING:
         return OTHER, STRUCK_STANDING
@@ -415,7 +422,7 @@ def decide(scene, e, k, kind, own, own_part, risk, side, late, avoidable, whole,
         return EGO, STANDING_AHEAD
     if kind in (SIDE_SWIPE, HEAD_ON):
         return of_leaving(scene, e, k, kind, own, own_part, avoidable)
-    return of_crossing(scene, e, k, risk, whole)
+    return of_crossing(scene, e, k, since, whole)
 
 
 @kernel
@@ -552,7 +559,7 @@ def of_striking(scene, e, k, risk, side, late, avoidable, whole):
         return NOBODY, BRAKED_HARD_AHEAD
     # had it time to open the gap before the other braked, since that was ahead of it?
     kept = braked(scene, 0, e, risk, start, BRAKING) == CLEAR
-    whole[PREVENTABLE] = kept
+    whole[DECIDED], whole[PREVENTABLE] = start, kept
     if kept or moved:
         return EGO, REAR_DISTANCE
     return NOBODY, UNSAFE_START
