@@ -7,6 +7,8 @@ happens up to the ego's first contact with anybody counts.
 import math
 
 from bridgegen.compiled import kernel
+from bridgegen.conflict._careful_driver_kernels import gains
+from bridgegen.conflict._circumstances_kernels import stops_at_red
 from bridgegen.conflict._codes import (
     ACROSS,
     ALONG,
@@ -53,7 +55,7 @@ from bridgegen.conflict._limits import (
     SOON,
     STANDS,
 )
-from bridgegen.conflict._responsibility_kernels import gains, judge, stops_at_red
+from bridgegen.conflict._responsibility_kernels import judge
 from bridgegen.conflict._type_kernels import type_of
 from bridgegen.metrics._ttc_kernels import STANDSTILL, time_to_contact
 

@@ -1,0 +1,128 @@
+"""Compiled: what a careful driver would have achieved, by braking on its own path.
+
+It is the driver of UN Regulation 157, Annex 3, whatever the road. Where the question is whether
+somebody was forced to brake, comfortable braking takes its place, after the same reaction time. Of
+a near miss the careful driver must avoid the near miss, not the contact.
+"""
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.conflict._geometry_kernels import pose_on
+from bridgegen.conflict._limits import (
+    AHEAD_BY,
+    BRAKES_FOR,
+    HEADWAY,
+    HEADWAY_RISE,
+    JERK,
+    MOST_HEADWAY,
+    MOVES,
+    OPENING,
+    OPENS_TO,
+    REACTION,
+    SAME_WAY,
+    SERIOUS_DECELERATION,
+    SERIOUS_TTC,
+)
+from bridgegen.metrics._pet_kernels import separation
+from bridgegen.metrics._ttc_kernels import STANDSTILL, time_to_contact
+
+CLEAR, COMES_NEAR, COLLIDES = range(3)
+"""What becomes of a body that brakes."""
+
+
+@kernel
+def gains(speed, other, ca, sa, cb, sb):
+    """Return by how much a body is faster than another, along its own heading [m/s].
+
+    It must lose so much not to meet the other. One that comes across or towards it counts as if it
+    stood: braking ends at standstill.
+    """
+    return max(speed - max(other * (cb * ca + sb * sa), 0.0), 0.0)
+
+
+@kernel
+def gives(scene, a, i, speed):
+    """Return how hard body a can brake at instant i of its track at a speed [m/s²].
+
+    What the tyres need to hold it in the bend is not left to brake (the friction circle).
+    """
+    gone = scene.gone[a]
+    length = gone[i + 1] - gone[i] if i + 1 < scene.n else 0.0
+    if length <= 0.0 or scene.friction == math.inf:
+        return scene.friction
+    c, s = scene.c[a], scene.s[a]
+    bend = (c[i] * s[i + 1] - s[i] * c[i + 1]) / length
+    across = speed * speed * bend
+    return math.sqrt(max(scene.friction * scene.friction - across * across, 0.0))
+
+
+@kernel
+def follows(gap, speed, its):
+    """Return by how much a driver slows down who opens the gap to somebody ahead [m/s²].
+
+    It does so while the gap is shorter than UN R157 asks for, and it is not much slower already.
+    """
+    headway = min(HEADWAY + speed * HEADWAY_RISE, MOST_HEADWAY)
+    return OPENING if gap < headway * speed and speed > OPENS_TO * its else 0.0
+
+
+@kernel
+def braked(scene, a, b, k, start, braking):
+    """Return what becomes of body a on its own track if it brakes from instant ``start`` on.
+
+    From instant k to ``start`` it opens its gap to b as drivers do, see `follows`.
+
+    It keeps its speed for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
+    [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
+    speed on its track. A body that stands when b runs into it has done all that braking can do: it
+    counts as clear. One that crosses b's way and is ahead of its recorded place when they meet does
+    not: it has escaped by not braking.
+    """
+    half, x, y, c, s, v, gone = (
+        scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone
+    )  # fmt: skip
+    dt, n, until = scene.dt, scene.n, scene.until
+    la, wa, lb, wb = half[a, 0], half[a, 1], half[b, 0], half[b, 1]
+    worst = CLEAR
+    k_meet = scene.at
+    crosses = c[a, k_meet] * c[b, k_meet] + s[a, k_meet] * s[b, k_meet] < SAME_WAY
+    at, speed, slowed, i, j = gone[a, k], v[a, k], 0.0, k, min(k, until)
+    apart = math.inf
+    for m in range(k, start + int(BRAKES_FOR / dt)):
+        if m > k:
+            harder = slowed
+            if m <= start:
+                harder = follows(apart, speed, v[b, min(m - 1, until)])
+            elif (m - start) * dt > REACTION + 1e-9:
+                harder = min(slowed + JERK * dt, braking, gives(scene, a, i, speed))
+            after = max(speed - 0.5 * (slowed + harder) * dt, 0.0)
+            slowed = harder
+            at += 0.5 * (speed + after) * dt
+            speed = after
+        i, xa, ya = pose_on(x[a], y[a], c[a], s[a], gone[a], n, i, at)
+        way = gone[b, m] if m <= until else gone[b, until] + v[b, until] * (m - until) * dt
+        j, xb, yb = pose_on(x[b], y[b], c[b], s[b], gone[b], n, j, way)
+        if m <= until:  # a body that moves without a way of its own: sideways, or on the spot
+            j, xb, yb = m, x[b, m], y[b, m]
+        dx, dy = xb - xa, yb - ya
+        apart = separation(dx, dy, c[a, i], s[a, i], c[b, j], s[b, j], la, wa, lb, wb)
+        its = v[b, min(m, until)]
+        if apart <= 0.0:
+            return worst if speed <= 0.0 and its > 0.0 else COLLIDES
+        meets = crosses and (speed <= 0.0 or m == k_meet)
+        if meets and at > gone[a, k_meet] + AHEAD_BY:
+            return COLLIDES
+        if speed <= 0.0:
+            return worst
+        if scene.near and worst == CLEAR and speed >= MOVES:
+            wx, wy = its * c[b, j] - speed * c[a, i], its * s[b, j] - speed * s[a, i]
+            time = time_to_contact(
+                dx, dy, wx, wy, c[a, i], s[a, i], c[b, j], s[b, j], la, wa, lb, wb,
+                STANDSTILL * (speed + its),
+            )  # fmt: skip
+            faster = gains(speed, its, c[a, i], s[a, i], c[b, j], s[b, j])
+            needed = faster / (2.0 * max(time, dt))
+            if time <= SERIOUS_TTC and needed >= SERIOUS_DECELERATION and needed > slowed:
+                worst = COMES_NEAR
+    return worst
