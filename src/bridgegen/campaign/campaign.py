@@ -9,7 +9,7 @@ import numpy as np
 
 from bridgegen import search as toolkit
 from bridgegen.campaign.beforehand import refuse_beforehand
-from bridgegen.campaign.chosen import chosen_objective, columns_of, counted
+from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of, counted
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
@@ -142,7 +142,7 @@ def run_search(
     method = toolkit.get(algorithm)
     columns = columns_of(method, objectives)
     spec = chosen_objective(catalogue.objective, objective, weights, scale, columns, counted(count))
-    logical = replace(catalogue, objective=spec)
+    logical = as_judged(replace(catalogue, objective=spec), spec.rule)
     logical, roads = placed(logical, road_map, junction)
     driven: str | None = None
     if adversary is not None or getattr(method, "is_adversary", False):

@@ -9,7 +9,7 @@ from bridgegen.conflict.quantities import HARM
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.objective import Objectives
 from bridgegen.odd.objectives import PAPERS
-from bridgegen.odd.scenario import ObjectiveSpec, Term
+from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
 from bridgegen.search import Algorithm
 
 PAPER = "paper"
@@ -41,6 +41,18 @@ def counted(count: str | None) -> Count | None:
     if count is not None:
         raise UnknownNameError("choice of whose conflicts count", count, get_args(Count))
     return None
+
+
+def as_judged(scenario: SearchedScenario, rule: str | None) -> SearchedScenario:
+    """Return a scenario as the rule of what is critical wants it.
+
+    Traffic that stops dead where its road ends could not happen, and would not count as harm: with
+    the rule "harm" everybody drives on and leaves there, whatever the scenario says for the paper's
+    evaluation. What a scenario file says stays.
+    """
+    if rule == "harm" and isinstance(scenario, LogicalScenario):
+        return replace(scenario, road_end="leave")
+    return scenario
 
 
 def chosen_objective(

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from bridgegen.campaign.chosen import as_judged
 from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
@@ -115,6 +116,7 @@ def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | N
             f"{folder}: scenario {settings.scenario}{what} is not what it was when the run began; "
             "its results can still be read"
         )
+    logical = as_judged(logical, settings.objective.get("rule"))
     there, roads = placed(logical, settings.map, settings.junction)
     if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
         raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
