@@ -44,6 +44,7 @@ def test_all_harmful_rows_are_in_a_mode(run):
     harmful = frame["harm"] >= NEAR_MISS
     assert 20 < harmful.sum() < 140
     assert sum(one.count for one in run.modes) == run.triage.bound.harmful == harmful.sum()
+    assert len({(one.title, one.cause) for one in run.modes}) == len(run.modes)
     for one in run.modes:
         worst = frame.loc[one.worst]
         assert worst["harm"] == one.harm

@@ -271,9 +271,7 @@ class _Triage:
         keys = []
         for one, i in zip(groups, shown, strict=True):
             cause = self._found[i].cause if i in self._found else ""
-            keys.append(
-                one.key._replace(cause=cause) if cause not in ("", "sensitive") else one.key
-            )
+            keys.append(one.key._replace(cause=cause) if cause else one.key)
         joined = rekeyed(groups, keys, harm, U)
         held = np.zeros(len(harm), dtype=np.int64)
         for k, one in enumerate(joined):
@@ -345,12 +343,10 @@ class _Triage:
             members = set(one.rows.tolist())
             kept = [names[j] for j in exports if j in members and j != i]
             near = self._found.get(i)
-            sensitive = near is not None and near.cause == "sensitive"
             modes.append(
                 Mode(
                     number=k, title=self._title(one, groups),
-                    **{name: getattr(one.key, name) for name in Key._fields if name != "cause"},
-                    cause="sensitive" if sensitive else one.key.cause,
+                    **one.key._asdict(),
                     tested=near is not None and near.cause != "",
                     count=len(one.rows), space=shares[k - 1],
                     harm=float(self._harm[self._at[one.rows]].max()),
