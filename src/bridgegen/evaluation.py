@@ -7,9 +7,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.findings import KINDS, Findings
+from bridgegen.conflict.harm import NEAR_MISS, Count, decisive
+from bridgegen.conflict.place import place_on_route
+from bridgegen.conflict.plausibility import plausibility
 from bridgegen.simulation.embedded.intentions import Intentions
+from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.rollout import Rollout
 
 
@@ -84,6 +89,38 @@ class Trials:
         """``(N,)`` bool: a collision or near miss of the ego's."""
         harmful: Bool = self.ok & (self.harm >= NEAR_MISS)
         return harmful
+
+    @classmethod
+    def of(cls, rollout: Rollout, roads: Network, which: Int, harm: str, count: Count) -> "Trials":
+        """Return what a rollout came to.
+
+        Args:
+            rollout: of N rows.
+            roads: compiled.
+            which: ``(N,)``, the road network of each row.
+            harm: the quantity that counts, "harm" or "harm_any".
+            count: whose conflicts do.
+        """
+        n = rollout.shape[0]
+        conflicts = analyse(rollout)
+        values = quantities.evaluate(rollout, [harm, "severity"])
+        findings = Findings.of(conflicts, plausibility(rollout).labels, count)
+        ok: Bool = (rollout.status == 0) & (findings.implausible == "")
+        place = np.full(n, "", dtype=object)
+        rows = np.arange(n)
+        instant = conflicts.instant[rows, decisive(conflicts, count)[0]]
+        front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
+        h = rollout.h[rows, 0, instant]
+        x = rollout.x[rows, 0, instant] + front * np.cos(h)
+        y = rollout.y[rows, 0, instant] + front * np.sin(h)
+        wanted = ok & np.isin(findings.conflict, list(KINDS.values()))
+        for p in np.unique(which[wanted]).tolist():
+            at = np.flatnonzero(wanted & (which == p))
+            step = float(roads.tables.steps[p, 0])
+            way, junctions = roads.way(p, 0), roads.in_junctions(p)
+            place[at] = place_on_route(way, step, junctions, x[at], y[at])
+        worth, severity = (np.where(ok, values[:, k], 0.0) for k in range(2))
+        return cls(worth, severity, ok, findings, place)
 
     @classmethod
     def none(cls, n: int) -> "Trials":

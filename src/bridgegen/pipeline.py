@@ -20,9 +20,8 @@ from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals, requ
 from bridgegen.compiled import compiling_alone
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import analyse
-from bridgegen.conflict.findings import KINDS, Findings
-from bridgegen.conflict.harm import Count, decisive
-from bridgegen.conflict.place import place_on_route
+from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.harm import Count
 from bridgegen.conflict.plausibility import Implausible, plausibility
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError
@@ -33,7 +32,6 @@ from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.simulation.embedded.network import Network
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
@@ -315,7 +313,7 @@ class Pipeline:
                 driver=replay.driver if replay else None, dry=replay is not None and replay.dry,
             )  # fmt: skip
             order.append(at)
-            parts.append(_trials(rollout, roads, which[at], harm, count))
+            parts.append(Trials.of(rollout, roads, which[at], harm, count))
         return Trials.join(parts).take(np.argsort(np.concatenate(order)))
 
     def noise_keys(self, X: Float) -> npt.NDArray[np.uint64]:
@@ -453,30 +451,6 @@ def _harmless(rollout: Rollout, objective: Objective) -> Bool:
     metrics = quantities.evaluate(rollout, names)
     harmless: Bool = (rollout.status == 0) & ~objective.critical(metrics, names)
     return harmless
-
-
-def _trials(rollout: Rollout, roads: Network, which: Int, harm: str, count: Count) -> Trials:
-    """Return what a rollout came to; ``which`` is the road network of each row, ``(N,)``."""
-    n = rollout.shape[0]
-    conflicts = analyse(rollout)
-    values = quantities.evaluate(rollout, [harm, "severity"])
-    findings = Findings.of(conflicts, plausibility(rollout).labels, count)
-    ok: Bool = (rollout.status == 0) & (findings.implausible == "")
-    place = np.full(n, "", dtype=object)
-    rows = np.arange(n)
-    instant = conflicts.instant[rows, decisive(conflicts, count)[0]]
-    front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
-    h = rollout.h[rows, 0, instant]
-    x = rollout.x[rows, 0, instant] + front * np.cos(h)
-    y = rollout.y[rows, 0, instant] + front * np.sin(h)
-    wanted = ok & np.isin(findings.conflict, list(KINDS.values()))
-    for p in np.unique(which[wanted]).tolist():
-        at = np.flatnonzero(wanted & (which == p))
-        step = float(roads.tables.steps[p, 0])
-        place[at] = place_on_route(roads.way(p, 0), step, roads.in_junctions(p), x[at], y[at])
-    return Trials(
-        np.where(ok, values[:, 0], 0.0), np.where(ok, values[:, 1], 0.0), ok, findings, place
-    )
 
 
 def _source(

@@ -4,12 +4,11 @@ from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from bridgegen.arrays import Float
 from bridgegen.confirmation.schema import Record, Scenario
 from bridgegen.disk import write_whole
-from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.errors import FileFormatError
+from bridgegen.records import read_model
 
 PREFIX, SUFFIX = "confirmation-", ".json"
 
@@ -45,19 +44,8 @@ def read_record(path: Path) -> Record | None:
         FileFormatError: it is something else.
         StorageError: it cannot be read.
     """
-    try:
-        record = Record.model_validate_json(path.read_bytes(), strict=True)
-    except FileNotFoundError:
-        return None
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValidationError as error:
-        first = error.errors(include_input=False, include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise _not_ours(path, f"{place}: {first['msg']}" if place else first["msg"]) from None
-    except InputError as error:
-        raise _not_ours(path, "; ".join(error.problems)) from None
-    if file_name(record.simulator) != path.name:
+    record = read_model(path, Record, _not_ours)
+    if record is not None and file_name(record.simulator) != path.name:
         raise _not_ours(path, f"simulator is {record.simulator!r}")
     return record
 

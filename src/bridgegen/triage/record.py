@@ -6,10 +6,11 @@ Every list has a limit, so that the size of the record does not depend on the le
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bridgegen.disk import write_whole
-from bridgegen.errors import FileFormatError, StorageError
+from bridgegen.errors import FileFormatError
+from bridgegen.records import read_model
 
 JSON_FILE = "triage.json"
 """Its name in a run's folder."""
@@ -367,17 +368,8 @@ def read_record(path: Path, results: str | None = None) -> Triage | None:
         FileFormatError: it is something else, or another run's.
         StorageError: it cannot be read.
     """
-    try:
-        record = Triage.model_validate_json(path.read_bytes(), strict=True)
-    except FileNotFoundError:
-        return None
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValidationError as error:
-        first = error.errors(include_input=False, include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise _not_ours(path, f"{place}: {first['msg']}" if place else first["msg"]) from None
-    if results is not None and record.results != results:
+    record = read_model(path, Triage, _not_ours)
+    if record is not None and results is not None and record.results != results:
         raise _not_ours(path, "it was made from other evaluations than the run's")
     return record
 
