@@ -73,7 +73,7 @@ def braked(scene, a, b, k, start, braking):
 
     From instant k to ``start`` it opens its gap to b as drivers do, see `follows`.
 
-    It keeps its speed for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
+    It goes on as it did for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
     [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
     speed on its track. A body that stands when b runs into it has done all that braking can do: it
     counts as clear. One that crosses b's way and is ahead of its recorded place when they meet does
