@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from bridgegen.triage.minimal import Minimiser
+from bridgegen.triage.minimal import Minimiser, sentence
 from bridgegen.triage.modes import Key
 from bridgegen.triage.moves import nearest, ranges, searched
 from bridgegen.triage.neighbours import RADIUS
+from bridgegen.triage.record import Condition
 
 WAY = Key("contact", "front-to-rear striking", "ego", "rear distance", "truck", "")
 
@@ -110,3 +111,11 @@ def test_parameters_that_limit_each_other_and_whole_numbers(every, world):
         assert not every.violations(np.array([found.x]))
         assert pipeline.try_all(np.array([found.x])).harmful.all()
         assert "fog_density" in [one.name for one in found.conditions]
+
+
+@pytest.mark.parametrize(("limit", "said"), [(4.19e-9, "0"), (-1e-5, "0"), (0.25, "0.25")])
+def test_what_is_next_to_nothing_is_said_as_0(limit, said):
+    one = Condition(
+        name="delay", unit="s", sign="<=", limit=limit, step=0.1, value=limit, nominal=3.0
+    )
+    assert sentence([one]) == f"needs delay <= {said} s; all else nominal"

@@ -312,10 +312,16 @@ def sentence(conditions: Sequence[Condition]) -> str:
     if not conditions:
         return "the nominal scenario itself"
     said = [
-        f"{one.name} {one.sign} {one.limit:.3g}" + ("" if one.unit in _UNITLESS else f" {one.unit}")
+        f"{one.name} {one.sign} {_in_steps(one):.3g}"
+        + ("" if one.unit in _UNITLESS else f" {one.unit}")
         for one in conditions
     ]
     return f"needs {_listed(said)}; all else nominal"
+
+
+def _in_steps(one: Condition) -> float:
+    """Return a condition's limit; 0 where it is less than a thousandth of a step from that."""
+    return one.limit if abs(one.limit) >= 1e-3 * one.step else 0.0
 
 
 def _listed(texts: Sequence[str]) -> str:
