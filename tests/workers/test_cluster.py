@@ -34,7 +34,7 @@ LOCAL = {
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # loopback, not this machine's address
     "RAY_AUTH_MODE": "disabled",  # whatever token somebody keeps in the home folder
     "RAY_health_check_period_ms": "500",
-    "RAY_health_check_timeout_ms": "500",
+    "RAY_health_check_timeout_ms": "10000",  # a busy node is not a dead one
     "RAY_health_check_failure_threshold": "2",
     "RAY_USAGE_STATS_ENABLED": "0",
     "BRIDGEGEN_IDLE_SECONDS": "600",
@@ -77,9 +77,15 @@ class TwoNodes:
 @pytest.fixture(autouse=True)
 def in_time() -> Iterator[None]:
     """A test that hangs ends, with where it was."""
+
+    def too_late(*_):
+        raise TimeoutError("four minutes")
+
+    usual = signal.signal(signal.SIGALRM, too_late)
     signal.alarm(240)  # Ray's client tries for 40 s, thrice at most
     yield
     signal.alarm(0)
+    signal.signal(signal.SIGALRM, usual)
 
 
 @pytest.fixture(scope="module")

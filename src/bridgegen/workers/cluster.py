@@ -43,6 +43,7 @@ class Cluster(Crew[int]):
         self._reasons: dict[int, str] = {}
         self._log: IO[bytes] | None = None
         self._device, self._room, self._has_joined = "CPU", 0, False
+        self._actors, self._has_lost = 0, False
 
     @property
     def count(self) -> int:
@@ -63,6 +64,7 @@ class Cluster(Crew[int]):
         if self._gate is not None:
             self._gate.end()
             self._gate, self._room, self._has_joined = None, 0, False
+            self._actors, self._has_lost = 0, False
         if self._log is not None:
             self._log.close()
             self._log = None
@@ -91,7 +93,8 @@ class Cluster(Crew[int]):
         if gate is not self._gate:
             return None  # an earlier one's last words
         if who == "joined":
-            self._room, self._has_joined = rest[0], True
+            self._room, actors = rest
+            self._actors, self._has_joined = max(actors, self._actors, self._room), True
         elif who == "lost":
             hint = (
                 ""
@@ -117,8 +120,14 @@ class Cluster(Crew[int]):
                     f"has, got {said[1]}"
                 )
             if said[0] == "died":
-                self._reasons[number] = said[1]
+                self._reasons[number], self._has_lost = said[1], True
             return number, said
+
+    def _missing(self, chunks: int) -> int:
+        """See `Crew`; of actors that have no room for them all, Ray alone knows which have some."""
+        if chunks and (self._has_lost or self._actors > self._room):
+            return self._actors - len(self._posts)
+        return super()._missing(chunks)
 
     def _hire(self) -> int:
         number, taken = next(self._numbers), set(self._places.values())

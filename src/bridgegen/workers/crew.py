@@ -169,14 +169,16 @@ class Crew(ABC, Generic[Hand]):
         for hand in posts:
             self._dismiss(hand)
 
+    def _missing(self, chunks: int) -> int:
+        """Return how many workers to start for so many waiting chunks; none if it is negative."""
+        free = sum(post.chunk is None for post in self._posts.values())
+        return min(min(self.count, chunks) - free, self.count - len(self._posts))
+
     def _share_out(
         self, waiting: deque[Chunk], recipe: Recipe, work: str, X: Float, given: tuple[Any, ...]
     ) -> None:
         """Give everybody who is idle something to do, and begin who is missing."""
-        missing = min(self.count, len(waiting)) - sum(
-            post.chunk is None for post in self._posts.values()
-        )
-        for _ in range(min(missing, self.count - len(self._posts))):
+        for _ in range(self._missing(len(waiting))):
             hand = self._hire()
             self._posts[hand] = Post(hand)
         for post in [post for post in self._posts.values() if post.is_idle]:

@@ -46,7 +46,7 @@ class Gate:
         self._connect(address=address or "auto", namespace=self._namespace, log_to_driver=False)
         self._class = ray.remote(_Actor)
         self._count = self._room()
-        say("joined", self._count)
+        say("joined", self._count, self._actors_there())
         threading.Thread(target=self._look, daemon=True).start()
 
     def _connect(self, **given: Any) -> None:
@@ -116,6 +116,11 @@ class Gate:
     def _room(self) -> int:
         return int(self._ray.cluster_resources().get(self._device, 0))
 
+    def _actors_there(self) -> int:
+        """How many actors there are, all campaigns', with room or waiting for some."""
+        names = self._ray.util.list_named_actors()
+        return sum(name.startswith(f"{self._device}-") for name in names)
+
     def _look(self) -> None:
         """Say whenever the cluster has grown or shrunk."""
         while True:
@@ -127,7 +132,7 @@ class Gate:
                 return
             if count != self._count:
                 self._count = count
-                self._say("joined", count)
+                self._say("joined", count, self._actors_there())
 
 
 class _Actor(Station):
