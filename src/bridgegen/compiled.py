@@ -1,20 +1,8 @@
-"""The one decorator for compiled code, and where the compiled code is kept between runs.
-
-Numba keys its cache by the file of the compiled function alone, so a change in a kernel that it
-calls from another file would go unnoticed. Here the cache folder's name is a digest of the source
-of every private module beside a kernel, all that kernels read: change one, and all are compiled
-again.
-"""
+"""The one decorator for compiled code, and what compiled code can do that Numba has no word for."""
 
 import ctypes
 import gc
-import hashlib
-import os
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import lru_cache
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, cast
 
 import numba
@@ -25,51 +13,7 @@ from numba.core import cgutils, event
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
-
-@lru_cache(maxsize=1)
-def cache_folder() -> Path:
-    """The folder that holds the compiled code of exactly this source, made if need be.
-
-    ``NUMBA_CACHE_DIR`` overrules it; where the user's cache cannot be written, a temporary folder
-    serves for as long as the machine keeps it.
-    """
-    digest = hashlib.sha256(numba.__version__.encode())
-    homes = {kernels.parent for kernels in Path(__file__).parent.rglob("_*_kernels.py")}
-    for source in sorted(one for home in homes for one in home.glob("_[!_]*.py")):
-        digest.update(source.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:16]}"
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    home = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "bridgegen"
-    fallback = (
-        Path(tempfile.gettempdir()) / f"bridgegen-{os.getuid() if hasattr(os, 'getuid') else 0}"
-    )
-    for parent in [Path(chosen)] if chosen else [home, fallback]:
-        folder = parent / name
-        try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    return Path(tempfile.mkdtemp(prefix="bridgegen-"))
-
-
-def is_compiled() -> bool:
-    """Whether an earlier run has left compiled kernels, so that this one starts at once."""
-    return any(cache_folder().rglob("*.nbi"))
-
-
-@contextmanager
-def compiling_alone() -> Iterator[None]:
-    """Let one process of this machine compile, and the others wait for what it has compiled."""
-    try:
-        import fcntl
-    except ImportError:  # not on this system: each compiles for itself
-        yield
-        return
-    with (cache_folder() / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_SH if is_compiled() else fcntl.LOCK_EX)
-        yield
+from bridgegen.kernel_cache import KernelCache, compiling
 
 
 class _Unhurried(event.Listener):  # type: ignore[misc]
@@ -98,7 +42,17 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     A kernel never raises, does not check its arguments (its wrapper does), divides by zero as
     IEEE 754 says, and is not reordered (no fastmath), so its result is the same in any batch.
     """
-    return _compile(function, cache=True)
+    compiled = _compile(function)
+    if not numba.config.DISABLE_JIT:
+        compiled._cache = KernelCache(function)
+        compile_or_load = compiled.compile
+
+        def compile_alone(signature: Any) -> Any:
+            with compiling():
+                return compile_or_load(signature)
+
+        compiled.compile = compile_alone
+    return cast(Callable[..., Any], compiled)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -106,11 +60,10 @@ def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     For what runs at every instant and takes many arrays, whose descriptions a call would copy.
     """
-    return _compile(function, inline="always")
+    return cast(Callable[..., Any], _compile(function, inline="always"))
 
 
-def _compile(function: Callable[..., Any], **options: bool | str) -> Callable[..., Any]:
-    numba.config.CACHE_DIR = str(cache_folder())
+def _compile(function: Callable[..., Any], **options: bool | str) -> Any:
     options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:
@@ -122,7 +75,7 @@ def _compile(function: Callable[..., Any], **options: bool | str) -> Callable[..
             return resolve([plain(a) for a in given], {k: plain(a) for k, a in named.items()})
 
         compiled.get_call_template = resolve_alike
-    return cast(Callable[..., Any], compiled)
+    return compiled
 
 
 def _borrowed(_: Any, array: Any) -> Any:

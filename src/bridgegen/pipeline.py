@@ -17,7 +17,6 @@ from bridgegen import metrics as measures
 from bridgegen.adversary import AdversarySource, Arena
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals, require
-from bridgegen.compiled import compiling_alone
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
@@ -440,8 +439,7 @@ class Pipeline:
 def _remade(*, ego: CarriedDriver | None, **made_with: Any) -> Pipeline:
     """Return a pipeline for a worker, which is one thread; its kernels are compiled by then."""
     pipeline = Pipeline(**made_with, ego=ego.here() if ego else None, workers=Threads(1))
-    with compiling_alone():
-        pipeline.warm_up()
+    pipeline.warm_up()
     return pipeline
 
 

@@ -56,7 +56,7 @@ class Live:
 
     def say_compiling(self) -> None:
         """Tell, once, why nothing moves, if the kernels are not compiled yet."""
-        from bridgegen.compiled import is_compiled
+        from bridgegen.kernel_cache import is_compiled
 
         if not self._told and not is_compiled():
             self._told = True
