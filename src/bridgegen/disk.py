@@ -33,6 +33,31 @@ def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
             part.unlink()
 
 
+def read_inside(folder: Path, name: str) -> bytes:
+    """Return a file of a folder that somebody else may have made.
+
+    Args:
+        folder: of a run.
+        name: of the file, relative to it.
+
+    Raises:
+        FileNotFoundError: there is none.
+        StorageError: it cannot be read, is no file, or is a link to a place outside the folder.
+    """
+    path = folder / name
+    try:
+        if not path.resolve(strict=True).is_relative_to(folder.resolve(strict=True)):
+            raise StorageError(f"{path}: is a link to a place outside {folder}, and is not read")
+        if not path.is_file():
+            raise StorageError(f"{path}: is not a file")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
+        why = error.strerror if isinstance(error, OSError) else error
+        raise StorageError(f"{path}: cannot be read: {why}") from None
+
+
 def refuse_other(page: Path, generator: str, what: str) -> None:
     """Refuse a page's name that is no page's, or is taken by anything but an earlier one.
 

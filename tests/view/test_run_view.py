@@ -3,15 +3,18 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import urllib.request
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bridgegen.campaign.report import write_run_report
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.report.payload import ROWS
@@ -176,7 +179,7 @@ def test_the_command_serves_until_ctrl_c(finished):
     )
     try:
         url = server.stdout.readline().split()[0]
-        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", url)
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[-\w]{32,}/", url)
         with urllib.request.urlopen(f"{url}news?after=120", timeout=60) as reply:
             assert json.load(reply) == {"finished": True, "kept": 2, "elsewhere": 0}
         server.send_signal(signal.SIGINT)
@@ -191,7 +194,8 @@ def test_the_browser_is_opened_at_the_evaluation(finished, monkeypatch, capsys):
     opened = []
 
     def interrupted(url):
-        opened.append(url)
+        page = Path(url.removeprefix("file://"))
+        opened.append((url, page.read_text("utf-8"), page.parent.stat().st_mode))
         raise KeyboardInterrupt
 
     words = ["bridgegen", "view", str(finished), "--evaluation", "17"]
@@ -200,5 +204,30 @@ def test_the_browser_is_opened_at_the_evaluation(finished, monkeypatch, capsys):
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 0
-    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#evaluation-17", opened[0])
-    assert "No longer served." in capsys.readouterr().out
+    ((page, text, mode),) = opened
+    (there,) = set(re.findall(r"http://127\.0\.0\.1:\d+/[-\w]{32,}/#evaluation-17", text))
+    out = capsys.readouterr().out
+    assert there in out
+    assert "No longer served." in out
+    # Every user of this machine can read a browser's command line, but not this page.
+    assert page.startswith("file://")
+    assert mode & 0o077 == 0
+    assert not Path(page.removeprefix("file://")).exists()
+
+
+def test_links_that_lead_out_of_the_run_are_not_followed(finished, tmp_path):
+    """A stranger's run must not serve this machine's files, nor pack them into a report."""
+    folder, secret = tmp_path / "theirs", tmp_path / "secret"
+    shutil.copytree(finished, folder)
+    secret.write_text("mine")
+    for name in ("critical/0001.xosc", "critical/minimal-01.xosc", "regions.json"):
+        (folder / name).unlink(missing_ok=True)
+        (folder / name).symlink_to(secret)
+        with pytest.raises(StorageError, match=rf"{name}: is a link to a place outside"):
+            RunView(folder).file(name)
+    view, refused = RunView(folder), r"0001\.xosc: is a link to a place outside"
+    with Store.open(folder) as store, pytest.raises(StorageError, match=refused):
+        write_run_report(view._pipeline, store, view.settings, view._rows, view._kept())
+    (folder / "critical/0002.xosc").unlink()
+    (folder / "critical/0002.xosc").symlink_to("0001.owl")  # inside: their own files
+    assert RunView(folder).file("critical/0002.xosc") == RunView(folder).file("critical/0001.owl")

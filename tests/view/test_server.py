@@ -3,6 +3,7 @@
 import http.client
 import json
 import socket
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -42,9 +43,11 @@ def server() -> Iterator[Server]:
 
 
 def ask(
-    server: Server, path: str, method: str = "GET", **headers: str
+    server: Server, path: str, method: str = "GET", token: str | None = None, **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
+    """Ask for a path behind the server's token, or behind another one."""
     port = server.server_address[1]
+    path = f"/{server.token if token is None else token}{path}"
     connection = http.client.HTTPConnection(LOOPBACK, port, timeout=10)
     connection.putrequest(method, path, skip_host="Host" in headers)
     for name, value in headers.items():
@@ -67,7 +70,25 @@ def test_it_gives_the_page_what_is_new_motion_and_files(server):
 
 def test_it_listens_on_loopback_only(server):
     assert server.server_address[0] == "127.0.0.1"
-    assert server.url == f"http://127.0.0.1:{server.server_address[1]}/"
+    assert server.url == f"http://127.0.0.1:{server.server_address[1]}/{server.token}/"
+
+
+@pytest.mark.parametrize("path", ["/", "/news", "/motion/1", "/critical/0001.xosc", "//", ""])
+def test_without_the_token_it_says_nothing(server, path):
+    """Any user of this machine can reach the port."""
+    for token in ("", "x" * len(server.token), server.token[:-1], server.token + "x", "%ff"):
+        status, _, body = ask(server, path, token=token)
+        assert (status, b"page" in body, b"xml" in body) == (403, False, False)
+
+
+def test_each_server_has_a_token_of_its_own():
+    tokens = set()
+    for _ in range(3):
+        server = Server(Site())
+        tokens.add(server.token)
+        server.server_close()
+    assert len(tokens) == 3
+    assert all(len(token) >= 32 for token in tokens)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +111,8 @@ def test_two_names_are_none(server):
     port = server.server_address[1]
     with socket.create_connection((LOOPBACK, port), timeout=10) as stream:
         name = f"127.0.0.1:{port}"
-        text = f"GET / HTTP/1.1\r\nHost: {name}\r\nHost: evil.example\r\nConnection: close\r\n\r\n"
+        hosts = f"Host: {name}\r\nHost: evil.example\r\n"
+        text = f"GET /{server.token}/ HTTP/1.1\r\n{hosts}Connection: close\r\n\r\n"
         stream.sendall(text.encode())
         assert stream.makefile("rb").readline().split()[1] == b"421"
 
@@ -156,6 +178,45 @@ def test_a_port_that_is_taken_or_none_is_one_clear_error(server):
     for none in (-1, 65_536):
         with pytest.raises(InputError, match=f"0 <= port <= 65535 must hold, got {none}"):
             Server(Site(), none)
+
+
+class Slow(Site):
+    """Takes as long for the first page as the test likes, and counts the motions."""
+
+    def __init__(self) -> None:
+        self.begun, self.go_on, self.moved = threading.Event(), threading.Event(), []
+
+    def page(self) -> bytes:
+        self.begun.set()
+        assert self.go_on.wait(30.0)
+        return b""
+
+    def motion(self, evaluation: int) -> dict[str, Any] | None:
+        self.moved.append(evaluation)
+        return {}
+
+
+def test_what_nobody_waits_for_any_more_is_not_worked_out():
+    """Who clicks through twenty scenarios wants the last one, not all twenty one by one."""
+    site = Slow()
+    server = Server(site)
+    server.start()
+    name = f"127.0.0.1:{server.server_address[1]}"
+    page = threading.Thread(target=ask, args=(server, "/"))
+    page.start()
+    assert site.begun.wait(30.0)
+    for evaluation in range(20):
+        with socket.create_connection(server.server_address, timeout=10) as stream:
+            target = f"/{server.token}/motion/{evaluation}"
+            stream.sendall(f"GET {target} HTTP/1.1\r\nHost: {name}\r\n\r\n".encode())
+    last = threading.Thread(target=ask, args=(server, "/motion/99"))
+    last.start()
+    site.go_on.set()
+    page.join(30.0)
+    last.join(30.0)
+    server.shutdown()
+    server.server_close()
+    assert site.moved == [99]
 
 
 def test_a_browser_that_hangs_up_is_no_trouble(server, capfd):

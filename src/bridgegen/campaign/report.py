@@ -8,6 +8,7 @@ from bridgegen.campaign.handover import FOLDER, MINIMAL, Kept
 from bridgegen.campaign.run import REPORT
 from bridgegen.campaign.settings import Settings
 from bridgegen.confirmation.record import read_records
+from bridgegen.disk import read_inside
 from bridgegen.pipeline import Pipeline
 from bridgegen.regions.record import JSON_FILE, read_record
 from bridgegen.report.build import build_report
@@ -38,7 +39,7 @@ def write_run_report(
     """
     path = store.folder / REPORT
     names = [*(name for one in kept for name in one.files), *minimal_files(store.folder)]
-    files = {name: (store.folder / name).read_bytes() for name in names}
+    files = {name: read_inside(store.folder, name) for name in names}
     data = run_data(pipeline, store, settings, rows, kept, files=files, more=True)
     write_report(path, data)
     return path

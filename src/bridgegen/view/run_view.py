@@ -12,6 +12,7 @@ from bridgegen.campaign.restored import pipeline_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.confirmation.record import file_name, read_records
 from bridgegen.confirmation.schema import Record
+from bridgegen.disk import read_inside
 from bridgegen.errors import InputError
 from bridgegen.regions.record import JSON_FILE
 from bridgegen.report.motion import motion_payload
@@ -106,7 +107,7 @@ class RunView:
         names |= {file_name(name) for name in SIMULATORS}
         names |= {TRIAGE_FILE, *minimal_files(self.folder)}
         try:
-            return (self.folder / name).read_bytes() if name in names else None
+            return read_inside(self.folder, name) if name in names else None
         except FileNotFoundError:
             return None
 

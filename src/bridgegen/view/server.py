@@ -3,10 +3,17 @@
 Any website that is open in the same browser can send requests to a server on loopback. So only GET
 is answered, only under the names of loopback in the ``Host`` header (a website whose name is made
 to point here sends its own), nothing is written, no path of the file system is ever built from a
-request, and the answers tell the browser not to let other pages read or frame them.
+request, and the answers tell the browser not to let other pages read or frame them. Any other user
+of this machine can send requests, too: so every address begins with a secret token.
+
+One request is answered at a time. One whose browser has hung up meanwhile is dropped.
 """
 
+import hmac
 import json
+import secrets
+import select
+import socket
 import sys
 import threading
 from collections.abc import Mapping
@@ -129,16 +136,33 @@ class _Handler(BaseHTTPRequestHandler):
     def do_HEAD(self) -> None:
         self._send(self._found(), body=False)
 
-    def _found(self) -> Answer:
+    def _found(self) -> Answer | None:
+        """Return the answer; None if nobody waits for it any more."""
         if self.headers.get_all("Host", []) not in ([name] for name in self.server.names):
             text = b"This server is for the machine that it runs on.\n"
             return Answer(HTTPStatus.MISDIRECTED_REQUEST, "text/plain", text)
         # Websites may not even make work for it: what they send, the browser marks.
         if self.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", b"Not for other websites.\n")
-        return answer(self.server.site, self.path)
+        token, slash, rest = self.path.removeprefix("/").partition("/")
+        if not (slash and hmac.compare_digest(token.encode(), self.server.token.encode())):
+            text = b"The address must be the one that 'bridgegen view' printed, with its token.\n"
+            return Answer(HTTPStatus.FORBIDDEN, "text/plain", text)
+        with self.server.turn:
+            return None if self._is_gone() else answer(self.server.site, f"/{rest}")
 
-    def _send(self, one: Answer, *, body: bool = True) -> None:
+    def _is_gone(self) -> bool:
+        """Whether the browser has hung up while others were answered."""
+        readable, _, _ = select.select([self.connection], [], [], 0.0)
+        try:
+            return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
+        except OSError:
+            return True
+
+    def _send(self, one: Answer | None, *, body: bool = True) -> None:
+        if one is None:
+            self.close_connection = True
+            return
         self.send_response(one.status)
         for name, value in {**HEADERS, "Content-Type": one.kind}.items():
             self.send_header(name, value)
@@ -159,7 +183,9 @@ class Server(ThreadingHTTPServer):
         port: 0 for one that is free.
 
     Attributes:
-        url: of the page.
+        token: a secret of this server; every address begins with it.
+        url: of the page, with the token.
+        turn: held while a request is answered.
 
     Raises:
         InputError: no such port, or it cannot be had.
@@ -169,7 +195,7 @@ class Server(ThreadingHTTPServer):
     block_on_close = False
 
     def __init__(self, site: Site, port: int = 0) -> None:
-        self.site = site
+        self.site, self.token, self.turn = site, secrets.token_urlsafe(24), threading.Lock()
         if not 0 <= port <= MAX_PORT:
             raise InputError(f"0 <= port <= {MAX_PORT} must hold, got {port}")
         try:
@@ -180,7 +206,7 @@ class Server(ThreadingHTTPServer):
                 "choose another with --port, or leave it out"
             ) from None
         port = self.server_address[1]
-        self.url = f"http://{LOOPBACK}:{port}/"
+        self.url = f"http://{LOOPBACK}:{port}/{self.token}/"
         self.names = frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))
         if port == 80:
             self.names |= {LOOPBACK, "localhost"}
