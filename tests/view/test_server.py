@@ -120,7 +120,10 @@ def test_two_names_are_none(server):
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 def test_other_websites_are_sent_away(server, site):
     assert ask(server, "/motion/1", Sec_Fetch_Site=site)[0] == 403
+    assert ask(server, "/motion/1", Sec_Fetch_Site=site, Sec_Fetch_Dest="script")[0] == 403
     assert ask(server, "/motion/1", Sec_Fetch_Site="same-origin")[0] == 200
+    # From the page on disk that the browser is started with.
+    assert ask(server, "/", Sec_Fetch_Site=site, Sec_Fetch_Dest="document")[0] == 200
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "CONNECT", "get"])

@@ -6,6 +6,7 @@ import pytest
 from bridgegen.confirmation.record import digest_of, write_record
 from bridgegen.confirmation.schema import Outcome, Record, Scenario
 from bridgegen.objective import Thresholds
+from bridgegen.screen.view import _redirect
 from bridgegen.view.run_view import RunView
 from bridgegen.view.server import Server
 
@@ -31,6 +32,14 @@ def opened(browser, growing):
     page.close()
     server.shutdown()
     server.server_close()
+
+
+def test_the_page_that_the_browser_is_started_with_leads_there(opened, tmp_path):
+    page, server = opened
+    page.goto(_redirect(tmp_path, f"{server.url}#evaluation-3"))
+    page.wait_for_url(f"{server.url}#evaluation-3")
+    assert page.evaluate("bridgegen.data.rows.n") == 60
+    assert page.complaints == []
 
 
 def test_it_grows_with_its_run_and_says_so(opened, growing):

@@ -141,8 +141,10 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get_all("Host", []) not in ([name] for name in self.server.names):
             text = b"This server is for the machine that it runs on.\n"
             return Answer(HTTPStatus.MISDIRECTED_REQUEST, "text/plain", text)
-        # Websites may not even make work for it: what they send, the browser marks.
-        if self.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
+        # Websites may not even make work for it: what they send, the browser marks. It also marks
+        # the way here from the page on disk that it is started with; that one opens a document.
+        elsewhere = self.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin")
+        if elsewhere and self.headers.get("Sec-Fetch-Dest") != "document":
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", b"Not for other websites.\n")
         token, slash, rest = self.path.removeprefix("/").partition("/")
         if not (slash and hmac.compare_digest(token.encode(), self.server.token.encode())):
