@@ -46,6 +46,17 @@ def test_the_first_instant_counts_over_all_entities(rollout_of):
     assert v_d(rollout) == [7.0]
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_rounding_does_not_choose_the_instant(rollout_of, sign):
+    """At a constant gap, d_min is reached when it is first reached, whatever the last bits say."""
+    last_bits = sign * 5e-14 * np.arange(4)
+    rollout = rollout_of(x=[[0, 0, 0, 0], 9.0 + last_bits], v=[[4, 3, 2, 1], [0, 0, 0, 0]])
+    assert d_min(rollout) == pytest.approx([5.0], abs=1e-12)
+    assert v_d(rollout) == [4.0]
+    nearer = rollout_of(x=[[0, 0, 0, 0], [9.0, 9.0 - 2e-9, 9, 9]], v=[[4, 3, 2, 1], [0] * 4])
+    assert v_d(nearer) == [3.0]
+
+
 def test_on_a_collision_v_d_is_the_speed_at_first_contact(rollout_of):
     rollout = rollout_of(x=[[0, 0, 0, 0], [5, 3, 0, 9]], v=[[9, 8, 1, 1], [0, 0, 0, 0]])
     assert d_min(rollout) == [0.0]
@@ -284,7 +295,7 @@ def plain(rollout, i):
     n = rollout.n_steps[i]
     gap = rollout.distance[i, 1:, :n]
     a, step = rollout.a[i, 0, :n], rollout.time_step
-    k = int(gap.min(axis=0).argmin())
+    k = int((gap.min(axis=0) <= gap.min() + 1e-9).argmax())
     count = 0
     for row in gap:
         touching = np.flatnonzero(row == 0) * step

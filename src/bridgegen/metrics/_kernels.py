@@ -8,20 +8,30 @@ import numpy as np
 from bridgegen.arrays import Float, Int
 from bridgegen.compiled import kernel
 
+TIE = 1e-9
+"""Distances that differ by no more are alike [m]."""
+
 
 @kernel
 def closest(distance: Float, n_steps: Int, least: Float, instant: Int) -> None:
-    """Write the least distance and its first instant; +inf and −1 without other entities."""
+    """Write the least distance and its first instant; +inf and −1 without other entities.
+
+    The instant is the first within ``TIE`` of the least: at a constant gap, the last bits do not
+    choose it.
+    """
     n_rows, n_entities, _ = distance.shape
     for i in range(n_rows):
         best = np.inf
-        at = -1
         for e in range(1, n_entities):
             for k in range(n_steps[i]):
-                d = distance[i, e, k]
-                if d < best or (d == best and k < at):
-                    best = d
-                    at = k
+                best = min(best, distance[i, e, k])
+        at = -1
+        if best < np.inf:
+            for e in range(1, n_entities):
+                for k in range(n_steps[i] if at < 0 else at):
+                    if distance[i, e, k] <= best + TIE:
+                        at = k
+                        break
         least[i] = best
         instant[i] = at
 

@@ -20,13 +20,23 @@ def d_min(rollout: Rollout) -> Float:
 
 
 def closest(rollout: Rollout) -> tuple[Float, Int]:
-    """Return the smallest distance ``(N,)`` [m] and its first instant ``(N,)``, −1 if none."""
+    """Return the smallest distance ``(N,)`` [m] and the first instant within 1e-9 m of it ``(N,)``.
+
+    The instant is −1 where there is no other entity.
+    """
     from bridgegen.metrics import _kernels
 
     n = rollout.shape[0]
     least, instant = np.empty(n), np.empty(n, dtype=np.int64)
     _kernels.closest(distance(rollout), steps(rollout), least, instant)
     return least, instant
+
+
+def first_closest(distance: Float) -> int:
+    """Return the first instant of ``(T,)`` distances [m] that is the closest; as `closest` does."""
+    from bridgegen.metrics import _kernels
+
+    return int((distance <= distance.min() + _kernels.TIE).argmax())
 
 
 METRIC = Metric(

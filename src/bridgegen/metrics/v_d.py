@@ -9,7 +9,7 @@ from bridgegen.simulation.rollout import Rollout
 
 
 def v_d(rollout: Rollout) -> Float:
-    """Return the ego's speed at the moment of d_min, the first if there are several.
+    """Return the ego's speed at the moment of d_min, the first within 1e-9 m of it.
 
     Returns:
         ``(N,)`` float64 [m/s], ≥ 0: on a collision the speed at first contact; 0 where there is

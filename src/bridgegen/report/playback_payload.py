@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.metrics.d_min import first_closest
 from bridgegen.report.findings_payload import conflict_payload
 from bridgegen.report.playback import Course, Lamp, Playback, Sensed, Weather
 from bridgegen.report.series import packed
@@ -80,7 +81,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
         ],
         "lamps": [_lamp(lamp, p.n_steps) for lamp in p.lamps],
         "series": _series(p),
-        "closest": int(finite.argmin()) if np.isfinite(finite).any() else None,
+        "closest": first_closest(finite) if np.isfinite(finite).any() else None,
         "contacts": begins.tolist(),
         "sensed": None if p.sensed is None else _sensed(p.sensed, p),
         "course": None if p.course is None else _course(p.course, p.n_steps),
