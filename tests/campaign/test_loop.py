@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.campaign.loop import PATIENCE, Progress, Reason, run_loop
+from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.errors import InputError, StorageError
 from bridgegen.search import Problem, Results, get
 from bridgegen.store import Store
@@ -122,16 +122,16 @@ def test_the_budget_cuts_a_batch_and_counts_new_rows_only(open_store):
     assert len(search.told) == 1
 
 
-def test_converged(open_store):
-    search, store = Scripted([0.5], *[[0.5, 0.5]] * (PATIENCE + 5)), open_store()
+def test_a_hundred_batches_without_a_new_row_are_converged(open_store):
+    search, store = Scripted([0.5], *[[0.5, 0.5]] * 105), open_store()
     result = go(store, search, 10)
     assert result.reason is Reason.CONVERGED
-    assert (result.evaluations, result.batches) == (1, 1 + PATIENCE)
+    assert (result.evaluations, result.batches) == (1, 101)
     assert store.finished == "converged"
 
 
 def test_one_new_row_is_not_converged(open_store):
-    quiet = [[0.5]] * (PATIENCE - 1)
+    quiet = [[0.5]] * 99
     search, store = Scripted([0.5], *quiet, [0.6], *quiet), open_store()
     assert go(store, search, 10).reason is Reason.EXHAUSTED
 

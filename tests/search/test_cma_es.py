@@ -112,3 +112,17 @@ def test_it_begins_afresh_where_nothing_improves():
         U = search.ask()
         search.tell(U, Results.of_F(np.ones((len(U), 1))))
     assert search._kind != "first"
+
+
+@pytest.mark.parametrize(("n_var", "rows", "patience"), [(2, 6, 20), (3, 30, 13), (2, 14, 15)])
+@pytest.mark.parametrize("improving", [0, 7])
+def test_how_long_it_waits_for_an_improvement(n_var, rows, patience, improving):
+    """10 + ⌈30 n/λ⌉ generations whose best are equal (Hansen 2016, B.3); then twice the rows."""
+    search = CMAES(Problem.unnamed(n_var), 0, population=rows, restart_within=1e-12)
+    sizes = []
+    for generation in range(60):
+        U = search.ask()
+        sizes.append(len(U))
+        best = float(max(improving - generation, 0))
+        search.tell(U, Results.of_F(np.full((len(U), 1), best)))
+    assert sizes.index(2 * rows) == improving + patience

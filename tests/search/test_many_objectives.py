@@ -89,3 +89,21 @@ def test_the_archive_is_cut_to_its_size():
     assert len(front) == 10
     dominated = [any((a <= b).all() and (a < b).any() for a in front) for b in front]
     assert not any(dominated)
+
+
+def test_of_two_leaders_the_less_crowded_leads():
+    """SMPSO: each particle flies towards the less crowded of two rows of the front.
+
+    All rows are of the front, those below 0.5 apart, those above it close together: of two drawn at
+    random, one below leads in three cases of four. From just above 0.5 a particle, whose own best
+    row is where it is, then goes down; and in a few cases of those where one above leads.
+    """
+    search = get("mopso")(
+        Problem.unnamed(1, 2), 3, population=2000, archive=2000, w=0.0, mutation=0.0
+    )
+    U = search.ask()
+    f = np.where(U[:, 0] < 0.5, 100.0 * U[:, 0], 50.0 + 0.01 * U[:, 0])
+    search.tell(U, Results.of_F(np.stack([f, -f], axis=1)))
+    near = (U[:, 0] > 0.5) & (U[:, 0] < 0.6)
+    down = search.ask()[near] < U[near]
+    assert 0.7 < down.mean() < 0.85

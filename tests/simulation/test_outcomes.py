@@ -67,6 +67,14 @@ def test_one_accident_within_five_seconds_two_beyond():
     assert [one.time for one in accidents(rollout(x), 0)] == [0.3, 10.0]
 
 
+@pytest.mark.parametrize(("again", "times"), [(59, [1.0]), (60, [1.0]), (61, [1.0, 6.1])])
+def test_five_seconds_after_a_contact_another_begins(again, times):
+    """Contacts at 1.0 s and, 4.9, 5.0 or 5.1 s later, again."""
+    x = np.full((2, 120), [[0.0], [20.0]])
+    x[1, [10, again]] = 1.0
+    assert [one.time for one in accidents(rollout(x), 0)] == times
+
+
 def test_others_collide_too_but_not_what_is_part_of_the_road():
     x = [[-50.0] * 3, [0.0] * 3, [1.0] * 3, [2.0] * 3, [2.5] * 3]
     names = ("ego", "cone_1", "bv", "other", "cone_2")
@@ -95,8 +103,15 @@ def test_accidents_do_not_depend_on_where_north_is(turn):
     assert turned.y == pytest.approx(s * straight.x + c * straight.y)
 
 
-def test_accidents_are_values():
-    assert Accident(1.0, 0.0, 0.0, ("a", "b")) == Accident(1.0, 0.0, 0.0, ("a", "b"))
+def test_accidents_come_in_the_order_of_time():
+    """b and c touch at 0.2 s, before the ego and b do; of one instant, in the rollout's order."""
+    x = np.full((3, 10), [[0.0], [20.0], [40.0]])
+    x[1, 5:], x[2, 2:5] = 1.0, 21.0
+    first, second = accidents(rollout(x, names=("ego", "b", "c")), 0)
+    assert first == Accident(0.2, pytest.approx(20.5), 0.0, ("b", "c"))
+    assert (second.time, second.who) == (0.5, ("ego", "b"))
+    together = rollout([[0.0] * 3, [1.0] * 3, [2.0] * 3], names=("ego", "b", "c"))
+    assert [one.who for one in accidents(together, 0)] == [("b", "c"), ("ego", "b"), ("ego", "c")]
 
 
 # -- queues ----------------------------------------------------------------------------------------
@@ -216,14 +231,15 @@ def test_a_row_of_a_batch_is_that_row_alone(model):
 # -- who is not there --------------------------------------------------------------------------
 
 
-def test_nobody_runs_into_somebody_that_is_not_there():
-    """As above, with bv1 there up to 2.5 s, which is an instant before it would be touched."""
+@pytest.mark.parametrize("who", [0, 1])
+def test_nobody_runs_into_somebody_that_is_not_there(who):
+    """As above, with either there up to 2.5 s, which is an instant before they would touch."""
     t = np.arange(40) * DT
     one = rollout([10.0 * t, np.full(40, 30.0)], np.array([[0.0], [1.0]]))
     present = np.ones(one.x.shape, dtype=np.bool_)
-    present[0, 1, 27:] = False
+    present[0, who, 27:] = False
     assert len(accidents(replace(one, present=present), 0)) == 1
-    present[0, 1, 26:] = False
+    present[0, who, 26:] = False
     assert accidents(replace(one, present=present), 0) == ()
 
 

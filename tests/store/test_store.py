@@ -121,6 +121,18 @@ def test_rows_stream_in_chunks(tmp_path):
         assert len(store.read(118, 500)) == 3
 
 
+@pytest.mark.parametrize("n", [4095, 4096, 4097, 8193])
+def test_the_last_evaluation_is_read_whatever_their_number(n, tmp_path):
+    """Long runs are read some thousands at a time: one more than such a part is one more row."""
+    with filled(tmp_path / "run", n) as store:
+        assert store.read().id.tolist() == list(range(n))
+        assert store.read(1).id.tolist() == list(range(1, n))
+        assert [part.id[-1] for part in store.rows()][-1] == n - 1
+        assert store.frame().index.tolist() == list(range(n))
+        for chunk in (n - 1, n, n + 1):
+            assert sum(len(part) for part in store.rows(chunk=chunk)) == n
+
+
 def test_causes_are_recorded_by_name_and_read_back(tmp_path):
     U, X, result = batch(30)
     result.cause = np.arange(30) % 5
