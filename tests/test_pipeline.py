@@ -68,13 +68,24 @@ def test_no_rows_no_results():
     assert empty.critical.shape == (0,)
 
 
-def test_weather_acts_through_friction_alone_for_now():
+def test_on_a_slippery_road_the_ego_leaves_its_path_further():
     pipeline = made()
     x = np.repeat(rows(pipeline, 1), 2, axis=0)
     x[:, pipeline.space.index("ego_speed")] = 8.9
     x[1, pipeline.space.index("friction")] = 0.35
     offset = np.abs(pipeline.rollout(x).offset[:, 0]).max(axis=1)
     assert offset[1] > offset[0]
+
+
+@pytest.mark.parametrize(("ego", "changes"), [("route-follower", False), ("reference", True)])
+def test_fog_changes_the_results_of_a_driver_that_perceives_and_of_no_other(ego, changes):
+    pipeline = made(ego=ego)
+    clear = rows(pipeline, 8)
+    clear[:, pipeline.space.index("fog_density")] = 0.0
+    foggy = clear.copy()
+    foggy[:, pipeline.space.index("fog_density")] = 90.0
+    one, other = pipeline.evaluate(clear).metrics, pipeline.evaluate(foggy).metrics
+    assert np.array_equal(one, other, equal_nan=True) is not changes
 
 
 @pytest.mark.parametrize(

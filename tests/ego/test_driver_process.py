@@ -1,4 +1,3 @@
-import time
 from pathlib import Path
 
 import numpy as np
@@ -64,11 +63,9 @@ def test_a_bad_driver_costs_an_error_and_can_be_asked_again(process, name, kind,
     driver = process(name, time_limit=0.5)
     for _ in range(2):
         driver.reset(N, scene())
-        start = time.perf_counter()
         with pytest.raises(DriverError, match=message) as error:
             driver.act(observation())
         assert error.value.kind == kind
-        assert time.perf_counter() - start < 3.0
 
 
 def test_what_is_answered_for_an_ended_scenario_is_not_looked_at(process):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.json_schema import schema, schema_text, write_schema
 from bridgegen.odd.plain_yaml import Document, read_plain_yaml
-from bridgegen.odd.reader import _build, names
+from bridgegen.odd.reader import _build, _Declarations, names
 from bridgegen.odd.schema import FragmentFile, ScenarioFile
 from bridgegen.odd.shape import shape_problems
 
@@ -117,6 +117,17 @@ def changed(draw, originals):
     return data
 
 
+def change(data, path, value):
+    """Set an entry; None: drop it."""
+    *parents, last = path
+    for key in parents:
+        data = data[key]
+    if value is None:
+        del data[last]
+    else:
+        data[last] = value
+
+
 def refused(data: object) -> bool:
     try:
         _build(Document(data, {}, "made.yaml"), None)
@@ -141,8 +152,35 @@ def test_schema_and_reader_agree(data):
 @settings(max_examples=60)
 @given(changed([catalogue("weather"), catalogue("encounter")]))
 def test_schema_and_reader_agree_on_fragments(data):
-    if shape_problems(FragmentFile, Document(data, {}, "made.yaml")):
-        assert not validator("fragment").is_valid(data)
+    document, valid = Document(data, {}, "made.yaml"), validator("fragment").is_valid(data)
+    if shape_problems(FragmentFile, document):
+        assert not valid
+    elif not valid:
+        declared = _Declarations()
+        declared.take(document)
+        assert declared.problems, problems("fragment", data)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("fragment",), 3.0),
+        (("parameters", "precipitation", "low"), "none"),
+        (("parameters", "precipitation", "low"), None),
+        (("parameters", "precipitation", "unit"), "km/h"),
+        (("parameters", "Rain"), {}),
+        (("bounds", 0, "target"), None),
+        (("derived", "friction", "value"), None),
+    ],
+)
+def test_a_damaged_fragment_is_invalid_to_both(path, value):
+    data = copy.deepcopy(catalogue("weather"))
+    assert validator("fragment").is_valid(data)
+    change(data, path, value)
+    declared, document = _Declarations(), Document(data, {}, "made.yaml")
+    declared.take(document)
+    assert shape_problems(FragmentFile, document) or declared.problems
+    assert not validator("fragment").is_valid(data)
 
 
 @pytest.mark.parametrize(
@@ -166,13 +204,7 @@ def test_schema_and_reader_agree_on_fragments(data):
 )
 def test_rules_between_keys_are_the_schema_s_too(path, value):
     data = copy.deepcopy(catalogue("crossroads-s4"))
-    at = data
-    for key in path[:-1]:
-        at = at[key]
-    if value is None:
-        del at[path[-1]]
-    else:
-        at[path[-1]] = value
+    change(data, path, value)
     assert refused(data)
     assert not validator("scenario").is_valid(data)
 

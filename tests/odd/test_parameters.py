@@ -97,5 +97,6 @@ def test_axes_by_name_in_their_order():
 def test_values_rounded_to_four_decimals_keep_their_bounds():
     # Twice 50.00005, rounded to four decimals, beside 50.0000: off by 1e-4.
     assert np.abs(100.0001 - 2 * 50.0) <= slack(100.0)
-    assert slack(0.0) == TOLERANCE
+    assert slack(0.0) == TOLERANCE == 1e-4
+    assert slack(9.0) == pytest.approx(1e-3)
     assert slack(-100.0) == slack(100.0)
