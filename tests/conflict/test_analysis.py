@@ -334,3 +334,14 @@ def test_failed_rows_are_empty(track, meeting):
     assert not found.kind.any()
     assert np.isinf(found.ttc).all()
     assert not harm_of_pairs(found).any()
+
+
+def test_an_object_that_moves_gives_way_and_one_that_stands_does_not(track, meeting):
+    """A barrier takes nothing off the ego's change of speed; what rolls on ahead does."""
+    barrier = one(meeting(track(v=20.0), track(x=60.0), kinds=[CAR, OTHER]))
+    rolls = one(meeting(track(v=20.0), track(x=24.0, v=5.0), kinds=[CAR, OTHER]))
+    assert barrier.delta_v_ego == pytest.approx(20.0)
+    assert 0.0 < rolls.delta_v_ego < 0.5 * 15.0
+    car = one(meeting(track(v=20.0), track(x=60.0)))
+    assert car.delta_v_ego == pytest.approx(10.0)  # a standing car of equal mass
+    assert barrier.severity > car.severity > 0.0

@@ -7,7 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.conflict.plausibility import LIMITS, SLIP, Implausible, plausibility
-from bridgegen.ego.kinds import BICYCLE, BUS, CAR, OTHER, PEDESTRIAN, TRUCK
+from bridgegen.ego.kinds import (
+    ANIMAL,
+    BICYCLE,
+    BUS,
+    CAR,
+    MOTORBIKE,
+    OTHER,
+    PEDESTRIAN,
+    TRUCK,
+)
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.05
@@ -299,3 +308,24 @@ def test_collisions_are_those_that_plain_geometry_finds():
             assert contact is not None
             assert contact < first + 1
     assert hits >= 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "starts", "brakes", "radius", "across"),
+    [
+        (CAR, 8.0, 11.0, 3.125, 9.81),
+        (TRUCK, 3.0, 8.0, 5.0, 4.905),
+        (BUS, 3.0, 8.0, 5.0, 4.905),
+        (MOTORBIKE, 10.0, 11.0, 2.0, 9.81),
+        (BICYCLE, 3.0, 7.0, 1.0, 6.867),
+        (PEDESTRIAN, 8.0, 8.0, 0.0, np.inf),
+        (ANIMAL, 13.0, 13.0, 0.0, np.inf),
+        (OTHER, np.inf, np.inf, 0.0, np.inf),
+    ],
+)
+def test_what_bodies_can_do_is_as_published(kind, starts, brakes, radius, across):
+    """The numbers of the sources that `LIMITS` names: m/s², m/s², m, m/s²."""
+    most = LIMITS[kind]
+    assert most[:2] == (starts, brakes)
+    assert 1.0 / most[2] == pytest.approx(radius)
+    assert most[3] == pytest.approx(across)
