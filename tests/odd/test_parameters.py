@@ -100,3 +100,24 @@ def test_values_rounded_to_four_decimals_keep_their_bounds():
     assert slack(0.0) == TOLERANCE == 1e-4
     assert slack(9.0) == pytest.approx(1e-3)
     assert slack(-100.0) == slack(100.0)
+
+
+def test_shares_of_an_interval_by_hand():
+    """Of 2.0 to 2.5, 2.1 to 2.2 has the shares 0.2 to 0.4; of no width, all or nothing."""
+    one = Parameter("p", Axis.EXTENSION, "1", 0.0, 9.0, 0.0)
+    assert one.shares(2.1, 2.2, 2.0, 2.5) == (pytest.approx(0.2), pytest.approx(0.4))
+    assert one.shares(0.0, 9.0, 2.0, 2.5) == (0.0, 1.0)
+    for low, high, expected in ((1.0, 3.0, (0.0, 1.0)), (2.0, 2.0, (0.0, 1.0))):
+        assert one.shares(low, high, 2.0, 2.0) == expected
+    for low, high in ((0.0, 1.5), (2.5, 3.0)):  # beside it: nothing between first and last
+        first, last = one.shares(low, high, 2.0, 2.0)
+        assert first >= last
+
+
+def test_whole_numbers_in_a_range_by_hand():
+    """Of 1 to 4, 1.2 to 3.9 holds 2 and 3: the second and the third quarter."""
+    one = Parameter("n", Axis.EXTENSION, "1", 0, 9, 0, "integer")
+    assert one.shares(1.2, 3.9, 1.0, 4.0) == (0.25, 0.75)
+    assert one.ends(1.2, 3.9) == (2.0, 3.0)
+    assert one.ends(2.0, 2.0) == (2.0, 2.0)
+    assert Parameter("p", Axis.EXTENSION, "1", 0, 9, 0).ends(1.2, 3.9) is None

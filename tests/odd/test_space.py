@@ -9,6 +9,7 @@ from hypothesis.extra import numpy as hnp
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.parameters import TOLERANCE, Axis
 from bridgegen.odd.reader import load
+from bridgegen.odd.space import probes
 
 EVERY = tuple(Axis)
 _unit = st.one_of(st.sampled_from([0.0, 1.0, 0.5]), st.floats(0.0, 1.0))
@@ -350,6 +351,34 @@ def test_tolerance_is_one_for_all(build, make_parameter, sign):
         assert names == (["b", "d"] if count else [])
 
 
+def test_what_misses_a_limit_by_the_tolerance_itself_keeps_it(build, make_parameter):
+    """1e-4 of 0: a parameter's range and a bound take it; a hair more, neither."""
+    scenario = build([make_parameter("a", 0.0, 1.0), make_parameter("b", 0.0, 1.0)])
+    space = scenario.space()
+    assert space.violations([[-1e-4, 0.5]]) == []
+    assert [one.parameter for one in space.violations([[-1.0001e-4, 0.5]])] == ["a"]
+    bounded = build([make_parameter("a", -1, 1), make_parameter("b", -1, 1)], [("b", "a", "a")])
+    assert bounded.space().violations([[0.0, -1e-4], [0.0, 1e-4]]) == []
+    assert len(bounded.space().violations([[0.0, -1.0001e-4], [0.0, 1.0001e-4]])) == 2
+
+
+def test_encode_refuses_what_is_off_by_more_than_the_tolerance(build, make_parameter):
+    space = build([make_parameter("a", 0.0, 1.0)]).space()
+    assert space.encode([[-1e-4]]) == [[0.0]]
+    with pytest.raises(ScenarioError, match=r"decodes to row 1: a \[1\] would be 0"):
+        space.encode([[0.5], [-1.0001e-4]])
+
+
+@pytest.mark.parametrize("wrong", [-0.25, 1.25])
+def test_a_point_outside_the_cube_is_named_by_parameter_and_row(wrong, s4):
+    space = s4.space()
+    U = np.full((3, space.n_var), 0.5)
+    U[0, 0], U[0, 1], U[2, 4] = 0.0, 1.0, wrong
+    name = space.variables[4]
+    with pytest.raises(ValueError, match=f"must hold for {name}, got {wrong} in row 2"):
+        space.decode(U)
+
+
 def test_row_from_names(s4):
     space = s4.space()
     speed = np.nextafter(7.0, 8.0)
@@ -401,3 +430,14 @@ def test_rows_are_decoded_together(s4):
 
     calls(1)  # what is made once
     assert calls(1000) == calls(1) > 0
+
+
+def test_a_space_is_tried_at_all_its_corners_while_they_are_few():
+    """2^11 = 2048 corners and as many other points; of more parameters as many corners."""
+    small, large = probes(11), probes(12)
+    assert len({tuple(one) for one in small[:2048].tolist()}) == 2048
+    for found, n_var in ((small, 11), (large, 12), (probes(40), 40)):
+        assert found.shape == (4096, n_var)
+        assert set(np.unique(found[:2048])) == {0.0, 1.0}
+        assert ((found[2048:] > 0.0) & (found[2048:] < 1.0)).all()
+    assert probes(3).shape == (8 + 2048, 3)
