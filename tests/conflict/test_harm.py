@@ -12,6 +12,7 @@ from bridgegen.conflict.analysis import (
     NO_CONFLICT,
     ConflictType,
     Responsible,
+    Rule,
     Zone,
     analyse,
 )
@@ -101,3 +102,8 @@ def test_the_largest_harm_decides_and_below_a_course_what_happened(found):
         kind=[NO_CONFLICT, NEAR_MISS, CONTACT], responsible=others, nearness=[0.9, 0.0, 0.0]
     )
     assert [one.tolist() for one in decisive(conflicts)] == [[3], pytest.approx([0.09])]
+
+
+def test_rules_are_called_by_their_names():
+    assert Rule.NONE.label == ""
+    assert Rule.STRUCK_STANDING.label == "struck standing"

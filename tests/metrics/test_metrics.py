@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen import metrics
-from bridgegen.errors import UnknownNameError
+from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.metrics.a_change import a_change
 from bridgegen.metrics.d_min import d_min
 from bridgegen.metrics.l_offset import l_offset
@@ -175,11 +175,17 @@ def test_offset_counts_to_either_side_and_only_the_egos(rollout_of):
         (lambda r: n_collision(r, merge_within=0.0), r"merge_within \[s\] must be finite and > 0"),
         (lambda r: a_change(r, window=np.nan), r"window \[s\] must be finite and > 0, got nan"),
         (lambda r: n_brake(r, threshold=-3.0), r"threshold \[m/s²\] must be finite and > 0"),
+        (lambda r: n_brake(r, threshold=0.0), r"threshold \[m/s²\] must be finite and > 0"),
     ],
 )
 def test_senseless_arguments_are_refused(rollout_of, call, message):
     with pytest.raises(ValueError, match=message):
         call(rollout_of(x=np.zeros((1, 2, 3))))
+
+
+def test_a_small_threshold_is_one(rollout_of):
+    a = np.array([[[0.0, -0.4, 0.0, -0.2, 0.0, -0.4]]])
+    assert n_brake(rollout_of(a=a), threshold=0.3) == [2.0]
 
 
 @pytest.mark.parametrize("field", ["x", "v", "a", "offset"])
@@ -363,6 +369,47 @@ def test_the_paper_s_eleven_and_their_units():
     assert all(m.name == name and m.description for name, m in metrics.METRICS.items())
     smaller = {name for name in metrics.TABLE_I if metrics.get(name).sense == "smaller"}
     assert smaller == {"ttc", "d_min", "iou", "map"}
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "sense", "cap"),
+    [
+        ("r_red", "count", "larger", 0.0),
+        ("n_collision", "count", "larger", 0.0),
+        ("ttc", "s", "smaller", 20.0),
+        ("d_min", "m", "smaller", 200.0),
+        ("v_d", "m/s", "larger", 0.0),
+        ("l_offset", "m", "larger", 0.0),
+        ("iou", "1", "smaller", 1.0),
+        ("e_position", "m", "larger", 0.0),
+        ("map", "1", "smaller", 1.0),
+        ("a_change", "m/s²", "larger", 0.0),
+        ("n_brake", "count", "larger", 0.0),
+        ("pet", "s", "smaller", 10.0),
+        ("drac", "m/s²", "larger", 0.0),
+        ("btn", "1", "larger", 0.0),
+        ("thw", "s", "smaller", 10.0),
+        ("tet", "s", "larger", 0.0),
+        ("tit", "s²", "larger", 0.0),
+        ("rss", "1", "larger", 0.0),
+    ],
+)
+def test_what_counts_as_critical_and_as_not_at_all(name, unit, sense, cap):
+    """What an objective makes of a metric: a change here changes what every search looks for."""
+    one = metrics.get(name)
+    assert (one.unit, one.sense, one.cap) == (unit, sense, cap)
+    assert one.sign == (-1.0 if sense == "smaller" else 1.0)
+
+
+def test_who_asks_for_what_is_not_perceived_is_told_who_perceives():
+    with pytest.raises(InputError) as error:
+        metrics.require(("ttc", "iou", "r_red"), (), "the recording")
+    first, second = error.value.problems
+    assert first == (
+        "the metric 'iou' needs detections, and the recording has none; drivers that perceive "
+        "(--ego): reference"
+    )
+    assert second == "the metric 'r_red' needs lights, and the recording has none"
 
 
 def test_which_metrics_exist_depends_on_what_a_rollout_holds():

@@ -269,6 +269,28 @@ def test_any_name_is_a_column(tmp_path):
     assert frame[NASTY[0]].tolist() == [0.0, float(n)]
 
 
+def test_each_schema_has_its_last_columns():
+    """The first had no causes, the second no findings; a new run has all."""
+    named = [Columns.named(1, ["a"], ["m"], 1, schema=k).last for k in (1, 2, 3)]
+    assert named[0] == ("status", "critical")
+    assert named[1] == ("status", "critical", "cause")
+    assert named[2] == ("status", "critical", "cause", *COLUMNS)
+    assert Columns.named(1, ["a"], ["m"], 1).last == named[2]
+
+
+def test_a_run_of_the_second_schema_has_its_causes():
+    columns = Columns.named(1, ["a"], ["m"], 1, schema=2)
+    u = np.array([0.5]).tobytes()
+    rows = columns.unpack([(0, 0, 1.5, u, 2.0, 3.0, 4.0, 0, 1, "planning"),
+                           (1, 0, 1.5, u, 2.5, 3.5, 4.5, 2, 0, None)])  # fmt: skip
+    assert rows.cause.tolist() == [2, 0]
+    assert rows.status.tolist() == [0, 2]
+    assert rows.critical.tolist() == [True, False]
+    assert (rows.X.tolist(), rows.metrics.tolist()) == ([[2.0], [2.5]], [[3.0], [3.5]])
+    assert (rows.F.tolist(), rows.U.tolist()) == ([[4.0], [4.5]], [[0.5], [0.5]])
+    assert len(rows.findings) == 2
+
+
 text = st.text(st.characters(blacklist_categories=["Cs"], blacklist_characters="\0"), min_size=1)
 name_lists = st.lists(text.filter(str.strip), unique=True, max_size=8)
 
@@ -290,6 +312,8 @@ def test_columns_never_clash(parameters, metrics):
         ([""], "a parameter's name must be a non-empty text, got ''"),
         (["a\0b"], "non-empty text"),
         (["\ud800"], "non-empty text"),
+        (["a\ud800b"], "non-empty text"),
+        ([" "], "non-empty text"),
         (["a", "a"], "a parameter's name must be unique, got 'a' twice"),
     ],
 )
