@@ -80,6 +80,15 @@ def test_without_lights_none_is_run(rollout_of):
     ("change", "message"),
     [
         ({"stop_lights": np.array([1])}, r"stop_lights must be in 0\.\.0, got \[1\]"),
+        ({"stop_lights": np.array([-1])}, r"stop_lights must be in 0\.\.0, got \[-1\]"),
+        (
+            {
+                "stop_lights": np.array([0, 1]),
+                "stop_lines": np.zeros((1, 2, 3)),
+                "stop_entities": np.zeros(2, np.int64),
+            },
+            r"stop_lights must be in 0\.\.0, got \[0 1\]",
+        ),
         ({"stop_lines": np.zeros((1, 2, 3))}, r"stop_lines must have shape \(1, 1, 3\)"),
         ({"stop_lines": np.full((1, 1, 3), np.nan)}, "stop_lines must be finite"),
         ({"lights": np.zeros((1, 1, 2), np.int8)}, r"lights must have shape \(N, S, T\)"),

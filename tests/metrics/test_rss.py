@@ -51,6 +51,18 @@ def missing(gap, safe):
     return 1 - gap / safe if gap < safe else 0.0
 
 
+def test_the_usual_assumptions_are_those_of_ad_rss_lib():
+    """Its documentation, Parameter discussion."""
+    assert (P.ego_response, P.other_response, P.accel_max) == (1.0, 2.0, 3.5)
+    assert (P.brake_min, P.brake_max) == (4.0, 8.0)
+    assert (P.lateral_accel_max, P.lateral_brake_min, P.lateral_margin) == (0.2, 0.8, 0.1)
+
+
+def test_following_by_hand(rollout_of):
+    """10 m/s each: 10 + 1.75 + 13.5²/8 − 10²/16 = 28.28125 m are safe; half of that is there."""
+    assert rss(two(rollout_of, x=4.0 + 14.140625, v=10.0)) == pytest.approx([0.5])
+
+
 @given(speeds, speeds, gaps)
 def test_following(rollout_of, v, ego, gap):
     expected = missing(gap, following(ego, v, P.ego_response)) if ego or v else None
