@@ -4,12 +4,14 @@
 ``python``: executed, a page's blocks one after the other. ``yaml``: a scenario, or parts of one, is
 read and held against the schema. ``xml``: well formed. ``text`` is output.
 
-Searches are shortened (``shortened``). A comment before a block says what else is to be known:
+Searches are shortened (``shortened``), but not those of the pages ``AS_PRINTED``. A comment before
+a block says what else is to be known:
 ``<!-- not run: WHY -->`` and ``<!-- tested by: FILE -->`` (what takes too long here; the commands
 of both must still parse), ``<!-- file: NAME -->`` (what the reader saves as that file),
 ``<!-- exit: 3 -->``, ``<!-- ci -->`` (another program's YAML).
 """
 
+import json
 import re
 import runpy
 import shlex
@@ -26,11 +28,15 @@ import pytest
 import yaml
 from typer.main import get_command
 
+from bridgegen.campaign.handover import NOT_EXPORTED
 from bridgegen.cli import app, main
 from bridgegen.odd.json_schema import schema
 from bridgegen.odd.plain_yaml import read_plain_yaml
 from bridgegen.odd.reader import load
 from bridgegen.odd.starter import start_scenario
+from bridgegen.ontology.check import check
+from bridgegen.ontology.files import load as load_owl
+from bridgegen.openx.openscenario.read import read
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -43,6 +49,9 @@ SHORT = {
     "check-driver": {"--scenario": "cut-in"},
 }
 """What commands are run with instead of what the page says."""
+
+AS_PRINTED = ("search-a-file",)
+"""Pages whose commands are run exactly as they are printed."""
 
 ELSEWHERE = ("not run", "tested by")
 
@@ -102,6 +111,7 @@ class Page:
 
     def __init__(self, monkeypatch) -> None:
         self.patch, self.names = monkeypatch, {"__name__": "a_page"}
+        self.as_printed = False
 
     def run(self, block: Block) -> None:
         if block.mark == "file":
@@ -121,7 +131,7 @@ class Page:
 
     def command(self, words: list[str]) -> int:
         if words[0] == "bridgegen":
-            self.patch.setattr(sys, "argv", shortened(words))
+            self.patch.setattr(sys, "argv", words if self.as_printed else shortened(words))
             with pytest.raises(SystemExit) as end:
                 main()
             return int(end.value.code or 0)
@@ -184,10 +194,37 @@ def page(tmp_path, monkeypatch) -> Page:
     return Page(monkeypatch)
 
 
+def check_exports_of_a_searched_file() -> None:
+    """They state what this search found, not what the one found that wrote the file."""
+    searched = Path("runs/file")
+    assert not (searched / NOT_EXPORTED).exists()
+    paths = sorted((searched / "critical").glob("*.json"))
+    assert paths
+    for path in paths:
+        facts = json.loads(path.read_text("utf-8"))
+        conflict = facts["conflict"]
+        header = read(path.with_suffix(".xosc")).file_header.properties
+        assert header.get("cause") == facts.get("cause"), path.name
+        assert header.get("conflict_type") == conflict["type"]
+        individuals = load_owl(path.with_suffix(".owl"))
+        scenario = individuals.one("Scenario")
+        assert individuals.optional_text(scenario, "has_cause") == facts.get("cause")
+        assert individuals.optional_text(scenario, "has_conflict_type") == conflict["type"]
+        assert individuals.number(scenario, "has_severity") == conflict["severity"]["value"]
+        assert check(individuals) == []
+
+
+AFTERWARDS = {"search-a-file": check_exports_of_a_searched_file}
+"""What must hold once all of a page has run."""
+
+
 @pytest.mark.parametrize("name", [name for name in PAGES if blocks(name)])
 def test_every_snippet_runs(name, page):
+    page.as_printed = name in AS_PRINTED
     for block in blocks(name):
         page.run(block)
+    if name in AFTERWARDS:
+        AFTERWARDS[name]()
 
 
 def test_few_snippets_cannot_be_run():

@@ -7,9 +7,11 @@ import pyoxigraph as ox
 import pytest
 
 import bridgegen as bg
+from bridgegen.campaign.handover import write_scenario
 from bridgegen.cause import CAUSES
-from bridgegen.conflict.analysis import CONTACT, NEAR_MISS
+from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, analyse
 from bridgegen.conflict.outcomes import with_outcomes
+from bridgegen.conflict.summary import summarise
 from bridgegen.conflict.types import ConflictType, Responsible
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import load
@@ -24,10 +26,12 @@ from bridgegen.ontology.reasoner import reason, require
 from bridgegen.ontology.vocabulary import bg as tbox_property
 from bridgegen.ontology.vocabulary import local_name, tbox
 from bridgegen.openx.convert import convert_file, import_file
+from bridgegen.openx.file_scenario import load_file_scenario
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.source import on_map
@@ -273,6 +277,62 @@ def test_the_conflict_is_in_every_file_and_comes_back(found, tmp_path):
         for term in ("has_conflict_type", "has_responsibility"):
             assert back.text(back.one("Scenario"), term) == individuals.text(scenario, term)
         assert back.number(back.one("Scenario"), "has_severity") == conflict["severity"]["value"]
+
+
+def findings_of(folder, name):
+    """Return what a written scenario's storyboard and individuals say of why it is critical."""
+    header = read(folder / f"{name}.xosc").file_header.properties
+    individuals = load_owl(folder / f"{name}.owl")
+    node = individuals.one("Scenario")
+    severity = header.get("severity")
+    return (
+        {key: header.get(key) for key in FINDINGS} | {"severity": severity and float(severity)},
+        {key: individuals.optional_text(node, term) for key, term in FINDINGS.items()}
+        | {"severity": individuals.optional_number(node, "has_severity")},
+    )
+
+
+def test_findings_of_an_earlier_run_are_replaced_or_left_out(found, tmp_path):
+    """A search of an exported file says what that search found, also where it found less."""
+    scenario = load_file_scenario(found[0])
+    pipeline = Pipeline(scenario, scenario.space())
+    x = pipeline.space.row({})
+    earlier = read(found[0]).file_header.properties
+    assert all(earlier.get(key) is not None for key in (*FINDINGS, "severity"))
+    rollout = pipeline.rollout(x[np.newaxis])
+    nothing = dict.fromkeys((*FINDINGS, "severity"))
+    write_scenario(pipeline, x, tmp_path, "nothing", rollout=rollout)
+    assert findings_of(tmp_path, "nothing") == (nothing, nothing)
+    other = next(one for one in CAUSES if one.label != earlier.get("cause"))
+    write_scenario(pipeline, x, tmp_path, "cause", other, rollout=rollout)
+    cause = nothing | {"cause": other.label}
+    assert findings_of(tmp_path, "cause") == (cause, cause)
+    summary = summarise(analyse(rollout))
+    assert summary is not None
+    write_scenario(pipeline, x, tmp_path, "conflict", rollout=rollout, found=summary)
+    conflict = nothing | {
+        "conflict_type": summary.type,
+        "responsible": summary.responsible,
+        "severity": summary.severity,
+    }
+    assert findings_of(tmp_path, "conflict") == (conflict, conflict)
+    for name in ("nothing", "cause", "conflict"):
+        assert check(load_owl(tmp_path / f"{name}.owl")) == []
+
+
+def test_outcomes_of_another_rollout_are_replaced(crashed):
+    """Individuals that are read from a file may have them already."""
+    scenario = load("road-works")
+    pipeline = Pipeline(scenario, scenario.space())
+    x = pipeline.space.row({})
+    roads, rollout = pipeline.concrete(x).roads, pipeline.rollout(x[np.newaxis])
+    plain = with_outcomes(pipeline.concrete(x).individuals, rollout, roads)
+    assert records(crashed) != records(plain)
+    again = with_outcomes(crashed, rollout, roads)
+    assert set(again.quads) == set(plain.quads)
+    rollout.status[0] = 1
+    failed = with_outcomes(crashed, rollout, roads)
+    assert set(failed.quads) == set(pipeline.concrete(x).individuals.quads)
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ from bridgegen.openx.openscenario.declarations import (
     RESPONSIBLE,
     SEVERITY,
 )
+from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
@@ -274,18 +275,21 @@ def _explained(
 ) -> osc.OpenScenario:
     """Return a scenario whose header says cause and decisive conflict, as far as they are known.
 
-    From version 1.2 on: earlier headers have no properties.
+    What a file said of them before was another run's, and is left out. From version 1.2 on: earlier
+    headers have no properties.
     """
     header = storyboard.file_header
     stated = {CAUSE: cause.label} if cause else {}
     if found is not None and found.happened:
         stated |= {CONFLICT_TYPE: found.type, RESPONSIBLE: found.responsible}
         stated[SEVERITY] = format_double(found.severity)
-    if not stated or header.rev_minor in (0, 1):
+    if header.rev_minor in (0, 1):
         return storyboard
     said = header.properties or osc.Properties()
-    others = tuple(one for one in said.properties if one.name not in stated)
+    others = tuple(one for one in said.properties if one.name not in (*FINDINGS, SEVERITY))
     added = tuple(osc.Property(name, value) for name, value in stated.items())
+    if (*others, *added) == said.properties:
+        return storyboard
     properties = replace(said, properties=(*others, *added))
     return replace(storyboard, file_header=replace(header, properties=properties))
 
@@ -310,17 +314,18 @@ def keyed(scenario: osc.OpenScenario, key: str) -> osc.OpenScenario:
 def _with_findings(
     individuals: Individuals, cause: Cause, found: ConflictSummary | None
 ) -> Individuals:
+    """Return individuals that say cause and decisive conflict, and no longer what a file said."""
     scenario = individuals.one("Scenario")
     values: dict[str, str | float] = {"has_cause": cause.label} if cause else {}
     if found is not None and found.happened:
         values |= {"has_conflict_type": found.type, "has_responsibility": found.responsible}
         values["has_severity"] = found.severity
-    stated = {bg(name) for name in values}  # a file may say what an earlier search found
-    before = [
-        one for one in individuals.quads if one.subject != scenario or one.predicate not in stated
+    terms = {bg(name) for name in (*FINDINGS.values(), "has_severity")}
+    others = [
+        one for one in individuals.quads if one.subject != scenario or one.predicate not in terms
     ]
     quads = [ox.Quad(scenario, bg(name), ox.Literal(value)) for name, value in values.items()]
-    return Individuals([*before, *quads])
+    return Individuals([*others, *quads])
 
 
 def _cause(quick: Cause, tested: Neighbourhood | None) -> Cause:

@@ -24,7 +24,8 @@ def with_outcomes(
     ``TrafficJam``; the scenario has them by ``has_outcome``, and the converters leave them aside.
     Near misses and the ego's first collision have the type, the responsible participant and the
     rule of the conflict analysis. A queue that the scenario itself declares is no outcome, unless
-    other participants have joined it.
+    other participants have joined it. Outcomes that the individuals have already are those of
+    another rollout, and are left out.
 
     Args:
         individuals: of the scenario.
@@ -32,9 +33,10 @@ def with_outcomes(
         model: the road network.
         row: which of them is this one.
     """
+    scenario = individuals.one("Scenario")
+    individuals = _without_outcomes(individuals, scenario)
     if rollout.status[row] != 0:
         return individuals
-    scenario = individuals.one("Scenario")
     participants = {
         individuals.text(node, "has_name"): node
         for node in individuals.links(scenario, "has_participant")
@@ -83,6 +85,16 @@ def with_outcomes(
         for name in queue.who:
             writer.put(node, "has_who", participants[name])
     return Individuals([*individuals.quads, *writer.quads])
+
+
+def _without_outcomes(individuals: Individuals, scenario: Subject) -> Individuals:
+    """Return a scenario's individuals without its outcomes; the same if it has none."""
+    nodes = set(individuals.links(scenario, "has_outcome"))
+    if not nodes:
+        return individuals
+    return Individuals(
+        one for one in individuals.quads if one.subject not in nodes and one.object not in nodes
+    )
 
 
 def _conflict_of(conflicts: Conflicts, row: int, accident: Accident) -> ConflictSummary | None:
