@@ -120,7 +120,9 @@ def test_what_is_elsewhere_there_is_found(folder, double):
         assert first.gap == pytest.approx(60.0)
         assert one.there.d_min > 2.0
         assert f"d_min is {one.there.d_min:.2f} m there" in one.explanation
-        assert "bv parts first: at 2.00 s" in one.explanation
+        assert one.differences.closest.time >= 2.0
+        assert "bv diverges first, from 2.00 s on: at" in one.explanation
+        assert "parts first" not in one.explanation
         (track,) = one.tracks
         assert (track.entity, track.first) == ("bv", 40)
     assert (found.summary.confirmed, found.summary.lost) == (0, 4)
@@ -301,9 +303,39 @@ def test_every_mistake_is_one_clear_error(folder, double, cli, tmp_path):
     assert "must be what 'bridgegen confirm' writes" in refused(folder, *there)
     assert cli("confirm", folder, *there, "--again")[0] == 0
     shutil.rmtree(folder / "critical")
-    assert "hands no scenario over; choose among its critical ones with --rows" in refused(
-        folder, *there
+    none_exported = refused(folder, *there)
+    assert f"no scenario is exported; 'bridgegen resume {folder}' finishes" in none_exported
+    assert re.search(r"--rows N confirms the N most critical of its \d+ critical", none_exported)
+
+
+@pytest.mark.parametrize("rows", [None, 5])
+@pytest.mark.parametrize(
+    ("budget", "what"),
+    [(150, "search with a larger --budget, another --seed or another --algorithm"),
+     (200, "'bridgegen resume {}' runs the other 50")],
+)  # fmt: skip
+def test_without_a_critical_evaluation_it_says_what_can_be_done(
+    folder, double, monkeypatch, rows, budget, what
+):
+    shutil.rmtree(folder / "critical")
+    read, given = Store.read, Settings.from_dict
+
+    def calm(store):
+        found = read(store)
+        return replace(found, critical=np.zeros_like(found.critical))
+
+    def larger(data, place):
+        return replace(given(data, place), budget=budget)
+
+    monkeypatch.setattr(Store, "read", calm)
+    monkeypatch.setattr(Settings, "from_dict", larger)
+    with pytest.raises(InputError) as refused:
+        confirm(folder, elsewhere(), rows=rows)
+    said = str(refused.value)
+    assert f"none of 150 evaluations is critical, so that there is nothing to confirm; {what}" in (
+        said.replace(str(folder), "{}")
     )
+    assert "--rows" not in said
 
 
 def test_a_record_of_another_run_is_refused(folder, double):

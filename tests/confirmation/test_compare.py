@@ -11,11 +11,15 @@ from bridgegen.confirmation.compare import compare, tracks
 from bridgegen.confirmation.differences import (
     PARTED,
     TRACE,
+    Approach,
     Contact,
     EventTimes,
     LightTimes,
     Offset,
 )
+from bridgegen.confirmation.schema import Differences, Outcome
+from bridgegen.confirmation.words import explanation
+from bridgegen.objective import Thresholds
 from bridgegen.simulation.rollout import Rollout
 
 STEP = 0.1
@@ -112,6 +116,83 @@ def test_who_goes_another_way_is_told_by_how_much():
     stands = moving(np.zeros((1, 21)), np.zeros((1, 21)))
     (one,) = compare(stands, here).partings
     assert one.turn is None
+
+
+def passing(aside=0.0, late=0.0, after=0.0, instants=41):
+    """The ego passes a standing car at 10 m/s: beside it from 1.6 s on, boxes 1.9 m apart.
+
+    Args:
+        aside: how far to the left of its course the ego is, from 1 s on [m].
+        late: how far behind, likewise.
+        after: how far to the left the other car is from 2.5 s on [m].
+        instants: in all.
+    """
+    t = np.arange(instants) * STEP
+    begun, over = t > 1.0 - 1e-9, t > 2.5 - 1e-9
+    x = np.array([10.0 * t - late * begun, np.full(instants, 20.0)])
+    y = np.array([aside * begun, 3.9 + after * over])
+    return moving(x, y, v=np.array([[10.0], [0.0]]))
+
+
+def test_a_small_difference_before_the_closest_approach_is_found_and_a_large_one_after_is_not():
+    found = compare(passing(), passing(aside=-0.2, after=5.0))
+    assert found.closest == Approach(pytest.approx(1.6), "bv", pytest.approx(1.9))
+    (one,) = found.diverged
+    assert (one.entity, one.since, one.only) == ("ego", pytest.approx(1.0), None)
+    assert one.time <= found.closest.time
+    assert (one.gap, one.along, one.across, one.speed) == pytest.approx((0.2, 0.0, -0.2, 0.0))
+    assert [each.entity for each in found.partings] == ["bv"]  # after it
+    assert compare(passing(), passing(after=5.0)).diverged == ()
+
+
+def test_a_miss_names_the_small_difference_before_and_not_the_large_one_after():
+    """0.2 m to the right, the ego passes at 2.1 m instead of 1.9 m: the threshold is 2 m."""
+    found = compare(passing(), passing(aside=-0.2, after=5.0))
+    ours, theirs = (
+        Outcome(critical=d_min < 2.0, d_min=d_min, v_d=10.0, n_collision=0.0, F=(d_min,))
+        for d_min in (1.9, 2.1)
+    )
+    text = explanation(ours, theirs, Differences.of(found), Thresholds())
+    assert "ego diverges first, from 1.00 s on: at 1.00 s it is 0.20 m off, mainly " in text
+    assert "mainly laterally (0.20 m to the right), and as fast" in text
+    assert "bv diverges" not in text
+    assert "parts" not in text
+
+
+def test_up_to_the_closest_approach_who_is_off_most_is_told_when_it_is():
+    """Behind by 0.1 m a second: 0.05 m is passed after 0.5 s, 0.16 m at the closest approach."""
+    there = passing()
+    t = np.arange(41) * STEP
+    there.x[0, 0] -= 0.1 * t
+    (one,) = compare(passing(), there).diverged
+    assert (one.since, one.time) == (pytest.approx(0.6), pytest.approx(1.6))
+    assert (one.along, one.across) == (pytest.approx(-0.16), pytest.approx(0.0))
+
+
+def test_what_no_more_than_traces_differs_has_not_diverged():
+    assert compare(passing(), passing(aside=-TRACE)).diverged == ()
+    assert len(compare(passing(), passing(aside=-TRACE - 1e-9)).diverged) == 1
+
+
+def test_the_closest_approach_is_the_first_contact_or_that_to_the_partner():
+    here = moving(np.array([[0.0, 1.0, 2.0, 3.0], [5.5] * 4, [10.0] * 4]), np.zeros((3, 4)),
+                  names=("ego", "bv", "van"))  # fmt: skip
+    assert compare(here, here).closest == Approach(pytest.approx(0.2), "bv", 0.0)
+    van = compare(here, here, partner="van").closest
+    assert van == Approach(pytest.approx(0.3), "van", pytest.approx(3.0))
+    assert compare(here, here, partner="nobody").closest == compare(here, here).closest
+    alone = moving(np.zeros((1, 4)))
+    assert compare(alone, alone).closest is None
+
+
+def test_who_is_missing_before_the_closest_approach_has_diverged():
+    here, there = passing(), passing()
+    gone = np.ones((1, 2, 41), dtype=bool)
+    gone[0, 1, 5:] = False
+    found = compare(here, replace(there, present=gone))
+    (one,) = found.diverged
+    assert (one.entity, one.only, one.gap) == ("bv", "here", None)
+    assert one.since == one.time == pytest.approx(0.6)  # for more than a step
 
 
 def test_the_limit_itself_is_not_parted():

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from bridgegen.confirmation.differences import (
+    Approach,
     BoxSizes,
     Contact,
+    Divergence,
     EventTimes,
     LightTimes,
     Offset,
@@ -169,3 +171,67 @@ def test_contacts_are_told_where_only_one_has_them():
 
 def test_where_nobody_parts_that_is_said():
     assert said(came_to(True, 1.0, 5.0)) == "Nobody ever is more than 0.5 m from where it is here."
+
+
+CLOSEST = Approach(4.0, "bv", 1.0)
+LATER = Parting("bv", 5.2, 0.52, -0.51, 0.1, -0.4, None, 4.6)
+
+
+def test_a_miss_is_explained_by_what_differs_before_the_closest_approach():
+    text = said(
+        came_to(False, 2.1, 5.0),
+        closest=CLOSEST,
+        diverged=(
+            Divergence("bv", 2.7, 4.0, 0.31, -0.3, 0.05, -0.4, None),
+            Divergence("ego", 3.1, 3.5, 0.1, 0.01, -0.1, 0.0, 0.2),
+        ),
+        partings=(LATER,),
+        events=(EventTimes("bv_sets_off", 2.5, 2.65), EventTimes("late", 4.5, 5.0)),
+        lights=(LightTimes("s1", 4.1, 1, 4),),
+    )
+    assert text == (
+        "d_min is 2.10 m there, 1.00 m here: narrowly, 0.10 m above the threshold. "
+        "The closest approach here is to bv, 1.00 m, at 4.00 s. "
+        "bv_sets_off began 0.15 s later there, at 2.65 s. "
+        "bv diverges first, from 2.70 s on: at 4.00 s it is 0.31 m off, mainly longitudinally "
+        "(0.30 m behind, 0.05 m to the left), and 0.40 m/s slower. "
+        "ego diverges from 3.10 s on: at 3.50 s it is 0.10 m off, mainly laterally "
+        "(0.10 m to the right, 0.01 m ahead), and as fast, going 11° to the left of its way here."
+    )
+
+
+def test_a_miss_names_nothing_that_comes_after_the_closest_approach():
+    text = said(came_to(False, 2.1, 5.0), closest=CLOSEST, partings=(LATER,))
+    assert text.endswith(
+        "The closest approach here is to bv, 1.00 m, at 4.00 s. "
+        "Until then nobody is more than 0.05 m from where it is here."
+    )
+
+
+def test_a_missed_contact_is_explained_by_what_differs_before_it():
+    text = said(
+        came_to(False, 2.1, 5.0),
+        here=came_to(True, 0.0, 5.0, Contact(3.0, "bv")),
+        closest=Approach(3.0, "bv", 0.0),
+        diverged=(Divergence("bv", 1.0, 1.05, None, None, None, None, None, "here"),),
+        only_here=("cone",),
+    )
+    assert text.endswith(
+        "No contact there; here with bv at 3.00 s. "
+        "cone is not there. bv diverges first, from 1.00 s on: at 1.05 s it is here alone."
+    )
+
+
+def test_where_both_have_contacts_the_first_one_here_is_told():
+    text = said(
+        came_to(False, 0.0, 0.5, Contact(3.5, "bv")),
+        here=came_to(True, 0.0, 5.0, Contact(3.0, "bv")),
+        closest=Approach(3.0, "bv", 0.0),
+    )
+    assert "The first contact here is with bv at 3.00 s. Until then nobody" in text
+
+
+def test_what_is_critical_there_is_told_as_ever():
+    text = said(came_to(True, 1.0, 5.0), closest=CLOSEST, partings=(LATER,))
+    assert "bv parts first" in text
+    assert "closest approach" not in text

@@ -115,7 +115,7 @@ def confirm(
             "one (--simulator)"
         )
     handed = {one.evaluation: one.name for one in handed_over(place)}
-    asked = _chosen(place, every, handed, rows)
+    asked = _chosen(place, every, handed, rows, settings.budget)
     command = f"confirm --simulator {simulator.name}"
     here = pipeline_of(settings, names, place, ego=ego, command=command, causes=False)
     stage("compile")
@@ -232,23 +232,33 @@ class _Book:
         return record
 
 
-def _chosen(folder: Path, every: Rows, handed: dict[int, str], rows: int | None) -> list[int]:
+def _chosen(
+    folder: Path, every: Rows, handed: dict[int, str], rows: int | None, budget: int
+) -> list[int]:
     """Return the evaluations to confirm, most critical first.
 
     Raises:
         InputError: there is none.
     """
-    if rows is None:
-        if not handed:
-            raise InputError(
-                f"{folder}: hands no scenario over; choose among its critical ones with --rows N"
-            )
+    if rows is None and handed:
         if outside := [k for k in handed if not 0 <= k < len(every) or every.status[k] != 0]:
             raise InputError(f"{folder}: has no result of evaluation {outside[0] + 1}")
         return list(handed)
     order = sorted(_merit(every).items(), key=lambda one: one[1])
+    finish = f"'bridgegen resume {folder}'"
     if not order:
-        raise InputError(f"{folder}: none of {len(every)} evaluations is critical")
+        more = "search with a larger --budget, another --seed or another --algorithm"
+        if len(every) < budget:
+            more = f"{finish} runs the other {budget - len(every)}"
+        raise InputError(
+            f"{folder}: none of {len(every)} evaluations is critical, so that there is nothing to "
+            f"confirm; {more}"
+        )
+    if rows is None:
+        raise InputError(
+            f"{folder}: no scenario is exported; {finish} finishes a search that was stopped, "
+            f"--rows N confirms the N most critical of its {len(order)} critical evaluations"
+        )
     return [k for k, _ in order[:rows]]
 
 

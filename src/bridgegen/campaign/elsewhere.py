@@ -112,7 +112,8 @@ def _scenario(
         ours = known.model_copy(update={"contact": first_contact(motion, row)})
         return Scenario(evaluation=k, name=None, row=digest, here=ours, failure=failure)
     F, _ = objective.F(ran.metrics[np.newaxis], here.metrics)
-    found = compare(motion, ran.rollout, row, ran.row)
+    partner = known.partner if objective.rule == "harm" else ""
+    found = compare(motion, ran.rollout, row, ran.row, partner)
     both = (known, _outcome(here, ran.metrics, F[0], ran.findings.row(ran.row)))
     ours, theirs = (
         one.model_copy(update={"contact": contact, "ends": ends})

@@ -16,9 +16,11 @@ from bridgegen.confirmation.differences import (
     PARTED,
     SLIGHT,
     TRACE,
+    Approach,
     BoxSizes,
     Comparison,
     Contact,
+    Divergence,
     EventTimes,
     LightTimes,
     Offset,
@@ -29,6 +31,9 @@ from bridgegen.simulation.rollout import Rollout
 
 SAME_BOX = 1e-3
 """Boxes that differ by less are the same [m]."""
+
+NEAREST = 1e-9
+"""The closest approach is the first instant within this of the smallest distance [m]."""
 
 STANDS = 1e-3
 """Who moves less in a step has no direction [m]."""
@@ -47,7 +52,19 @@ class _States:
     present: Bool
 
 
-def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison:
+@dataclass(frozen=True)
+class _OffBy:
+    """How an entity differs at an instant; see `Parting`."""
+
+    gap: float | None = None
+    along: float | None = None
+    across: float | None = None
+    speed: float | None = None
+    turn: float | None = None
+    only: str | None = None
+
+
+def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0, partner: str = "") -> Comparison:
     """Compare row i of one rollout with row j of another.
 
     Args:
@@ -56,6 +73,7 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison
             have the same name.
         i: of ``here``, not failed.
         j: of ``there``, not failed.
+        partner: whose closest approach to the ego counts; that of whoever comes closest by default.
     """
     times = _instants(here, there, i, j)
     step = max(here.time_step, there.time_step)
@@ -66,6 +84,7 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison
     ]
     partings = [_parting(name, a, b, times) for name, a, b in pairs]
     parted = sorted(filter(None, partings), key=lambda one: one.time)
+    closest = closest_approach(here, i, partner)
     return Comparison(
         step=step,
         ends=(_end(here, i), _end(there, j)),
@@ -77,6 +96,8 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> Comparison
         boxes=_boxes(here, there, bodies),
         only_here=tuple(name for e, name in enumerate(here.names) if e not in known),
         only_there=tuple(name for f, name in enumerate(there.names) if f not in met),
+        closest=closest,
+        diverged=_diverged(pairs, times, closest) if closest else (),
     )
 
 
@@ -176,20 +197,61 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
     k = int(off[0])
     trace = np.flatnonzero(~((gap > TRACE) | alone)[: k + 1])  # where it was not off yet
     since = float(times[trace[-1] + 1 if trace.size else 0])
-    if alone[k]:
-        only = "here" if a.present[k] else "there"
-        return Parting(entity, float(times[k]), None, None, None, None, None, since, only)
-    dx, dy = float(b.x[k] - a.x[k]), float(b.y[k] - a.y[k])
-    cos, sin = float(np.cos(a.h[k])), float(np.sin(a.h[k]))
+    off_by = _off_by(a, b, k)
     return Parting(
         entity,
         float(times[k]),
-        gap=float(gap[k]),
+        gap=off_by.gap,
+        along=off_by.along,
+        across=off_by.across,
+        speed=off_by.speed,
+        turn=off_by.turn,
+        since=since,
+        only=off_by.only,
+    )
+
+
+def _diverged(
+    pairs: Sequence[tuple[str, _States, _States]], times: Float, closest: Approach
+) -> tuple[Divergence, ...]:
+    """Return who is off by more than TRACE up to the closest approach, the first one first."""
+    n = int(np.searchsorted(times, closest.time + _EPSILON))
+    found = []
+    for name, a, b in pairs:
+        gap, alone = _gap(a, b)[:n], _lasting(a.present != b.present)[:n]
+        off = np.flatnonzero((gap > TRACE) | alone)
+        if not off.size:
+            continue
+        k = int(np.flatnonzero(alone)[0] if alone.any() else gap.argmax())
+        off_by = _off_by(a, b, k)
+        found.append(
+            Divergence(
+                name,
+                since=float(times[off[0]]),
+                time=float(times[k]),
+                gap=off_by.gap,
+                along=off_by.along,
+                across=off_by.across,
+                speed=off_by.speed,
+                turn=off_by.turn,
+                only=off_by.only,
+            )
+        )
+    return tuple(sorted(found, key=lambda one: one.since))
+
+
+def _off_by(a: _States, b: _States, k: int) -> _OffBy:
+    """Return how an entity differs at an instant."""
+    if a.present[k] != b.present[k]:
+        return _OffBy(only="here" if a.present[k] else "there")
+    dx, dy = float(b.x[k] - a.x[k]), float(b.y[k] - a.y[k])
+    cos, sin = float(np.cos(a.h[k])), float(np.sin(a.h[k]))
+    return _OffBy(
+        gap=float(_gap(a, b)[k]),
         along=dx * cos + dy * sin,
         across=dy * cos - dx * sin,
         speed=float(b.v[k] - a.v[k]),
         turn=_turn(a, b, k),
-        since=since,
     )
 
 
@@ -221,6 +283,25 @@ def first_contact(rollout: Rollout, row: int) -> Contact | None:
         return None
     k = int(instants[0])
     return Contact(k * rollout.time_step, rollout.names[int(distance[:, k].argmin())])
+
+
+def closest_approach(rollout: Rollout, row: int, partner: str = "") -> Approach | None:
+    """Return the ego's closest approach in a row that has not failed; None if it is alone.
+
+    Args:
+        rollout: with the ego first.
+        row: of it.
+        partner: to whom; to whoever comes closest, if it takes no part.
+    """
+    distance = rollout.distance[row, :, : rollout.n_steps[row]]
+    who = rollout.names.index(partner) if partner in rollout.names[1:] else None
+    distance = distance if who is None else distance[who : who + 1]
+    least = distance.min(axis=0)
+    if not np.isfinite(least).any():
+        return None
+    k = int(np.flatnonzero(least <= least.min() + NEAREST)[0])
+    e = int(distance[:, k].argmin()) if who is None else who
+    return Approach(k * rollout.time_step, rollout.names[e], float(least[k]))
 
 
 def _events(here: Rollout, there: Rollout, i: int, j: int, step: float) -> tuple[EventTimes, ...]:

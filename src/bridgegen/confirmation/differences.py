@@ -66,6 +66,49 @@ class Parting(_Checked):
 
 
 @dataclass(frozen=True)
+class Approach(_Checked):
+    """The closest approach of the ego to another entity; the first contact, if there is one.
+
+    Attributes:
+        time: [s].
+        entity: the other one.
+        distance: of the boxes [m].
+    """
+
+    time: float
+    entity: str
+    distance: float
+
+
+@dataclass(frozen=True)
+class Divergence(_Checked):
+    """How far an entity is from where it is in the other rollout, up to the closest approach.
+
+    Attributes:
+        entity: who.
+        since: the first instant at which it is off by more than TRACE [s].
+        time: the instant, up to the closest approach, at which it is off most [s].
+        gap: how far the reference points are apart then [m]; None where it is in one alone.
+        along: how far ahead it is there, in its own direction here [m]; None likewise, and so all
+            that follow.
+        across: how far left it is there [m].
+        speed: how much faster it is there [m/s].
+        turn: see `Parting`.
+        only: likewise.
+    """
+
+    entity: str
+    since: float
+    time: float
+    gap: float | None
+    along: float | None
+    across: float | None
+    speed: float | None
+    turn: float | None
+    only: str | None = None
+
+
+@dataclass(frozen=True)
 class Offset(_Checked):
     """Who else was a little off when the first one parted, and may have led to it.
 
@@ -145,6 +188,8 @@ class Comparison:
         boxes: those that differ.
         only_here: entities that are unknown there.
         only_there: entities that are unknown here.
+        closest: the closest approach here; None where the ego is alone.
+        diverged: who was off by more than TRACE up to then, the first one first.
     """
 
     step: float
@@ -157,6 +202,8 @@ class Comparison:
     boxes: tuple[BoxSizes, ...] = ()
     only_here: tuple[str, ...] = ()
     only_there: tuple[str, ...] = ()
+    closest: Approach | None = None
+    diverged: tuple[Divergence, ...] = ()
 
 
 @dataclass(frozen=True)

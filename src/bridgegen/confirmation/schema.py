@@ -10,9 +10,11 @@ from bridgegen.arrays import Float
 from bridgegen.confirmation.differences import (
     PARTED,
     TRACE,
+    Approach,
     BoxSizes,
     Comparison,
     Contact,
+    Divergence,
     EventTimes,
     LightTimes,
     Offset,
@@ -140,6 +142,8 @@ class Differences(_Model):
     boxes: tuple[BoxSizes, ...] = ()
     only_here: tuple[str, ...] = ()
     only_there: tuple[str, ...] = ()
+    closest: Approach | None = None
+    diverged: tuple[Divergence, ...] = ()
 
     @classmethod
     def of(cls, found: Comparison) -> "Differences":

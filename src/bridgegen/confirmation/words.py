@@ -4,7 +4,10 @@ import math
 
 from bridgegen.confirmation.differences import (
     PARTED,
+    TRACE,
+    Approach,
     BoxSizes,
+    Divergence,
     EventTimes,
     LightTimes,
     Parting,
@@ -38,6 +41,9 @@ def explanation(
 ) -> str:
     """Return what is known of why a scenario is, or is not, critical there.
 
+    Why it is not is explained by what differs up to the closest approach here: had nothing differed
+    by then, it would be as close there. What differs later is not named.
+
     Args:
         here: what it came to here.
         there: what it came to there.
@@ -48,7 +54,12 @@ def explanation(
     said = []
     if not there.critical:
         said = [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
-    return " ".join([*said, *_contacts(here, there), *_story(found)])
+    told = _contacts(here, there)
+    if there.critical or found.closest is None:
+        return " ".join([*said, *told, *_story(found)])
+    if there.contact or found.closest.distance > 0.0:  # else it is told already
+        told.append(_closest(found.closest))
+    return " ".join([*said, *told, *_until(found, found.closest.time)])
 
 
 def _less_harm(here: Outcome, there: Outcome) -> str:
@@ -115,11 +126,57 @@ def _contacts(here: Outcome, there: Outcome) -> list[str]:
     return []
 
 
-def _story(found: Differences) -> list[str]:
-    """Return what differed, in the order in which it did, up to the first who parted."""
+def _closest(one: Approach) -> str:
+    what = f"first contact here is with {one.entity}"
+    if one.distance > 0.0:
+        what = f"closest approach here is to {one.entity}, {_length(one.distance)} m,"
+    return f"The {what} at {one.time:.2f} s."
+
+
+def _until(found: Differences, time: float) -> list[str]:
+    """Return what differed up to the closest approach, in the order in which it did."""
+    said = _always(found)
+    if not found.diverged:
+        said.append(f"Until then nobody is more than {TRACE:g} m from where it is here.")
+    before = [(one.since, 1, _divergence(one, first=not k)) for k, one in enumerate(found.diverged)]
+    before += [(one.first, 0, _event(one)) for one in found.events if one.first <= time]
+    before += [(one.time, 0, _light(one)) for one in found.lights if one.time <= time]
+    return [*said, *(text for *_, text in sorted(before, key=lambda one: one[:2]))]
+
+
+def _divergence(one: Divergence, *, first: bool) -> str:
+    said = f"{one.entity} diverges{' first,' if first else ''} from {one.since:.2f} s on: "
+    if one.only is not None:
+        return f"{said}at {one.time:.2f} s it is {one.only} alone."
+    assert one.gap is not None
+    assert one.along is not None
+    assert one.across is not None
+    assert one.speed is not None
+    ahead = abs(one.along) >= abs(one.across)
+    parts = [
+        (abs(one.along), "behind" if one.along < 0.0 else "ahead"),
+        (abs(one.across), "to the right" if one.across < 0.0 else "to the left"),
+    ]
+    largest, other = parts if ahead else parts[::-1]
+    shown = (largest, *([other] if other[0] >= 0.005 else []))
+    where = ", ".join(f"{by:.2f} m {side}" for by, side in shown)
+    return (
+        f"{said}at {one.time:.2f} s it is {one.gap:.2f} m off, mainly "
+        f"{'longitudinally' if ahead else 'laterally'} ({where}), and {_pace(one.speed)}"
+        f"{_way(one.turn)}."
+    )
+
+
+def _always(found: Differences) -> list[str]:
+    """Return what differs from the start on."""
     said = [f"{name} is not there." for name in found.only_here]
     said += [f"{name} is there alone." for name in found.only_there]
-    said += [_box(one) for one in found.boxes]
+    return said + [_box(one) for one in found.boxes]
+
+
+def _story(found: Differences) -> list[str]:
+    """Return what differed, in the order in which it did, up to the first who parted."""
+    said = _always(found)
     if not found.partings:
         return [*said, f"Nobody ever is more than {PARTED:g} m from where it is here."]
     first = found.partings[0]
@@ -178,14 +235,22 @@ def _parting(one: Parting) -> str:
     along = abs(one.along) >= abs(one.across)
     sides = ("ahead", "behind") if along else ("to the left", "to the right")
     where = sides[(one.along if along else one.across) < 0.0]
-    pace = f"{abs(one.speed):.2f} m/s {'faster' if one.speed > 0.0 else 'slower'}"
-    if abs(one.speed) < 0.05:
-        pace = "as fast"
-    way = ""
-    if one.turn is not None and abs(one.turn) > TURNED:
-        side = "left" if one.turn > 0.0 else "right"
-        way = f", going {math.degrees(abs(one.turn)):.0f}° to the {side} of its way here"
     return (
         f"{one.entity} parts first: at {one.time:.2f} s it is {one.gap:.2f} m apart there, "
-        f"{where}, and {pace}{way}; on its way since {one.since:.2f} s."
+        f"{where}, and {_pace(one.speed)}{_way(one.turn)}; on its way since {one.since:.2f} s."
     )
+
+
+def _pace(speed: float) -> str:
+    """Return how much faster somebody is there, in words."""
+    if abs(speed) < 0.05:
+        return "as fast"
+    return f"{abs(speed):.2f} m/s {'faster' if speed > 0.0 else 'slower'}"
+
+
+def _way(turn: float | None) -> str:
+    """Return in which other direction somebody moves there, if it does."""
+    if turn is None or abs(turn) <= TURNED:
+        return ""
+    side = "left" if turn > 0.0 else "right"
+    return f", going {math.degrees(abs(turn)):.0f}° to the {side} of its way here"
