@@ -53,7 +53,7 @@ def save(individuals: Individuals, path: Path | str, include_tbox: bool = True) 
 
 
 def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:
-    """Return what `save` writes."""
+    """Return what `save` writes: the same bytes for the same statements in the same order."""
     header: ox.NamedNode | ox.BlankNode | ox.Triple = ox.NamedNode(SCENARIOS + "unnamed")
     by_subject: dict[object, list[ox.Quad]] = {}
     for quad in individuals.quads:
@@ -64,9 +64,28 @@ def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:
     quads += tbox().quads if include_tbox else [ox.Quad(header, _IMPORTS, _ONTOLOGY)]
     for about_one in by_subject.values():  # each individual in one piece, however it was built
         quads += about_one
-    data = ox.serialize(quads, format=_RDF_XML, prefixes=PREFIXES)
+    data = ox.serialize(_renamed(quads), format=_RDF_XML, prefixes=PREFIXES)
     assert data is not None
     return data
+
+
+def _renamed(quads: Iterable[ox.Quad]) -> Iterator[ox.Quad]:
+    """Yield statements whose anonymous nodes are numbered; a parser calls them at random."""
+    names: dict[object, ox.BlankNode] = {}
+
+    def name(node: ox.BlankNode) -> ox.BlankNode:
+        return names.setdefault(node, ox.BlankNode(f"b{len(names) + 1}"))
+
+    for quad in quads:
+        subject, value = quad.subject, quad.object
+        if isinstance(subject, ox.BlankNode) or isinstance(value, ox.BlankNode):
+            yield ox.Quad(
+                name(subject) if isinstance(subject, ox.BlankNode) else subject,
+                quad.predicate,
+                name(value) if isinstance(value, ox.BlankNode) else value,
+            )
+        else:
+            yield quad
 
 
 def load(path: Path | str) -> Individuals:
