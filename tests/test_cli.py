@@ -383,6 +383,32 @@ from bridgegen.cli import main; main()
     assert bg.Run(tmp_path / "run").summary.evaluations >= 40
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+@pytest.mark.parametrize("words", [["schema"], ["list", "algorithms"], ["schema", "--help"]])
+def test_an_output_that_is_full_is_one_clear_error(words):
+    """What is printed at once, and what is printed when the command ends."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", "from bridgegen.cli import main; main()", *words],
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=300, check=False,
+        )  # fmt: skip
+    message = "bridgegen: error: the output cannot be written: No space left on device\n"
+    assert (done.returncode, done.stderr) == (2, message)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs names of any bytes")
+@pytest.mark.parametrize("words", [["search", "cut-in", "--budget", "5", "--out"], ["resume"]])
+def test_a_folder_whose_name_is_not_utf_8_is_one_clear_error(words, tmp_path, cli):
+    folder = tmp_path / os.fsdecode(b"run\xff")
+    if words == ["resume"]:
+        folder.mkdir()
+        (folder / "run.sqlite").touch()
+    status, _, err = cli(*words, folder)
+    assert (status, "Traceback" in err) == (2, False)
+    assert "its path must be valid UTF-8" in err
+    assert folder.exists() == (words == ["resume"])
+
+
 def test_a_command_without_documentation_fails_this_test(cli):
     readme = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
     code, out, _ = cli("--help")

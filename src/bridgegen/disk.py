@@ -1,9 +1,11 @@
 """Files that are written whole or not at all, and pages that replace none but their own kind."""
 
+import glob
 import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
+from typing import IO
 
 from bridgegen.errors import InputError, StorageError
 
@@ -14,6 +16,9 @@ _HEAD = 1000
 def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
     """Write a file beside its place, then put it there: nobody ever reads half of it.
 
+    What processes that were killed left of the same file is removed. A device or a pipe is written
+    to, and never replaced.
+
     Args:
         path: where to; a file that exists is replaced.
         chunks: what it holds.
@@ -23,7 +28,13 @@ def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        if path.exists() and not path.is_file():
+            with path.open("wb") as file:
+                file.writelines(chunks)
+            return
+        _remove_left_over(path)
         with part.open("wb") as file:
+            _lock(file)
             file.writelines(chunks)
         part.replace(path)
     except OSError as error:
@@ -56,6 +67,44 @@ def read_inside(folder: Path, name: str) -> bytes:
     except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
         why = error.strerror if isinstance(error, OSError) else error
         raise StorageError(f"{path}: cannot be read: {why}") from None
+
+
+def _remove_left_over(path: Path) -> None:
+    """Remove the parts of a file whose processes have ended: none of this machine's, none locked.
+
+    The lock tells of processes on other machines, where the file system has such locks.
+    """
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+        pid = part.name.split(".")[-2]
+        if not (pid.isascii() and pid.isdecimal()) or _runs(int(pid)):
+            continue
+        with suppress(OSError), part.open("rb") as file:
+            if _lock(file):
+                part.unlink()
+
+
+def _runs(pid: int) -> bool:
+    """Say whether there is such a process on this machine, as far as can be told."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # somebody else's; or no process's number
+        return True
+    return True
+
+
+def _lock(file: IO[bytes]) -> bool:
+    """Lock a file until it is closed; return whether that succeeds."""
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (ImportError, OSError):  # not on this system, nor on this file system; or it is taken
+        return False
+    return True
 
 
 def refuse_other(page: Path, generator: str, what: str) -> None:

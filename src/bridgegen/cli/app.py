@@ -1,6 +1,9 @@
 """The application that the commands are registered with, and how it is run."""
 
+import errno
+import os
 import sys
+from contextlib import suppress
 
 import typer
 
@@ -25,10 +28,17 @@ ontology = typer.Typer(help="The ontology itself.", no_args_is_help=True, rich_m
 app.add_typer(ontology, name="ontology")
 
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
 def main() -> None:
     """Run the command line; a user's mistake is one message on stderr and exit status 2."""
     try:
-        app()
+        try:
+            app()
+        except SystemExit:
+            sys.stdout.flush()  # else Python says at its end, and in its own words, what fails
+            raise
     except Interrupted as stop:
         print(f"bridgegen: {stop}", file=sys.stderr)
         sys.exit(130)
@@ -36,3 +46,20 @@ def main() -> None:
         for problem in error.problems:
             print(f"bridgegen: error: {problem}", file=sys.stderr)
         sys.exit(2)
+    except BrokenPipeError:
+        _drop_output()
+        sys.exit(1)
+    except OSError as error:
+        if error.filename is not None or error.errno not in _FULL:
+            raise
+        _drop_output()
+        print(f"bridgegen: error: the output cannot be written: {error.strerror}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _drop_output() -> None:
+    """Send what is still to be printed nowhere: where it should go cannot be written to."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -22,12 +22,28 @@ DRAFT = "run.sqlite.new"
 KEYS = ("schema", "version", "settings", "parameters", "metrics", "n_var", "n_obj")
 
 
+def refuse_other_names(folder: Path) -> None:
+    """Refuse a folder whose path no settings, page or ontology could name.
+
+    Raises:
+        StorageError: its path is not valid UTF-8.
+    """
+    path = str(folder.absolute())
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        shown = path.encode("utf-8", "backslashreplace").decode()
+        raise StorageError(f"{shown}: its path must be valid UTF-8; choose another folder") from None
+
+
 def refuse_used(folder: Path) -> None:
     """Let a run begin only where nothing can be overwritten.
 
     Raises:
-        StorageError: the folder holds a run, or anything else that no run left behind.
+        StorageError: the folder holds a run, or anything else that no run left behind; or its path
+            is not valid UTF-8.
     """
+    refuse_other_names(folder)
     ours = {LOCK, DRAFT, f"{DRAFT}-journal"}
     with storage_errors(folder, "read"):
         if (folder / FILE).exists():

@@ -20,6 +20,7 @@ from bridgegen.store.run_file import (
     SCHEMA,
     columns_of,
     read_run,
+    refuse_other_names,
     refuse_used,
     write_run,
 )
@@ -132,6 +133,7 @@ class Store:
             StorageError: not a run, damaged, of another schema, locked, or not readable.
         """
         folder = Path(folder)
+        refuse_other_names(folder)
         with storage_errors(folder, "read"):
             if not (folder / FILE).is_file():
                 what = "holds no run" if folder.is_dir() else "there is no such folder"
