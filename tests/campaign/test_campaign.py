@@ -1,6 +1,7 @@
 import json
 import os
 import shlex
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
+from bridgegen.campaign import Watch
 from bridgegen.campaign.handover import most_critical
 from bridgegen.cli import main
 from bridgegen.conflict.findings import COLUMNS
@@ -448,3 +450,53 @@ def test_what_an_algorithm_refuses_leaves_no_folder(tmp_path):
             out=tmp_path / "run",
         )  # fmt: skip
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs files that can be deleted while open")
+@pytest.mark.parametrize("when", ["batch", "triage", "hand over", "report"])
+def test_a_folder_that_is_deleted_in_mid_run_is_said_to_be(tmp_path, when):
+    folder, batches = tmp_path / "run", []
+
+    def on_batch(progress) -> None:
+        batches.append(progress.evaluations)
+        if when == "batch" and len(batches) == 2:
+            shutil.rmtree(folder)
+
+    def on_stage(name) -> None:
+        if name == when:
+            shutil.rmtree(folder)
+
+    with pytest.raises(StorageError) as stop:
+        bg.run_search("crossroads-s4", budget=200, keep=1, ego="route-follower", causes=False,
+                      out=folder, watch=Watch(batch=on_batch, stage=on_stage))  # fmt: skip
+    assert str(stop.value) == (
+        f"{folder}: run.sqlite was deleted or moved while the run was going on; if it was deleted, "
+        "its evaluations are lost"
+    )
+    if when == "batch":
+        assert len(batches) == 2  # it stops with the next one
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs files that can be deleted while open")
+def test_ctrl_c_does_not_say_that_a_deleted_run_can_be_resumed(tmp_path):
+    folder = tmp_path / "run"
+
+    def on_batch(progress) -> None:
+        shutil.rmtree(folder)
+        raise KeyboardInterrupt
+
+    with pytest.raises(StorageError, match="was deleted or moved"):
+        bg.run_search("crossroads-s4", budget=200, out=folder, watch=Watch(batch=on_batch))
+
+
+def test_an_exported_file_that_is_deleted_while_the_report_is_made_costs_no_evaluation(tmp_path):
+    folder = tmp_path / "run"
+
+    def on_stage(name) -> None:
+        if name == "report":
+            shutil.rmtree(folder / "critical")
+
+    with pytest.raises(StorageError, match="the evaluations are kept, 'bridgegen resume"):
+        bg.run_search("crossroads-s4", budget=120, keep=1, ego="route-follower", causes=False,
+                      out=folder, watch=Watch(stage=on_stage))  # fmt: skip
+    assert bg.resume(folder).scenarios

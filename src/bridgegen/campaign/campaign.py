@@ -18,7 +18,7 @@ from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
-from bridgegen.errors import InputError, Interrupted, WorkersError
+from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.algorithm import Problem, Value, resolve
@@ -285,6 +285,7 @@ def _go(
         )
     except WorkersError as error:
         raise _workers_lost(error, store) from error
+    store.require_there()
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
     if not deliver:
@@ -292,13 +293,23 @@ def _go(
     try:
         _finish(pipeline, store, settings, watch)
     except KeyboardInterrupt:
+        store.require_there()
         raise Interrupted(store.folder, result.evaluations, settings.budget) from None
     except WorkersError as error:
         raise _workers_lost(error, store) from error
+    except (OSError, StorageError) as error:
+        store.require_there()
+        if isinstance(error, StorageError):
+            raise
+        raise StorageError(
+            f"{error.filename or store.folder}: cannot be read or written: {error.strerror}; the "
+            f"evaluations are kept, 'bridgegen resume {store.folder}' writes the files"
+        ) from None
     return Run(store.folder)
 
 
 def _workers_lost(error: WorkersError, store: Store) -> WorkersError:
+    store.require_there()
     problem = f"{error}; {len(store)} evaluations are kept"
     return WorkersError(f"{problem}, go on with 'bridgegen resume {store.folder}'")
 

@@ -33,7 +33,21 @@ def refuse_other_names(folder: Path) -> None:
         path.encode()
     except UnicodeEncodeError:
         shown = path.encode("utf-8", "backslashreplace").decode()
-        raise StorageError(f"{shown}: its path must be valid UTF-8; choose another folder") from None
+        problem = "its path must be valid UTF-8; choose another folder"
+        raise StorageError(f"{shown}: {problem}") from None
+
+
+def require_there(folder: Path) -> None:
+    """Refuse to go on with a run whose file is no longer in its folder.
+
+    Raises:
+        StorageError: it was deleted, or moved.
+    """
+    if not (folder / FILE).is_file():
+        raise StorageError(
+            f"{folder}: {FILE} was deleted or moved while the run was going on; if it was deleted, "
+            "its evaluations are lost"
+        )
 
 
 def refuse_used(folder: Path) -> None:

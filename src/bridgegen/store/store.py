@@ -22,6 +22,7 @@ from bridgegen.store.run_file import (
     read_run,
     refuse_other_names,
     refuse_used,
+    require_there,
     write_run,
 )
 from bridgegen.store.sqlite import Lock, connect, storage_errors, transaction
@@ -275,8 +276,17 @@ class Store:
     def _writing(self, kept: str) -> Iterator[None]:
         if self._lock is None:
             raise StorageError(f"{self.folder}: this run was opened for reading only")
+        self.require_there()  # SQLite would go on writing to what nobody can open again
         with storage_errors(self.folder / FILE, "written", kept), transaction(self._connection):
             yield
+
+    def require_there(self) -> None:
+        """Make sure that what was recorded is still where it was recorded.
+
+        Raises:
+            StorageError: the run's file was deleted, or moved.
+        """
+        require_there(self.folder)
 
     def failures(self) -> dict[int, str]:
         """Return what is said of failed evaluations besides their status, by id."""
