@@ -4,7 +4,8 @@
 
 Quote medians and ratios: on a shared machine absolute times wander. Each figure is the best of
 three, for the machine's other work only ever makes it slower; where it matters, the processor time
-stands beside it. Parts may be named: `run.py own_drivers many_actors`.
+stands beside it. Parts may be named: `run.py own_drivers many_actors`. What needs an extra that is
+not installed is skipped, and named.
 """
 
 import os
@@ -15,6 +16,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +36,7 @@ from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.search import Problem, Results, get, names
+from bridgegen.search.algorithm import EXTRAS
 from bridgegen.store import Rows
 from bridgegen.triage.triage import triage as triage_of
 from workers import workers
@@ -259,15 +262,24 @@ LEARNERS = ("nsga2-dt", "map-elites")
 
 def algorithms() -> list[Row]:
     """Time what each algorithm takes for 40 rows, over a search of 1000, beside the simulator."""
-    rows = []
+    rows: list[Row] = []
+    skipped: dict[str, list[str]] = {}
     for name in names():
         if getattr(get(name), "is_adversary", False):
             continue  # it drives within scenarios, of which there are none here
+        extra = getattr(get(name), "extra", None)
+        if extra and not all(find_spec(module) for module in EXTRAS[extra]):
+            skipped.setdefault(extra, []).append(name)
+            continue
         target = "≤ 50" if name in LEARNERS else "≤ 5"
         if hasattr(get(name), "restore"):
             target = ""  # it trains a network
         taken = best(lambda name=name: 40 * seconds_a_row(name))
         rows.append((f"{name}, for 40 rows, ms", f"{1e3 * taken:.2f}", target))
+    rows += [
+        (f"{', '.join(some)}: skipped, need the extra {extra}", "–", "")
+        for extra, some in skipped.items()
+    ]
     return rows
 
 
