@@ -93,8 +93,16 @@ COLUMNS = tuple(one.name for one in fields(Findings))
 
 
 def unpacked(rows: Sequence[Sequence[Any]]) -> Findings:
-    """Return findings from rows of texts or None, in the order of ``COLUMNS``."""
-    texts = [[str(one or "") for one in column] for column in zip(*rows, strict=True)]
+    """Return findings from rows of texts or None, in the order of ``COLUMNS``.
+
+    Raises:
+        TypeError: a value is something else.
+    """
+    columns = list(zip(*rows, strict=True))
+    for name, column in zip(COLUMNS, columns, strict=False):
+        if odd := {*map(type, column)} - {str, type(None)}:
+            raise TypeError(f"{name} must be a text, got a {odd.pop().__name__}")
+    texts = [[one or "" for one in column] for column in columns]
     if not texts:
         return Findings.none(0)
     return Findings(*(np.array(column, dtype=object) for column in texts))

@@ -6,7 +6,7 @@ from hashlib import blake2b
 
 from bridgegen.errors import InputError
 
-_TABLE = (
+TABLE = (
     "checkpoint (id INTEGER PRIMARY KEY CHECK (id = 0), evaluations INTEGER NOT NULL, "
     "idle INTEGER NOT NULL, digest BLOB NOT NULL, state BLOB NOT NULL)"
 )
@@ -29,7 +29,7 @@ class Checkpoint:
 
 def write_checkpoint(connection: sqlite3.Connection, checkpoint: Checkpoint) -> None:
     """Put a checkpoint in the place of the one before; within a transaction."""
-    connection.execute(f"CREATE TABLE IF NOT EXISTS {_TABLE}")
+    connection.execute(f"CREATE TABLE IF NOT EXISTS {TABLE}")
     connection.execute(
         "INSERT OR REPLACE INTO checkpoint VALUES (0, ?, ?, ?, ?)",
         (checkpoint.evaluations, checkpoint.idle, _digest(checkpoint), checkpoint.state),
@@ -49,7 +49,8 @@ def read_checkpoint(connection: sqlite3.Connection) -> Checkpoint | None:
     if row is None:
         return None
     evaluations, idle, digest, state = row
-    if isinstance(evaluations, int) and isinstance(idle, int) and isinstance(state, bytes):
+    whole = isinstance(evaluations, int) and isinstance(idle, int)
+    if whole and min(evaluations, idle) >= 0 and isinstance(state, bytes):
         checkpoint = Checkpoint(evaluations, idle, state)
         if digest == _digest(checkpoint):
             return checkpoint

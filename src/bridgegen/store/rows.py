@@ -175,7 +175,7 @@ class Columns:
         """Return the statement that makes the table."""
         kinds = {"id": "INTEGER PRIMARY KEY", "batch": "INTEGER NOT NULL", "u": "BLOB NOT NULL"}
         kinds |= {"status": "INTEGER NOT NULL", "critical": "INTEGER NOT NULL"}
-        kinds |= dict.fromkeys(("cause", *COLUMNS), "TEXT")
+        kinds |= dict.fromkeys(self.last[2:], "TEXT")
         columns = ", ".join(f"{quoted(name)} {kinds.get(name, 'REAL')}" for name in self.all)
         return f"CREATE TABLE evaluations ({columns})"
 
@@ -232,7 +232,7 @@ class Columns:
         Raises:
             ValueError, TypeError, InputError: values that this table cannot hold.
         """
-        n, first = len(rows), len(FIRST)
+        n, first, names = len(rows), len(FIRST), self.all
         n_float = len(self.X) + len(self.metrics) + len(self.F)
         # NULL arrives as None, which float64 takes as NaN.
         numbers = np.array([row[first : first + n_float] for row in rows], dtype=np.float64)
@@ -240,20 +240,24 @@ class Columns:
         X, metrics, F = np.split(
             numbers, np.cumsum([len(self.X), len(self.metrics)]).tolist(), axis=1
         )
+        if any(type(row[3]) is not bytes or len(row[3]) != 8 * self.n_var for row in rows):
+            raise ValueError(f"a row of the unit cube is not {self.n_var} numbers")
         blob = b"".join(row[3] for row in rows)
         U = np.frombuffer(blob, dtype="<f8").reshape(n, self.n_var)
+        if not np.isfinite(U).all():
+            raise ValueError("a row of the unit cube is not finite")
         last = first + n_float
         causes = [row[last + 2] if len(self.last) > 2 else None for row in rows]
         return Rows(
-            id=_column(rows, 0, np.int64),
-            batch=_column(rows, 1, np.int64),
-            seconds=_column(rows, 2, np.float64),
+            id=_column(rows, names, 0, np.int64),
+            batch=_column(rows, names, 1, np.int64),
+            seconds=_column(rows, names, 2, np.float64),
             U=U.astype(np.float64),
             X=np.ascontiguousarray(X),
             metrics=np.ascontiguousarray(metrics),
             F=np.ascontiguousarray(F),
-            status=_column(rows, last, np.int64),
-            critical=_column(rows, last + 1, np.bool_),
+            status=_column(rows, names, last, np.int64),
+            critical=_column(rows, names, last + 1, np.bool_),
             cause=np.array([Cause.named(one) if one else Cause.NONE for one in causes], np.int8),
             findings=unpacked([row[last + 3 :] for row in rows])
             if len(self.last) > 3
@@ -266,8 +270,13 @@ def quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"'
 
 
-def _column(rows: Sequence[tuple[Any, ...]], at: int, kind: type[Any]) -> Any:
-    return np.array([row[at] for row in rows], dtype=kind)
+def _column(rows: Sequence[tuple[Any, ...]], names: Sequence[str], at: int, kind: type[Any]) -> Any:
+    values = [row[at] for row in rows]
+    wanted = {int, float} if kind is np.float64 else {int}
+    if odd := {*map(type, values)} - wanted:
+        what = "a number" if kind is np.float64 else "a whole number"
+        raise TypeError(f"{names[at]} must be {what}, got a {odd.pop().__name__}")
+    return np.array(values, dtype=kind)
 
 
 def _free(names: Iterable[str], kind: str, taken: set[str]) -> tuple[str, ...]:

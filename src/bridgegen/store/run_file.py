@@ -8,8 +8,10 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from bridgegen.errors import StorageError
-from bridgegen.store.rows import LAST_OF_SCHEMA, Columns
+from bridgegen.errors import InputError, StorageError
+from bridgegen.records import parse_json
+from bridgegen.store.rows import FIRST, LAST_OF_SCHEMA, Columns
+from bridgegen.store.schema import NEEDED, RUN, check_columns, tables_of
 from bridgegen.store.sqlite import storage_errors, transaction
 
 SCHEMA = 3
@@ -19,6 +21,7 @@ READABLE = tuple(LAST_OF_SCHEMA)
 FILE = "run.sqlite"
 LOCK = "run.lock"
 DRAFT = "run.sqlite.new"
+MAX_N_VAR = 10**5
 KEYS = ("schema", "version", "settings", "parameters", "metrics", "n_var", "n_obj")
 
 
@@ -80,7 +83,7 @@ def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
     try:
         connect = sqlite3.connect(draft, isolation_level=None)
         with closing(connect) as connection, transaction(connection):
-            connection.execute("CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL)")
+            connection.execute(f"CREATE TABLE {RUN}")
             connection.execute(columns.create_sql())
             connection.executemany("INSERT INTO run VALUES (?, ?)", values)
         os.replace(draft, folder / FILE)
@@ -106,25 +109,82 @@ def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
     Raises:
         StorageError: not a run, damaged, or of another schema.
     """
-    with storage_errors(path, "read"):
-        tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master")}
-        if not {"run", "evaluations"} <= tables:
-            raise StorageError(f"{path}: is not a run: its tables are missing")
-        stored = connection.execute("SELECT key, value FROM run").fetchall()
-        names = [row[1] for row in connection.execute("PRAGMA table_info(evaluations)")]
     try:
-        run = {key: json.loads(value) for key, value in stored}
+        with storage_errors(path, "read"):
+            if missing := {*NEEDED} - tables_of(connection):
+                told = ", ".join(sorted(missing))
+                raise StorageError(f"{path}: is not a run: its tables are missing ({told})")
+            stored = connection.execute("SELECT key, value FROM run").fetchall()
+            found = connection.execute("PRAGMA table_xinfo(evaluations)").fetchall()
+        run = {key: _value(key, text) for key, text in stored}
         schema = run["schema"]
-        if schema not in READABLE:
+        if type(schema) is not int or schema not in READABLE:
             raise StorageError(
                 f"{path}: the store's schema must be at most {SCHEMA}, got {schema!r}: "
                 f"it was made by BridgeGen {run.get('version', '(unknown)')}"
             )
-        columns = columns_of(run)
-        missing = [key for key in KEYS if key not in run]
+        if absent := [key for key in KEYS if key not in run]:
+            raise InputError(f"no {', '.join(absent)}")
+        _check_values(run, len(found))
+        with storage_errors(path, "read"):
+            check_columns(connection, "evaluations", columns_of(run).create_sql())
+            _check_rows(connection, run["n_var"], len(found))
+    except InputError as error:
+        raise StorageError(f"{path}: the file is damaged: {'; '.join(error.problems)}") from error
     except (KeyError, TypeError, ValueError) as error:
         raise StorageError(f"{path}: the file is damaged: bad or missing {error}") from error
-    if missing or names != list(columns.all):
-        what = f"no {', '.join(missing)}" if missing else "the columns are not the run's"
-        raise StorageError(f"{path}: the file is damaged: {what}")
     return run
+
+
+def _value(key: str, text: str) -> Any:
+    """Return a value that a run's file has as JSON.
+
+    Raises:
+        InputError: it is not JSON of finite numbers.
+    """
+    try:
+        return parse_json(text)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"bad or missing {key}: {error}") from error
+
+
+def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
+    """Refuse values of the wrong type, and counts that do not fit the table of evaluations.
+
+    Raises:
+        InputError: the first that is wrong.
+    """
+    kinds = {"version": str, "settings": dict, "notes": dict, "n_var": int, "n_obj": int}
+    for key, kind in kinds.items():
+        if key in run and type(run[key]) is not kind:
+            raise InputError(f"bad or missing {key}: it is a {type(run[key]).__name__}")
+    if not isinstance(run.get("finished", ""), str):
+        raise InputError("bad or missing finished: it must be a text")
+    for key in ("parameters", "metrics"):
+        if type(run[key]) is not list or not all(isinstance(name, str) for name in run[key]):
+            raise InputError(f"bad or missing {key}: it must be a list of names")
+    if not 0 <= run["n_var"] <= MAX_N_VAR:
+        raise InputError(f"0 <= n_var <= {MAX_N_VAR} must hold, got {run['n_var']}")
+    named = len(FIRST) + len(run["parameters"]) + len(run["metrics"])
+    left = n_columns - named - len(LAST_OF_SCHEMA[run["schema"]])
+    if run["n_obj"] != left:
+        raise InputError(f"the columns are not the run's: n_obj is {run['n_obj']}, not {left}")
+
+
+def _check_rows(connection: sqlite3.Connection, n_var: int, n_columns: int) -> None:
+    """Refuse numbers of evaluations that the file has no room for: arrays are made for as many.
+
+    Raises:
+        InputError: they are negative, or too many for the size of the file.
+    """
+    last, first = (
+        connection.execute(f"SELECT {end}(id) FROM evaluations").fetchone()[0]
+        for end in ("max", "min")
+    )
+    size = connection.execute("PRAGMA page_count").fetchone()[0]
+    size *= connection.execute("PRAGMA page_size").fetchone()[0]
+    if first is not None and (first < 0 or (last + 1) * (8 * n_var + n_columns) > size):
+        raise InputError(
+            f"evaluations {first} to {last} cannot be in a file of {size} bytes: they must be "
+            "numbered from 0"
+        )

@@ -17,6 +17,7 @@ CAUSES = {
     sqlite3.SQLITE_IOERR: "reading or writing failed",
     sqlite3.SQLITE_CORRUPT: "the file is damaged",
     sqlite3.SQLITE_NOTADB: "it is not an SQLite database",
+    sqlite3.SQLITE_AUTH: "the file is damaged: it holds a view or a trigger",
     sqlite3.SQLITE_BUSY: "another process holds it",
 }
 
@@ -59,9 +60,40 @@ def connect(path: Path, *, write: bool) -> sqlite3.Connection:
         mode = "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
     uri = f"file:{quote(str(path.absolute()))}?mode={mode}"
     connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=10.0)
-    if not write:
-        connection.execute("PRAGMA query_only = ON")
+    try:
+        # The file may be anybody's: its schema calls no function that has side effects, and every
+        # page is checked before it is used.
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.execute("PRAGMA cell_size_check = ON")
+        if not write:
+            connection.execute("PRAGMA query_only = ON")
+        connection.set_authorizer(_authorize)
+    except BaseException:
+        connection.close()
+        raise
     return connection
+
+
+_FORBIDDEN = {
+    sqlite3.SQLITE_ATTACH,
+    sqlite3.SQLITE_CREATE_TRIGGER,
+    sqlite3.SQLITE_CREATE_VIEW,
+    sqlite3.SQLITE_CREATE_VTABLE,
+    sqlite3.SQLITE_RECURSIVE,
+}
+
+
+def _authorize(
+    action: int, _first: str | None, _second: str | None, _base: str | None, inside: str | None
+) -> int:
+    """Refuse what no statement of the store needs: a file's own views, triggers and recursion.
+
+    Args:
+        action: what is about to be done.
+        inside: the view or trigger that asks for it, if one does.
+    """
+    refused = inside is not None or action in _FORBIDDEN
+    return sqlite3.SQLITE_DENY if refused else sqlite3.SQLITE_OK
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from bridgegen.store.run_file import (
     require_there,
     write_run,
 )
+from bridgegen.store.schema import FAILURES
 from bridgegen.store.sqlite import Lock, connect, storage_errors, transaction
 
 if TYPE_CHECKING:
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
 
 CHUNK = 4096
 """Rows that are read from SQL at a time."""
-
-
-_FAILURES = "failures (id INTEGER PRIMARY KEY, message TEXT NOT NULL)"
 
 
 class Store:
@@ -212,7 +210,7 @@ class Store:
             self._connection.executemany(self.columns.insert_sql(), rows)
             if result.messages:
                 said = [(start + row, text) for row, text in sorted(result.messages.items())]
-                self._connection.execute(f"CREATE TABLE IF NOT EXISTS {_FAILURES}")
+                self._connection.execute(f"CREATE TABLE IF NOT EXISTS {FAILURES}")
                 self._connection.executemany("INSERT INTO failures VALUES (?, ?)", said)
         self._finished = None
 
@@ -289,13 +287,19 @@ class Store:
         require_there(self.folder)
 
     def failures(self) -> dict[int, str]:
-        """Return what is said of failed evaluations besides their status, by id."""
+        """Return what is said of failed evaluations besides their status, by id.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
         with self._reading():
             there = self._connection.execute(
                 "SELECT count(*) FROM sqlite_master WHERE name = 'failures'"
             ).fetchone()[0]
-            found = self._connection.execute("SELECT * FROM failures") if there else ()
-            return dict(found)
+            found = dict(self._connection.execute("SELECT * FROM failures") if there else ())
+        if not all(isinstance(text, str) for text in found.values()):
+            raise self._damaged("a message of a failed evaluation is not a text")
+        return found
 
     @property
     def finished(self) -> str | None:
@@ -326,6 +330,8 @@ class Store:
             row = self._connection.execute(
                 "SELECT seconds FROM evaluations ORDER BY id DESC LIMIT 1"
             ).fetchone()
+        if row and not isinstance(row[0], int | float):
+            raise self._damaged("the time of the last evaluation is not a number")
         return float(row[0]) if row else 0.0
 
     def read(self, start: int = 0, stop: int | None = None) -> Rows:
@@ -345,7 +351,7 @@ class Store:
             found = self._connection.execute(sql, (start, stop)).fetchall()
         try:
             rows = self.columns.unpack(found)
-        except (TypeError, ValueError, InputError) as error:
+        except (TypeError, ValueError, OverflowError, InputError) as error:
             raise self._damaged(str(error)) from error
         if rows.id.tolist() != list(range(start, stop)):
             raise self._damaged(f"evaluations between {start} and {stop - 1} are missing")
@@ -397,4 +403,7 @@ class Store:
 
     def _number(self, sql: str) -> int:
         with self._reading():
-            return int(self._connection.execute(sql).fetchone()[0])
+            found = self._connection.execute(sql).fetchone()[0]
+        if not isinstance(found, int) or found < 0:
+            raise self._damaged(f"a number of evaluations or batches is {found!r}")
+        return found
