@@ -17,12 +17,13 @@ One declaration serves reading, writing and checking. A field's annotation says 
 """
 
 import re
+import sys
 import types
 import typing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
-from typing import Any, TypeVar, Union, cast, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin
 
 from bridgegen.openx.openscenario.values import Expr, Kind, ParameterRef
 
@@ -55,10 +56,24 @@ class AtLeast:
 
 @dataclass(frozen=True)
 class Range:
-    """The range that the standard gives for a number."""
+    """The range of a number: the standard's, or what is left of it by the meaning of the number.
+
+    Attributes:
+        low: the least.
+        high: the greatest; `FINITE` where it may be any but infinite.
+        above: whether ``low`` itself is outside.
+    """
 
     low: float
     high: float = float("inf")
+    above: bool = False
+
+
+FINITE = sys.float_info.max
+"""The end of a range that leaves out what is infinite: of sizes, places and target speeds."""
+
+
+FiniteDouble = Annotated[float | ParameterRef | Expr, Kind.DOUBLE, Range(-FINITE, FINITE)]
 
 
 @dataclass(frozen=True)

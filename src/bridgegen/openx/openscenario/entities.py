@@ -5,7 +5,15 @@ from typing import Annotated
 
 from bridgegen.openx.openscenario.catalog_files import CATALOG
 from bridgegen.openx.openscenario.declarations import ParameterDeclarations, Properties
-from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range, Tag
+from bridgegen.openx.openscenario.element import (
+    ENTITY,
+    FINITE,
+    AtLeast,
+    Element,
+    FiniteDouble,
+    Range,
+    Tag,
+)
 from bridgegen.openx.openscenario.enumerations import (
     ControllerType,
     MiscObjectCategory,
@@ -18,24 +26,25 @@ from bridgegen.openx.openscenario.enumerations import (
 from bridgegen.openx.openscenario.values import Boolean, Double, ParameterRef, String
 
 _NOT_NEGATIVE = Range(0.0)
+_EXTENT = Range(0.0, FINITE, above=True)  # a box without an area has no distance to others
 
 
 @dataclass(frozen=True)
 class Center(Element):
     """The middle of a bounding box from the reference point [m], x ahead, y left, z up."""
 
-    x: Double
-    y: Double
-    z: Double
+    x: FiniteDouble
+    y: FiniteDouble
+    z: FiniteDouble
 
 
 @dataclass(frozen=True)
 class Dimensions(Element):
     """The size of a bounding box [m]."""
 
-    width: Annotated[Double, _NOT_NEGATIVE]
-    length: Annotated[Double, _NOT_NEGATIVE]
-    height: Annotated[Double, _NOT_NEGATIVE]
+    width: Annotated[Double, _EXTENT]
+    length: Annotated[Double, _EXTENT]
+    height: Annotated[Double, Range(0.0, FINITE)]
 
 
 @dataclass(frozen=True)
@@ -64,8 +73,8 @@ class Axle(Element):
     max_steering: Annotated[Double, _NOT_NEGATIVE]
     wheel_diameter: Annotated[Double, _NOT_NEGATIVE]
     track_width: Annotated[Double, _NOT_NEGATIVE]
-    position_x: Double
-    position_z: Double
+    position_x: FiniteDouble
+    position_z: FiniteDouble
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import ENTITY, Element, Range, Tag
+from bridgegen.openx.openscenario.element import ENTITY, Element, FiniteDouble, Range, Tag
 from bridgegen.openx.openscenario.enumerations import (
     CoordinateSystem,
     DynamicsShape,
@@ -41,7 +41,7 @@ class LaneChangeAction(Element):
 
     dynamics: Annotated[TransitionDynamics, Tag("LaneChangeActionDynamics")]
     lane_change_target: LaneChangeTarget
-    target_lane_offset: Double | None = None
+    target_lane_offset: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class LaneOffsetActionDynamics(Element):
 class AbsoluteTargetLaneOffset(Element):
     """A distance from the centre of the present lane [m]."""
 
-    value: Double
+    value: FiniteDouble
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class RelativeTargetLaneOffset(Element):
     """A distance from another entity's [m]."""
 
     entity_ref: Annotated[String, ENTITY]
-    value: Double
+    value: FiniteDouble
 
 
 @dataclass(frozen=True)

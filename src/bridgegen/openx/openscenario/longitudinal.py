@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, Range, Tag
+from bridgegen.openx.openscenario.element import ENTITY, AtLeast, Element, FiniteDouble, Range, Tag
 from bridgegen.openx.openscenario.enumerations import (
     CoordinateSystem,
     DynamicsDimension,
@@ -42,7 +42,7 @@ class DynamicConstraints(Element):
 class AbsoluteTargetSpeed(Element):
     """A speed to reach [m/s]."""
 
-    value: Double
+    value: FiniteDouble
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class RelativeTargetSpeed(Element):
     """A speed to reach, by another entity's: so much more [m/s], or so many times."""
 
     entity_ref: Annotated[String, ENTITY]
-    value: Double
+    value: FiniteDouble
     speed_target_value_type: SpeedTargetValueType | ParameterRef
     continuous: Boolean
 
@@ -74,7 +74,7 @@ class SpeedAction(Element):
 class SpeedProfileEntry(Element):
     """A speed to reach [m/s], and how long after the entry before [s]."""
 
-    speed: Double
+    speed: FiniteDouble
     time: Annotated[Double | None, _NOT_NEGATIVE] = None
 
 

@@ -7,9 +7,11 @@ from bridgegen.openx.openscenario.catalog_files import CATALOG
 from bridgegen.openx.openscenario.declarations import ParameterDeclarations
 from bridgegen.openx.openscenario.element import (
     ENTITY,
+    FINITE,
     ROAD,
     AtLeast,
     Element,
+    FiniteDouble,
     Range,
     Tag,
 )
@@ -32,21 +34,21 @@ class Orientation(Element):
     """
 
     type: ReferenceContext | ParameterRef | None = None
-    h: Double | None = None
-    p: Double | None = None
-    r: Double | None = None
+    h: FiniteDouble | None = None
+    p: FiniteDouble | None = None
+    r: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
 class WorldPosition(Element):
     """A point of the world [m], with an orientation [rad]."""
 
-    x: Double
-    y: Double
-    z: Double | None = None
-    h: Double | None = None
-    p: Double | None = None
-    r: Double | None = None
+    x: FiniteDouble
+    y: FiniteDouble
+    z: FiniteDouble | None = None
+    h: FiniteDouble | None = None
+    p: FiniteDouble | None = None
+    r: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
@@ -54,9 +56,9 @@ class RelativeWorldPosition(Element):
     """A point so far from an entity's, along the axes of the world [m]."""
 
     entity_ref: Annotated[String, ENTITY]
-    dx: Double
-    dy: Double
-    dz: Double | None = None
+    dx: FiniteDouble
+    dy: FiniteDouble
+    dz: FiniteDouble | None = None
     orientation: Orientation | None = None
 
 
@@ -65,9 +67,9 @@ class RelativeObjectPosition(Element):
     """A point so far from an entity's, along the axes of that entity [m]: ahead, left, up."""
 
     entity_ref: Annotated[String, ENTITY]
-    dx: Double
-    dy: Double
-    dz: Double | None = None
+    dx: FiniteDouble
+    dy: FiniteDouble
+    dz: FiniteDouble | None = None
     orientation: Orientation | None = None
 
 
@@ -76,8 +78,8 @@ class RoadPosition(Element):
     """A point by its road's coordinates [m]: along the reference line, and left of it."""
 
     road_id: Annotated[String, ROAD]
-    s: Annotated[Double, Range(0.0)]
-    t: Double
+    s: Annotated[Double, Range(0.0, FINITE)]
+    t: FiniteDouble
     orientation: Orientation | None = None
 
 
@@ -86,8 +88,8 @@ class RelativeRoadPosition(Element):
     """A point so far from an entity's in its road's coordinates [m]."""
 
     entity_ref: Annotated[String, ENTITY]
-    ds: Double
-    dt: Double
+    ds: FiniteDouble
+    dt: FiniteDouble
     orientation: Orientation | None = None
 
 
@@ -101,8 +103,8 @@ class LanePosition(Element):
 
     road_id: Annotated[String, ROAD]
     lane_id: String
-    s: Annotated[Double, Range(0.0)]
-    offset: Double | None = None
+    s: Annotated[Double, Range(0.0, FINITE)]
+    offset: FiniteDouble | None = None
     orientation: Orientation | None = None
 
 
@@ -115,9 +117,9 @@ class RelativeLanePosition(Element):
 
     entity_ref: Annotated[String, ENTITY]
     d_lane: Int
-    ds: Double | None = None
-    ds_lane: Double | None = None
-    offset: Double | None = None
+    ds: FiniteDouble | None = None
+    ds_lane: FiniteDouble | None = None
+    offset: FiniteDouble | None = None
     orientation: Orientation | None = None
 
 
@@ -127,11 +129,11 @@ class GeoPosition(Element):
 
     latitude_deg: Annotated[Double | None, Range(-90.0, 90.0)] = None
     longitude_deg: Annotated[Double | None, Range(-180.0, 180.0)] = None
-    altitude: Double | None = None
+    altitude: FiniteDouble | None = None
     vertical_road_selection: Int | None = None
-    latitude: Double | None = None
-    longitude: Double | None = None
-    height: Double | None = None
+    latitude: FiniteDouble | None = None
+    longitude: FiniteDouble | None = None
+    height: FiniteDouble | None = None
     orientation: Orientation | None = None
 
 
@@ -146,17 +148,17 @@ class PositionOfCurrentEntity(Element):
 class PositionInRoadCoordinates(Element):
     """So far along the route, and left of its roads' reference lines [m]."""
 
-    path_s: Annotated[Double, Range(0.0)]
-    t: Double
+    path_s: Annotated[Double, Range(0.0, FINITE)]
+    t: FiniteDouble
 
 
 @dataclass(frozen=True)
 class PositionInLaneCoordinates(Element):
     """So far along the route, on a lane, and left of its centre [m]."""
 
-    path_s: Annotated[Double, Range(0.0)]
+    path_s: Annotated[Double, Range(0.0, FINITE)]
     lane_id: String
-    lane_offset: Double | None = None
+    lane_offset: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
@@ -210,7 +212,7 @@ class Vertex(Element):
     """A point of a polyline, and when to be there [s]."""
 
     position: "Position"
-    time: Double | None = None
+    time: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
@@ -227,13 +229,13 @@ class Clothoid(Element):
     ``curvature_dot`` is 1.0's name of ``curvature_prime`` [1/m²].
     """
 
-    curvature: Double
-    length: Annotated[Double, Range(0.0)]
+    curvature: FiniteDouble
+    length: Annotated[Double, Range(0.0, FINITE)]
     position: "Position"
-    curvature_prime: Double | None = None
-    curvature_dot: Double | None = None
-    start_time: Double | None = None
-    stop_time: Double | None = None
+    curvature_prime: FiniteDouble | None = None
+    curvature_dot: FiniteDouble | None = None
+    start_time: FiniteDouble | None = None
+    stop_time: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
@@ -243,11 +245,11 @@ class ClothoidSplineSegment(Element):
     ``h_offset`` [rad] is a kink at its start.
     """
 
-    curvature_start: Double
-    curvature_end: Double
-    length: Annotated[Double, Range(0.0)]
-    h_offset: Double | None = None
-    time_start: Double | None = None
+    curvature_start: FiniteDouble
+    curvature_end: FiniteDouble
+    length: Annotated[Double, Range(0.0, FINITE)]
+    h_offset: FiniteDouble | None = None
+    time_start: FiniteDouble | None = None
     position_start: Annotated["Position | None", Tag("PositionStart")] = None
 
 
@@ -256,7 +258,7 @@ class ClothoidSpline(Element):
     """Clothoids one after the other, and when the last one ends [s]."""
 
     segments: Annotated[tuple[ClothoidSplineSegment, ...], AtLeast(1)]
-    time_end: Double | None = None
+    time_end: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
@@ -264,15 +266,15 @@ class ControlPoint(Element):
     """A control point of a NURBS curve."""
 
     position: "Position"
-    time: Double | None = None
-    weight: Double | None = None
+    time: FiniteDouble | None = None
+    weight: FiniteDouble | None = None
 
 
 @dataclass(frozen=True)
 class Knot(Element):
     """A knot of a NURBS curve."""
 
-    value: Double
+    value: FiniteDouble
 
 
 @dataclass(frozen=True)
@@ -313,8 +315,8 @@ class TrajectoryPosition(Element):
     """A point on a trajectory [m]: along it, and left of it."""
 
     trajectory_ref: TrajectoryRef
-    s: Double
-    t: Double | None = None
+    s: FiniteDouble
+    t: FiniteDouble | None = None
     orientation: Orientation | None = None
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridgegen.openx.openscenario.element import BARE, Element, Range, Tag
+from bridgegen.openx.openscenario.element import BARE, Element, FiniteDouble, Range, Tag
 from bridgegen.openx.openscenario.enumerations import FollowingMode, ReferenceContext
 from bridgegen.openx.openscenario.positions import TrajectoryRef
 from bridgegen.openx.openscenario.values import Double, ParameterRef
@@ -19,8 +19,8 @@ class Timing(Element):
     """Times of the vertices count, moved [s] and scaled."""
 
     domain_absolute_relative: ReferenceContext | ParameterRef
-    scale: Double
-    offset: Double
+    scale: FiniteDouble
+    offset: FiniteDouble
 
 
 @dataclass(frozen=True)

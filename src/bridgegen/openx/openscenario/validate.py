@@ -11,6 +11,7 @@ from bridgegen.openx.opendrive.routes import plan_route
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, references
 from bridgegen.openx.openscenario.element import (
+    FINITE,
     Attribute,
     Element,
     children_of,
@@ -108,6 +109,8 @@ class _Check:
                         else f"{value:g}"
                     )
                     yield element.line, f"{what} must {_range_text(attribute)}, got {given}"
+                elif isinstance(raw, osc.Expr) and (rule := _out_of_type(attribute, value)):
+                    yield element.line, f"{what} must {rule}, got {raw} = {value:g}"
 
     def is_rate(self, element: Element) -> bool:
         """Say whether an element's number is a rate, whose sign says no more than the target."""
@@ -161,13 +164,33 @@ class _Check:
 
 def _in_range(attribute: Attribute, value: float) -> bool:
     limits = attribute.limits
-    return not math.isnan(value) and (limits is None or limits.low <= value <= limits.high)
+    if limits is None:
+        return not math.isnan(value)
+    is_above = limits.low < value if limits.above else limits.low <= value
+    return is_above and value <= limits.high
+
+
+def _out_of_type(attribute: Attribute, value: float) -> str | None:
+    """Return the rule of its type that an expression's value breaks, if it breaks one."""
+    if not attribute.kind.is_number:
+        return None
+    if not math.isfinite(value):
+        return "be finite"
+    whole = attribute.kind.whole
+    if whole is not None and not whole[0] <= value <= whole[1]:
+        return f"be of type {attribute.kind.value}, {whole[0]} to {whole[1]}"
+    return None
 
 
 def _range_text(attribute: Attribute) -> str:
     limits = attribute.limits
     if limits is None:
         return "be a number"
+    if limits.low == -FINITE:
+        return "be finite"
+    least = f"{'above' if limits.above else 'at least'} {limits.low:g}"
     if math.isinf(limits.high):
-        return f"be at least {limits.low:g}"
+        return f"be {least}"
+    if limits.high == FINITE:
+        return f"be {least} and finite"
     return f"be {limits.low:g} to {limits.high:g}"

@@ -48,6 +48,11 @@ class Kind(Enum):
         return self in _NUMBERS
 
     @property
+    def whole(self) -> tuple[int, int] | None:
+        """The least and the greatest of the whole numbers that it has; None if it has others."""
+        return _RANGES.get(self)
+
+    @property
     def is_integer(self) -> bool:
         """Whether it is a whole number."""
         return self in _RANGES
