@@ -262,6 +262,8 @@ class Objective:
         Raises:
             InputError: a key is unknown or missing, or a value breaks a rule.
         """
+        if not isinstance(data, Mapping):
+            raise InputError(f"not an objective: {data!r}")
         data = {"rule": "thresholds", "count": "ego", **data}  # earlier versions had no others
         if odd := set(data) ^ {field.name for field in fields(cls)}:
             raise InputError(f"unknown or missing keys of an objective: {sorted(odd)}")
@@ -272,7 +274,7 @@ class Objective:
             }
             values["thresholds"] = Thresholds(**data["thresholds"])
             return cls(**values)
-        except TypeError as error:
+        except (AttributeError, OverflowError, TypeError, ValueError) as error:
             raise InputError(f"not an objective: {error}") from None
 
     def _scaled(self, x: Float) -> Float:

@@ -16,7 +16,7 @@ from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
-from bridgegen.campaign.settings import Settings
+from bridgegen.campaign.settings import MAX_BUDGET, MAX_KEEP, MAX_SEED, Settings
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
@@ -27,8 +27,6 @@ from bridgegen.store import Store, refuse_used
 from bridgegen.triage.record import write_record
 from bridgegen.triage.triage import triage
 from bridgegen.workers import Choice, Workers, open_workers
-
-MAX_BUDGET = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -266,7 +264,8 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
         arena.warm_up()
     names, n_obj = pipeline.space.variables, pipeline.objective.n_obj
     problem = Problem(names, pipeline.metrics, n_obj, arena)
-    return method(problem, settings.seed, **settings.algorithm_settings)
+    values = resolve(method, problem, settings.seed, settings.algorithm_settings)
+    return method(problem, settings.seed, **values)
 
 
 def _go(
@@ -339,8 +338,8 @@ def _check_numbers(budget: int, seed: int, keep: int) -> None:
         f"{low} <= {name} <= {high} must hold, got {value}"
         for name, value, low, high in (
             ("budget", budget, 1, MAX_BUDGET),
-            ("seed", seed, 0, 2**32 - 1),
-            ("keep", keep, 0, 1000),
+            ("seed", seed, 0, MAX_SEED),
+            ("keep", keep, 0, MAX_KEEP),
         )
         if not low <= value <= high
     ]

@@ -114,7 +114,7 @@ def confirm(
             f"{place}: was searched in the simulator {settings.simulator}; confirm it in another "
             "one (--simulator)"
         )
-    handed = {one.evaluation: one.name for one in handed_over(place)}
+    handed = {one.evaluation: one.name for one in handed_over(place, len(every))}
     asked = _chosen(place, every, handed, rows, settings.budget)
     command = f"confirm --simulator {simulator.name}"
     here = pipeline_of(settings, names, place, ego=ego, command=command, causes=False)
@@ -148,8 +148,9 @@ def confirm(
         stage("report")
         try:
             with Store.open(folder) as store:
-                kept = handed_over(place)
-                files.append(write_run_report(here, store, settings, store.read(), kept))
+                rows_now = store.read()
+                kept = handed_over(place, len(rows_now))
+                files.append(write_run_report(here, store, settings, rows_now, kept))
         except KeyboardInterrupt:
             raise _stopped(place, simulator.name, rows, len(todo), len(todo)) from None
     return RunConfirmation(place, record, tuple(book.of(asked)), len(todo), tuple(files))

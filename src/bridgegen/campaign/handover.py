@@ -5,9 +5,11 @@ import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated, TypeVar
 
 import numpy as np
 import pyoxigraph as ox
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause
@@ -34,11 +36,14 @@ from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
+from bridgegen.records import parse_json, read_bytes
 from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.rollout import Rollout
 from bridgegen.store import Rows
 from bridgegen.triage.distinct import distinct
 from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Triage
+
+_Read = TypeVar("_Read", bound=BaseModel)
 
 FOLDER = "critical"
 MINIMAL = "minimal-"
@@ -74,8 +79,46 @@ class Refused:
     """
 
     name: str
-    evaluation: int
+    evaluation: Annotated[int, Field(ge=0)]
     problems: tuple[str, ...]
+
+
+_REFUSED = TypeAdapter(list[Refused])
+
+
+class Quantity(BaseModel):
+    """A value in a scenario's ``.json``: None is infinite or NaN."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    value: float | None
+    unit: str
+
+
+class _Handed(BaseModel):
+    """Which evaluation a scenario's ``.json`` is of."""
+
+    evaluation: Annotated[int, Field(ge=0)]
+
+
+class Facts(_Handed):
+    """What a scenario's ``.json`` says, as far as a verdict needs it; see `_facts`."""
+
+    parameters: dict[str, Quantity]
+    metrics: dict[str, Quantity]
+    cause: str | None
+    quick_cause: str | None = None
+    mode: int | None = None
+    robustness: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+
+
+def read_facts(path: Path) -> Facts:
+    """Return what the ``.json`` of a scenario says.
+
+    Raises:
+        StorageError: it is not what was written.
+    """
+    return _read(path, Facts)
 
 
 def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
@@ -184,38 +227,62 @@ def not_exported(folder: Path) -> tuple[Refused, ...]:
     """
     path = folder / NOT_EXPORTED
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        return tuple(Refused(o["name"], int(o["evaluation"]), tuple(o["problems"])) for o in said)
+        data = read_bytes(path)
+        parse_json(data)
+        return tuple(_REFUSED.validate_json(data, strict=True))
     except FileNotFoundError:
         return ()
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError) as error:
         raise StorageError(
-            f"{path}: is not what was written: {error}; 'bridgegen resume {folder}' writes it again"
+            f"{path}: is not what was written: {_why(error)}; 'bridgegen resume {folder}' writes "
+            "it again"
         ) from None
 
 
-def handed_over(folder: Path) -> tuple[Kept, ...]:
+def handed_over(folder: Path, evaluations: int | None = None) -> tuple[Kept, ...]:
     """Return what a run has handed over, most critical first; nothing before it has.
 
     Args:
         folder: the run's.
+        evaluations: how many it has, if that is known; none handed over may be another.
 
     Raises:
         StorageError: a scenario's ``.json`` is not what was written.
     """
     kept = []
     for path in sorted((folder / FOLDER).glob("[0-9]*.json")):
-        try:
-            evaluation = int(json.loads(path.read_text(encoding="utf-8"))["evaluation"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise StorageError(
-                f"{path}: is not what was handed over: {error}; "
-                f"'bridgegen resume {folder}' writes the files again"
-            ) from None
+        evaluation = _read(path, _Handed).evaluation
+        if evaluations is not None and evaluation >= evaluations:
+            raise _not_written(path, f"the run has no evaluation {evaluation}")
         files = (path.with_suffix(f".{kind}") for kind in ("owl", "xodr", "xosc", "json"))
         names = tuple(f"{FOLDER}/{file.name}" for file in files if file.is_file())
         kept.append(Kept(path.stem, evaluation, names))
     return tuple(kept)
+
+
+def _read(path: Path, model: type[_Read]) -> _Read:
+    try:
+        data = read_bytes(path)
+        parse_json(data)
+        return model.model_validate_json(data, strict=True)
+    except (OSError, ValueError) as error:
+        raise _not_written(path, _why(error)) from None
+
+
+def _not_written(path: Path, why: str) -> StorageError:
+    run = path.parent.parent
+    return StorageError(
+        f"{path}: is not what was handed over: {why}; 'bridgegen resume {run}' writes the files "
+        "again"
+    )
+
+
+def _why(error: OSError | ValueError) -> str:
+    """Return what is wrong with a record, in one line."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_input=False, include_url=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return str(error)
 
 
 def write_scenario(

@@ -129,8 +129,9 @@ def regions_of(
     if (place / REPORT).is_file():
         stage("report")
         with Store.open(folder) as store:
-            kept = handed_over(place)
-            files.append(write_run_report(pipeline, store, settings, store.read(), kept))
+            every = store.read()
+            kept = handed_over(place, len(every))
+            files.append(write_run_report(pipeline, store, settings, every, kept))
     return RunRegions(
         place, space, found, record,
         files=tuple(files),

@@ -5,11 +5,37 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import StorageError
 from bridgegen.simulation.choice import EMBEDDED
+
+MAX_BUDGET = 10**7
+MAX_SEED = 2**32 - 1
+MAX_KEEP = 1000
+
+Text = Annotated[str, Field(pattern="^[^\\x00]*$", max_length=4096)]
+"""Of a run's settings; the system takes no path with NUL."""
+
+Value = bool | int | float | Text
+Part = Value | None | list[Value] | Mapping[Text, Value]
+
+
+class _Chosen(BaseModel):
+    """What ``Settings.chosen`` holds; runs of the first versions do not have it all."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    objective: Mapping[Text, float | None] | None
+    weights: Text | None = None
+    scale: Text | None = None
+    objectives: Text | None = None
+    count: Text | None = None
+    metrics: list[Text] = []
+
 
 SINCE: Mapping[str, Any] = {
     "distribution": None,
@@ -58,30 +84,34 @@ class Settings:
             to be recorded besides.
     """
 
-    scenario: str
-    distribution: str | None
-    fingerprint: str
-    algorithm: str
-    algorithm_settings: Mapping[str, Any]
-    budget: int
-    seed: int
-    ego: str
-    ideal: tuple[str, ...]
-    time_limit: float | None
-    axes: tuple[str, ...]
-    fixed: Mapping[str, float]
-    map: str | None
-    map_digest: str | None
-    junction: str | None
-    keep: int
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(
+        strict=True, allow_inf_nan=False, revalidate_instances="always"
+    )
+
+    scenario: Text
+    distribution: Text | None
+    fingerprint: Text
+    algorithm: Text
+    algorithm_settings: Mapping[Text, Value]
+    budget: Annotated[int, Field(ge=1, le=MAX_BUDGET)]
+    seed: Annotated[int, Field(ge=0, le=MAX_SEED)]
+    ego: Text
+    ideal: tuple[Text, ...]
+    time_limit: Annotated[float, Field(gt=0.0)] | None
+    axes: tuple[Text, ...]
+    fixed: Mapping[Text, float]
+    map: Text | None
+    map_digest: Text | None
+    junction: Text | None
+    keep: Annotated[int, Field(ge=0, le=MAX_KEEP)]
     causes: bool
-    cause: str | None
-    adversary: str | None
-    others: str | None
-    simulator: str
-    simulator_settings: Mapping[str, Any]
-    objective: Mapping[str, Any]
-    chosen: Mapping[str, Any]
+    cause: Text | None
+    adversary: Text | None
+    others: Text | None
+    simulator: Text
+    simulator_settings: Mapping[Text, Value]
+    objective: Mapping[Text, Any]
+    chosen: Mapping[Text, Any]
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types."""
@@ -92,7 +122,8 @@ class Settings:
         """Return the settings of a store.
 
         Raises:
-            StorageError: a key is unknown or missing: the run is another version's.
+            StorageError: a key is unknown or missing: the run is another version's; or a value is
+                of the wrong type or out of its range.
         """
         data = {**SINCE, **data}
         if odd := set(data) ^ {one.name for one in fields(cls)}:
@@ -100,7 +131,19 @@ class Settings:
                 f"{place}: a run's settings must be those of this version; unknown or missing: "
                 f"{', '.join(sorted(odd))}"
             )
-        return cls(**{**data, "axes": tuple(data["axes"]), "ideal": tuple(data["ideal"])})
+        try:
+            axes, ideal = (_TEXTS.validate_python(data[name]) for name in ("axes", "ideal"))
+            data |= {"axes": tuple(axes), "ideal": tuple(ideal)}
+            _Chosen.model_validate(data["chosen"])
+            _OBJECTIVE.validate_python(data["objective"])
+            settings = cls(**data)
+            _SETTINGS.validate_python(settings)
+        except ValidationError as error:
+            first = error.errors(include_input=False, include_url=False)[0]
+            where = ".".join(map(str, first["loc"]))
+            what = f"{where}: {first['msg']}" if where else first["msg"]
+            raise StorageError(f"{place}: the run's settings are damaged: {what}") from None
+        return settings  # as recorded: an integer stays one
 
     def command(self, folder: Path) -> str:
         """Return the command line that makes the same run."""
@@ -142,3 +185,9 @@ class Settings:
         if self.map:
             words += ["--map", self.map, "--junction", str(self.junction)]
         return shlex.join([*words, "--out", str(folder)])
+
+
+_SETTINGS = TypeAdapter(Settings)
+_STRICT = ConfigDict(strict=True, allow_inf_nan=False)
+_TEXTS = TypeAdapter(list[Text], config=_STRICT)
+_OBJECTIVE = TypeAdapter(Mapping[Text, Part], config=_STRICT)

@@ -14,6 +14,7 @@ from bridgegen.campaign.scenarios import is_file, load
 from bridgegen.comparison.distinct import APART
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.records import parse_json, read_bytes
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.store.run_file import FILE as RUN_FILE
 
@@ -214,7 +215,7 @@ def begin(plan: Plan) -> None:
     """
     file, mine = plan.out / FILE, plan.identity()
     try:
-        before = json.loads(file.read_text("utf-8")) if file.exists() else None
+        before = parse_json(read_bytes(file)) if file.exists() else None
         if before is not None and not isinstance(before, dict):
             raise ValueError("it must hold an object")
         if before is None and plan.out.exists() and any(plan.out.iterdir()):
@@ -249,7 +250,12 @@ def _difference(name: str, before: Any, now: Any) -> str:
     if isinstance(before, dict) and isinstance(now, dict):
         keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
         before, now = ({key: one.get(key) for key in keys} for one in (before, now))
-    return f"{name} was {json.dumps(before)}, is {json.dumps(now)}"
+    return f"{name} was {_shown(before)}, is {_shown(now)}"
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 1000 else f"{text[:1000]} …"
 
 
 def _twice(what: str, names: Iterable[str]) -> list[str]:

@@ -1,13 +1,12 @@
 """What was found, as JSON: for machines, and to be drawn."""
 
-import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from bridgegen.errors import FileFormatError
 from bridgegen.odd.space import SearchSpace
+from bridgegen.records import parse_json, read_bytes
 from bridgegen.regions.box import Box, whole
 from bridgegen.regions.evidence import CONFIDENCE, Evidence
 from bridgegen.regions.find import Found, Region
@@ -24,16 +23,14 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
         FileFormatError: it cannot be read, or is something else.
     """
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = parse_json(read_bytes(path))
         for one in record["regions"]:
             _check(one)
-        for key in ("evaluations", "critical", "critical_held"):
-            int(record[key])
-        for key in ("confidence", "at_least", "space_share"):
-            _finite(record[key])
+        _whole(*(record[key] for key in ("evaluations", "critical", "critical_held")))
+        _number(*(record[key] for key in ("confidence", "at_least", "space_share")))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FileFormatError(
             f"{path}: must be what 'bridgegen regions' writes, and {_said(error)}; "
             "run that again, or delete the file"
@@ -43,19 +40,32 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
 
 def _check(one: Mapping[str, Any]) -> None:
     """Raise a KeyError, TypeError or ValueError where a region lacks what a page needs."""
-    int(one["number"]), bool(one["confirmed"]), str(one["rule"]), str(one["sentence"])
+    _whole(one["number"])
+    _of(bool, one["confirmed"])
+    _of(str, one["rule"], one["sentence"], *_of(list, one["named"])[0])
     ends = [end for name in one["named"] for end in (one["box"][name][k] for k in ("low", "high"))]
     for evidence in (one["fresh"], one["search"]):
-        int(evidence["rows"]), int(evidence["critical"])
+        _whole(evidence["rows"], evidence["critical"])
         low, high = evidence["interval"]
         ends += [low, high]
-    for end in (*ends, one["space_share"]):
-        _finite(end)
+    _number(*ends, one["space_share"])
 
 
-def _finite(value: float) -> None:
-    if not math.isfinite(value):
-        raise ValueError(f"{value} is not finite")
+def _of(kind: type, *values: Any) -> tuple[Any, ...]:
+    for value in values:
+        if type(value) is not kind:
+            raise TypeError(f"{kind.__name__} is needed, got {str(value)[:40]!r}")
+    return values
+
+
+def _whole(*values: Any) -> None:
+    if min(_of(int, *values)) < 0:
+        raise ValueError(f"numbers of rows must be at least 0, got {min(values)}")
+
+
+def _number(*values: Any) -> None:
+    """Refuse what is no number; `parse_json` has refused what is not finite."""
+    _of(float, *(float(value) if type(value) is int else value for value in values))
 
 
 def _said(error: Exception) -> str:

@@ -3,17 +3,16 @@
 A test fails in the XML exactly where the command says so by its exit status.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from bridgegen.campaign.handover import Facts, Quantity, read_facts
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import CAUSES
 from bridgegen.ego import STORYBOARD
-from bridgegen.errors import InputError
+from bridgegen.errors import InputError, StorageError
 from bridgegen.store import Store
 from bridgegen.triage.words import mode_in_words
 from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
@@ -182,11 +181,16 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
 
 def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
     """Return a handed-over scenario as a test, failed if it is to blame for a criterion."""
-    facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
+    facts = read_facts(path.with_suffix(".json"))
+    if missing := {"d_min", "v_d", "n_collision"} - facts.metrics.keys():
+        raise StorageError(
+            f"{path.with_suffix('.json')}: is not what was handed over: it has no "
+            f"{', '.join(sorted(missing))}"
+        )
     blamed = [one.test for one in broken if _is_to_blame(facts, one.figures)]
-    values = {key: _told(one) for key, one in facts["metrics"].items()}
-    cause = f", cause: {facts['cause']}" if facts["cause"] else ""
-    what = "collision" if facts["metrics"]["n_collision"]["value"] else "near miss"
+    values = {key: _told(one) for key, one in facts.metrics.items()}
+    cause = f", cause: {facts.cause}" if facts.cause else ""
+    what = "collision" if facts.metrics["n_collision"].value else "near miss"
     message = f"{what}: d_min {values['d_min']} at v_d {values['v_d']}{cause}"
     files = sorted(path.parent.glob(f"{path.stem}.*"))
     text = "\n".join(
@@ -196,28 +200,28 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
             f"playback: {run.report}",
             f"files: {' '.join(str(file) for file in files)}",
             "parameters:",
-            *(f"  {key} = {_told(one)}" for key, one in facts["parameters"].items()),
+            *(f"  {key} = {_told(one)}" for key, one in facts.parameters.items()),
             "metrics:",
             *(f"  {key} = {value}" for key, value in values.items()),
         ]
     )
     case = Case(group, f"critical {path.stem}", "failure" if blamed else None, message, text)
-    properties = values | {key: _told(one) for key, one in facts["parameters"].items()}
-    properties |= {"cause": facts["cause"] or "", "evaluation": str(facts["evaluation"])}
-    if facts.get("robustness") is not None:
-        properties |= {"mode": str(facts["mode"]), "robustness": f"{facts['robustness']:.6g}"}
+    properties = values | {key: _told(one) for key, one in facts.parameters.items()}
+    properties |= {"cause": facts.cause or "", "evaluation": str(facts.evaluation)}
+    if facts.robustness is not None:
+        properties |= {"mode": str(facts.mode), "robustness": f"{facts.robustness:.6g}"}
     return Suite(f"{name} {path.stem}", [case], properties)
 
 
-def _is_to_blame(facts: dict[str, Any], figures: Sequence[str]) -> bool:
+def _is_to_blame(facts: Facts, figures: Sequence[str]) -> bool:
     """Say whether a critical scenario speaks for a broken criterion, by its quick cause."""
-    cause = facts.get("quick_cause", facts["cause"])
+    cause = facts.quick_cause if "quick_cause" in facts.model_fields_set else facts.cause
     return any(name == cause if name in _CAUSES else name not in _OF_THE_RUN for name in figures)
 
 
-def _told(one: dict[str, Any]) -> str:
+def _told(one: Quantity) -> str:
     """Return a value with its unit; null is infinite, as what it is written from has no NaN."""
-    if one["value"] is None:
+    if one.value is None:
         return "inf"
-    unit = "" if one["unit"] in ("1", "count") else f" {one['unit']}"
-    return f"{one['value']:.6g}{unit}"
+    unit = "" if one.unit in ("1", "count") else f" {one.unit}"
+    return f"{one.value:.6g}{unit}"

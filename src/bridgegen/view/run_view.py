@@ -72,7 +72,8 @@ class RunView:
     def page(self) -> bytes:
         """Return the run's page, as it stands."""
         with self._lock, Store.open(self.folder) as store:
-            rows, kept = self._read(store), self._kept()
+            rows = self._read(store)
+            kept = handed_over(self.folder, len(rows))
             data = run_data(self._pipeline, store, self.settings, rows, kept)
         return b"".join(report_page(data, live=True))
 
