@@ -1,7 +1,8 @@
 """A process that we begin, and what we exchange with it: pickled messages, through its pipes.
 
 Not forked, so that it inherits no threads and no compiled code's state. It ends with this process,
-however this one ends.
+however this one ends, and all processes that it has started end with it: see
+`bridgegen.supervisor`.
 """
 
 import os
@@ -12,23 +13,32 @@ import struct
 import subprocess
 import sys
 import threading
+import traceback
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import IO, Any
+from pathlib import Path
+from typing import IO, Any, NoReturn
 
 Say = Callable[..., None]
 """Says something to who began this process; may be called by any thread."""
 
+SUPERVISOR = Path(__file__).with_name("supervisor.py")
+
+END_SECONDS = 10.0
+"""So long is the end of a process awaited that has been asked to end; then it is killed."""
+
+DRAIN_SECONDS = 2.0
+"""Of a process's pipe and the process itself, one ends so long after the other at most."""
+
 
 class Child:
-    """A process, seen from here.
+    """A process, seen from here, with those that it starts; Ctrl-C is not theirs.
 
     Args:
         program: what Python is to run, e.g. ``-m`` and a module of ours that calls `connect`.
-        take: is given each message of its, a tuple, in a thread; the last is ``("died",)``.
-        apart: whether it has a session of its own: Ctrl-C is not its, and those that it has begun
-            end with it.
+        take: is given each message of its, a tuple, in a thread; the last is ``("died",)``, when
+            the process has ended.
         environment: of it, besides ours.
         errors: takes what it writes to its standard error; ours does by default.
     """
@@ -38,23 +48,23 @@ class Child:
         program: Sequence[str],
         take: Callable[[tuple[Any, ...]], None],
         *,
-        apart: bool = False,
         environment: Mapping[str, str] | None = None,
         errors: IO[bytes] | None = None,
     ) -> None:
         path = {"PYTHONPATH": os.pathsep.join(["", *sys.path])}
+        supervisor = [sys.executable, "-I", "-S", str(SUPERVISOR)]
         self._process = process = subprocess.Popen(
-            [sys.executable, *program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=errors, env=os.environ | (environment or {}) | path, start_new_session=apart,
+            [*supervisor, sys.executable, *program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=errors, env=os.environ | (environment or {}) | path, start_new_session=True,
         )  # fmt: skip
-        reader = threading.Thread(target=_forward, args=(process.stdout, take), daemon=True)
-        reader.start()
-        self._apart = apart
-        self._end = weakref.finalize(self, _end, process, reader, apart)
+        ended, read = threading.Event(), threading.Event()
+        for work in ((_forward, process, take, ended, read), (_wait, process, take, ended, read)):
+            threading.Thread(target=work[0], args=work[1:], daemon=True).start()
+        self._end = weakref.finalize(self, _end, process, ended, read)
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """The number of the process that supervises it."""
         return self._process.pid
 
     def send(self, message: Any) -> None:
@@ -68,38 +78,65 @@ class Child:
 
     def kill(self) -> None:
         """End it, from any thread; whoever waits for its messages gets the last."""
-        _kill(self._process, self._apart)
+        _terminate(self._process)
 
     def end(self) -> int:
-        """End it, if it is running, at once; so does this object's end. Return its exit status."""
+        """End it, if it is running, at once; so does this object's end. Return its exit status.
+
+        It is negative for a signal; that of SIGKILL, too, of a process that cannot be ended.
+        """
         self._end()
-        return self._process.wait()
+        status = self._process.returncode
+        return -signal.SIGKILL if status is None else status
 
 
-def _kill(process: subprocess.Popen[bytes], apart: bool) -> None:
+def _terminate(process: subprocess.Popen[bytes]) -> None:
+    """Ask the supervisor to kill the process and what it has started."""
     with suppress(OSError):
-        if apart:
+        process.terminate()
+
+
+def _end(process: subprocess.Popen[bytes], ended: threading.Event, read: threading.Event) -> None:
+    _terminate(process)
+    if not ended.wait(END_SECONDS):  # the supervisor has been stopped, say
+        with suppress(OSError):
             os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
-
-
-def _end(process: subprocess.Popen[bytes], reader: threading.Thread, apart: bool) -> None:
-    _kill(process, apart)
-    process.wait()
-    reader.join()  # the pipe has ended
+        ended.wait(END_SECONDS)
+    if not read.wait(DRAIN_SECONDS):
+        return  # somebody else holds its pipes: closing them here might wait for ever
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             with suppress(OSError):
                 pipe.close()
 
 
-def _forward(pipe: IO[bytes], take: Callable[[tuple[Any, ...]], None]) -> None:
-    try:
+def _wait(
+    process: subprocess.Popen[bytes],
+    take: Callable[[tuple[Any, ...]], None],
+    ended: threading.Event,
+    read: threading.Event,
+) -> None:
+    """Wait for the end of the process itself: a process that it started may hold its pipe."""
+    process.wait()
+    ended.set()
+    read.wait(DRAIN_SECONDS)
+    take(("died",))
+
+
+def _forward(
+    process: subprocess.Popen[bytes],
+    take: Callable[[tuple[Any, ...]], None],
+    ended: threading.Event,
+    read: threading.Event,
+) -> None:
+    """Pass on its messages; end it if it says what is no message, or closes its pipe."""
+    assert process.stdout is not None
+    with suppress(Exception):
         while True:
-            take(pickle.loads(_read(pipe)))
-    except Exception:  # it has ended, or says what is no message
-        take(("died",))
+            take(pickle.loads(_read(process.stdout)))
+    read.set()
+    if not ended.wait(DRAIN_SECONDS):
+        _terminate(process)
 
 
 def _write(pipe: IO[bytes], data: bytes) -> None:
@@ -129,8 +166,18 @@ def connect(
         at_end: is called when nobody is there any more; then this process ends, whatever it is at.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the job itself ends us
-    answers, lock = os.fdopen(os.dup(1), "wb"), threading.Lock()
-    os.dup2(spoken, 1)  # what is printed must not get between our messages
+    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    lock = threading.Lock()
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 0)  # what is read must not be our messages,
+    os.dup2(spoken, 1)  # and what is printed must not get between them
+    pipes = questions.fileno(), answers.fileno()
+
+    def release_pipes() -> None:
+        for pipe in pipes:
+            os.dup2(nothing, pipe, inheritable=False)
+
+    os.register_at_fork(after_in_child=release_pipes)  # they close when this process ends
 
     def say(*message: Any) -> None:
         data = pickle.dumps(message, protocol=5)
@@ -138,14 +185,34 @@ def connect(
             _write(answers, data)
 
     requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(requests, at_end), daemon=True).start()
+    threading.Thread(target=_listen, args=(questions, requests, at_end), daemon=True).start()
     return requests, say
 
 
-def _listen(requests: "queue.SimpleQueue[bytes]", at_end: Callable[[], None]) -> None:
+def leave(error: BaseException) -> NoReturn:
+    """End this process as Python would for an exception that nobody caught, but at once.
+
+    Python would first wait for threads and processes that the driver has started.
+    """
+    status: Any = 1
+    if isinstance(error, SystemExit):
+        status = error.code if isinstance(error.code, int | None) else 1
+        if status != error.code:
+            print(error.code, file=sys.stderr)
+    else:
+        traceback.print_exception(error)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(Exception):
+            stream.flush()
+    os._exit((status or 0) & 0xFF)
+
+
+def _listen(
+    questions: IO[bytes], requests: "queue.SimpleQueue[bytes]", at_end: Callable[[], None]
+) -> None:
     try:
         while True:
-            requests.put(_read(sys.stdin.buffer))
+            requests.put(_read(questions))
     except (EOFError, OSError):
         at_end()
     finally:

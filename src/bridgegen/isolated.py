@@ -7,9 +7,10 @@ and nothing else. The process is ended then, and another one is begun for the ne
 import pickle
 import queue
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
-from bridgegen.child import Child, connect
+from bridgegen.child import Child, Say, connect, leave
 
 Answer = Callable[..., Any]
 """Answers a request, in the other process."""
@@ -34,7 +35,6 @@ class IsolatedProcess:
         module: of ours; run as a program, it calls ``main``.
         arguments: of that program.
         error: what is raised where a call is not answered.
-        apart: see `Child`.
     """
 
     def __init__(
@@ -42,10 +42,8 @@ class IsolatedProcess:
         module: str,
         arguments: Sequence[str] = (),
         error: type[CallError] = CallError,
-        *,
-        apart: bool = False,
     ) -> None:
-        self._program, self._error, self._apart = ["-m", module, *arguments], error, apart
+        self._program, self._error = ["-m", module, *arguments], error
         self._child: Child | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
@@ -64,7 +62,7 @@ class IsolatedProcess:
             CallError: it cannot be begun.
         """
         self._answers = queue.SimpleQueue()
-        self._child = Child(self._program, self._answers.put, apart=self._apart)
+        self._child = Child(self._program, self._answers.put)
         try:
             return self._answer(seconds)
         except CallError:
@@ -84,11 +82,8 @@ class IsolatedProcess:
                 has ended.
         """
         assert self._child is not None
-        try:
+        with suppress(OSError):  # it has ended: the last that it says tells how
             self._child.send(request)
-        except OSError:
-            self.close()
-            raise self._error("died", "its process has ended") from None
         return self._answer(seconds, progress)
 
     def kill(self) -> None:
@@ -141,6 +136,18 @@ def serve(
         at_end: is called when nobody is there any more.
     """
     requests, say = connect(spoken, at_end)
+    try:
+        _serve(make, told, requests, say)
+    except BaseException as error:  # sys.exit, say
+        leave(error)
+
+
+def _serve(
+    make: Callable[[], tuple[Any, Answer]],
+    told: Callable[[Exception], str],
+    requests: "queue.SimpleQueue[bytes]",
+    say: Say,
+) -> None:
     try:
         greeting, answer = make()
     except Exception as error:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -74,6 +75,28 @@ def test_what_is_raised_arrives_as_it_was(crew, doubles):
 def test_what_cannot_be_made_is_no_endless_loop(crew, doubles):
     with pytest.raises(WorkersError, match="ended before they were ready: with exit status 9"):
         crew.map(doubles.Unmakeable(), "double", X)
+
+
+@pytest.mark.parametrize(
+    ("work", "reason"),
+    [("fork_and_die", "with exit status 4"), ("fork_and_exit", "with exit status 5")],
+)
+def test_one_that_dies_after_a_fork_is_told(crew, doubles, work, reason):
+    parts = crew.map(doubles.Doubler(), work, X[:1])
+    assert [part.came for part in parts] == [Lost(reason)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells whose a daemon was")
+def test_what_they_start_ends_with_them(crew, doubles, tmp_path):
+    assert (joined(crew.map(doubles.Doubler(), "start_daemon", X, tmp_path)) == X).all()
+    end = time.monotonic() + 60.0
+    while not (pids := [int(path.name) for path in tmp_path.iterdir()]):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert Path(f"/proc/{pids[0]}").exists()
+    crew.close()
+    pids = [int(path.name) for path in tmp_path.iterdir()]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
 
 
 def test_ctrl_c_ends_them_at_once(doubles, tmp_path):

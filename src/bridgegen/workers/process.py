@@ -30,7 +30,6 @@ class Process:
         self._child = Child(
             ["-c", f"from {module} import main; main()"],
             lambda message: said.put((self, message)),
-            apart=True,  # Ctrl-C is ours, and a driver's process ends with it
             environment=ONE_THREAD,
             errors=errors,
         )

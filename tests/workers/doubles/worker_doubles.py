@@ -53,6 +53,27 @@ class Doubler:
     def fail(self, X: np.ndarray) -> np.ndarray:
         raise ZeroDivisionError("by nobody")
 
+    def start_daemon(self, X: np.ndarray, folder: Path) -> np.ndarray:
+        """Leave a process behind that is nobody's child and has a session of its own."""
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                (folder / str(os.getpid())).touch()
+                os.execlp("sleep", "sleep", "300")
+            os._exit(0)
+        os.wait()
+        return X
+
+    def fork_and_die(self, X: np.ndarray) -> np.ndarray:
+        if os.fork() == 0:
+            time.sleep(300.0)
+        os._exit(4)
+
+    def fork_and_exit(self, X: np.ndarray) -> np.ndarray:
+        if os.fork() == 0:
+            time.sleep(300.0)
+        raise SystemExit(5)
+
     def who(self, X: np.ndarray) -> int:
         return os.getpid()
 

@@ -86,7 +86,7 @@ class Seat:
 
         self._job, self._seconds = job, seconds
         self._folder = Folder()
-        self._process = IsolatedProcess(PROGRAM, [str(library), str(self._folder.path)], apart=True)
+        self._process = IsolatedProcess(PROGRAM, [str(library), str(self._folder.path)])
         self._shared = SharedArrays()
         self._roads: object = None  # those that it has been sent
         self._is_warm = False
