@@ -434,9 +434,9 @@ def test_rows_are_decoded_together(s4):
 
 def test_a_space_is_tried_at_all_its_corners_while_they_are_few():
     """2^11 = 2048 corners and as many other points; of more parameters as many corners."""
-    small, large = probes(11), probes(12)
-    assert len({tuple(one) for one in small[:2048].tolist()}) == 2048
-    for found, n_var in ((small, 11), (large, 12), (probes(40), 40)):
+    assert len({tuple(one) for one in probes(11)[:2048].tolist()}) == 2048
+    for n_var in (11, 12, 40):
+        found = probes(n_var)
         assert found.shape == (4096, n_var)
         assert set(np.unique(found[:2048])) == {0.0, 1.0}
         assert ((found[2048:] > 0.0) & (found[2048:] < 1.0)).all()
