@@ -48,13 +48,22 @@ def observation():
     )  # fmt: skip
 
 
+def stat(number):
+    """A process's status, as Linux tells it from its state on; nothing of one that is not there."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return []
+
+
+def children(parent):
+    numbers = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
+    return [number for number in numbers if stat(number)[1:2] == [str(parent)]]
+
+
 def runs(number):
     """Whether a process is there, and not a zombie that whoever adopted it has not collected."""
-    try:
-        fields = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return False
-    return fields[0] != "Z"
+    return stat(number)[:1] not in ([], ["Z"])
 
 
 @pytest.fixture
@@ -164,6 +173,9 @@ def test_a_killed_supervisor_is_told_and_takes_the_driver_with_it(driver, starte
     one.reset(1, scene())
     child = one._process._child
     assert child is not None
+    drivers = children(child.pid)
+    assert len(drivers) == 1
     os.kill(child.pid, signal.SIGKILL)
+    await_end(drivers)
     with pytest.raises(DriverError, match="ended with status -9"):
         one.act(observation())

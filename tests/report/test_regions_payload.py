@@ -92,7 +92,7 @@ def test_numbers_that_are_none_are_refused_and_no_file_is_no_record(tmp_path, re
     path.write_text(json.dumps(record))
     assert read_record(path) == record
     path.write_text(json.dumps(record | {"space_share": float("nan")}))
-    with pytest.raises(FileFormatError, match="nan is not finite"):
+    with pytest.raises(FileFormatError, match="numbers must be finite, got NaN"):
         read_record(path)
 
 

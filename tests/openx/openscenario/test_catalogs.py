@@ -136,7 +136,7 @@ def test_every_kind_of_entry(tmp_path, kind):
 def test_lines_say_which_file_they_are_of(file):
     path = file(cars=catalog("cars", "\n\n" + car("small", "-1")))
     (problem,) = validate.problems(read(path))
-    assert "width of Dimensions must be at least 0, got -1 (line 3 of " in problem
+    assert "width of Dimensions must be above 0 and finite, got -1 (line 3 of " in problem
     assert problem.endswith("cars.xosc)")
 
 
