@@ -244,7 +244,7 @@ def handed_over(folder: Path, evaluations: int | None = None) -> tuple[Kept, ...
 
     Args:
         folder: the run's.
-        evaluations: how many it has, if that is known; none handed over may be another.
+        evaluations: how many the run has, if known; no exported scenario may be of another one.
 
     Raises:
         StorageError: a scenario's ``.json`` is not what was written.

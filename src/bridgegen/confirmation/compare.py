@@ -27,13 +27,11 @@ from bridgegen.confirmation.differences import (
     Parting,
     Track,
 )
+from bridgegen.metrics.d_min import first_closest
 from bridgegen.simulation.rollout import Rollout
 
 SAME_BOX = 1e-3
 """Boxes that differ by less are the same [m]."""
-
-NEAREST = 1e-9
-"""The closest approach is the first instant within this of the smallest distance [m]."""
 
 STANDS = 1e-3
 """Who moves less in a step has no direction [m]."""
@@ -299,7 +297,7 @@ def closest_approach(rollout: Rollout, row: int, partner: str = "") -> Approach 
     least = distance.min(axis=0)
     if not np.isfinite(least).any():
         return None
-    k = int(np.flatnonzero(least <= least.min() + NEAREST)[0])
+    k = first_closest(least)
     e = int(distance[:, k].argmin()) if who is None else who
     return Approach(k * rollout.time_step, rollout.names[e], float(least[k]))
 

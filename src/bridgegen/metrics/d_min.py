@@ -33,7 +33,7 @@ def closest(rollout: Rollout) -> tuple[Float, Int]:
 
 
 def first_closest(distance: Float) -> int:
-    """Return the first instant of ``(T,)`` distances [m] that is the closest; as `closest` does."""
+    """Return the first instant within 1e-9 m of the least of ``(T,)`` distances [m]."""
     from bridgegen.metrics import _kernels
 
     return int((distance <= distance.min() + _kernels.TIE).argmax())
