@@ -20,7 +20,11 @@ from bridgegen.ego._shift_kernels import UNSHIFTED as STAYS
 from bridgegen.ego._speed_kernels import bend_speed, limit_speed, sight_speed
 from bridgegen.ego._surroundings_kernels import AROUND, surround
 from bridgegen.ego._yielding_kernels import (
+    EDGE,
     PART,
+    SPEED,
+    STATION,
+    ZONE,
     coming,
     find_zone,
     place_on_route,
@@ -189,7 +193,7 @@ def test_a_stop_sign_is_halted_at_once_and_then_left_behind() -> None:
 def crossing() -> tuple[Float, Float, Float]:
     """Two ways that cross at 50 m of each, and their zone."""
     own, other = line(0.0, 0.0, 0.0, 100.0), line(50.0, -50.0, math.pi / 2, 100.0)
-    zone = np.empty(5)
+    zone = np.empty(ZONE)
     find_zone(own, len(own), DS, CAR, other, len(other), DS, CAR, zone)
     return own, other, zone
 
@@ -200,7 +204,7 @@ def test_a_zone_is_where_two_bodies_would_be_too_near() -> None:
     assert zone[0] == pytest.approx(50.0 - side, abs=DS)
     assert zone[1] == pytest.approx(50.0 + side, abs=DS)
     assert zone[4] == 0.0
-    apart = np.empty(5)
+    apart = np.empty(ZONE)
     own, far = line(0.0, 0.0, 0.0, 100.0), line(0.0, 5.0, 0.0, 100.0)
     find_zone(own, len(own), DS, CAR, far, len(far), DS, CAR, apart)
     assert math.isinf(apart[0])
@@ -212,7 +216,7 @@ def test_ways_that_go_together_for_a_while_are_followed_not_waited_for() -> None
     x, y = (np.concatenate([[0.0], np.cumsum(DS * f(h[:-1]))]) for f in (np.cos, np.sin))
     left = np.stack([x, y, h, np.cos(h), np.sin(h), 0.0 * s], axis=1)
     straight = line(0.0, 0.0, 0.0, 100.0)
-    zone = np.empty(5)
+    zone = np.empty(ZONE)
     find_zone(straight, len(straight), DS, CAR, left, len(left), DS, CAR, zone)
     assert zone[4] == PART
     assert zone[0] == zone[2] == 0.0
@@ -226,7 +230,7 @@ def test_ways_that_go_together_for_a_while_are_followed_not_waited_for() -> None
 
 
 def test_who_has_to_wait_joins_only_if_nobody_has_to_brake_for_it() -> None:
-    zone = np.array([40.0, 80.0, 40.0, 80.0, PART])
+    zone = np.array([40.0, 80.0, 40.0, 80.0, PART, 41.0])
     far = {}
     for rank in (0, -1):
         rows = [passage(zone, q, 9.0, 0.0, rank) for q in np.arange(-60.0, 30.0)]
@@ -294,8 +298,71 @@ def test_who_can_no_longer_stop_before_a_conflict_goes_on() -> None:
         assert (asked < 0.0) == stays
 
 
+def test_the_edge_of_a_zone_is_where_the_bumper_does_not_yet_touch() -> None:
+    edge = crossing()[2][EDGE]
+    assert edge == pytest.approx(50.0 - 0.5 * 1.9, abs=DS)  # half of the other car's width
+    assert edge < 50.0 - 0.5 * 1.9
+    own, beside = line(0.0, 0.0, 0.0, 100.0), line(0.0, 2.2, 0.0, 100.0)
+    zone = np.empty(ZONE)
+    find_zone(own, len(own), DS, CAR, beside, len(beside), DS, CAR, zone)
+    assert zone[0] == 0.0  # 0.3 m beside each other, too near
+    assert zone[EDGE] == math.inf  # but they never touch
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.6, 1.0, 2.0])
+def test_an_ego_that_has_stopped_in_a_zone_does_not_pull_away_before_a_car(depth: float) -> None:
+    """Its bumper overran the start of the zone; a car comes at 6 m/s, and then has passed."""
+    zone = crossing()[2]
+    s = zone[0] - 3.65 + depth
+
+    def asked(q: float, w: float) -> float:
+        one = passage(zone, q, w)
+        return float(yield_to_all(s, 0.0, 10.0, 3.65, 0.85, STAYS, GRIP, one, 1))
+
+    # The ego needs some 4 s to clear the crossing.
+    assert all(asked(q, 6.0) <= 0.0 for q in np.arange(30.0, 53.0))
+    assert asked(0.0, 5.0) == math.inf  # 9 s away: it passes before
+    assert asked(60.0, 6.0) == math.inf  # it has passed
+    assert asked(40.0, 0.0) == math.inf  # it stands: both would wait for ever
+
+
+@pytest.mark.parametrize(
+    ("depth", "v", "stops"),
+    [(0.2, 3.0, True), (0.2, 6.0, False), (0.9, 2.0, False), (2.0, 3.0, False)],
+)
+def test_an_ego_that_has_begun_to_cross_stops_only_before_the_edge(
+    depth: float, v: float, stops: bool
+) -> None:
+    zone, limit = crossing()[2], 0.8 * GRIP
+    s = zone[0] - 3.65 + depth
+    one = passage(zone, 36.0, 6.0)  # 1.5 s away
+    asked = yield_to_all(s, v, 10.0, 3.65, 0.85, STAYS, GRIP, one, 1)
+    assert (asked < 0.0) == stops == (depth + v * v / (2.0 * limit) <= zone[EDGE] - zone[0])
+
+
+def test_an_ego_that_creeps_past_the_edge_stops_for_who_comes() -> None:
+    zone = crossing()[2]
+    s, one = zone[EDGE] - 3.65 + 0.5, passage(zone, 36.0, 6.0)
+    asked = [
+        yield_to_all(s, v, 10.0, 3.65, 0.85, STAYS, GRIP, one, 1) for v in (0.0, 0.5, 1.4, 1.6)
+    ]
+    assert asked == [0.0, -2.0, -2.0, math.inf]
+
+
+def test_an_ego_that_crosses_does_not_stop_for_a_margin() -> None:
+    """It clears the zone 0.7 s before the other comes: enough to go on, not enough to begin."""
+    zone = crossing()[2]
+    s, v = zone[0] - 3.65 + 0.2, 3.0
+    through = zone[1] - zone[0] + 4.5 - 0.2
+    clears = (math.sqrt(v * v + 3.0 * through) - v) / 1.5 + 0.3
+    other = passage(zone, zone[2] - 2.25 - 6.0 * (clears + 0.7), 6.0)
+    assert yield_to_all(s, v, 10.0, 3.65, 0.85, STAYS, GRIP, other, 1) == math.inf
+    assert yield_to_all(s - 0.3, v, 10.0, 3.65, 0.85, STAYS, 99.0, other, 1) < 0.0
+
+
 def test_one_does_not_wait_in_somebody_elses_way() -> None:
-    near, far = np.array([40.0, 46.0, 40.0, 46.0, 0.0]), np.array([47.0, 52.0, 47.0, 52.0, 0.0])
+    near = np.array([40.0, 46.0, 40.0, 46.0, 0.0, 41.0])
+    far = np.array([47.0, 52.0, 47.0, 52.0, 0.0, 48.0])
     only = passage(far, 37.0, 5.0)
     both = np.concatenate([only, passage(near, 0.0, 2.0)])
     before_far = yield_to_all(30.0, 6.0, 6.0, 3.65, 0.85, STAYS, GRIP, only, 1)
@@ -322,10 +389,11 @@ def test_somebody_on_foot_is_expected_straight_ahead() -> None:
     tracks = tracked((40.0, -6.0, math.pi / 2, 1.5, kinds.PEDESTRIAN))
     passages = np.zeros((4, PASSAGE))
     assert add_straight(path, len(path), DS, 0.0, 90.0, 1.9, tracks[1], 1, 0.0, passages, 0) == 1
-    enter, leave, other_enter, other_leave, merges, q, w = passages[0, :7]
+    enter, leave, other_enter, other_leave, merges, edge, q, w = passages[0, :8]
     assert 0.5 * (enter + leave) == pytest.approx(40.0, abs=0.1)
     assert 0.5 * (other_enter + other_leave) == pytest.approx(6.0, abs=0.1)
     assert (merges, q) == (0.0, 0.0)
+    assert edge == pytest.approx(enter + 1.0)  # what is kept from somebody on foot
     assert w == pytest.approx(1.5)
     tracks[1, track.VY] = -1.5  # walks away
     assert add_straight(path, len(path), DS, 0.0, 90.0, 1.9, tracks[1], 1, 0.0, passages, 0) == 0
@@ -345,8 +413,8 @@ def test_a_vehicle_is_expected_on_the_ways_that_it_is_on() -> None:
             steps, zones, np.zeros(2, np.int64), np.array([0, 0, 2]), feet, passages,
         )  # fmt: skip
         assert count == expected
-        assert passages[0, 5] == pytest.approx(y + 50.0)
-        assert passages[0, 6] == pytest.approx(8.0)
+        assert passages[0, STATION] == pytest.approx(y + 50.0)
+        assert passages[0, SPEED] == pytest.approx(8.0)
 
 
 # -- caution ---------------------------------------------------------------------------------------

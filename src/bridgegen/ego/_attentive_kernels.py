@@ -189,7 +189,7 @@ def look(
     nowhere). Of all participants: the path that each is ``on`` (a row of ``paths``, ``path_n`` and
     ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will be (``target``)
     [m]; who is ``present``; what is ``seen`` of them; their ``bodies`` ``(E, ·)`` and ``kinds``.
-    ``far`` ``(E,)`` is room to work in. ``zones`` ``(E, 5)`` is where its first path meets the
+    ``far`` ``(E,)`` is room to work in. ``zones`` ``(E, ZONE)`` is where its first path meets the
     others' first ones, if it ``meets`` any, ``claims`` ``(E,)`` > 0 where the other waits, < 0
     where it does (``right_of_way.claim``); ``stops`` and ``halts`` are the stations of lights and
     of stop signs on its first path.

@@ -1,6 +1,6 @@
 """Where each track will be: its passages over the ego's route, by the ways that the map offers.
 
-A passage is a row of `PASSAGE` numbers: a conflict zone (five, see ``_yielding_kernels``), then the
+A passage is a row of `PASSAGE` numbers: a conflict zone (see ``_yielding_kernels``), then the
 track's station on its way [m], its speed along it [m/s], how far its body reaches ahead of and
 behind that station [m], the track, how its speed changes [m/s²], and who waits for whom
 (``right_of_way``). The planner reads passages, whoever predicted them.
@@ -20,6 +20,7 @@ from bridgegen.ego._tracking_kernels import CONFIRMED, KIND, LENGTH, STATE, VX, 
 from bridgegen.ego._tracking_kernels import X as TRACK_X
 from bridgegen.ego._tracking_kernels import Y as TRACK_Y
 from bridgegen.ego._yielding_kernels import (
+    ACROSS,
     FRONT,
     GAIN,
     RANK,
@@ -29,10 +30,11 @@ from bridgegen.ego._yielding_kernels import (
     STANDING,
     STATION,
     WHO,
+    ZONE,
 )
 from bridgegen.ego.kinds import ANIMAL, BICYCLE, PEDESTRIAN
 
-PASSAGE = 12
+PASSAGE = ZONE + 7
 
 OFF_WAY = 2.0  # m beside a way's centre, or …
 TURNED = 0.6  # rad off its heading, a vehicle is not on it
@@ -71,7 +73,7 @@ def add_passage(passages, count, zone, q, w, half, e, gain, rank):
     """Append a passage; return how many there are."""
     if count == passages.shape[0]:
         return count
-    for i in range(5):
+    for i in range(ZONE):
         passages[count, i] = zone[i]
     passages[count, STATION], passages[count, SPEED] = q, w
     passages[count, FRONT] = passages[count, REAR] = half
@@ -105,7 +107,8 @@ def add_straight(path, n, ds, s, ahead, own_width, track, e, gain, passages, cou
                 margin = SIDE_MARGIN + ON_FOOT_MARGIN
                 own = 0.5 * (track[WIDTH] + own_width * cosine) / sine + margin
                 other = 0.5 * (own_width + track[WIDTH] * cosine) / sine + margin
-                zone = (at - own, at + own, r - other, r + other, 0.0)
+                edge = at - own + margin
+                zone = (at - own, at + own, r - other, r + other, ACROSS, edge)
                 return add_passage(passages, count, zone, 0.0, w, 0.5 * track[LENGTH], e, gain, 0)
         before = side
     return count
@@ -117,7 +120,7 @@ def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, count
     """Fill ``passages`` by the map and the tracks; return how many there are.
 
     ``ways`` ``(W, L, 6)`` are those that the map offers, entity e's from ``first[e]`` to
-    ``first[e + 1]``; ``zones`` ``(W, 5)`` tells where each meets the ego's route, and ``ranks``
+    ``first[e + 1]``; ``zones`` ``(W, ZONE)`` tells where each meets the ego's route, and ``ranks``
     ``(W,)`` who waits there; ``feet`` ``(W,)`` remembers the station of the entity on it. On a
     route that the zones are not for (``known``), everybody is expected straight ahead.
     """

@@ -1,19 +1,28 @@
-"""Where two ways conflict, and whether to go first.
+"""Where two paths conflict, and whether to go first.
 
-A conflict zone is a row of five: where the ego's route enters and leaves it [m], where the other's
-way does [m], and whether they are `ACROSS`, merge and go on together (`MERGE`), or go together for
-a while and `PART` again, as in a roundabout. No zone: infinity. A
-passage begins with its zone, see ``_prediction_kernels``.
+A conflict zone is a row of `ZONE` numbers: where the ego's route enters and leaves it [m], where
+the other's path does [m], whether they are `ACROSS`, merge and go on together (`MERGE`), or go
+together for a while and `PART` again, as in a roundabout; and the `EDGE`: the last station of the
+ego's bumper [m] at which it does not touch a body on the other's path, which is farther on than
+where the zone begins, for that keeps a margin. No zone: infinity. A passage begins with its zone,
+see ``_prediction_kernels``.
 
-Who comes first goes first, with a margin in time, a larger one where the ego has to wait by the
-rules; it gives way wherever that is in doubt, and does not wait where somebody else will pass (StVO
-§ 11). Where a sign makes the other wait, the ego goes first as long as the other can still stop.
+Whoever comes first goes first, with a margin in time, a larger one where the ego has to wait by the
+rules; the ego gives way wherever that is in doubt, and does not wait where another actor will pass
+(StVO § 11). Where a sign makes the other wait, the ego goes first as long as the other can still
+stop. An ego that stands or creeps with its bumper in the zone waits there until it can pass;
+one that is faster stops again only if both would meet and it can still stop before the edge.
 """
 
 import math
 
 from bridgegen.compiled import kernel
-from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, follow, stop_for
+from bridgegen.ego._following_kernels import (
+    COMFORT_ACCELERATION,
+    COMFORT_DECELERATION,
+    follow,
+    stop_for,
+)
 from bridgegen.ego._path_kernels import COS, SIN, X, Y
 from bridgegen.ego._shift_kernels import aside_at
 
@@ -29,7 +38,10 @@ BUILD_UP = 0.3  # s, until the ego's own acceleration has built up
 TAIL_MARGIN = 1.0  # m, kept to the tail of who has passed
 KEEP_CLEAR_ROUNDS = 3  # zones that overlap in a row, at most
 HORIZON = 10.0  # s, how far ahead arrivals are compared
-STATION, SPEED, FRONT, REAR, WHO, GAIN, RANK = 5, 6, 7, 8, 9, 10, 11
+ENTER, LEAVE, OTHER_ENTERS, OTHER_LEAVES, HOW, EDGE = range(6)
+ZONE = 6
+"""Columns of a zone, and how many there are."""
+STATION, SPEED, FRONT, REAR, WHO, GAIN, RANK = range(ZONE, ZONE + 7)
 """Columns of a passage after its zone."""
 
 ACROSS, MERGE, PART = 0.0, 1.0, 2.0
@@ -38,14 +50,17 @@ TOGETHER = 8.0  # m; ways that lead the same way for less only cross
 SCAN_STEP = 0.5  # m, between the points of a way that are looked at
 SAME_WAY = 0.9  # cosine of the heading difference above which two ways go on together
 STANDING = 0.1  # m/s, who is slower stands
+CREEPING = 1.5  # m/s, from which the ego stops within 0.6 m, comfortably
 ELSEWHERE = 1.5  # m beside its route, the ego is not in the way of who joins that
 
 
 @kernel
 def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone):
-    """Fill ``zone`` with the first conflict zone of two ways."""
+    """Fill ``zone`` with the first conflict zone of two paths."""
     side = 0.5 * (body[1] + other_body[1]) + SIDE_MARGIN
-    zone[:] = (math.inf, math.inf, math.inf, math.inf, 0.0)
+    for column in range(ZONE):
+        zone[column] = math.inf
+    zone[HOW] = ACROSS
     stride = max(int(SCAN_STEP / ds), 1)
     other_stride = max(int(SCAN_STEP / other_ds), 1)
     last_i, along, together = -1, 0.0, 0.0
@@ -61,19 +76,25 @@ def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone
         if at >= 0:
             q = at * other_ds
             if last_i < 0:
-                zone[0], zone[2], zone[3] = i * ds, q, q
-            zone[1], zone[2], zone[3] = i * ds, min(zone[2], q), max(zone[3], q)
+                zone[ENTER], zone[OTHER_ENTERS], zone[OTHER_LEAVES] = i * ds, q, q
+            zone[LEAVE], zone[OTHER_ENTERS], zone[OTHER_LEAVES] = (
+                i * ds,
+                min(zone[OTHER_ENTERS], q),
+                max(zone[OTHER_LEAVES], q),
+            )
             along = path[i, COS] * other_path[at, COS] + path[i, SIN] * other_path[at, SIN]
+            if zone[EDGE] == math.inf and nearest < 0.5 * (other_body[1] + body[1] * abs(along)):
+                zone[EDGE] = max((i - stride) * ds, zone[ENTER])
             if along > SAME_WAY:
                 together += stride * ds
             last_i = i
         elif last_i >= 0:
             break
     if last_i >= 0:
-        zone[4] = MERGE if along > SAME_WAY else PART if together > TOGETHER else ACROSS
-        if zone[4] == ACROSS:  # the ego's width counts, too
-            zone[2] -= 0.5 * body[1]
-            zone[3] += 0.5 * body[1]
+        zone[HOW] = MERGE if along > SAME_WAY else PART if together > TOGETHER else ACROSS
+        if zone[HOW] == ACROSS:  # the ego's width counts, too
+            zone[OTHER_ENTERS] -= 0.5 * body[1]
+            zone[OTHER_LEAVES] += 0.5 * body[1]
 
 
 @kernel
@@ -92,9 +113,9 @@ def place_on_route(zone, q):
 
     Of two ways that part again, from their common beginning.
     """
-    if zone[4] == PART:
-        return zone[0] + q - zone[2]
-    return zone[1] - zone[3] + q
+    if zone[HOW] == PART:
+        return zone[ENTER] + q - zone[OTHER_ENTERS]
+    return zone[LEAVE] - zone[OTHER_LEAVES] + q
 
 
 @kernel
@@ -120,23 +141,22 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
     ``gain``; ``rank`` says who waits (``right_of_way``). Bodies reach ``front`` and ``rear`` [m]
     ahead of and behind these stations.
     """
-    together = zone[4] != ACROSS
-    if s - rear > zone[1] or (q - other_rear > zone[3] and zone[4] != MERGE):
+    together = zone[HOW] != ACROSS
+    if s - rear > zone[LEAVE] or (q - other_rear > zone[OTHER_LEAVES] and zone[HOW] != MERGE):
         return math.inf, math.inf
-    to_enter = zone[0] - front - s  # what is left until our bumper is in
-    inside = q + other_front > zone[2]
+    to_enter = zone[ENTER] - front - s  # what is left until our bumper is in
+    inside = q + other_front > zone[OTHER_ENTERS]
     if together and inside:
         # It drives before us, or will: its place on our route.
         ahead = place_on_route(zone, q)
         if ahead >= s:
             return follow(ahead - other_rear - front - s, v, w, min(gain, 0.0)), math.inf
         return math.inf, math.inf
-    if to_enter <= 0.0:
-        return math.inf, math.inf  # we are in: the way out is forward
     if w < STANDING:
-        return math.inf, zone[0] if inside else math.inf
-    width = 0.0 if together else zone[3] - zone[2]
-    until = zone[2] - other_front - q
+        return math.inf, zone[ENTER] if inside and to_enter > 0.0 else math.inf
+    is_in, moves = to_enter <= 0.0, v > STANDING
+    width = 0.0 if together else zone[OTHER_LEAVES] - zone[OTHER_ENTERS]
+    until = zone[OTHER_ENTERS] - other_front - q
     if rank > 0 and until > 0.0 and w * w < 2.0 * CAN_STOP * until:
         return math.inf, math.inf
     length = width + other_front + other_rear + TAIL_MARGIN
@@ -144,15 +164,22 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
     slower = max(gain, -0.5 * w / GOES_ON) if gain < -LEAST_GAIN else 0.0
     enters, leaves = coming(until, w, quicker), coming(until + length, w, slower)
     margin = WAITING_MARGIN if rank < 0 else TIME_MARGIN
-    if rank < 0 and together:
+    if is_in and moves:
+        margin = 0.0  # it has begun to cross
+    elif rank < 0 and together:
         # Nor must it have to brake much for us, who may be slower.
-        margin += max(w - math.sqrt(v * v + 2.0 * COMFORT_ACCELERATION * to_enter), 0.0) / CAN_STOP
-    through = front + rear + (0.0 if together else zone[1] - zone[0])
-    arrives = time_to(to_enter, v, pace)
+        gained = v * v + 2.0 * COMFORT_ACCELERATION * max(to_enter, 0.0)
+        margin += max(w - math.sqrt(gained), 0.0) / CAN_STOP
+    through = front + rear + (0.0 if together else zone[LEAVE] - zone[ENTER])
+    arrives = time_to(max(to_enter, 0.0), v, pace)
     clears = time_to(to_enter + through, v, pace) + BUILD_UP
-    if enters < HORIZON and arrives < leaves + margin and clears > enters - margin:
-        return math.inf, zone[0]
-    return math.inf, math.inf
+    if enters >= HORIZON or arrives >= leaves + margin or clears <= enters - margin:
+        return math.inf, math.inf
+    if not is_in:
+        return math.inf, zone[ENTER]
+    if v <= CREEPING:
+        return -COMFORT_DECELERATION if moves else 0.0, math.inf
+    return math.inf, zone[EDGE]
 
 
 @kernel
@@ -161,18 +188,18 @@ def keep_clear(s, front, rear, length, zone, q, w, other_rear, stop):
 
     ``length`` is the ego's [m]; the rest as of `give_way`.
     """
-    gone = q - other_rear > zone[3] or w < STANDING
-    if gone or zone[0] - front - s <= 0.0 or zone[0] >= stop or stop - length > zone[1]:
+    gone = q - other_rear > zone[OTHER_LEAVES] or w < STANDING
+    if gone or zone[ENTER] - front - s <= 0.0 or zone[ENTER] >= stop or stop - length > zone[LEAVE]:
         return stop
-    return zone[0]
+    return zone[ENTER]
 
 
 @kernel
 def is_left(shift, s, passage):
     """Say whether the ego is in another lane where somebody comes, or is, to go its route's way."""
-    if passage[4] == ACROSS or shift[0] == shift[1] == 0.0:
+    if passage[HOW] == ACROSS or shift[0] == shift[1] == 0.0:
         return False
-    place = max(s, passage[0], place_on_route(passage, passage[STATION]))
+    place = max(s, passage[ENTER], place_on_route(passage, passage[STATION]))
     return abs(aside_at(shift, place)) > ELSEWHERE
 
 

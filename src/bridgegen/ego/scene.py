@@ -52,7 +52,7 @@ class Scene(NamedTuple):
             curvature [1/m].
         hypothesis_counts: ``(P, W)`` int64, samples of each.
         hypothesis_steps: ``(P, W)`` [m], between two samples.
-        hypothesis_zones: ``(P, W, 5)``, where each meets the ego's; see ``_yielding_kernels``.
+        hypothesis_zones: ``(P, W, ZONE)``, where each meets the ego's; see ``_yielding_kernels``.
         hypothesis_ranks: ``(P, W)`` int64, who waits where they meet; see ``right_of_way``.
         hypothesis_first: ``(P, E + 1)`` int64: entity e's are those from ``[e]`` to ``[e + 1]``.
         path_ranks: ``(P, E)`` int64, as `hypothesis_ranks`, of the ways that the entities take.
@@ -94,7 +94,7 @@ def survey(
         starts: per entity the lanes that it starts or changes to, and where [m along the road].
         bodies: ``(E, ≥2)``: length and width [m].
     """
-    from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
+    from bridgegen.ego._yielding_kernels import ZONE, find_zone  # numba is slow to import
 
     stops, route = np.full(len(lights), np.inf), routes[0]
     if route is not None:
@@ -116,7 +116,7 @@ def survey(
             columns = (line_.x, line_.y, line_.h, np.cos(line_.h), np.sin(line_.h), line_.curvature)
             tables.append(np.stack(columns, axis=1))
             steps.append(way_step)
-            zone = np.empty(5)
+            zone = np.empty(ZONE)
             find_zone(
                 path, len(path), step, bodies[0],
                 tables[-1], len(tables[-1]), way_step, bodies[e], zone,
@@ -135,7 +135,7 @@ def survey(
         ways[None],
         np.array([[len(table) for table in tables]], dtype=np.int64),
         np.array([steps], dtype=np.float64),
-        np.array(zones, dtype=np.float64).reshape(1, len(zones), 5),
+        np.array(zones, dtype=np.float64).reshape(1, len(zones), ZONE),
         np.array([ranks], dtype=np.int64),
         np.array([first], dtype=np.int64),
         np.array(

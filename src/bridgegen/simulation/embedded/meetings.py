@@ -17,8 +17,8 @@ class Meetings(NamedTuple):
 
     Attributes:
         meets: ``(P, E)`` int64, whether there is anything in the following.
-        meetings: ``(P, E, E, 5)`` where an attentive participant's first path meets each other's,
-            see ``bridgegen.ego._yielding_kernels``; infinite where it does not.
+        meetings: ``(P, E, E, ZONE)`` where an attentive participant's first path meets each
+            other's, see ``bridgegen.ego._yielding_kernels``; infinite where it does not.
         lines: ``(P, E, S)`` [m], the stations of the stop lines of S lights on its path, else +inf.
         signs: ``(P, E, H)`` [m], the stations of the lines of stop signs on it; +inf pads.
     """
@@ -31,15 +31,17 @@ class Meetings(NamedTuple):
 
 def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]) -> Meetings:
     """Return what the attentive participants of a storyboard know of its road networks."""
+    from bridgegen.ego._yielding_kernels import ZONE  # numba is slow to import
+
     p, e, lights = len(models), len(program.names), len(program.lights)
     if not program.attends.size:
         return Meetings(
             np.zeros((p, 0), np.int64),
-            np.zeros((p, 0, 0, 5)),
+            np.zeros((p, 0, 0, ZONE)),
             np.zeros((p, 0, 0)),
             np.zeros((p, 0, 0)),
         )
-    zones, lines = np.full((p, e, e, 5), np.inf), np.full((p, e, lights), np.inf)
+    zones, lines = np.full((p, e, e, ZONE), np.inf), np.full((p, e, lights), np.inf)
     signs: dict[tuple[int, int], list[float]] = {}
     for number, (model, known) in enumerate(zip(models, ways, strict=True)):
         for one in program.attends.tolist():
@@ -58,7 +60,7 @@ def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]
 
 
 def _find_zones(zones: Float, one: int, program: Program, ways: Ways) -> None:
-    """Fill ``(E, 5)`` with where a participant's path meets the others'."""
+    """Fill ``(E, ZONE)`` with where a participant's path meets the others'."""
     from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
 
     own, bodies = ways.paths[one], program.bodies

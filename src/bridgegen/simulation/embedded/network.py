@@ -129,7 +129,7 @@ class Network:
                 self.tables.timetables[p, m, : len(table)] = table
 
     def zones(self, name: str) -> Float:
-        """Return where the ego's way meets the timed trajectory of an entity, ``(P, 5)``."""
+        """Return where the ego's way meets the timed trajectory of an entity, ``(P, ZONE)``."""
         path = self._program.trajectories[self._program.trajectory_of(name)]
         zones: Float = self.tables.zones[:, path]
         return zones
@@ -197,14 +197,14 @@ class Network:
         )
 
     def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
-        """Return where the ego's first path meets each other one, ``(P, K, 5)``."""
-        from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
+        """Return where the ego's first path meets each other one, ``(P, K, ZONE)``."""
+        from bridgegen.ego._yielding_kernels import ZONE, find_zone  # numba is slow to import
 
         bodies = self._program.bodies
         widest = bodies[int(np.argmax(bodies[:, 1]))]
         for p, found in enumerate(self._zones):
             for k in range(len(found), len(self._ways[p].paths)):
-                zone = np.full(5, np.inf)
+                zone = np.full(ZONE, np.inf)
                 if k > 0:
                     find_zone(
                         paths[p, 0], counts[p, 0], steps[p, 0], bodies[0],
@@ -212,7 +212,7 @@ class Network:
                         bodies[k] if k < len(bodies) else widest, zone,
                     )  # fmt: skip
                 found.append(zone)
-        whole = np.full((*counts.shape, 5), np.inf)
+        whole = np.full((*counts.shape, ZONE), np.inf)
         for p, found in enumerate(self._zones):
             whole[p, : len(found)] = found
         return whole
