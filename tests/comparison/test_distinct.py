@@ -76,6 +76,6 @@ def test_parameters_are_shares_of_their_ranges():
     assert shares.min() >= -1e-12
     assert shares.max() <= 1.0 + 1e-12
     for k, name in enumerate(space.variables):
-        one = space.scenario.parameters[name]
+        one = space.parameters[name]
         back = one.low + shares[:, k] * (one.high - one.low)
         assert back == pytest.approx(X[:, space.index(name)])

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.adversary import PERIOD, adversarial
+from bridgegen.odd.adversary import (
+    PERIOD,
+    adversarial,
+    first_speed,
+    limits,
+    room,
+    top_speed,
+)
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 
@@ -33,12 +40,12 @@ def test_its_limits_are_the_scenario_s():
     X = space.decode(np.random.default_rng(1).random((50, space.n_var)))
     for x in X:
         values = space.values(x)
-        assert who.first_speed(values) == 0.0
-        assert who.top_speed(values) == values["bv_speed"]
-        rate, braking = who.limits(values)
+        assert first_speed(who, values) == 0.0
+        assert top_speed(who, values) == values["bv_speed"]
+        rate, braking = limits(who, values)
         assert rate == 3.0  # of the scenario's event
         assert braking == pytest.approx(min(9.0, 0.85 * 9.81 * values["friction"]))
-        assert who.room(values) == pytest.approx(0.5 * (values["lane_width"] - 1.9) - 0.1)
+        assert room(who, values) == pytest.approx(0.5 * (values["lane_width"] - 1.9) - 0.1)
 
 
 def test_what_it_leaves_alone_stays_as_it_was():

@@ -20,7 +20,7 @@ LANES = {"lanes_per_direction": (2.0, 3.0), "bv_start": (8.0, 20.0), "intersecti
 
 def box(space, edges):
     both = [
-        edges.get(name, (space.scenario.parameters[name].low, space.scenario.parameters[name].high))
+        edges.get(name, (space.parameters[name].low, space.parameters[name].high))
         for name in space.variables
     ]
     low, high = np.array(both).T

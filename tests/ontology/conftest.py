@@ -42,7 +42,7 @@ def everything() -> Individuals:
 
 
 def at_defaults(scenario: LogicalScenario) -> Individuals:
-    whole = SearchSpace(scenario, Axis)
+    whole = scenario.space(Axis)
     defaults = {one.name: one.default for one in scenario.parameters.values()}
     return build(scenario, whole.values(whole.row(defaults)), driver="reference")
 

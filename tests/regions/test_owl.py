@@ -13,7 +13,8 @@ from bridgegen.regions.evidence import Evidence
 from bridgegen.regions.find import Region
 from bridgegen.regions.owl import carriers, classes, statable
 
-SPACE = load_scenario("crossroads-s4").space(tuple(Axis))
+SCENARIO = load_scenario("crossroads-s4")
+SPACE = SCENARIO.space(tuple(Axis))
 EDGES = {
     "lanes_per_direction": (2, 3), "fog_density": (5.0, 80.0), "bv_start": (7.0, 20.0),
     "bv_trigger_time": (2.5, 10.0),
@@ -25,7 +26,7 @@ def row(seed):
 
 
 def individuals(x):
-    return build(SPACE.scenario, SPACE.values(x), driver="route-follower")
+    return build(SCENARIO, SPACE.values(x), driver="route-follower")
 
 
 def box(**edges):
@@ -128,7 +129,7 @@ def test_a_class_holds_the_scenarios_of_its_box_and_no_others():
 def test_every_parameter_is_carried_and_its_edges_count_as_inside(name):
     x = row(1)
     value = SPACE.values(x)[name]
-    outer = SPACE.scenario.parameters[name]
+    outer = SPACE.parameters[name]
     whole_numbers = outer.kind == "integer"
     beyond = value + 1 if whole_numbers else np.nextafter(value, np.inf)
     below = value - 1 if whole_numbers else np.nextafter(value, -np.inf)

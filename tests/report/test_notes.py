@@ -37,7 +37,7 @@ def test_of_a_long_table_the_page_has_the_beginning(space):
 
 
 def test_a_box_is_told_in_units_where_nothing_limits_the_parameter(space):
-    free = space.scenario.parameters["bv_trigger_distance"]
+    free = space.parameters["bv_trigger_distance"]
     assert not space.bounds["bv_trigger_distance"]
     middle = f"{(free.low + free.high) / 2:.4g}"
     assert box_in_words({free.name: [0.5, 1.0]}, space) == f"{free.name} ≥ {middle} m"

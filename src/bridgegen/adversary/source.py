@@ -7,7 +7,8 @@ from functools import lru_cache
 from bridgegen.adversary.course import Course, Lane
 from bridgegen.arrays import Float
 from bridgegen.ego import DRIVERS
-from bridgegen.odd.adversary import Adversary
+from bridgegen.odd.adversary import first_speed, limits, room, top_speed
+from bridgegen.odd.story import Adversary
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.source import ConcreteScenario, OntologySource
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
@@ -70,8 +71,8 @@ class AdversarySource:
         a, b = lane.station
         station = a + b * float(program.fill(known, 1)[0, slot]) if slot >= 0 else a
         return Course(
-            lane, station, who.first_speed(values), who.top_speed(values), who.limits(values),
-            who.room(values), program.time_step, program.n_steps,
+            lane, station, first_speed(who, values), top_speed(who, values), limits(who, values),
+            room(who, values), program.time_step, program.n_steps,
         )  # fmt: skip
 
     def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:

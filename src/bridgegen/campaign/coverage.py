@@ -27,7 +27,7 @@ def coverage_of(
     with Store.open(folder) as store:
         settings = Settings.from_dict(store.settings, store.folder)
         rows = store.read()
-    space = searched(settings, Path(folder))[0]
+    space = searched(settings, Path(folder))[1]
     ok = rows.status == 0
     found = coverage(space, rows.X[ok], rows.critical[ok], bins=bins, strength=strength)
     return settings, found

@@ -110,7 +110,7 @@ def regions_of(
     driver = pipeline.driver.label
     record = {
         "run": str(place),
-        "scenario": space.scenario.name,
+        "scenario": space.name,
         "ego": driver,
         "cause": settings.cause,
         "algorithm": settings.algorithm,

@@ -52,9 +52,9 @@ def pipeline_of(
             must be named.
     """
     _check_driver(settings, ego, folder, command)
-    space, roads = searched(settings, folder)
+    scenario, space, roads = searched(settings, folder)
     pipeline = Pipeline(
-        space.scenario,
+        scenario,
         space,
         ego=_ego(settings),
         ideal=settings.ideal,
@@ -102,8 +102,10 @@ def _check_driver(settings: Settings, ego: str | None, folder: Path, command: st
         raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")
 
 
-def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | None]:
-    """Return the search space that a run was made with, and its map if it has one.
+def searched(
+    settings: Settings, folder: Path
+) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
+    """Return the scenario of a run, the space that it searched, and its map if it has one.
 
     Raises:
         StorageError: the scenario or the map is not what it was.
@@ -122,7 +124,7 @@ def searched(settings: Settings, folder: Path) -> tuple[SearchSpace, RoadMap | N
         raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
     if settings.adversary is not None:
         there = adversarial(there, settings.adversary)
-    return there.space(settings.axes, settings.fixed), roads
+    return there, there.space(settings.axes, settings.fixed), roads
 
 
 def placed(

@@ -25,7 +25,7 @@ def normalised(space: SearchSpace, X: Float) -> Float:
     Returns:
         ``(N, space.n_var)`` float64 in [0, 1], but for rounding.
     """
-    chosen = [space.scenario.parameters[name] for name in space.variables]
+    chosen = [space.parameters[name] for name in space.variables]
     low = np.array([one.low for one in chosen])
     span = np.array([one.high for one in chosen]) - low
     columns = [space.index(name) for name in space.variables]

@@ -86,7 +86,7 @@ def space_of(folder: Path) -> SearchSpace:
         InputError: the scenario or the map is missing.
     """
     with Store.open(folder) as store:
-        return searched(Settings.from_dict(store.settings, folder), folder)[0]
+        return searched(Settings.from_dict(store.settings, folder), folder)[1]
 
 
 def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart: float) -> Record:

@@ -8,7 +8,7 @@ its lane.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 from bridgegen.errors import InputError, UnknownNameError
@@ -17,7 +17,7 @@ from bridgegen.odd.parameters import Axis, Parameter
 from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import speeds_of
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
-from bridgegen.odd.story import EventSpec, Participant, SpeedChange, Story
+from bridgegen.odd.story import Adversary, EventSpec, Participant, SpeedChange, Story
 
 PERIOD = 0.5
 """Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
@@ -29,57 +29,26 @@ GRIP = 0.85 * 9.81
 """What tyres hold on a dry road [m/s²]; see `bridgegen.odd.rules`."""
 
 
-@dataclass(frozen=True)
-class Adversary:
-    """Who is driven by an adversary, and within what limits.
+def first_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
+    """Return the participant's speed at the start [m/s]."""
+    return _value(adversary.speeds[0], values)
 
-    Attributes:
-        participant: its name.
-        speeds: [m/s] that the scenario gives it: the first is its speed at the start, the largest
-            its highest.
-        lane_width: [m] of the lane that it keeps to.
-        width: of its body [m].
-        rate: [m/s²] at which the scenario has it change its speed.
-        acceleration: of its body at most [m/s²].
-        braking: of its body at most [m/s²].
-        paces: the parameters that are its speeds as shares of the highest, one per decision.
-        offsets: the parameters that are its places in the lane, -1 at its right edge, 1 at its left
-            one, one per decision.
-    """
 
-    participant: str
-    speeds: tuple[Quantity, ...]
-    lane_width: Quantity
-    width: float
-    rate: Quantity
-    acceleration: float
-    braking: float
-    paces: tuple[str, ...]
-    offsets: tuple[str, ...]
+def top_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
+    """Return the participant's highest speed [m/s]."""
+    return max(_value(one, values) for one in adversary.speeds)
 
-    @property
-    def controls(self) -> tuple[str, ...]:
-        """The parameters by decision: pace and place of the first, then of the second."""
-        pairs = zip(self.paces, self.offsets, strict=True)
-        return tuple(name for pair in pairs for name in pair)
 
-    def first_speed(self, values: Mapping[str, float]) -> float:
-        """Return its speed at the start [m/s]."""
-        return _value(self.speeds[0], values)
+def limits(adversary: Adversary, values: Mapping[str, float]) -> tuple[float, float]:
+    """Return by how much the participant accelerates and brakes at most [m/s²]."""
+    grip = GRIP * values.get("friction", 1.0)
+    rate = min(_value(adversary.rate, values), adversary.acceleration, grip)
+    return rate, min(adversary.braking, grip)
 
-    def top_speed(self, values: Mapping[str, float]) -> float:
-        """Return its highest speed [m/s]."""
-        return max(_value(one, values) for one in self.speeds)
 
-    def limits(self, values: Mapping[str, float]) -> tuple[float, float]:
-        """Return by how much it accelerates and brakes at most [m/s²]."""
-        grip = GRIP * values.get("friction", 1.0)
-        rate = min(_value(self.rate, values), self.acceleration, grip)
-        return rate, min(self.braking, grip)
-
-    def room(self, values: Mapping[str, float]) -> float:
-        """Return how far it may be aside of its lane's centre [m]."""
-        return max(0.0, 0.5 * (_value(self.lane_width, values) - self.width) - MARGIN)
+def room(adversary: Adversary, values: Mapping[str, float]) -> float:
+    """Return how far the participant may be aside of its lane's centre [m]."""
+    return max(0.0, 0.5 * (_value(adversary.lane_width, values) - adversary.width) - MARGIN)
 
 
 def adversarial(scenario: SearchedScenario, participant: str | None = None) -> LogicalScenario:
@@ -130,8 +99,8 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
         events=rest,
     )
     left = replace(scenario, story=story)
-    limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
-    needed = {quantity for quantity in limits if isinstance(quantity, str)}
+    own_limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
+    needed = {quantity for quantity in own_limits if isinstance(quantity, str)}
     idle = _quantities(own) - _quantities(rest) - needed - _elsewhere(left)
     kept = {name: one for name, one in left.parameters.items() if name not in idle}
     return replace(

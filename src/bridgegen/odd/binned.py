@@ -118,7 +118,7 @@ class BinnedRows:
 
 
 def _edges(space: SearchSpace, name: str, bins: int) -> Float:
-    one = space.scenario.parameters[name]
+    one = space.parameters[name]
     if one.kind == "integer":
         return np.arange(one.low, one.high + 2.0) - 0.5
     return np.linspace(one.low, one.high, bins + 1)

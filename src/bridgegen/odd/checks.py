@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Set
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, neares
 from bridgegen.odd.plain_yaml import Document
 from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import cap, speeds_of
-from bridgegen.odd.space import SearchSpace, probes
-
-if TYPE_CHECKING:
-    from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.space import probes
 
 MAX_STEPS = 100_000
 
@@ -109,14 +106,14 @@ def time_problems(document: Document) -> list[str]:
     ]
 
 
-def try_out(scenario: "LogicalScenario") -> None:
+def try_out(scenario: LogicalScenario) -> None:
     """Refuse what only shows in values: at the defaults, and all over the space.
 
     Raises:
         ScenarioError: constraints that leave no value, defaults that break them, positions past
             the end of a leg or inside each other, nothing to search.
     """
-    whole = SearchSpace(scenario, Axis)
+    whole = scenario.space(Axis)
     if scenario.space().n_var == 0:
         raise ScenarioError(
             f"the axes {', '.join(scenario.axes)} hold nothing to search ({scenario.place})"
@@ -134,7 +131,7 @@ def try_out(scenario: "LogicalScenario") -> None:
         raise ScenarioError(*problems)
 
 
-def _places(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterator[str]:
+def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[str]:
     """Yield who may come off a leg, or start inside another."""
     for one in scenario.participants:
         ends = [(one.start, 0.0), *((point, 0.0) for point in one.path[1:])]
@@ -179,7 +176,7 @@ def _places(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterat
             )
 
 
-def _fast(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterator[str]:
+def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[str]:
     """Yield who may be faster than road, weather or legs allow; parameters have their bounds."""
     prefixes = sorted(
         name.removesuffix("speed_factor") for name in columns if name.endswith("speed_factor")
@@ -201,7 +198,7 @@ def _fast(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Iterator
                 )
 
 
-def _segments_length(scenario: "LogicalScenario", columns: Mapping[str, Float]) -> Float:
+def _segments_length(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Float:
     parts = [_metres(one.length, columns) for one in scenario.roads.segments]
     return np.asarray(sum(parts[1:], parts[0]))
 

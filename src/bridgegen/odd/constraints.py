@@ -1,9 +1,27 @@
-"""The graph of constraints: what depends on what, in an order that can be computed."""
+"""What may vary and what limits it: the graph of constraints, in an order that can be computed."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from bridgegen.odd.parameters import Bound, Derived, Parameter, at, nearest
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """What a search space is made of, and what its rows must keep.
+
+    Attributes:
+        parameters: what may vary, by name.
+        bounds: what limits it.
+        derived: what follows from it.
+        axes: what is searched unless the user says otherwise.
+    """
+
+    parameters: Mapping[str, Parameter]
+    bounds: tuple[Bound, ...]
+    derived: tuple[Derived, ...]
+    axes: tuple[Axis, ...]
 
 
 def problems_of(

@@ -207,7 +207,7 @@ def _check(bins: int, strength: int) -> None:
 def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
     found = []
     for number, name in enumerate(rows.names):
-        one = rows.space.scenario.parameters[name]
+        one = rows.space.parameters[name]
         critical, evaluated, met = rows.counts([number])
         found.append(
             ParameterBins(

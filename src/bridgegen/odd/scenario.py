@@ -3,15 +3,13 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from bridgegen.odd.constraints import Constraints
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.odd.space import SearchSpace
-from bridgegen.odd.story import EventSpec, Participant, Story
-
-if TYPE_CHECKING:
-    from bridgegen.odd.adversary import Adversary
+from bridgegen.odd.story import Adversary, EventSpec, Participant, Story
 
 
 @dataclass(frozen=True)
@@ -117,6 +115,16 @@ class SearchedScenario:
         """A digest of all that it says: the same for the same scenario on any machine."""
         return sha256(repr(self).encode()).hexdigest()
 
+    @property
+    def rules(self) -> Constraints:
+        """What its search space is made of."""
+        return Constraints(self.parameters, self.bounds, self.derived, self.axes)
+
+    @property
+    def decisions(self) -> tuple[str, ...]:
+        """The parameters that are an adversary's decisions."""
+        return ()
+
     def space(
         self, axes: Iterable[str] | None = None, fixed: Mapping[str, float] | None = None
     ) -> SearchSpace:
@@ -130,7 +138,7 @@ class SearchedScenario:
             UnknownNameError: no such axis.
             ScenarioError: what is fixed does not fit (see ``SearchSpace``).
         """
-        return SearchSpace(self, axes, fixed)
+        return SearchSpace(self.rules, axes, fixed, name=self.name, decisions=self.decisions)
 
     def table(self) -> tuple[ParameterLine, ...]:
         """Return every parameter and derived quantity with its range and rules, for people."""
@@ -174,7 +182,7 @@ class LogicalScenario(SearchedScenario):
     driver: str
     effects: tuple[str, ...]
     road_end: Literal["leave", "stand"] = field(default="leave", kw_only=True)
-    adversary: "Adversary | None" = field(default=None, repr=False, kw_only=True)
+    adversary: Adversary | None = field(default=None, repr=False, kw_only=True)
 
     @property
     def fingerprint(self) -> str:
@@ -182,6 +190,11 @@ class LogicalScenario(SearchedScenario):
         said = repr(self)
         drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
         return sha256((said + repr(drivers) if drivers else said).encode()).hexdigest()
+
+    @property
+    def decisions(self) -> tuple[str, ...]:
+        """See `SearchedScenario`."""
+        return self.adversary.controls if self.adversary else ()
 
     @property
     def participants(self) -> tuple[Participant, ...]:

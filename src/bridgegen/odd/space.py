@@ -2,14 +2,13 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, as_float
 from bridgegen.errors import ScenarioError, UnknownNameError
-from bridgegen.odd.constraints import order, problems_of
+from bridgegen.odd.constraints import Constraints, order, problems_of
 from bridgegen.odd.parameters import (
     TOLERANCE,
     Bound,
@@ -21,9 +20,6 @@ from bridgegen.odd.parameters import (
     slack,
 )
 from bridgegen.odd.violations import Violation, violations
-
-if TYPE_CHECKING:
-    from bridgegen.odd.scenario import SearchedScenario
 
 # Points at which a new space is tried: all corners of the cube up to _CORNERS, and as many others.
 _CORNERS = 2048
@@ -39,7 +35,9 @@ class SearchSpace:
     bound asks for it. Derived quantities follow.
 
     Attributes:
-        scenario: what is searched.
+        name: of the scenario that is searched.
+        constraints: what the space is made of.
+        parameters: its parameters by name, searched or not.
         axes: the axes that are searched.
         variables: the searched parameters, in declared order: the columns of U. One whose low is
             its high is not searched.
@@ -53,9 +51,11 @@ class SearchSpace:
         defaults: where each parameter stands while it is not searched.
 
     Args:
-        scenario: where the parameters and constraints come from.
-        axes: what to search; the scenario's own choice if ``None``.
+        constraints: what it is made of.
+        axes: what to search; the constraints' own choice if ``None``.
         fixed: parameters to hold at a value instead of searching them.
+        name: of the scenario, for messages.
+        decisions: the parameters that are an adversary's decisions.
 
     Raises:
         UnknownNameError: no such axis or parameter.
@@ -65,18 +65,22 @@ class SearchSpace:
 
     def __init__(
         self,
-        scenario: "SearchedScenario",
+        constraints: Constraints,
         axes: Iterable[str] | None = None,
         fixed: Mapping[str, float] | None = None,
+        *,
+        name: str = "",
+        decisions: Iterable[str] = (),
     ) -> None:
-        self.scenario = scenario
-        self.axes = read_axes(scenario.axes if axes is None else axes)
-        parameters, fixed = scenario.parameters, dict(fixed or {})
-        problems = problems_of(parameters.values(), scenario.bounds, scenario.derived)
-        problems += _fixed_problems(fixed, scenario)
+        self.name, self.constraints = name, constraints
+        self.axes = read_axes(constraints.axes if axes is None else axes)
+        self.parameters = parameters = constraints.parameters
+        fixed = dict(fixed or {})
+        problems = problems_of(parameters.values(), constraints.bounds, constraints.derived)
+        problems += _fixed_problems(fixed, constraints)
         if problems:
             raise ScenarioError(*problems)
-        columns: list[Parameter | Derived] = [*parameters.values(), *scenario.derived]
+        columns: list[Parameter | Derived] = [*parameters.values(), *constraints.derived]
         self.names = tuple(column.name for column in columns)
         self.units = tuple(column.unit for column in columns)
         self.variables = tuple(
@@ -84,15 +88,14 @@ class SearchSpace:
             for p in parameters.values()
             if p.axis in self.axes and p.name not in fixed and p.low < p.high
         )
-        adversary = getattr(scenario, "adversary", None)
-        self.decisions: frozenset[str] = frozenset(adversary.controls if adversary else ())
+        self.decisions = frozenset(decisions)
         self.defaults = {p.name: p.default for p in parameters.values()} | fixed
         self._columns = {name: number for number, name in enumerate(self.names)}
-        self.derived = {one.name: one for one in scenario.derived}
+        self.derived = {one.name: one for one in constraints.derived}
         self.bounds: dict[str, tuple[Bound, ...]] = {
-            name: tuple(b for b in scenario.bounds if b.target == name) for name in parameters
+            name: tuple(b for b in constraints.bounds if b.target == name) for name in parameters
         }
-        self.order = order(self.names, scenario.bounds, scenario.derived)
+        self.order = order(self.names, constraints.bounds, constraints.derived)
         self._decode(probes(self.n_var))
 
     @property
@@ -162,7 +165,7 @@ class SearchSpace:
         cube = np.empty((len(rows), self.n_var))
         for number, name in enumerate(self.variables):
             lo, hi = self.interval(name, table)
-            cube[:, number] = self.scenario.parameters[name].share(table[name], lo, hi)
+            cube[:, number] = self.parameters[name].share(table[name], lo, hi)
         back = self._decode(cube)
         wrong = np.argwhere(np.abs(rows - back) > slack(back)).tolist()
         if wrong:
@@ -222,7 +225,7 @@ class SearchSpace:
             ValueError: wrong shape.
         """
         rows = as_float("X", X, (None, len(self.names)), finite=False)
-        return violations(self.scenario, self._table(rows))
+        return violations(self.constraints, self._table(rows))
 
     def _table(self, rows: Float) -> dict[str, Float]:
         return dict(zip(self.names, np.ascontiguousarray(rows.T), strict=True))
@@ -246,7 +249,7 @@ class SearchSpace:
                 continue
             lo, hi = self.interval(name, table)
             if name in shares:
-                out[:] = self.scenario.parameters[name].at(shares[name], lo, hi)
+                out[:] = self.parameters[name].at(shares[name], lo, hi)
             else:
                 out[:] = np.clip(self.defaults[name], lo, hi)
             table[name] = out
@@ -264,7 +267,7 @@ class SearchSpace:
         Raises:
             ScenarioError: they leave it no value in some row.
         """
-        parameter = self.scenario.parameters[name]
+        parameter = self.parameters[name]
         if not self.bounds[name]:
             return parameter.low, parameter.high
         lo: Float | float = parameter.low
@@ -301,10 +304,10 @@ class SearchSpace:
             raise ScenarioError(f"{problem} at {', '.join(values) or 'any row'}")
 
 
-def _fixed_problems(fixed: Mapping[str, float], scenario: "SearchedScenario") -> list[str]:
+def _fixed_problems(fixed: Mapping[str, float], constraints: Constraints) -> list[str]:
     problems = []
-    parameters = scenario.parameters
-    derived = {one.name: one for one in scenario.derived}
+    parameters = constraints.parameters
+    derived = {one.name: one for one in constraints.derived}
     for name, value in fixed.items():
         if name in derived:
             problems.append(f"cannot fix '{name}', which follows from '{derived[name]}'")

@@ -254,3 +254,38 @@ class Story:
         actions = (action for event in self.events for action in event.actions)
         found = (one.prefix for one in actions if isinstance(one, WeatherChange))
         return tuple(dict.fromkeys(found))
+
+
+@dataclass(frozen=True)
+class Adversary:
+    """A participant that the search drives, and within what limits (`bridgegen.odd.adversary`).
+
+    Attributes:
+        participant: its name.
+        speeds: [m/s] that the scenario gives it: the first is its speed at the start, the largest
+            its highest.
+        lane_width: [m] of the lane that it keeps to.
+        width: of its body [m].
+        rate: [m/s²] at which the scenario has it change its speed.
+        acceleration: of its body at most [m/s²].
+        braking: of its body at most [m/s²].
+        paces: the parameters that are its speeds as shares of the highest, one per decision.
+        offsets: the parameters that are its places in the lane, -1 at its right edge, 1 at its left
+            one, one per decision.
+    """
+
+    participant: str
+    speeds: tuple[Quantity, ...]
+    lane_width: Quantity
+    width: float
+    rate: Quantity
+    acceleration: float
+    braking: float
+    paces: tuple[str, ...]
+    offsets: tuple[str, ...]
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """The parameters by decision: pace and place of the first, then of the second."""
+        pairs = zip(self.paces, self.offsets, strict=True)
+        return tuple(name for pair in pairs for name in pair)

@@ -2,16 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bridgegen.arrays import Bool, Float
+from bridgegen.odd.constraints import Constraints
 from bridgegen.odd.expression import Expression
 from bridgegen.odd.parameters import TOLERANCE, slack
-
-if TYPE_CHECKING:
-    from bridgegen.odd.scenario import SearchedScenario
 
 
 @dataclass(frozen=True)
@@ -31,16 +28,16 @@ class Violation:
     reason: str
 
 
-def violations(scenario: "SearchedScenario", table: Mapping[str, Float]) -> list[Violation]:
+def violations(constraints: Constraints, table: Mapping[str, Float]) -> list[Violation]:
     """Return all that is wrong with the rows, by row; nothing if they are feasible.
 
     Args:
-        scenario: its parameters, bounds and derived quantities are the rules.
+        constraints: the rules: parameters' ranges, bounds and formulas.
         table: ``(N,)`` for each parameter and derived quantity; NaN and inf break every rule.
     """
     found: list[Violation] = []
-    units = {one.name: one.unit for one in scenario.parameters.values()}
-    units |= {one.name: one.unit for one in scenario.derived}
+    units = {one.name: one.unit for one in constraints.parameters.values()}
+    units |= {one.name: one.unit for one in constraints.derived}
 
     def report(name: str, kept: Bool, rule: str, limit: Float | None = None, why: str = "") -> None:
         for row in np.flatnonzero(~kept).tolist():
@@ -50,14 +47,14 @@ def violations(scenario: "SearchedScenario", table: Mapping[str, Float]) -> list
             found.append(Violation(row, name, value, reason))
 
     with np.errstate(invalid="ignore"):  # comparing with NaN is false, which is what is wanted
-        for name, parameter in scenario.parameters.items():
+        for name, parameter in constraints.parameters.items():
             value, low, high = table[name], parameter.low, parameter.high
             inside = (value >= low - slack(low)) & (value <= high + slack(high))
             report(name, inside, f"{low:g} <= {name} <= {high:g}")
             if parameter.kind == "integer":
                 whole = np.abs(value - np.round(value)) <= TOLERANCE
                 report(name, whole, "a whole number")
-        for bound in scenario.bounds:
+        for bound in constraints.bounds:
             name, why = bound.target, f": {bound.why} (source: {bound.source})"
             value = table[name]
             if bound.lo is not None:
@@ -66,7 +63,7 @@ def violations(scenario: "SearchedScenario", table: Mapping[str, Float]) -> list
             if bound.hi is not None:
                 limit = _column(bound.hi, table, value)
                 report(name, value <= limit + slack(limit), f"{name} <= {bound.hi}", limit, why)
-        for derived in scenario.derived:
+        for derived in constraints.derived:
             name, why = derived.name, f": {derived.why} (source: {derived.source})"
             limit = _column(derived.value, table, table[name])
             kept = np.abs(table[name] - limit) <= slack(limit)

@@ -118,7 +118,7 @@ def _narrowed(space: SearchSpace, U: Float, low: Float, high: Float) -> tuple[Fl
         if k is None:
             table[name] = np.clip(space.defaults[name], lo, hi)
             continue
-        one = space.scenario.parameters[name]
+        one = space.parameters[name]
         if low[k] > one.low or high[k] < one.high:
             first, last = one.shares(float(low[k]), float(high[k]), lo, hi)
             part = np.maximum(last - first, 0.0)

@@ -39,7 +39,7 @@ class Box:
 
 def whole(space: SearchSpace) -> Box:
     """Return the box of all rows: every searched parameter's declared range."""
-    parameters = [space.scenario.parameters[name] for name in space.variables]
+    parameters = [space.parameters[name] for name in space.variables]
     return Box(
         np.array([one.low for one in parameters]), np.array([one.high for one in parameters])
     )
@@ -55,7 +55,7 @@ def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
     """
     low, high = leaf.low.copy(), leaf.high.copy()
     for k, name in enumerate(space.variables):
-        one = space.scenario.parameters[name]
+        one = space.parameters[name]
         if ends := one.ends(float(low[k]), float(high[k])):
             low[k], high[k] = ends
             continue

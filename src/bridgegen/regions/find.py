@@ -257,10 +257,10 @@ def check(space: SearchSpace, critical: Bool, samples: int, at_least: float) -> 
     if not 0.0 < at_least < 1.0:
         problems.append(f"0 < at_least < 1 must hold, got {at_least:g}")
     if not problems and space.n_var == 0:
-        problems.append(f"{space.scenario.name}: nothing is searched, so it has no regions")
+        problems.append(f"{space.name}: nothing is searched, so it has no regions")
     if not problems and not critical.any():
         problems.append(
-            f"{space.scenario.name}: none of {len(critical)} evaluations is critical, so there is "
+            f"{space.name}: none of {len(critical)} evaluations is critical, so there is "
             "no critical region to be found"
         )
     if problems:

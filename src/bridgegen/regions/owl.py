@@ -146,17 +146,17 @@ def classes(
         origin: what they were found in, in words.
     """
     writer = _Writer(space, carried)
-    digest = hashlib.sha256(repr([space.scenario.name, driver]).encode())
+    digest = hashlib.sha256(repr([space.name, driver]).encode())
     for one in regions.values():
         digest.update(one.box.low.tobytes() + one.box.high.tobytes())
     # Regions of two runs may be loaded together: each run's have a name of their own.
-    name = quote(space.scenario.name, safe="")
+    name = quote(space.name, safe="")
     header = ox.NamedNode(f"{REGIONS}/{name}/{digest.hexdigest()[:12]}")
     writer.put(header, TYPE, OWL_ONTOLOGY)
     writer.put(
         header, VERSION_INFO, ox.Literal(f"made with the BridgeGen ontology {tbox().version}")
     )
-    about = f"Critical regions of {space.scenario.name} for {driver}, found in {origin}."
+    about = f"Critical regions of {space.name} for {driver}, found in {origin}."
     writer.put(header, COMMENT, ox.Literal(about))
     for term, text in _ANNOTATIONS.items():
         node = _annotation(term)
@@ -191,7 +191,7 @@ class _Writer:
 
     def region(self, node: ox.NamedNode, number: int, region: Region, driver: str) -> None:
         """Define the class of a region, and say what is known of it."""
-        name = self._space.scenario.name
+        name = self._space.name
         self.put(node, TYPE, _CLASS)
         self.put(node, LABEL, ox.Literal(f"critical region {number} of {name}"))
         words = sentence(region.box, self._space, driver, region.fresh)

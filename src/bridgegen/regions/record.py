@@ -88,8 +88,8 @@ def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:
         "parameters": [
             {
                 "name": name,
-                "unit": space.scenario.parameters[name].unit,
-                "integer": space.scenario.parameters[name].kind == "integer",
+                "unit": space.parameters[name].unit,
+                "integer": space.parameters[name].kind == "integer",
                 "low": low,
                 "high": high,
             }

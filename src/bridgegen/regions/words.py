@@ -42,7 +42,7 @@ def sentence(box: Box, space: SearchSpace, driver: str, fresh: Evidence) -> str:
     low, high = fresh.interval
     share = "an unknown share" if fresh.share is None else percent(fresh.share)
     return (
-        f"{where}, {share} of the random scenarios of {space.scenario.name} are critical for "
+        f"{where}, {share} of the random scenarios of {space.name} are critical for "
         f"{driver} ({fresh.critical} of {fresh.rows} that were simulated; {percent(low)} to "
         f"{percent(high)} with 95 % confidence)."
     )
@@ -72,5 +72,5 @@ def _range(low: float, high: float, low_counts: bool, high_counts: bool) -> str:
 
 
 def _unit(space: SearchSpace, name: str) -> str:
-    unit = space.scenario.parameters[name].unit
+    unit = space.parameters[name].unit
     return "" if unit in _UNITLESS else f" {unit}"

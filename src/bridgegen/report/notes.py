@@ -94,7 +94,7 @@ def box_in_words(box: Mapping[str, Sequence[float]], space: SearchSpace) -> str:
 
 
 def _side(name: str, low: float, high: float, space: SearchSpace) -> str:
-    parameter = space.scenario.parameters[name]
+    parameter = space.parameters[name]
     if space.bounds[name]:
         edges = [f"{100 * share:.1f}" for share in (low, high)]
         unit = " % of what is left to it"

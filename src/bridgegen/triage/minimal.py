@@ -62,7 +62,7 @@ class Ladder:
         """Return the ladder of a row of X."""
         step = RADIUS * ranges(space)
         for k, name in enumerate(space.variables):
-            if space.scenario.parameters[name].kind == "integer":
+            if space.parameters[name].kind == "integer":
                 step[k] = max(1.0, np.floor(step[k] + 0.5))
         start = searched(space, x[np.newaxis])[0]
         nominal = searched(space, space.row({})[np.newaxis])[0]
@@ -349,7 +349,7 @@ def _condition(space: SearchSpace, ladder: Ladder, at: Int, i: int, limit: int) 
     name = space.variables[i]
     values, last = ladder.values(at), ladder.values(_put(at, i, limit))
     return Condition(
-        name=name, unit=space.scenario.parameters[name].unit,
+        name=name, unit=space.parameters[name].unit,
         sign=">=" if values[i] > ladder.nominal[i] else "<=",
         limit=float(last[i]), step=float(ladder.step[i]), value=float(values[i]),
         nominal=float(ladder.nominal[i]),

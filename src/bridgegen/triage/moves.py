@@ -35,7 +35,7 @@ def nearest(space: SearchSpace, V: Float) -> Float:
             lo, hi = space.interval(name, table)
             if name in number:
                 value = wanted[:, number[name]]
-                if space.scenario.parameters[name].kind == "integer":
+                if space.parameters[name].kind == "integer":
                     value = np.floor(value + 0.5)
             else:
                 value = space.defaults[name]
@@ -52,7 +52,7 @@ def searched(space: SearchSpace, X: Float) -> Float:
 
 def ranges(space: SearchSpace) -> Float:
     """Return high − low of every searched parameter, ``(n_var,)``, > 0."""
-    parameters = (space.scenario.parameters[name] for name in space.variables)
+    parameters = (space.parameters[name] for name in space.variables)
     return np.array([one.high - one.low for one in parameters])
 
 

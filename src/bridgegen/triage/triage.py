@@ -398,7 +398,7 @@ class _Triage:
         if found is None:
             return text
         k, low, high = found
-        unit = self._space.scenario.parameters[names[k]].unit
+        unit = self._space.parameters[names[k]].unit
         said = "" if unit in ("1", "count", "?") else f" {unit}"
         return f"{text}, {names[k]} {low:.3g} to {high:.3g}{said}"
 
