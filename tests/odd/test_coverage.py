@@ -12,6 +12,7 @@ from bridgegen.errors import InputError
 from bridgegen.odd import binned
 from bridgegen.odd import coverage as module
 from bridgegen.odd.coverage import Ways, coverage, coverage_map
+from bridgegen.odd.kinds import INTEGER
 from bridgegen.search import Problem
 from bridgegen.search.pairwise import Pairwise
 
@@ -38,7 +39,7 @@ def test_two_parameters_by_hand(build, make_parameter):
 
 
 def test_whole_numbers_have_a_bin_each(build, make_parameter):
-    space = build([make_parameter("n", 2.0, 4.0, kind="integer")]).space()
+    space = build([make_parameter("n", 2.0, 4.0, kind=INTEGER)]).space()
     found = coverage(space, np.array([[2.0], [4.0], [4.0]]), none([0] * 3), bins=50)
     (n,) = found.parameters
     assert n.integer
@@ -112,7 +113,7 @@ def test_as_counted_one_by_one(build, make_parameter, cells, data):
     space = build(
         make_parameter(f"p{k}", 0.0, 1.0)
         if real
-        else make_parameter(f"p{k}", 1.0, float(size), kind="integer")
+        else make_parameter(f"p{k}", 1.0, float(size), kind=INTEGER)
         for k, (real, size) in enumerate(zip(floats, sizes, strict=True))
     ).space()
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
@@ -167,7 +168,7 @@ def test_a_pair_by_hand(build, make_parameter):
 
 
 def test_a_grid_that_is_too_large_is_only_summed(build, make_parameter, monkeypatch):
-    names = [make_parameter("n", 1.0, 4.0, kind="integer"), make_parameter("a")]
+    names = [make_parameter("n", 1.0, 4.0, kind=INTEGER), make_parameter("a")]
     space = build(names).space()
     X = space.decode(np.random.default_rng(0).random((9, 2)))
     whole = coverage_map(space, X, none(X))

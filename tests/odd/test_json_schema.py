@@ -22,6 +22,7 @@ OTHERS = [
     ROOT / "tests/campaign/t-turn.yaml",
     ROOT / "tests/report/all_layers.yaml",
     ROOT / "tests/ontology/everything.yaml",
+    ROOT / "docs/examples/braking-manner.yaml",
     ROOT / "docs/examples/oil-spill.yaml",
     ROOT / "src/bridgegen/odd/starter.yaml",
 ]

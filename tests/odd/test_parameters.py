@@ -5,16 +5,8 @@ import pytest
 
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import (
-    TOLERANCE,
-    UNITS,
-    Axis,
-    Bound,
-    Derived,
-    Parameter,
-    read_axes,
-    slack,
-)
+from bridgegen.odd.kinds import INTEGER, TOLERANCE, slack
+from bridgegen.odd.parameters import UNITS, Axis, Bound, Derived, Parameter, read_axes
 
 GOOD = {
     "name": "speed",
@@ -34,7 +26,7 @@ BAD = {
     "high of speed [m/s] must be finite, got inf": {"high": math.inf},
     "default of speed [m/s] must be finite, got -inf": {"default": -math.inf},
     "unknown unit 'mph' of speed; known: " + ", ".join(UNITS): {"unit": "mph"},
-    "default of speed [m/s] must be a whole number, got 2.5": {"default": 2.5, "kind": "integer"},
+    "default of speed [m/s] must be a whole number, got 2.5": {"default": 2.5, "kind": INTEGER},
     "a name is lower case letters, digits and '_', 64 at most, got 'Speed'": {"name": "Speed"},
     "'sqrt' has a meaning in formulas and cannot name a parameter": {"name": "sqrt"},
     "'if' has a meaning in formulas and cannot name a parameter": {"name": "if"},
@@ -116,7 +108,7 @@ def test_shares_of_an_interval_by_hand():
 
 def test_whole_numbers_in_a_range_by_hand():
     """Of 1 to 4, 1.2 to 3.9 holds 2 and 3: the second and the third quarter."""
-    one = Parameter("n", Axis.EXTENSION, "1", 0, 9, 0, "integer")
+    one = Parameter("n", Axis.EXTENSION, "1", 0, 9, 0, INTEGER)
     assert one.shares(1.2, 3.9, 1.0, 4.0) == (0.25, 0.75)
     assert one.ends(1.2, 3.9) == (2.0, 3.0)
     assert one.ends(2.0, 2.0) == (2.0, 2.0)

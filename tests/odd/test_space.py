@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from bridgegen.errors import ScenarioError, UnknownNameError
-from bridgegen.odd.parameters import TOLERANCE, Axis
+from bridgegen.odd.kinds import FLOAT, INTEGER, TOLERANCE
+from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 from bridgegen.odd.space import probes
 
@@ -46,7 +47,7 @@ def chains(draw):
     count = draw(st.integers(2, 6))
     lows = draw(st.lists(st.integers(-50, 50), min_size=count, max_size=count))
     widths = draw(st.lists(st.integers(1, 40), min_size=count, max_size=count))
-    kinds = draw(st.lists(st.sampled_from(["float", "integer"]), min_size=count, max_size=count))
+    kinds = draw(st.lists(st.sampled_from([FLOAT, INTEGER]), min_size=count, max_size=count))
     bounds = []
     for number in range(1, count):
         before = draw(st.integers(0, number - 1))
@@ -113,7 +114,7 @@ def test_encode_stays_in_the_cube_for_values_within_the_tolerance():
 
 
 def test_rounding_takes_no_whole_number_away(build, make_parameter):
-    parameters = [make_parameter("a", 0.2, 0.2), make_parameter("n", kind="integer")]
+    parameters = [make_parameter("a", 0.2, 0.2), make_parameter("n", kind=INTEGER)]
     assert (0.1 + 0.2) * 10 > 3  # in floating point
     space = build(parameters, [("n", "(0.1 + a)*10", "(0.1 + a)*10")]).space()
     assert space.decode([[0.5]])[0].tolist() == [0.2, 3.0]
@@ -157,7 +158,7 @@ def test_ends_of_the_cube_are_ends_of_the_interval(build, make_parameter):
         [
             make_parameter("a", 0, 4),
             make_parameter("b", 1, 9),
-            make_parameter("n", 0, 9, kind="integer"),
+            make_parameter("n", 0, 9, kind=INTEGER),
         ],
         [("b", "a", "2*a + 1"), ("n", "a/2 + 0.1", "a + 3.5")],
     )
@@ -231,7 +232,7 @@ def test_limits_that_cross_within_the_tolerance_meet_inside_the_range(build, mak
     ],
 )
 def test_empty_interval_is_refused_at_build(build, make_parameter, bound, message):
-    parameters = [make_parameter("a"), make_parameter("b"), make_parameter("n", kind="integer")]
+    parameters = [make_parameter("a"), make_parameter("b"), make_parameter("n", kind=INTEGER)]
     with pytest.raises(ScenarioError, match=message):
         build(parameters, [bound]).space()
 

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from bridgegen.odd.kinds import FLOAT, INTEGER
 from bridgegen.odd.parameters import Axis, Parameter
 from bridgegen.odd.reader import load
 from bridgegen.odd.within import _narrowed, draw_within, in_box
@@ -120,7 +121,7 @@ def test_what_no_row_can_be_in_stays_empty():
 
 @given(st.integers(-5, 5), st.integers(0, 4), st.floats(-6, 6), st.floats(0, 6), st.booleans())
 def test_shares_are_those_whose_values_lie_in_the_range(lo, width, low, more, whole):
-    one = Parameter("p", Axis.EXTENSION, "1", -5, 9, 0, "integer" if whole else "float")
+    one = Parameter("p", Axis.EXTENSION, "1", -5, 9, 0, INTEGER if whole else FLOAT)
     first, last = one.shares(low, low + more, float(lo), float(lo + width))
     share = np.linspace(0.0, 1.0, 1001)
     value = one.at(share, float(lo), float(lo + width))

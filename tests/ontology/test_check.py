@@ -11,7 +11,8 @@ import pytest
 import rdflib
 
 from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import TOLERANCE, Axis, Bound, Derived, Parameter, slack
+from bridgegen.odd.kinds import FLOAT, TOLERANCE, slack
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.reader import load, names
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import from_bytes, to_bytes
@@ -108,7 +109,7 @@ def planted(scenario, values):
     space = scenario.space(axes=["static", "participants", "weather"])
     for name, parameter in scenario.parameters.items():
         for limit, step in ((parameter.low, -1.0), (parameter.high, 1.0)):
-            value = limit + step * (3 * float(slack(limit)) if parameter.kind == "float" else 1.0)
+            value = limit + step * (3 * float(slack(limit)) if parameter.kind == FLOAT else 1.0)
             if value != 0.0 or name != "lanes_per_direction":  # no lane, no place to start at
                 yield name, value, f"{parameter.low:g} <= {name} <= {parameter.high:g}"
     for bound in scenario.bounds:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import TOLERANCE
+from bridgegen.odd.kinds import TOLERANCE
 from bridgegen.ontology.sparql import binds, literal, variable
 
 XSD_DOUBLE = "http://www.w3.org/2001/XMLSchema#double"

@@ -2,6 +2,7 @@ import numpy as np
 import pyoxigraph as ox
 import pytest
 
+from bridgegen.odd.kinds import INTEGER
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.ontology.files import from_bytes, load, save, to_bytes
@@ -42,7 +43,7 @@ def region(**edges):
 
 
 def stated(*regions):
-    carried = carriers(individuals(row(0)), SPACE.values(row(0)))
+    carried = carriers(individuals(row(0)), SPACE.values(row(0)), SPACE.parameters)
     numbered = dict(enumerate(regions, start=1))
     return classes(numbered, SPACE, carried, driver="route-follower", origin="a test")
 
@@ -130,7 +131,7 @@ def test_every_parameter_is_carried_and_its_edges_count_as_inside(name):
     x = row(1)
     value = SPACE.values(x)[name]
     outer = SPACE.parameters[name]
-    whole_numbers = outer.kind == "integer"
+    whole_numbers = outer.kind == INTEGER
     beyond = value + 1 if whole_numbers else np.nextafter(value, np.inf)
     below = value - 1 if whole_numbers else np.nextafter(value, -np.inf)
     them = individuals(x)
@@ -200,7 +201,7 @@ def test_regions_of_two_runs_have_names_of_their_own():
 
 
 def test_what_no_individual_carries_cannot_be_stated():
-    carried = carriers(individuals(row(0)), SPACE.values(row(0)))
+    carried = carriers(individuals(row(0)), SPACE.values(row(0)), SPACE.parameters)
     assert set(SPACE.variables) <= set(carried)
     del carried["fog_density"]
     assert not statable(region(**EDGES), SPACE, carried)

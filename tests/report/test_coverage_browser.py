@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bridgegen.odd.coverage import CoverageMap, coverage_map
+from bridgegen.odd.kinds import INTEGER
 from bridgegen.odd.reader import load
 from bridgegen.report.page import write_report
 
@@ -205,7 +206,7 @@ def test_a_phone_scrolls_only_downwards(show, report, scheme):
 
 def test_whole_numbers_many_bins_and_a_pair_too_large(show, report):
     space = load("crossroads-s4").space(["static", "participants", "weather"])
-    assert any(space.parameters[name].kind == "integer" for name in space.variables)
+    assert any(space.parameters[name].kind == INTEGER for name in space.variables)
     X = space.decode(np.random.default_rng(0).random((300, space.n_var)))
     found = coverage_map(space, X, X[:, 0] > 1e9, bins=20, strength=1, sample=1000)
     pair = replace(found.pairs[0], evaluated=None, critical=None, feasible=None)

@@ -58,7 +58,7 @@ def run_search(
     ideal: Iterable[str] = (),
     time_limit: float | None = None,
     axes: Iterable[str] | None = None,
-    fixed: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float | str] | None = None,
     road_map: Path | str | None = None,
     junction: str | None = None,
     keep: int = 10,
@@ -186,7 +186,7 @@ def run_search(
             ideal=tuple(sorted(pipeline.driver.ideal)),
             time_limit=time_limit,
             axes=tuple(str(axis) for axis in space.axes),
-            fixed=dict(fixed or {}),
+            fixed=space.fixed,
             map=str(roads.path.resolve()) if roads else None,
             map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
             junction=roads.site.junction_id if roads else None,
@@ -210,7 +210,7 @@ def run_search(
         searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
         with Store.create(
             folder, made_with.to_dict(), space.names, pipeline.metrics,
-            n_var=space.n_var, n_obj=chosen.n_obj,
+            n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
         ) as store:  # fmt: skip
             return _go(pipeline, searcher, store, made_with, watch, deliver)
 

@@ -427,7 +427,6 @@ def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Pat
     write_scenario(
         pipeline, X[0], folder, minimal.name, rollout=rollout, noise=noise, found=conflict
     )
-    units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
     facts = {
         "name": minimal.name,
         "scenario": pipeline.scenario.name,
@@ -440,7 +439,7 @@ def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Pat
         "noise_key": minimal.noise_key,
         "robustness": minimal.robustness,
         "conflict": None if conflict is None else conflict.to_dict(),
-        "parameters": _named(pipeline.facts(X[0]), units),
+        "parameters": _parameters(pipeline, X[0]),
         "metrics": _named(
             dict(zip(pipeline.metrics, metrics[0].tolist(), strict=True)),
             {name: QUANTITIES[name].unit for name in pipeline.metrics},
@@ -456,7 +455,6 @@ def _json(facts: Mapping[str, object]) -> str:
 
 def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, object]:
     """Return one scenario's parameters and metrics; what is infinite or NaN is None."""
-    units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
     return {
         "name": name,
         "evaluation": int(rows.id[i]),
@@ -464,13 +462,23 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, objec
         "ego": pipeline.driver.label,
         "critical": bool(rows.critical[i]),
         "implausible": rows.findings.implausible[i] or None,
-        "parameters": _named(pipeline.facts(rows.X[i]), units),
+        "parameters": _parameters(pipeline, rows.X[i]),
         "metrics": _named(
             dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),
             {name: QUANTITIES[name].unit for name in pipeline.metrics},
         ),
         "F": rows.F[i].tolist(),
     }
+
+
+def _parameters(pipeline: Pipeline, x: Float) -> dict[str, dict[str, float | str | None]]:
+    """Return the parameters of a row as people read them."""
+    units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
+    said = _named(pipeline.facts(x), units)
+    for name in said.keys() & pipeline.space.parameters.keys():
+        kind = pipeline.space.parameters[name].kind
+        said[name]["value"] = kind.written(float(x[pipeline.space.index(name)]))
+    return said
 
 
 def _named(

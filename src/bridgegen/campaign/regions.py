@@ -145,7 +145,9 @@ def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Re
     # Any row would do; in this one no two parameters have the same value.
     x = space.decode(np.random.default_rng(0).random((1, space.n_var)))[0]
     individuals = pipeline.concrete(x).individuals if found.confirmed else None
-    carried = {} if individuals is None else carriers(individuals, space.values(x))
+    carried = (
+        {} if individuals is None else carriers(individuals, space.values(x), space.parameters)
+    )
     stated = {
         number: one
         for number, one in enumerate(found.confirmed, start=1)

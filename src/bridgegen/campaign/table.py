@@ -112,7 +112,9 @@ def _schema(store: Store, said: dict[str, Any], settings: Settings, sample: floa
     columns, text = store.columns, pa.dictionary(pa.int32(), pa.string())
     fields = [(name, pa.int64() if isinstance(one, int) else text) for name, one in said.items()]
     fields += [("id", pa.int64()), ("batch", pa.int64()), ("seconds", pa.float64())]
-    fields += [(name, pa.float64()) for name in (*columns.X, *columns.metrics, *columns.F)]
+    named = {name for name, one in _labels(store) if "words" in one}
+    fields += [(name, text if name in named else pa.float64()) for name in columns.X]
+    fields += [(name, pa.float64()) for name in (*columns.metrics, *columns.F)]
     fields += [("status", pa.int16()), ("critical", pa.bool_())]
     fields += [*((name, text) for name in ("cause", *COLUMNS)), (WEIGHT, pa.float64())]
     made = {"settings": settings.to_dict(), "version": store.version, "sample": sample}
@@ -123,6 +125,23 @@ def _schema(store: Store, said: dict[str, Any], settings: Settings, sample: floa
             f"{', '.join(sorted(own))}"
         )
     return pa.schema(fields, metadata={"bridgegen": json.dumps(made)})
+
+
+def _labels(store: Store) -> list[tuple[str, dict[str, Any]]]:
+    """Return the columns of the parameters that are no plain numbers, and how they are read."""
+    columns = dict(zip(store.parameters, store.columns.X, strict=True))
+    return [(columns[name], one) for name, one in store.labels.items()]
+
+
+def _worded(store: Store, name: str, values: Float, words: Sequence[str]) -> list[str]:
+    """Return the names of the values of a category.
+
+    Raises:
+        StorageError: a row holds the number of none.
+    """
+    if len(values) and not (values.min() >= 0.0 and values.max() <= len(words) - 1):
+        raise StorageError(f"{store.folder}: {name} must be one of {', '.join(words)} in every row")
+    return [words[round(value)] for value in values.tolist()]
 
 
 def _kept(rows: Rows, sample: float) -> tuple[Int, Float]:
@@ -146,6 +165,11 @@ def _columns(store: Store, said: dict[str, Any], rows: Rows, weight: Float) -> d
     for names, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
                           (columns.F, rows.F)):  # fmt: skip
         found |= dict(zip(names, values.T, strict=True))
+    for name, one in _labels(store):
+        if words := one.get("words"):
+            found[name] = _worded(store, name, found[name], words)
+        elif turn := one.get("turn"):
+            found[name] = np.where(found[name] > turn, found[name] - 360.0, found[name])
     found |= {"status": rows.status.astype(np.int16), "critical": rows.critical}
     labels = {int(one): Cause(one).label or None for one in np.unique(rows.cause)}
     found["cause"] = [labels[one] for one in rows.cause.tolist()]

@@ -175,10 +175,27 @@ def read_names(text: str | None) -> list[str]:
     return [name.strip() for name in text.split(",")] if text else []
 
 
-def read_numbers(pairs: list[str] | None, option: str = "--fix") -> dict[str, float]:
+def read_values(pairs: list[str] | None, option: str = "--fix") -> dict[str, float | str]:
+    """Read ``name=value`` pairs: numbers, or names of categories' values."""
+    values: dict[str, float | str] = {}
+    problems = []
+    for pair in pairs or ():
+        name, equals, text = pair.partition("=")
+        try:
+            values[name] = float(text)
+        except ValueError:
+            values[name] = text
+        if not equals or not text:
+            problems.append(f"{option} must read NAME=VALUE, got '{pair}'")
+    if problems:
+        raise InputError(*problems)
+    return values
+
+
+def read_numbers(pairs: list[str], option: str) -> dict[str, float]:
     """Read ``name=number`` pairs."""
     values, problems = {}, []
-    for pair in pairs or ():
+    for pair in pairs:
         name, equals, text = pair.partition("=")
         try:
             values[name] = float(text)

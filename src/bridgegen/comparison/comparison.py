@@ -52,7 +52,7 @@ def compare(
     ideal: Iterable[str] = (),
     time_limit: float | None = None,
     axes: Iterable[str] | None = None,
-    fixed: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float | str] | None = None,
     road_map: Path | str | None = None,
     junction: str | None = None,
     objective: Mapping[str, float | None] | None = None,

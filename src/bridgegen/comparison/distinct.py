@@ -16,24 +16,27 @@ _CHUNK = 256
 
 
 def normalised(space: SearchSpace, X: Float) -> Float:
-    """Return the searched parameters as shares of their declared ranges.
+    """Return points whose distances are those of the searched parameters.
+
+    A parameter is the share of its declared range, or what its kind makes of it.
 
     Args:
         space: what was searched.
         X: ``(N, len(space.names))``.
 
     Returns:
-        ``(N, space.n_var)`` float64 in [0, 1], but for rounding.
+        ``(N, k)`` float64, k at least ``space.n_var``; no parameter differs by more than 1.
     """
-    chosen = [space.parameters[name] for name in space.variables]
-    low = np.array([one.low for one in chosen])
-    span = np.array([one.high for one in chosen]) - low
-    columns = [space.index(name) for name in space.variables]
-    shares: Float = (X[:, columns] - low) / span
-    return shares
+    parts = [np.empty((len(X), 0))]
+    for name in space.variables:
+        one = space.parameters[name]
+        parts.append(one.kind.coordinates(X[:, space.index(name)], one.low, one.high))
+    return np.concatenate(parts, axis=1)
 
 
-def distinct(points: Float, apart: float = APART, limit: int = LIMIT) -> Bool:
+def distinct(
+    points: Float, apart: float = APART, limit: int = LIMIT, n_var: int | None = None
+) -> Bool:
     """Return which points are new: at least ``apart`` from every new one before them.
 
     A greedy net, in the order of the points. What is new are points that lie apart from one
@@ -42,9 +45,10 @@ def distinct(points: Float, apart: float = APART, limit: int = LIMIT) -> Bool:
     that fills the space evenly would be one cluster, and count as having found one scenario.
 
     Args:
-        points: ``(N, d)`` float64, shares of the parameters' ranges.
-        apart: the root mean square of the d differences.
+        points: ``(N, d)`` float64, as `normalised` returns them.
+        apart: the root mean square of the parameters' differences.
         limit: that many new ones at most.
+        n_var: number of parameters; d by default.
 
     Returns:
         ``(N,)`` bool; after the limit has been reached, False.
@@ -55,7 +59,7 @@ def distinct(points: Float, apart: float = APART, limit: int = LIMIT) -> Bool:
     if not points.size:
         new[: min(len(points), 1)] = True
         return new
-    least = apart * np.sqrt(points.shape[1])
+    least = apart * np.sqrt(n_var or points.shape[1])
     centres = np.empty((min(len(points), limit), points.shape[1]))
     count = 0
     for start in range(0, len(points), _CHUNK):

@@ -280,7 +280,7 @@ def _as_words(options: Mapping[str, Any]) -> list[str]:
         if value is None or value is False or value in ({}, [], ()):
             continue
         if name == "fixed":
-            words += [word for key, one in value.items() for word in ("--fix", f"{key}={one!r}")]
+            words += [word for key, one in value.items() for word in ("--fix", f"{key}={one}")]
         elif name == "objective":
             terms = (key if one is None else f"{key}={one!r}" for key, one in value.items())
             words += ["--objective", ",".join(terms)]

@@ -126,7 +126,7 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
         reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
         seconds=seconds,
         seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
-        distinct=int(distinct(normalised(space, critical), apart).sum()),
+        distinct=int(distinct(normalised(space, critical), apart, n_var=space.n_var).sum()),
         modes=len(reader.modes),
         critical_bins=bins[0].critical,
         critical_pairs=bins[1].critical if len(bins) > 1 else 0,

@@ -119,6 +119,4 @@ class BinnedRows:
 
 def _edges(space: SearchSpace, name: str, bins: int) -> Float:
     one = space.parameters[name]
-    if one.kind == "integer":
-        return np.arange(one.low, one.high + 2.0) - 0.5
-    return np.linspace(one.low, one.high, bins + 1)
+    return one.kind.edges(one.low, one.high, bins)

@@ -10,7 +10,8 @@ from bridgegen.arrays import Float
 from bridgegen.errors import ScenarioError
 from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, slack
+from bridgegen.odd.kinds import slack
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest
 from bridgegen.odd.plain_yaml import Document
 from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import cap, speeds_of
@@ -72,7 +73,7 @@ def use_problems(
                 f"{name} belongs to the axis weather in {unit}, "
                 f"got {found.axis} in {found.unit}{at(found.place)}"
             )
-        elif isinstance(found, Parameter) and found.kind == "integer":
+        elif isinstance(found, Parameter) and found.kind.apart:
             problems.append(f"{name} [{unit}] must be of kind float{at(found.place)}")
     needed = set(NEEDED)
     rules: list[Bound | Derived] = [*bounds]

@@ -62,6 +62,11 @@ def problems_of(
                 f"the bound '{bound}' limits '{bound.target}', which follows from "
                 f"'{target}': limit what it follows from{at(bound.place)}"
             )
+        elif isinstance(target, Parameter) and target.kind.names:
+            problems.append(
+                f"the bound '{bound}' limits '{bound.target}', a category: its values have no "
+                f"order{at(bound.place)}"
+            )
     rules: list[Bound | Derived] = [*bounds, *derived]
     for rule in rules:
         problems += [

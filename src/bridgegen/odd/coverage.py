@@ -8,9 +8,11 @@ space says which are feasible. A combination that is possible but rare may be mi
 number of feasible ones is a lower bound.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from math import prod
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +40,8 @@ class ParameterBins:
         unit: its unit.
         axis: where it belongs.
         integer: whether each bin is one whole number, at its centre.
+        labels: how its values are read, `bridgegen.odd.kinds.Kind.labels`.
+        span: its declared range in words.
         edges: ``(n + 1,)`` float64 in the unit, ascending; a value on an inner edge belongs to
             the upper bin.
         evaluated: ``(n,)`` int64, rows in each bin.
@@ -49,6 +53,8 @@ class ParameterBins:
     unit: str
     axis: str
     integer: bool
+    labels: Mapping[str, Any]
+    span: str
     edges: Float
     evaluated: Int
     critical: Int
@@ -214,7 +220,9 @@ def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
                 name,
                 one.unit,
                 str(one.axis),
-                one.kind == "integer",
+                one.kind.apart,
+                one.kind.labels(),
+                one.kind.span_text(one.low, one.high, "{:g}".format, f" {one.unit}"),
                 rows.edges[number],
                 evaluated=evaluated,
                 critical=critical,

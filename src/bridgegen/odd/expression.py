@@ -14,6 +14,9 @@ normalises everything else away):
 ``Call``               a function of ``FUNCTIONS`` by name, positional arguments only
 =====================  ==========================================================================
 
+A name may also be a category; it is compared by ``==`` or ``!=`` with one of its values, which
+stands for its number (`bridgegen.odd.kinds.Category`): ``surface == wet``.
+
 A formula is a number or a truth value. A number stands for a truth value as in Python (not 0 is
 true); a truth value never stands for a number, except as the whole formula: 1 or 0.
 ``%`` has the sign of the divisor. ``round`` takes halves up, as SPARQL and XPath do.
@@ -26,6 +29,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -36,6 +40,7 @@ from bridgegen.errors import InputError
 MAX_LENGTH = 1000
 MAX_DEPTH = 32
 
+Categories = Mapping[str, Sequence[str]]
 _Program = Callable[[Mapping[str, Any]], Any]
 
 # NumPy may take different code for whole SIMD registers and for the rest, for strided arrays, and
@@ -119,12 +124,16 @@ class Expression:
         source: the text, white space normalised.
         names: the parameters that occur in it.
         tree: its normalised syntax tree, of the nodes listed above.
+        categories: its parameters that are categories, each with the names of its values.
     """
 
     source: str
     names: frozenset[str] = field(compare=False, repr=False)
     tree: ast.expr = field(compare=False, repr=False)
     _program: _Program = field(compare=False, repr=False)
+    categories: tuple[tuple[str, tuple[str, ...]], ...] = field(
+        default=(), repr=False, kw_only=True
+    )
 
     def evaluate(self, columns: Mapping[str, Float | float]) -> Float:
         """Return the formula's value for each row.
@@ -152,7 +161,7 @@ class Expression:
         return self.source
 
     def __reduce__(self) -> tuple[Callable[..., "Expression"], tuple[Any, ...]]:
-        return parse, (self.source,)
+        return parse, (self.source, "", dict(self.categories))
 
 
 @dataclass(frozen=True)
@@ -187,12 +196,13 @@ def lookup(index: str, values: Sequence[float]) -> Lookup:
     return Lookup(source, frozenset({index}), tree, take, tuple(table.tolist()))
 
 
-def parse(text: str, place: str = "") -> Expression:
+def parse(text: str, place: str = "", categories: Categories = MappingProxyType({})) -> Expression:
     """Read a formula.
 
     Args:
         text: such as ``"50 if fog_density > 80 else 100 - 0.5*fog_density"``.
         place: file and line, for the message.
+        categories: the names of the values of each parameter that is a category.
 
     Raises:
         InputError: not a formula, or one that holds what formulas may not.
@@ -208,11 +218,12 @@ def parse(text: str, place: str = "") -> Expression:
         unknown = _CHARACTERS.sub("", source)
         if unknown:
             raise _RefusedError(f"{unknown[0]!r} is no part of a formula")
-        tree, _ = _normalise(_syntax(source))
+        tree, _ = _normalise(_numbered(_syntax(source), categories))
     except _RefusedError as error:
         raise InputError(f"cannot read the formula '{shown}': {error}{where}") from None
     names = frozenset(node.id for node in _nodes(tree) if isinstance(node, ast.Name))
-    return Expression(source, names, tree, _compile(tree))
+    own = tuple((name, tuple(categories[name])) for name in sorted(names & categories.keys()))
+    return Expression(source, names, tree, _compile(tree), categories=own)
 
 
 class _RefusedError(Exception):
@@ -233,6 +244,49 @@ def _syntax(source: str) -> ast.expr:
         if not level:
             return tree
     raise _RefusedError(f"a formula may nest {MAX_DEPTH} deep")
+
+
+def _numbered(tree: ast.expr, categories: Categories) -> ast.expr:
+    """Return a formula in which the values of categories are their numbers."""
+    if not categories:
+        return tree
+    found = _Numbers(categories).visit(tree)
+    assert isinstance(found, ast.expr)
+    return found
+
+
+class _Numbers(ast.NodeTransformer):
+    """Puts the number of a category's value in place of its name."""
+
+    def __init__(self, categories: Categories) -> None:
+        self._categories = categories
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        sides = [node.left, *node.comparators]
+        of = [one.id for one in sides if isinstance(one, ast.Name) and one.id in self._categories]
+        if len(sides) != 2 or not of:
+            return self.generic_visit(node)
+        name, values = of[0], self._categories[of[0]]
+        category, value = (
+            sides
+            if isinstance(sides[0], ast.Name) and sides[0].id == name
+            else (sides[1], sides[0])
+        )
+        if not isinstance(node.ops[0], ast.Eq | ast.NotEq):
+            raise _RefusedError(f"the values of '{name}' have no order: compare it by == or !=")
+        if not isinstance(value, ast.Name) or value.id not in values:
+            raise _RefusedError(
+                f"'{name}' is one of {', '.join(values)}, got '{ast.unparse(value)}'"
+            )
+        return ast.Compare(category, node.ops, [ast.Constant(float(values.index(value.id)))])
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if node.id in self._categories:
+            first = self._categories[node.id][0]
+            raise _RefusedError(
+                f"'{node.id}' is a category and no number: compare it, {node.id} == {first}"
+            )
+        return node
 
 
 def _nodes(tree: ast.expr) -> list[ast.AST]:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
+from bridgegen.odd.kinds import FLOAT, KINDS
 from bridgegen.odd.parameters import UNITS
 from bridgegen.odd.reader import names
 from bridgegen.odd.roads import KNOBS, Template
@@ -101,10 +102,12 @@ def _between_keys(sections: dict[str, Any]) -> None:
     """Add what holds between the keys of a section, as far as a schema can say it."""
     for name in ("ParameterSection", "DerivedSection"):
         unit = sections[name]["properties"]["unit"]
+        unit.pop("anyOf", None)
         unit |= {
             "enum": list(UNITS),
             "description": ", ".join(f"{u} {w}" for u, w in UNITS.items()),
         }
+    sections["ParameterSection"]["allOf"] = [_of_kind(kind) for kind in KINDS]
     for one in sections.values():
         if "parameters" in one["properties"]:
             for key in ("parameters", "derived"):
@@ -142,6 +145,14 @@ def _between_keys(sections: dict[str, Any]) -> None:
     )
     condition["anyOf"] = [{"required": ["kind"]}, {"required": ["all"]}]
     condition["allOf"] = [_condition(kind) for kind in CONDITIONS]
+
+
+def _of_kind(kind: str) -> dict[str, Any]:
+    """Return what a kind of parameter needs, and what it does not have."""
+    is_it = {"properties": {"kind": {"const": kind}}, "required": ["kind"]}
+    if kind == FLOAT.name:
+        is_it = {"properties": {"kind": {"const": kind}}}
+    return {"if": is_it, "then": KINDS[kind].schema()}
 
 
 def _if_there(key: str, then: Mapping[str, Any]) -> dict[str, Any]:

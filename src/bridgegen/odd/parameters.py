@@ -7,18 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from enum import StrEnum
-from typing import Literal
-
-import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.expression import RESERVED, Expression
-
-# Every check of a bound or a derived value allows TOLERANCE·(1 + |limit|): values that passed
-# through a file rounded to four decimals still keep their bounds, and no physical quantity here
-# is known better. One constant, so that the decoder and the SHACL shapes cannot disagree.
-TOLERANCE = 1e-4
+from bridgegen.odd.kinds import FLOAT, Kind
 
 UNITS = {
     "m": "length",
@@ -62,11 +55,6 @@ def read_axes(axes: Iterable[str]) -> tuple[Axis, ...]:
     return tuple(axis for axis in Axis if axis in names)
 
 
-def slack(limit: Float | float) -> Float:
-    """Return by how much a value may miss ``limit`` and still keep it."""
-    return np.asarray(TOLERANCE * (1.0 + np.abs(limit)))
-
-
 @dataclass(frozen=True)
 class Parameter:
     """One quantity that may vary.
@@ -78,7 +66,7 @@ class Parameter:
         low: smallest value.
         high: largest value.
         default: value while its axis is not searched.
-        kind: whether it takes whole numbers only.
+        kind: what values it takes; low, high and default are its inner values.
         description: what it is, for people.
         source: where its range comes from.
         place: file and line that declare it, for messages.
@@ -93,7 +81,7 @@ class Parameter:
     low: float
     high: float
     default: float
-    kind: Literal["float", "integer"] = "float"
+    kind: Kind = FLOAT
     description: str = ""
     source: str = ""
     place: str = field(default="", compare=False, repr=False)
@@ -105,21 +93,12 @@ class Parameter:
         unusable = [key for key, value in values.items() if not math.isfinite(value)]
         problems += [f"{key} of {label} must be finite, got {values[key]}" for key in unusable]
         if not unusable:
-            if self.low > self.high:
-                problems.append(
-                    f"low <= high must hold for {label}, got low={self.low}, high={self.high}"
-                )
-            elif not self.low <= self.default <= self.high:
-                problems.append(
-                    f"low <= default <= high must hold for {label}, "
-                    f"got low={self.low}, default={self.default}, high={self.high}"
-                )
-            if self.kind == "integer":
-                problems += [
-                    f"{key} of {label} must be a whole number, got {value}"
-                    for key, value in values.items()
-                    if value != math.floor(value)
-                ]
+            for key, value in zip(values, self.kind.inner(*values.values()), strict=True):
+                object.__setattr__(self, key, value)
+            problems += self.kind.problems(label, self.low, self.high, self.default)
+        if self.kind.units and self.unit not in self.kind.units:
+            units = ", ".join(self.kind.units)
+            problems.append(f"{label} of kind {self.kind.name} must have the unit {units}")
         _refuse(problems, self.place)
 
     def at(self, share: Float, lo: Float | float, hi: Float | float) -> Float:
@@ -130,19 +109,11 @@ class Parameter:
             lo: smallest value, one or ``(N,)``.
             hi: largest value, likewise.
         """
-        if self.kind == "integer":
-            value = np.floor(lo + share * (hi - lo + 1.0))
-        else:
-            value = np.add(lo, share * (hi - lo))
-        return np.minimum(np.maximum(value, lo), hi)  # rounding may leave the interval by a bit
+        return self.kind.at(share, lo, hi)
 
     def share(self, value: Float, lo: Float | float, hi: Float | float) -> Float:
         """Return the shares at which values are, ``(N,)``; 0.5 where any would do."""
-        below, width = value - lo, np.broadcast_to(hi - lo, len(value))
-        if self.kind == "integer":
-            below, width = below + 0.5, width + 1.0
-        share = np.divide(below, width, out=np.full(len(value), 0.5), where=width > 0.0)
-        return np.asarray(np.clip(share, 0.0, 1.0))
+        return self.kind.share(value, lo, hi)
 
     def shares(
         self, low: float, high: float, lo: Float | float, hi: Float | float
@@ -159,27 +130,32 @@ class Parameter:
             The first and the last share, one or ``(N,)`` each, in [0, 1]; the last is at most the
             first where no value, or but one of infinitely many, lies in the range.
         """
-        more = 0.0
-        if self.kind == "integer":
-            low, high, more = math.ceil(low), math.floor(high), 1.0
-        below, above = np.asarray(low - lo), np.asarray(high - lo + more)
-        width = np.asarray(hi - lo + more)
-        safe = np.where(width > 0.0, width, 1.0)
-        first = np.where(width > 0.0, below / safe, np.where(below <= 0.0, 0.0, 1.0))
-        last = np.where(width > 0.0, above / safe, np.where(above >= 0.0, 1.0, 0.0))
-        return np.clip(first, 0.0, 1.0), np.clip(last, 0.0, 1.0)
+        return self.kind.shares(low, high, lo, hi)
 
     def ends(self, low: float, high: float) -> tuple[float, float] | None:
         """Return its lowest and its highest value in a range; None where it may take any there.
 
         The range holds a value of it at least.
         """
-        if self.kind == "integer":
-            return float(math.ceil(low)), float(math.floor(high))
-        return None
+        return self.kind.ends(low, high)
+
+    def read(self, given: float | str) -> float:
+        """Return the inner value of what a user gives (`bridgegen.odd.kinds`).
+
+        Raises:
+            ScenarioError: it is not of this kind; it may be outside the range.
+        """
+        value = self.kind.read(given, self.low, self.high)
+        if value is None:
+            raise ScenarioError(f"{self.name} must be {self.kind.expected()}, got {given!r}")
+        return value
 
     def _naming_problems(self) -> list[str]:
-        return [*_name_problems(self.name), *_unit_problems(self.name, self.unit)]
+        return [
+            *_name_problems(self.name),
+            *_unit_problems(self.name, self.unit),
+            *self.kind.naming_problems(self.name),
+        ]
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,11 @@ class Quantities:
                 hint = nearest(value, [*self.parameters, *self.derived])
                 self.say(f"{label} names the unknown parameter '{value}'{hint}", path)
             return
-        if one.unit != unit:
+        if isinstance(one, Parameter) and one.kind.names:
+            self.say(
+                f"{label} needs a number, '{value}' is a category: derive a number from it", path
+            )
+        elif one.unit != unit:
             self.say(f"{label} needs a parameter in {unit}, '{value}' is in {one.unit}", path)
         elif isinstance(one, Parameter) and (one.low < low or (above and one.low == low)):
             self.say(f"{rule}, '{value}' goes down to {one.low:g}", path)

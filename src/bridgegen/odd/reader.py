@@ -1,17 +1,19 @@
 """From scenario files to logical scenarios, and every reason why a file is none, at once."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.odd.changes import TemporaryChanges, jam_members
 from bridgegen.odd.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.odd.constraints import problems_of
-from bridgegen.odd.expression import parse
+from bridgegen.odd.expression import Expression, parse
+from bridgegen.odd.kinds import KEYS, KINDS
 from bridgegen.odd.objectives import HARM, read_objective
 from bridgegen.odd.others import DRIVERS, SCRIPTED, driven
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, read_axes
@@ -171,6 +173,33 @@ class _Declarations:
                 except InputError as error:
                     self.problems += error.problems
 
+    def number_categories(self) -> None:
+        """Read the formulas in which categories are compared with their values."""
+        named = [one for one in self.parameters if one.kind.names]
+        categories = {one.name: one.kind.names for one in named}
+        self.problems += [
+            f"'{value}' is a value of the category {one.name}, and cannot name a parameter"
+            f"{at(one.place)}"
+            for one in named
+            for value in sorted(self.names.intersection(one.kind.names))
+        ]
+        bounds, self.bounds = self.bounds, []
+        for bound in bounds:
+            with self._noting():
+                lo, hi = (_numbered(side, bound, categories) for side in (bound.lo, bound.hi))
+                self.bounds.append(replace(bound, lo=lo, hi=hi))
+        derived, self.derived = self.derived, []
+        for one in derived:
+            with self._noting():
+                self.derived.append(replace(one, value=_numbered(one.value, one, categories)))
+
+    @contextmanager
+    def _noting(self) -> Iterator[None]:
+        try:
+            yield
+        except InputError as error:
+            self.problems += error.problems
+
     def set_defaults(self, document: Document) -> None:
         """Give included parameters the defaults that the scenario wants."""
         own = {name for name, _ in entries(document, "parameters")}
@@ -189,17 +218,37 @@ class _Declarations:
                     )
                 else:
                     self.problems.append(f"{name} is derived: it has no default{at(place)}")
-            elif isinstance(value, int | float) and not isinstance(value, bool):
+            elif isinstance(value, int | float | str) and not isinstance(value, bool):
+                one = self.parameters[at_[name]]
+                default = one.kind.read(value, one.low, one.high)
+                if default is None:
+                    expected = one.kind.expected()
+                    self.problems.append(
+                        f"defaults.{name} must be {expected}, got {value!r}{at(place)}"
+                    )
+                    continue
                 try:
-                    one = self.parameters[at_[name]]
-                    self.parameters[at_[name]] = replace(one, default=float(value), place=place)
+                    self.parameters[at_[name]] = replace(one, default=default, place=place)
                 except InputError as error:
                     self.problems += error.problems
 
     def _parameter(self, name: str, given: ParameterSection, place: str) -> None:
-        values = given.model_dump(exclude={"axis"})
-        name = self._prefix + name
-        self.parameters.append(Parameter(name, Axis(given.axis), **values, place=place))
+        if problems := _key_problems(name, given):
+            raise ScenarioError(*(problem + at(place) for problem in problems))
+        kind = KINDS[given.kind].declared(given.values or (), given.low, given.high)
+        low, high = kind.limits(given.low, given.high)
+        default = kind.read(given.default, low, high)
+        if default is None:
+            raise ScenarioError(
+                f"parameters.{name}.default must be {kind.expected()}, got {given.default!r}"
+                f"{at(place)}"
+            )
+        self.parameters.append(
+            Parameter(
+                self._prefix + name, Axis(given.axis), given.unit or "1", low, high, default,
+                kind, given.description, given.source, place,
+            )
+        )  # fmt: skip
 
     def _bound(self, _: str, given: BoundSection, place: str) -> None:
         lo, hi = (
@@ -217,6 +266,30 @@ class _Declarations:
                 given.why, given.source, given.description, place,
             )
         )  # fmt: skip
+
+
+Side = TypeVar("Side", Expression, Expression | None)
+
+
+def _numbered(
+    formula: Side, rule: Bound | Derived, categories: Mapping[str, Sequence[str]]
+) -> Side:
+    """Return a formula with the categories that it names, as they are now known."""
+    if formula is None or not formula.names & categories.keys():
+        return formula
+    return parse(formula.source, rule.place, categories)
+
+
+def _key_problems(name: str, given: ParameterSection) -> list[str]:
+    """Return which keys a parameter of its kind lacks, and which it cannot have."""
+    kind, found = KINDS[given.kind], []
+    for key in KEYS:
+        there = getattr(given, key) is not None
+        if key in kind.keys and not there:
+            found.append(f"parameters.{name} must have the key '{key}'")
+        elif there and key not in kind.keys:
+            found.append(f"parameters.{name} of kind {kind.name} has no key '{key}'")
+    return found
 
 
 def _read_fragment(name: str, folder: Path | None) -> Document:
@@ -239,6 +312,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     said.set_defaults(document)
     if not said.complete or not isinstance(document.data, dict):
         raise ScenarioError(*problems, *said.problems)  # the rest would only say what follows
+    said.number_categories()
     parameters = {one.name: one for one in said.parameters}
     derived = {one.name: one for one in said.derived}
     declared: dict[str, Parameter | Derived] = {**derived, **parameters}

@@ -292,10 +292,12 @@ def knob_problems(
                 yield name, f"{name} names the unknown parameter '{value}'{hint}"
         elif isinstance(one, Derived) or one.axis is not Axis.STATIC:
             yield name, f"{name} must be a number or a parameter of the static axis, got '{value}'"
+        elif one.kind.names:
+            yield name, f"{name} needs a number, '{value}' is a category"
         elif one.unit != knob.unit:
             yield name, f"{name} needs a parameter in {knob.unit}, '{value}' is in {one.unit}"
         elif one.low < knob.low or one.high > knob.high:
             yield name, f"{rule}, '{value}' goes from {one.low:g} to {one.high:g}"
-        elif (one.kind == "integer") != (knob.unit == "count"):
+        elif one.kind.apart != (knob.unit == "count"):
             kind = "integer" if knob.unit == "count" else "float"
             yield name, f"{name} needs a parameter of kind {kind}, '{value}' is none"

@@ -65,7 +65,8 @@ class ObjectiveSpec:
 class ParameterLine:
     """One line of a scenario's table of parameters; ranges are empty for a derived quantity.
 
-    ``bounds`` holds the bounds on a parameter, or the formula of a derived quantity, as text.
+    ``bounds`` holds the bounds on a parameter, or the formula of a derived quantity, as text;
+    ``range`` and ``standard`` are range and default as people read them.
     """
 
     name: str
@@ -76,6 +77,8 @@ class ParameterLine:
     default: float | None
     bounds: str
     description: str
+    range: str = "derived"
+    standard: str = ""
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,7 @@ class SearchedScenario:
         return ()
 
     def space(
-        self, axes: Iterable[str] | None = None, fixed: Mapping[str, float] | None = None
+        self, axes: Iterable[str] | None = None, fixed: Mapping[str, float | str] | None = None
     ) -> SearchSpace:
         """Return the space of some axes, the scenario's own by default.
 
@@ -147,6 +150,8 @@ class SearchedScenario:
                 p.name, p.axis, p.unit, p.low, p.high, p.default,
                 "; ".join(str(bound) for bound in self.bounds if bound.target == p.name),
                 p.description,
+                p.kind.span_text(p.low, p.high, "{:g}".format, f" {p.unit}"),
+                p.kind.text(p.default, "{:g}".format),
             )
             for p in self.parameters.values()
         ]  # fmt: skip

@@ -9,7 +9,17 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from bridgegen.odd.roads_schema import RoadsSection
-from bridgegen.odd.shape import AxisName, Formula, Number, OrWord, ShapedSection, Text, Word
+from bridgegen.odd.shape import (
+    AxisName,
+    Formula,
+    KindName,
+    Number,
+    NumberOrName,
+    OrWord,
+    ShapedSection,
+    Text,
+    Word,
+)
 from bridgegen.odd.story_schema import (
     EventSection,
     JamSection,
@@ -23,16 +33,18 @@ class ParameterSection(ShapedSection):
 
     axis: AxisName
     """The part of the search space that it belongs to."""
-    unit: Text
-    """SI; see the list of units."""
-    low: Number
+    kind: KindName = "float"
+    """What it takes: any number, whole ones, one of some names, or angles."""
+    unit: Text | None = None
+    """SI; see the list of units. A category has none."""
+    low: Number | None = None
     """The smallest value."""
-    high: Number
-    """The largest value."""
-    default: Number
+    high: Number | None = None
+    """The largest value; of an angle, that may be less than the smallest."""
+    values: Annotated[list[Text], Field(min_length=2)] | None = None
+    """The names of a category's values."""
+    default: NumberOrName
     """The value while its axis is not searched."""
-    kind: Literal["float", "integer"] = "float"
-    """Whether it takes any number, or whole ones."""
     description: Text
     """What it is."""
     source: Text
@@ -169,7 +181,7 @@ class ScenarioFile(ShapedSection):
     """Functions of yours that add to each scenario."""
     parameters: dict[str, ParameterSection] = {}
     """By name: what may vary."""
-    defaults: dict[str, Number] = {}
+    defaults: dict[str, NumberOrName] = {}
     """Of included parameters, otherwise than their file says."""
     bounds: list[BoundSection] = []
     """Limits that depend on other parameters; the search never leaves them."""

@@ -76,6 +76,14 @@ Formula = Annotated[
     _number_or("a formula", ".+"),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}),
 ]
+NumberOrName = Annotated[
+    float | str,
+    _number_or("the name of a category's value", _PARAMETER),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_PARAMETER}$"}]}
+    ),
+]
+KindName = Literal["float", "integer", "category", "angle"]
 AxisName = Literal["static", "temporary", "participants", "weather", "extension"]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import product
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -9,16 +10,8 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, as_float
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.constraints import Constraints, order, problems_of
-from bridgegen.odd.parameters import (
-    TOLERANCE,
-    Bound,
-    Derived,
-    Parameter,
-    at,
-    nearest,
-    read_axes,
-    slack,
-)
+from bridgegen.odd.kinds import slack
+from bridgegen.odd.parameters import Bound, Derived, Parameter, at, nearest, read_axes
 from bridgegen.odd.violations import Violation, violations
 
 # Points at which a new space is tried: all corners of the cube up to _CORNERS, and as many others.
@@ -48,12 +41,14 @@ class SearchSpace:
         order: all of ``names``, each after those that it follows from or that limit it.
         bounds: per parameter, what limits it.
         derived: the derived quantities by name.
+        fixed: the values of the parameters that are held at one.
         defaults: where each parameter stands while it is not searched.
 
     Args:
         constraints: what it is made of.
         axes: what to search; the constraints' own choice if ``None``.
-        fixed: parameters to hold at a value instead of searching them.
+        fixed: parameters to hold at a value instead of searching them; that of a category by its
+            name.
         name: of the scenario, for messages.
         decisions: the parameters that are an adversary's decisions.
 
@@ -67,7 +62,7 @@ class SearchSpace:
         self,
         constraints: Constraints,
         axes: Iterable[str] | None = None,
-        fixed: Mapping[str, float] | None = None,
+        fixed: Mapping[str, float | str] | None = None,
         *,
         name: str = "",
         decisions: Iterable[str] = (),
@@ -75,9 +70,10 @@ class SearchSpace:
         self.name, self.constraints = name, constraints
         self.axes = read_axes(constraints.axes if axes is None else axes)
         self.parameters = parameters = constraints.parameters
-        fixed = dict(fixed or {})
+        fixed, unread = _read_fixed(fixed or {}, parameters)
+        self.fixed = fixed
         problems = problems_of(parameters.values(), constraints.bounds, constraints.derived)
-        problems += _fixed_problems(fixed, constraints)
+        problems += unread + _fixed_problems(fixed, constraints)
         if problems:
             raise ScenarioError(*problems)
         columns: list[Parameter | Derived] = [*parameters.values(), *constraints.derived]
@@ -102,6 +98,12 @@ class SearchSpace:
     def n_var(self) -> int:
         """Number of searched parameters: columns of U."""
         return len(self.variables)
+
+    @property
+    def labels(self) -> dict[str, dict[str, Any]]:
+        """How the values of its parameters are read, of those that are no plain numbers."""
+        said = {name: one.kind.labels() for name, one in self.parameters.items()}
+        return {name: one for name, one in said.items() if one}
 
     def index(self, name: str) -> int:
         """Return the column of X that holds ``name``.
@@ -277,11 +279,7 @@ class SearchSpace:
                 lo = np.maximum(lo, bound.lo.evaluate(table))
             if bound.hi is not None:
                 hi = np.minimum(hi, bound.hi.evaluate(table))
-        if parameter.kind == "integer":
-            lo, hi = np.ceil(lo - TOLERANCE), np.floor(hi + TOLERANCE)
-            empty = ~np.atleast_1d(lo <= hi)
-        else:
-            empty = ~np.atleast_1d(lo <= hi + slack(hi))  # true for NaN, too
+        lo, hi, empty = parameter.kind.narrowed(lo, hi)
         rules = " and ".join(f"'{bound}'{at(bound.place)}" for bound in self.bounds[name])
         label = f"{name} [{parameter.unit}], {parameter.low:g} to {parameter.high:g}"
         names = frozenset().union(*(bound.names for bound in self.bounds[name]))
@@ -304,6 +302,22 @@ class SearchSpace:
             raise ScenarioError(f"{problem} at {', '.join(values) or 'any row'}")
 
 
+def _read_fixed(
+    given: Mapping[str, float | str], parameters: Mapping[str, Parameter]
+) -> tuple[dict[str, float], list[str]]:
+    """Return the inner values to hold parameters at, and which are none."""
+    fixed: dict[str, float] = {}
+    problems: list[str] = []
+    for name, value in given.items():
+        try:
+            fixed[name] = parameters[name].read(value) if name in parameters else float(value)
+        except ScenarioError as error:
+            problems += error.problems
+        except ValueError:
+            problems.append(f"cannot fix '{name}' at '{value}'{nearest(name, parameters)}")
+    return fixed, problems
+
+
 def _fixed_problems(fixed: Mapping[str, float], constraints: Constraints) -> list[str]:
     problems = []
     parameters = constraints.parameters
@@ -317,11 +331,10 @@ def _fixed_problems(fixed: Mapping[str, float], constraints: Constraints) -> lis
             continue
         one = parameters[name]
         if not one.low <= value <= one.high:
-            problems.append(
-                f"{one.low:g} <= {name} <= {one.high:g} [{one.unit}] must hold, got {value!r}"
-            )
-        elif one.kind == "integer" and value != int(value):
-            problems.append(f"{name} [{one.unit}] must be a whole number, got {value!r}")
+            rule = one.kind.rule(name, one.low, one.high)
+            problems.append(f"{rule} [{one.unit}] must hold, got {value!r}")
+        elif (kept := one.kind.kept(np.array([value]))) and value != round(value):
+            problems.append(f"{name} [{one.unit}] must be {kept[1]}, got {value!r}")
     return problems
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float
 from bridgegen.odd.constraints import Constraints
 from bridgegen.odd.expression import Expression
-from bridgegen.odd.parameters import TOLERANCE, slack
+from bridgegen.odd.kinds import slack
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,9 @@ def violations(constraints: Constraints, table: Mapping[str, Float]) -> list[Vio
         for name, parameter in constraints.parameters.items():
             value, low, high = table[name], parameter.low, parameter.high
             inside = (value >= low - slack(low)) & (value <= high + slack(high))
-            report(name, inside, f"{low:g} <= {name} <= {high:g}")
-            if parameter.kind == "integer":
-                whole = np.abs(value - np.round(value)) <= TOLERANCE
-                report(name, whole, "a whole number")
+            report(name, inside, parameter.kind.rule(name, low, high))
+            if of_kind := parameter.kind.kept(value):
+                report(name, *of_kind)
         for bound in constraints.bounds:
             name, why = bound.target, f": {bound.why} (source: {bound.source})"
             value = table[name]

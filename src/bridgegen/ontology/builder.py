@@ -10,6 +10,7 @@ from urllib.parse import quote
 import pyoxigraph as ox
 
 from bridgegen.errors import OntologyError
+from bridgegen.odd.kinds import Kind
 from bridgegen.odd.parameters import Derived, Parameter
 from bridgegen.ontology.site import Searched
 from bridgegen.ontology.vocabulary import (
@@ -109,8 +110,9 @@ class Builder:
         """Add a parameter, after all that binds it.
 
         Raises:
-            OntologyError: it gives one property of an individual, and another one elsewhere that
-                the same individual has from somewhere else: who reads it would take that for its.
+            OntologyError: it is a category and gives a property; or it gives one property of an
+                individual, and another one elsewhere that the same individual has from somewhere
+                else: who reads it would take that for its.
         """
         derived = isinstance(parameter, Derived)
         node = self.node(f"p_{name}", "DerivedParameter" if derived else "Parameter")
@@ -119,6 +121,8 @@ class Builder:
         self.put(node, "has_unit", parameter.unit)
         if isinstance(parameter, Derived):
             self.put(node, "has_expression", parameter.value.source)
+        elif parameter.kind.names:
+            self._category(node, name, parameter.kind)
         else:
             self.put(node, "has_low", float(parameter.low))
             self.put(node, "has_high", float(parameter.high))
@@ -135,6 +139,20 @@ class Builder:
                             f"{bearer.value.removeprefix(self.base)}, too"
                         )
         return node
+
+    def _category(self, node: ox.NamedNode, name: str, kind: Kind) -> None:
+        """State the value of a category, which nothing but its parameter carries, and its names.
+
+        Raises:
+            OntologyError: it gives a property of an individual, which would be a number.
+        """
+        if name in self.bound:
+            given = ", ".join(sorted(self.bound[name]))
+            raise OntologyError(f"{name} is a category and gives no number, got {given}")
+        for word in kind.names:
+            self.put(node, "has_allowed_word", word)
+        self.put(node, "has_word", kind.text(self.values[name], str))
+        self.bind(node, "has_word", name)
 
     def explain(self, parameter: str, constraint: str) -> None:
         """Annotate a parameter, and the properties that carry its value, with a constraint."""

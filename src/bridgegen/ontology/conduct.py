@@ -6,7 +6,7 @@ Each is one query per scenario, however many participants it has.
 from collections.abc import Iterator
 
 from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import TOLERANCE
+from bridgegen.odd.kinds import TOLERANCE
 from bridgegen.odd.rules import GRIP, STRAIGHT
 from bridgegen.ontology.rule import Rule, about, called, is_a, shown, slack, with_unit
 from bridgegen.ontology.sparql import binds, literal

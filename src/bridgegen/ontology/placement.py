@@ -6,7 +6,7 @@ Each is one query per road network, however many lights it has. Places are state
 
 from collections.abc import Iterator
 
-from bridgegen.odd.parameters import TOLERANCE
+from bridgegen.odd.kinds import TOLERANCE
 from bridgegen.ontology.rule import Rule, about, called, is_a, shown
 from bridgegen.ontology.sparql import literal
 from bridgegen.ontology.templates import OPPOSITE

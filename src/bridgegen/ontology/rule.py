@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from bridgegen.odd.expression import Expression
-from bridgegen.odd.parameters import TOLERANCE
+from bridgegen.odd.kinds import TOLERANCE
 from bridgegen.ontology.sparql import literal
 from bridgegen.ontology.vocabulary import tbox
 

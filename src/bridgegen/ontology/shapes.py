@@ -9,12 +9,13 @@ Values of the weather's parameters are found as properties of the parts of the s
 the parameter (``bg:has_parameter``). What holds in every scenario, `placement` and `conduct` say.
 """
 
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from bridgegen.odd.expression import Expression
-from bridgegen.odd.parameters import TOLERANCE, Axis
+from bridgegen.odd.kinds import FLOAT, TOLERANCE
+from bridgegen.odd.parameters import Axis, Parameter
 from bridgegen.ontology.conduct import conduct_rules
 from bridgegen.ontology.individuals import reason
 from bridgegen.ontology.placement import placement_rules
@@ -117,6 +118,16 @@ def _declared_ranges() -> Rule:
     )  # fmt: skip
 
 
+def _declared_words() -> Rule:
+    return Rule(
+        "declared-words", "", "Parameter", "has a word that is allowed", None,
+        "a category has one of its names",
+        "SELECT DISTINCT $this (?word AS ?value) WHERE { $this bg:has_allowed_word ?any ; "
+        "bg:has_word ?word . FILTER NOT EXISTS { $this bg:has_allowed_word ?word } }",
+        "has_word", True,
+    )  # fmt: skip
+
+
 # -- constraints, from the declarations in odd -----------------------------------------------------
 
 
@@ -127,22 +138,23 @@ def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
     """
     found = list(_general_rules())
     if scenario is None:
-        return (*found, _declared_ranges())
+        return (*found, _declared_ranges(), _declared_words())
+    rule = partial(_rule, scenario.parameters)
     for name, parameter in scenario.parameters.items():
         low, high = (slack(literal(value), side) for value, side in
                      ((parameter.low, -1), (parameter.high, 1)))  # fmt: skip
         x = variable(name)
-        kept = f"{x} >= {low} && {x} <= {high}"
-        text = f"{parameter.low:g} <= {name} <= {parameter.high:g}"
-        found.append(_rule(f"range-{name}", name, text, kept, present=True, axis=parameter.axis))
-        if parameter.kind == "integer":
-            kept = f"ABS({x} - ROUND({x})) <= {literal(TOLERANCE)}"
-            found.append(_rule(f"whole-{name}", name, f"{name} is a whole number", kept))
+        kind = parameter.kind
+        inside = kind.sparql_inside(_raw(name)) or f"{x} >= {low} && {x} <= {high}"
+        text = kind.rule(name, parameter.low, parameter.high)
+        found.append(rule(f"range-{name}", name, text, inside, present=True, axis=parameter.axis))
+        if alone := kind.sparql_kept(x):
+            found.append(rule(f"whole-{name}", name, f"{name} is {alone[1]}", alone[0]))
     for number, bound in enumerate(scenario.bounds):
         for sign, expression, side in ((">=", bound.lo, -1), ("<=", bound.hi, 1)):
             if expression is not None:
                 found.append(
-                    _rule(
+                    rule(
                         f"bound-{number}-{'low' if side < 0 else 'high'}-{bound.target}",
                         bound.target,
                         f"{bound.target} {sign} {expression}",
@@ -154,7 +166,7 @@ def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
     for derived in scenario.derived:
         x = variable(derived.name)
         found.append(
-            _rule(
+            rule(
                 f"derived-{derived.name}",
                 derived.name,
                 str(derived),
@@ -169,6 +181,7 @@ def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
 
 
 def _rule(
+    parameters: Mapping[str, Parameter],
     key: str,
     target: str,
     text: str,
@@ -182,6 +195,7 @@ def _rule(
     """Return a rule about one parameter.
 
     Args:
+        parameters: the scenario's.
         key: local name of its shape.
         target: the parameter.
         text: the rule as people read it.
@@ -196,7 +210,8 @@ def _rule(
     for name in names:
         pattern = _pattern(name)
         lines.append(f"OPTIONAL {{ {pattern} }}" if present and name == target else pattern)
-        lines.append(f"BIND(xsd:double({_raw(name)}) AS {variable(name)})")
+        kind = parameters[name].kind if name in parameters else FLOAT
+        lines.append(f"BIND({kind.sparql_value(_raw(name))} AS {variable(name)})")
     if limit is not None:
         lines.append(binds(limit, "limit"))
     lines.append(f"BIND({_raw(target)} AS ?value)")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from bridgegen.errors import OntologyError
-from bridgegen.odd.parameters import TOLERANCE
+from bridgegen.odd.kinds import TOLERANCE
 from bridgegen.odd.roads import CROSSWALK_GAP, KNOBS, LegSpec, Quantity, RoadsSpec, usual
 from bridgegen.ontology.site import (
     ArmRoad,

@@ -9,11 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.objectives import HARM
-from bridgegen.odd.parameters import Axis
+from bridgegen.odd.parameters import Axis, Parameter
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.logic_file import logic_file
@@ -179,7 +180,7 @@ class FileSource:
     def concrete(self, values: Mapping[str, float], road_file: str = "") -> "ConcreteFile":
         """See `Source`."""
         road_file = road_file or self._scenario.roads.name
-        storyboard = with_values(self._base, values)
+        storyboard = with_values(self._base, values, self._scenario.parameters)
         network = replace(storyboard.road_network, logic_file=osc.File(road_file))
         return ConcreteFile(
             replace(storyboard, road_network=network), self._scenario.roads, road_file
@@ -220,12 +221,17 @@ def ego_of(storyboard: osc.OpenScenario) -> str:
     return next((name for name in names if name.lower() == EGO), names[0])
 
 
-def with_values(storyboard: osc.OpenScenario, values: Mapping[str, float]) -> osc.OpenScenario:
-    """Return a scenario file in which numeric parameters have other values.
+def with_values(
+    storyboard: osc.OpenScenario,
+    values: Mapping[str, float],
+    parameters: Mapping[str, Parameter] = MappingProxyType({}),
+) -> osc.OpenScenario:
+    """Return a scenario file in which parameters have other values.
 
     Args:
         storyboard: the file.
         values: by name; those that the file does not declare are passed over.
+        parameters: what is known of them; needed of categories.
     """
     declared = storyboard.parameter_declarations
     if declared is None:
@@ -233,11 +239,16 @@ def with_values(storyboard: osc.OpenScenario, values: Mapping[str, float]) -> os
     changed = []
     for one in declared.parameters:
         if one.name in values:
-            value = values[one.name]
-            whole = kind_of(one.parameter_type) is not Kind.DOUBLE
-            one = replace(one, value=str(int(value)) if whole else format_double(value))
+            one = replace(one, value=_literal(one, values[one.name], parameters.get(one.name)))
         changed.append(one)
     return replace(storyboard, parameter_declarations=osc.ParameterDeclarations(tuple(changed)))
+
+
+def _literal(one: osc.ParameterDeclaration, value: float, known: Parameter | None) -> str:
+    if known is not None and known.kind.names:
+        return known.kind.text(value, str)
+    whole = kind_of(one.parameter_type) is not Kind.DOUBLE
+    return str(int(value)) if whole else format_double(value)
 
 
 def with_driver(storyboard: osc.OpenScenario, driver: str, ideal: str = "") -> osc.OpenScenario:

@@ -19,6 +19,8 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
+from bridgegen.odd.kinds import FLOAT
+from bridgegen.odd.parameters import Parameter
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import (
@@ -78,12 +80,15 @@ class Carrier:
     datatype: ox.NamedNode
 
 
-def carriers(individuals: Individuals, values: Mapping[str, float]) -> dict[str, Carrier]:
+def carriers(
+    individuals: Individuals, values: Mapping[str, float], parameters: Mapping[str, Parameter]
+) -> dict[str, Carrier]:
     """Return where the value of each parameter is found.
 
     Args:
         individuals: of any one row.
         values: of that row, by name; generic, so that no two parameters agree by accident.
+        parameters: what may vary, by name.
     """
     paths = _paths(individuals)
     found = {}
@@ -91,12 +96,29 @@ def carriers(individuals: Individuals, values: Mapping[str, float]) -> dict[str,
         ways = [
             (len(paths[node]), paths[node], carried)
             for node, carried in bound
-            if node in paths and individuals.optional_number(node, carried) == values.get(name)
+            if node in paths and _has(individuals, node, carried, parameters, name, values)
         ]
         if ways:
             _, path, carried = min(ways)
             found[name] = Carrier(path, carried, tbox().ranges[carried])
     return found
+
+
+def _has(
+    individuals: Individuals,
+    node: Subject,
+    carried: str,
+    parameters: Mapping[str, Parameter],
+    name: str,
+    values: Mapping[str, float],
+) -> bool:
+    """Say whether an individual has the value of a parameter."""
+    if name not in values:
+        return False
+    kind = parameters[name].kind if name in parameters else FLOAT
+    if kind.names:
+        return individuals.optional_text(node, carried) == kind.text(values[name], repr)
+    return individuals.optional_number(node, carried) == values[name]
 
 
 def _paths(individuals: Individuals) -> dict[Subject, tuple[str, ...]]:
@@ -211,7 +233,9 @@ class _Writer:
             carrier = self._carried[name]
             low = float(box.low[k]) if box.low[k] > outer.low[k] else None
             high = float(box.high[k]) if box.high[k] < outer.high[k] else None
-            value = self._some(carrier.property, self._range(carrier.datatype, low, high))
+            names = self._space.parameters[name].kind.within(float(box.low[k]), float(box.high[k]))
+            values = self._one_of(names) if names else self._range(carrier.datatype, low, high)
+            value = self._some(carrier.property, values)
             bound = self._some("has_parameter", self._named(name))
             there = self._all([bound, value])
             for step in reversed(carrier.path):
@@ -256,7 +280,16 @@ class _Writer:
         self.put(node, ox.NamedNode(OWL + "withRestrictions"), self._list(facets))
         return node
 
-    def _list(self, parts: Sequence[ox.NamedNode | ox.BlankNode]) -> ox.NamedNode | ox.BlankNode:
+    def _one_of(self, names: Sequence[str]) -> ox.BlankNode:
+        """Return the data range of some texts."""
+        node = self._anonymous()
+        self.put(node, TYPE, ox.NamedNode(RDFS + "Datatype"))
+        self.put(node, ox.NamedNode(OWL + "oneOf"), self._list([ox.Literal(one) for one in names]))
+        return node
+
+    def _list(
+        self, parts: Sequence[ox.NamedNode | ox.BlankNode | ox.Literal]
+    ) -> ox.NamedNode | ox.BlankNode:
         head: ox.NamedNode | ox.BlankNode = ox.NamedNode(RDF + "nil")
         for part in reversed(parts):
             node = self._anonymous()

@@ -89,7 +89,8 @@ def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:
             {
                 "name": name,
                 "unit": space.parameters[name].unit,
-                "integer": space.parameters[name].kind == "integer",
+                "integer": space.parameters[name].kind.apart,
+                **space.parameters[name].kind.labels(),
                 "low": low,
                 "high": high,
             }

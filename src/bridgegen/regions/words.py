@@ -18,7 +18,10 @@ def conditions(box: Box, space: SearchSpace) -> list[str]:
     for k in box.narrows(outer).nonzero()[0].tolist():
         low, high = float(box.low[k]), float(box.high[k])
         name = space.variables[k]
-        text = _range(low, high, low > float(outer.low[k]), high < float(outer.high[k]))
+        text = space.parameters[name].kind.range_text(
+            low, high, number,
+            low_counts=low > float(outer.low[k]), high_counts=high < float(outer.high[k]),
+        )  # fmt: skip
         found.append(f"{name} {text}{_unit(space, name)}")
     return found
 
@@ -60,15 +63,6 @@ def percent(share: float) -> str:
 def number(value: float) -> str:
     """Return the shortest text that is read as the same float64."""
     return repr(value).removesuffix(".0")
-
-
-def _range(low: float, high: float, low_counts: bool, high_counts: bool) -> str:
-    """Return a range as read; an end that does not count excludes nothing."""
-    if low == high:
-        return f"= {number(low)}"
-    if low_counts and high_counts:
-        return f"in {number(low)} .. {number(high)}"
-    return f"≥ {number(low)}" if low_counts else f"≤ {number(high)}"
 
 
 def _unit(space: SearchSpace, name: str) -> str:

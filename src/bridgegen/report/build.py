@@ -196,6 +196,7 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
             declared[name].low if name in declared else None,
             declared[name].high if name in declared else None,
             name in space.variables,
+            declared[name].kind.labels() if name in declared else {},
         )
         for i, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
         if name not in {*pipeline.source.unused_names, *space.decisions}

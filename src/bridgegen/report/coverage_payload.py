@@ -38,6 +38,7 @@ def _parameter(one: ParameterBins) -> dict[str, Any]:
         "unit": one.unit,
         "axis": one.axis,
         "integer": one.integer,
+        **one.labels,
         "edges": [float(f"{edge:.6g}") for edge in one.edges.tolist()],
         "evaluated": _counts(one.evaluated, one.feasible),
         "critical": one.critical.tolist(),

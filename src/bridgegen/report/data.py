@@ -102,6 +102,7 @@ class Column:
         low: lower end of the declared range, in the unit; None where there is none.
         high: upper end.
         searched: a parameter that the algorithm varied; False for fixed and derived ones.
+        labels: how a parameter's values are read, `bridgegen.odd.kinds.Kind.labels`.
     """
 
     name: str
@@ -111,6 +112,7 @@ class Column:
     low: float | None = None
     high: float | None = None
     searched: bool = False
+    labels: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

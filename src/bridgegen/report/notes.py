@@ -99,9 +99,14 @@ def _side(name: str, low: float, high: float, space: SearchSpace) -> str:
         edges = [f"{100 * share:.1f}" for share in (low, high)]
         unit = " % of what is left to it"
     else:
-        values = parameter.at(np.array([low, high]), parameter.low, parameter.high)
-        edges = [f"{value:.4g}" for value in values.tolist()]
+        values = parameter.at(np.array([low, high]), parameter.low, parameter.high).tolist()
         unit = "" if parameter.unit in ("1", "count") else f" {parameter.unit}"
+        if parameter.kind.labels():
+            text = parameter.kind.range_text(
+                values[0], values[1], "{:.4g}".format, low_counts=low > 0.0, high_counts=high < 1.0
+            )
+            return f"{name} {text}{unit}"
+        edges = [f"{value:.4g}" for value in values]
     if low <= 0.0:
         return f"{name} ≤ {edges[1]}{unit}"
     if high >= 1.0:

@@ -102,9 +102,11 @@ class _Painter:
 
     def _carried_by_itself(self, node: Subject, parameter: Parameter) -> Phrase | None:
         """Return the value of a parameter that no other individual carries."""
-        found = self.members.values(node).get(bg("has_value"), ())
-        shown = [value_text(one, parameter.unit) for one in found if isinstance(one, ox.Literal)]
-        return Phrase(", ".join(shown), [(node, bg("has_value"))], [node]) if shown else None
+        for term in (bg("has_value"), bg("has_word")):
+            found = self.members.values(node).get(term, ())
+            if shown := [value_text(v, parameter.unit) for v in found if isinstance(v, ox.Literal)]:
+                return Phrase(", ".join(shown), [(node, term)], [node])
+        return None
 
     # -- what is a box -------------------------------------------------------------------------
 

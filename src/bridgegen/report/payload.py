@@ -239,6 +239,7 @@ def _column(column: Column, group: str, ok: Any) -> dict[str, Any]:
         "low": _number(column.low),
         "high": _number(column.high),
         "searched": column.searched,
+        **column.labels,
         "values": significant(column.values[ok]),
     }
 

@@ -64,8 +64,8 @@ def _parameter(one: Parameter) -> str:
     unit = "" if one.unit in ("1", "count") else f" {one.unit}"
     return (
         f"<tr><th>{_text(one.name)}</th><td>{one.axis}</td>"
-        f'<td class="number">{one.low:g} to {one.high:g}{unit}</td>'
-        f'<td class="number">{one.default:g}{unit}</td>'
+        f'<td class="number">{one.kind.span_text(one.low, one.high, "{:g}".format, unit)}</td>'
+        f'<td class="number">{one.kind.text(one.default, "{:g}".format)}{unit}</td>'
         f"<td>{_text(one.description)}<small>{_text(one.source)}</small></td></tr>"
     )
 

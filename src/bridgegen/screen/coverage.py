@@ -36,8 +36,7 @@ def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_jso
     print("Evaluations per bin, lowest first, of these critical; – where none is feasible:")
     width = max(len(one.name) for one in found.parameters)
     for one in found.parameters:
-        low, high = one.edges[[0, -1]] + ((0.5, -0.5) if one.integer else (0.0, 0.0))
-        print(f"{one.name:<{width}}  {one.axis}, {low:g} to {high:g} {one.unit}")
+        print(f"{one.name:<{width}}  {one.axis}, {one.span}")
         print(f"    {_cells(one)}")
 
 

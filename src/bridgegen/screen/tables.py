@@ -36,9 +36,8 @@ def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None
         return
     width = max(len(line.name) for line in lines)
     for line in lines:
-        span = "derived" if line.low is None else f"{line.low:g} to {line.high:g} {line.unit}"
-        default = "" if line.default is None else f", default {line.default:g}"
-        print(f"{line.name:<{width}}  {line.axis}, {span}{default}")
+        default = f", default {line.standard}" if line.standard else ""
+        print(f"{line.name:<{width}}  {line.axis}, {line.range}{default}")
         for text in (line.description, *line.bounds.split("; ")):
             if text:
                 print(f"{'':<{width}}    {text}")

@@ -77,7 +77,8 @@ def refuse_used(folder: Path) -> None:
 
 def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
     """Make the run's file: whole or not at all, whenever the process is killed."""
-    values = [(key, json.dumps(run[key], allow_nan=False)) for key in KEYS]
+    keys = [key for key in (*KEYS, "labels") if key in run]
+    values = [(key, json.dumps(run[key], allow_nan=False)) for key in keys]
     draft = folder / DRAFT
     draft.unlink(missing_ok=True)
     try:
@@ -154,7 +155,14 @@ def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
     Raises:
         InputError: the first that is wrong.
     """
-    kinds = {"version": str, "settings": dict, "notes": dict, "n_var": int, "n_obj": int}
+    kinds = {
+        "version": str,
+        "settings": dict,
+        "notes": dict,
+        "labels": dict,
+        "n_var": int,
+        "n_obj": int,
+    }
     for key, kind in kinds.items():
         if key in run and type(run[key]) is not kind:
             raise InputError(f"bad or missing {key}: it is a {type(run[key]).__name__}")
@@ -163,6 +171,14 @@ def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
     for key in ("parameters", "metrics"):
         if type(run[key]) is not list or not all(isinstance(name, str) for name in run[key]):
             raise InputError(f"bad or missing {key}: it must be a list of names")
+    for name, one in run.get("labels", {}).items():
+        words = one.get("words", []) if isinstance(one, dict) else None
+        if (
+            name not in run["parameters"]
+            or type(words) is not list
+            or not all(isinstance(word, str) for word in words)
+        ):
+            raise InputError(f"bad or missing labels: {name} must be a parameter with its words")
     if not 0 <= run["n_var"] <= MAX_N_VAR:
         raise InputError(f"0 <= n_var <= {MAX_N_VAR} must hold, got {run['n_var']}")
     named = len(FIRST) + len(run["parameters"]) + len(run["metrics"])

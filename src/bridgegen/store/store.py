@@ -55,6 +55,8 @@ class Store:
         parameters: names of X's columns.
         metrics: names of the metrics.
         columns: how the table names them.
+        labels: how the values of parameters are read that are no plain numbers, by name
+            (`bridgegen.odd.kinds.Kind.labels`).
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Store:
         self.metrics: tuple[str, ...] = tuple(run["metrics"])
         self.version: str = run["version"]
         self.columns = columns_of(run)
+        self.labels: dict[str, dict[str, Any]] = run.get("labels", {})
         self._connection = connection
         self._lock = lock
         self._finished: str | None = run.get("finished")
@@ -81,6 +84,7 @@ class Store:
         *,
         n_var: int,
         n_obj: int,
+        labels: Mapping[str, Any] | None = None,
     ) -> Self:
         """Start a run in a new or empty folder, and hold it for writing.
 
@@ -91,6 +95,7 @@ class Store:
             metrics: names of the metrics.
             n_var: searched parameters, the width of U.
             n_obj: objectives.
+            labels: how the values of parameters are read that are no plain numbers, by name.
 
         Raises:
             StorageError: the folder holds a run or anything else, or cannot be written.
@@ -106,6 +111,8 @@ class Store:
             "n_var": n_var,
             "n_obj": n_obj,
         }
+        if labels:
+            run["labels"] = labels
         columns = columns_of(run)
         refuse_used(folder)
         with storage_errors(folder, "made"):

@@ -13,6 +13,7 @@ needed of the parameters.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class Ladder:
     Attributes:
         start: ``(n_var,)``.
         nominal: ``(n_var,)``.
-        step: ``(n_var,)`` > 0; at least 1 of a whole number.
+        step: ``(n_var,)`` > 0; at least 1 of a whole number, the range of a category.
         rungs: ``(n_var,)`` int64, steps from start to nominal; the last may be shorter.
     """
 
@@ -60,10 +61,8 @@ class Ladder:
     @classmethod
     def of(cls, space: SearchSpace, x: Float) -> "Ladder":
         """Return the ladder of a row of X."""
-        step = RADIUS * ranges(space)
-        for k, name in enumerate(space.variables):
-            if space.parameters[name].kind == "integer":
-                step[k] = max(1.0, np.floor(step[k] + 0.5))
+        chosen = [space.parameters[name] for name in space.variables]
+        step = np.array([one.kind.step(one.low, one.high, RADIUS) for one in chosen])
         start = searched(space, x[np.newaxis])[0]
         nominal = searched(space, space.row({})[np.newaxis])[0]
         rungs = np.ceil(np.abs(nominal - start) / step - 1e-9).astype(np.int64)
@@ -312,7 +311,7 @@ def sentence(conditions: Sequence[Condition]) -> str:
     if not conditions:
         return "the nominal scenario itself"
     said = [
-        f"{one.name} {one.sign} {_in_steps(one):.3g}"
+        f"{one.name} {one.needs or f'{one.sign} {_in_steps(one):.3g}'}"
         + ("" if one.unit in _UNITLESS else f" {one.unit}")
         for one in conditions
     ]
@@ -347,10 +346,12 @@ def _put(at: Int, i: int, rung: int) -> Int:
 
 def _condition(space: SearchSpace, ladder: Ladder, at: Int, i: int, limit: int) -> Condition:
     name = space.variables[i]
+    one = space.parameters[name]
     values, last = ladder.values(at), ladder.values(_put(at, i, limit))
+    sign: Literal[">=", "<="] = ">=" if values[i] > ladder.nominal[i] else "<="
+    needs = one.kind.need_text(sign, float(last[i]), one.low, one.high, "{:.3g}".format)
     return Condition(
-        name=name, unit=space.parameters[name].unit,
-        sign=">=" if values[i] > ladder.nominal[i] else "<=",
+        name=name, unit=one.unit, sign=sign, needs=needs if one.kind.labels() else "",
         limit=float(last[i]), step=float(ladder.step[i]), value=float(values[i]),
         nominal=float(ladder.nominal[i]),
     )  # fmt: skip

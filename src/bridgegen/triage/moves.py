@@ -12,7 +12,8 @@ def nearest(space: SearchSpace, V: Float) -> Float:
     """Return the rows of X whose searched parameters are as near to wanted values as is feasible.
 
     The parameters are taken in the decoder's order, each moved into the interval that the earlier
-    ones leave to it; whole numbers are rounded. Feasible values are kept to the last bit.
+    ones leave to it, as its kind does it: whole numbers are rounded, angles go round. Feasible
+    values are kept to the last bit.
 
     Args:
         space: what is searched.
@@ -34,12 +35,9 @@ def nearest(space: SearchSpace, V: Float) -> Float:
         else:
             lo, hi = space.interval(name, table)
             if name in number:
-                value = wanted[:, number[name]]
-                if space.parameters[name].kind == "integer":
-                    value = np.floor(value + 0.5)
+                value = space.parameters[name].kind.nearest(wanted[:, number[name]], lo, hi)
             else:
-                value = space.defaults[name]
-            value = np.minimum(np.maximum(value, lo), hi)
+                value = np.minimum(np.maximum(space.defaults[name], lo), hi)
         table[name] = value
         X[:, space.index(name)] = value
     return X + 0.0  # no −0.0: what is simulated is what would be recorded
@@ -60,7 +58,7 @@ def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius:
     """Return two sets of n neighbours of a row: the second is one more random move of the first.
 
     Each searched parameter moves by at most ``radius`` of its range, uniformly; whole numbers
-    move only where that is half of one or more.
+    move only where that is half of one or more, categories never.
 
     Args:
         space: what is searched.
@@ -74,6 +72,12 @@ def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius:
         ``(2, n, len(space.names))``, feasible.
     """
     random = np.random.Generator(np.random.PCG64([seed, _STREAM, number]))
-    by = (2.0 * random.random((2, n, space.n_var)) - 1.0) * radius * ranges(space)
+    by = (2.0 * random.random((2, n, space.n_var)) - 1.0) * radius * _reaches(space)
     first = nearest(space, searched(space, x[np.newaxis]) + by[0])
     return np.stack([first, nearest(space, searched(space, first) + by[1])])
+
+
+def _reaches(space: SearchSpace) -> Float:
+    """Return the range of which each searched parameter of a neighbour moves by a share."""
+    parameters = (space.parameters[name] for name in space.variables)
+    return np.array([one.kind.reach(one.low, one.high) for one in parameters])

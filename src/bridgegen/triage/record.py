@@ -150,6 +150,7 @@ class Condition(_Model):
         step: of that parameter.
         value: in the minimal scenario.
         nominal: value of the parameter in the nominal scenario.
+        needs: sign and limit as people read them, of a category or an angle; "" of others.
     """
 
     name: Text
@@ -159,6 +160,7 @@ class Condition(_Model):
     step: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     value: Number
     nominal: Number
+    needs: Text = ""
 
 
 class Minimal(_Model):

@@ -398,9 +398,9 @@ class _Triage:
         if found is None:
             return text
         k, low, high = found
-        unit = self._space.parameters[names[k]].unit
-        said = "" if unit in ("1", "count", "?") else f" {unit}"
-        return f"{text}, {names[k]} {low:.3g} to {high:.3g}{said}"
+        parameter = self._space.parameters[names[k]]
+        unit = "" if parameter.unit in ("1", "count", "?") else f" {parameter.unit}"
+        return f"{text}, {names[k]} {parameter.kind.span_text(low, high, '{:.3g}'.format, unit)}"
 
 
 def _implausible(rows: Evaluations) -> Bool:

@@ -12,7 +12,7 @@ from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
 from bridgegen.errors import FileFormatError
-from bridgegen.odd.parameters import slack
+from bridgegen.odd.kinds import slack
 from bridgegen.openx.openscenario import expression_types
 from bridgegen.openx.openscenario.conditions import Condition
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint

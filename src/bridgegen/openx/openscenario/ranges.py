@@ -12,13 +12,14 @@ from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.distributions import Discrete, Distribution, Uniform, shares_within
 from bridgegen.odd.expression import lookup, parse
+from bridgegen.odd.kinds import FLOAT, INTEGER, Category
 from bridgegen.odd.parameters import Axis, Derived, Parameter, nearest
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.element import Element, values_of, walk
 from bridgegen.openx.openscenario.from_owl.notes import PARAMETER
 from bridgegen.openx.openscenario.parameters import broken, kind_of, numbers
-from bridgegen.openx.openscenario.values import Kind, parse_literal
+from bridgegen.openx.openscenario.values import Expr, Kind, ParameterRef, parse_literal
 
 UNIT = "?"
 """The unit of a parameter whose file does not say it."""
@@ -79,7 +80,8 @@ class Ranges:
 
     Attributes:
         parameters: every numeric parameter but the derived ones; what does not vary stands at the
-            value that the file declares. Besides, which of its sets a joint distribution takes.
+            value that the file declares. Texts that vary. Besides, which of its sets a joint
+            distribution takes.
         derived: those that value sets give, or a formula.
     """
 
@@ -111,6 +113,17 @@ def ranges_of(
     return builder.ranges()
 
 
+def _is_text(one: osc.ParameterDeclaration | None) -> bool:
+    return one is not None and kind_of(one.parameter_type) is Kind.STRING
+
+
+def _referred(one: Element) -> Iterator[str]:
+    """Yield the parameters that an element refers to itself."""
+    for _, value in values_of(one):
+        if isinstance(value, ParameterRef | Expr):
+            yield from value.names
+
+
 class _Builder:
     """Takes in distributions one by one.
 
@@ -125,6 +138,8 @@ class _Builder:
         header = scenario.file_header.properties
         self._said = {str(one.name): str(one.value) for one in header.properties} if header else {}
         self._single: dict[str, Distribution] = {}
+        self._categories: dict[str, Parameter] = {}
+        self._used = {name for one in walk(scenario) for name in _referred(one)}
         self._joint: list[dict[str, list[float]]] = []
         self.problems: list[str] = []
 
@@ -140,6 +155,11 @@ class _Builder:
             return
         name = one.parameter_name
         with self._saying(one.distribution):
+            if _is_text(self._declared.get(name)) and isinstance(
+                one.distribution, dst.DistributionSet | dst.ProbabilityDistributionSet
+            ):
+                self._add_category(name, one.distribution)
+                return
             kind = self._kind(name)
             found = dst.distribution_of(one.distribution)
             if kind.is_integer and not isinstance(found, Discrete | Uniform):
@@ -153,6 +173,55 @@ class _Builder:
             else:
                 self._check(name, kind, found.low, found.high)
             self._single[name] = found
+
+    def _add_category(
+        self, name: str, given: dst.DistributionSet | dst.ProbabilityDistributionSet
+    ) -> None:
+        """Take in the values of a text: nothing but formulas of the file's header may depend on it.
+
+        Raises:
+            InputError: the storyboard takes it, no formula compares it, a value that the scenario
+                does not allow, or a second distribution.
+        """
+        if name in self._categories:
+            raise InputError(f"parameter {name} must have one distribution, got two")
+        if name in self._used:
+            raise InputError(
+                f"parameter {name} is a text that the storyboard takes, and one storyboard serves "
+                "every row; only a text that formulas of the header compare can vary"
+            )
+        if not any(name in parse(text, place).names for place, text in self._texts()):
+            raise InputError(f"parameter {name} is a text that no formula of the header compares")
+        words = [str(one.value) for one in given.elements]
+        declaration = self._declared[name]
+        for word in words:
+            if reasons := broken(declaration, word):
+                raise InputError(f"parameter {name} {reasons[0]}")
+        allowed = [
+            one.value
+            for group in declaration.constraint_groups
+            for one in group.constraints
+            if one.rule is osc.Rule.EQUAL_TO
+        ]
+        names = tuple(dict.fromkeys(map(str, [*allowed, *words, declaration.value])))
+        weights = (
+            [one.weight for one in given.elements]
+            if isinstance(given, dst.ProbabilityDistributionSet)
+            else None
+        )
+        found = Discrete.of([float(names.index(word)) for word in words], weights)
+        default = float(names.index(str(declaration.value)))
+        self._categories[name] = FileParameter(
+            name, self._axis(name), self._unit(name), found.low, found.high,
+            min(max(default, found.low), found.high), Category(names), distribution=found,
+        )  # fmt: skip
+
+    def _texts(self) -> Iterator[tuple[str, str]]:
+        """Yield the formulas of the header, each after the name of its property."""
+        for name in self._numbers:
+            place = f"{PARAMETER}.{name}.expression"
+            if (text := self._said.get(place)) is not None:
+                yield place, text
 
     def _add_sets(self, given: dst.ValueSetDistribution) -> None:
         names = dict.fromkeys(one.parameter_ref for each in given.sets for one in each.assignments)
@@ -182,7 +251,7 @@ class _Builder:
                 index += "_"
             last = len(next(iter(columns.values()))) - 1
             parameters[index] = FileParameter(
-                index, Axis.PARTICIPANTS, "count", 0.0, float(last), 0.0, "integer",
+                index, Axis.PARTICIPANTS, "count", 0.0, float(last), 0.0, INTEGER,
                 "Which of the value sets is taken, from 0.",
             )  # fmt: skip
             joint += [
@@ -195,7 +264,7 @@ class _Builder:
         derived = [*joint, *self._formulas({one.name for one in joint})]
         following = {one.name for one in derived}
         own = {name: self._parameter(name) for name in self._numbers if name not in following}
-        return Ranges(own | parameters, tuple(derived))
+        return Ranges(own | self._categories | parameters, tuple(derived))
 
     def _formulas(self, joint: set[str]) -> Iterator[Derived]:
         """Yield the parameters that follow from others, as a file of ours says (`from_owl.notes`).
@@ -206,8 +275,9 @@ class _Builder:
             text = self._said.get(f"{PARAMETER}.{name}.expression")
             if text is None or name in self._single or name in joint:
                 continue
-            formula = parse(text, f"{PARAMETER}.{name}.expression")
-            if formula.names <= self._numbers.keys():
+            names = {one: each.kind.names for one, each in self._categories.items()}
+            formula = parse(text, f"{PARAMETER}.{name}.expression", names)
+            if formula.names <= self._numbers.keys() | names.keys():
                 yield DerivedParameter(
                     name, self._axis(name), self._unit(name), formula,
                     "The file's header says so.", "FileHeader",
@@ -222,7 +292,7 @@ class _Builder:
             low, high = float(math.ceil(low)), float(math.floor(high))
         return FileParameter(
             name, self._axis(name), self._unit(name), low, high, min(max(declared, low), high),
-            "integer" if whole else "float",
+            INTEGER if whole else FLOAT,
             distribution=None if isinstance(found, Uniform) else found,
         )  # fmt: skip
 

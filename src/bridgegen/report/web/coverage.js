@@ -21,9 +21,17 @@ function withUnit(parameter) {
   return unit ? `${parameter.name} [${unit}]` : parameter.name;
 }
 
+function binName(parameter, k) {
+  return worded(k, parameter) ?? brief(parameter.edges[k] + 0.5);
+}
+
+function edgeText(parameter, k) {
+  return brief(turned(parameter.edges[k], parameter));
+}
+
 function binRange(parameter, k) {
   const { edges, integer } = parameter, unit = unitText(parameter.unit);
-  const range = integer ? brief(edges[k] + 0.5) : `${brief(edges[k])} to ${brief(edges[k + 1])}`;
+  const range = integer ? binName(parameter, k) : `${edgeText(parameter, k)} to ${edgeText(parameter, k + 1)}`;
   return unit ? `${range}${NARROW}${unit}` : range;
 }
 
@@ -61,11 +69,11 @@ function binCell(evaluated, critical, label, row, column, amount) {
 // Values at the edges of the bins, or below the whole numbers; not more than there is room for.
 function binTicks(parameter, className) {
   const { edges, integer } = parameter, n = edges.length - 1;
-  const marks = integer ? edges.slice(0, n).map((edge, k) => [(k + 0.5) / n, edge + 0.5]) : edges.map((edge, k) => [k / n, edge]);
+  const marks = integer ? edges.slice(0, n).map((_, k) => [(k + 0.5) / n, binName(parameter, k)]) : edges.map((_, k) => [k / n, edgeText(parameter, k)]);
   const each = Math.ceil(marks.length / 11);
-  const shown = marks.filter((_, k) => k % each === 0).map(([at, value]) => {
+  const shown = marks.filter((_, k) => k % each === 0).map(([at, text]) => {
     const place = integer || (at > 0 && at < 1) ? "" : at ? "last" : "first";
-    return element("span", { class: place, style: `--at: ${(100 * at).toFixed(2)}%` }, brief(value));
+    return element("span", { class: place, style: `--at: ${(100 * at).toFixed(2)}%` }, text);
   });
   return element("div", { class: `ticks ${className}`, "aria-hidden": "true" }, ...shown);
 }

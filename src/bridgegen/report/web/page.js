@@ -32,6 +32,15 @@ function quantity(value, unit, digits) {
   return value === null || value === undefined || !text ? measured(value, unit, digits) : measured(value, unit, digits) + NARROW + text;
 }
 
+// A parameter's value as people read it, where that is no plain number: of a category its name, of an angle that within one turn.
+function worded(value, of) {
+  return of?.words && typeof value === "number" ? of.words[Math.round(value)] ?? "–" : null;
+}
+
+function turned(value, of) {
+  return of?.turn && value > of.turn ? value - 360 : value;
+}
+
 function titled(name) {
   const unit = unitText(columns.get(name)?.unit ?? "");
   return unit ? `${name} [${unit}]` : name;
@@ -99,13 +108,13 @@ function connectSummary() {
 
 function fillDetails(kept) {
   const line = (name, value, column) => {
-    const text = element("b", {}, quantity(value, column?.unit ?? ""));
+    const text = element("b", {}, worded(value, column) ?? quantity(turned(value, column), column?.unit ?? ""));
     const box = element("div", { title: column?.description ?? "" }, element("span", { class: "name" }, name), text);
     const { low, high } = column ?? {};
     if (typeof low === "number" && high > low && value !== null) {
       const mark = element("i");
       mark.style.left = `${(100 * Math.min(1, Math.max(0, (value - low) / (high - low)))).toFixed(1)}%`;
-      box.append(element("span", { class: "range", title: `range ${number(low)} to ${quantity(high, column.unit)}` }, mark));
+      box.append(element("span", { class: "range", title: column.words ? column.words.join(", ") : `range ${number(low)} to ${quantity(turned(high, column), column.unit)}` }, mark));
     }
     return box;
   };

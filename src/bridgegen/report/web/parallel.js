@@ -19,7 +19,7 @@ class Parallel {
   // The axes, as far as the rows go.
   rescale() {
     const chosen = this.names.map((name) => columns.get(name));
-    this.axes = chosen.map((c) => this.axis(c.name, c.unit, c.values, c.low, c.high));
+    this.axes = chosen.map((c) => ({ ...this.axis(c.name, c.unit, c.values, c.low, c.high), words: c.words, turn: c.turn }));
     if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, 4), words: data.causes.labels });
     this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
   }
@@ -178,7 +178,7 @@ class Parallel {
     const { low, high } = axis, span = high - low, step = roundStep(span / 4);
     const between = Array.from({ length: 9 }, (_, i) => (Math.ceil(low / step) + i) * step);
     const kept = between.filter((value) => value > low + 0.08 * span && value < high - 0.08 * span);
-    return [low, ...kept, high].map((value) => [value, number(Number(value.toPrecision(6)), 3)]);
+    return [low, ...kept, high].map((value) => [value, number(Number(turned(value, axis).toPrecision(6)), 3)]);
   }
 
   connect() {

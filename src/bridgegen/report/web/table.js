@@ -124,7 +124,8 @@ class Table {
     if (name === "region") return element("td", {}, value === null ? "–" : `${value}`);
     if (elsewhereBy(name)) return verdictCell(value);
     const digits = name === "harm" || name === "harm_any" ? 4 : 3; // collisions differ by their severity, in the third decimal
-    const cell = element("td", {}, measured(value, columns.get(name)?.unit, digits));
+    const column = columns.get(name);
+    const cell = element("td", {}, worded(value, column) ?? measured(turned(value, column), column?.unit, digits));
     if (name === "n_collision" && value > 0) cell.className = "hit";
     return cell;
   }

@@ -13,7 +13,8 @@ import pyoxigraph as ox
 
 from bridgegen.errors import OntologyError
 from bridgegen.odd.expression import RESERVED, Expression, parse
-from bridgegen.odd.parameters import Axis, slack
+from bridgegen.odd.kinds import slack
+from bridgegen.odd.parameters import Axis
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject, bg
 from bridgegen.openx.openscenario import model as osc
@@ -27,7 +28,8 @@ class Quantities:
     """The numbers of a scenario's individuals, as the storyboard needs them.
 
     Attributes:
-        values: every dynamic parameter's value by name, in alphabetical order.
+        values: every dynamic parameter's number by name, in alphabetical order.
+        words: likewise, of those that are categories, the name of the value.
         limits: derived parameters that only limit others: nothing in the storyboard carries them.
 
     Raises:
@@ -43,6 +45,7 @@ class Quantities:
             if quad.predicate == has_parameter and not isinstance(quad.subject, ox.Triple):
                 bearers.setdefault(quad.object, []).append(quad.subject)
         found: dict[str, tuple[float, Subject]] = {}
+        categories: dict[str, Subject] = {}
         self.limits: set[Subject] = set()
         for parameter in individuals.links(scenario, "has_parameter_declaration"):
             if individuals.text(parameter, "has_axis") == Axis.STATIC:
@@ -57,12 +60,25 @@ class Quantities:
                 raise OntologyError(
                     f"a parameter's name must be an identifier of its own, got '{name}'"
                 )
-            if name in found:
+            if name in found or name in categories:
                 raise OntologyError(f"parameter {name} is declared twice")
+            if individuals.texts(parameter, "has_allowed_word"):
+                categories[name] = parameter
+                continue
             value = self._value(name, parameter, bearers.get(parameter, []))
             found[name] = value, parameter
-        self._nodes = {name: found[name][1] for name in sorted(found)}
+        self.words = {name: self._word(name, categories[name]) for name in sorted(categories)}
+        self._nodes = {name: found[name][1] for name in sorted(found)} | categories
         self.values = {name: found[name][0] for name in sorted(found)}
+
+    def _word(self, name: str, parameter: Subject) -> str:
+        word, allowed = self._individuals.text(parameter, "has_word"), self._allowed(parameter)
+        if word not in allowed:
+            raise OntologyError(f"{name} must be one of {', '.join(allowed)}, got '{word}'")
+        return word
+
+    def _allowed(self, parameter: Subject) -> list[str]:
+        return sorted(self._individuals.texts(parameter, "has_allowed_word"))
 
     def _value(self, name: str, parameter: Subject, bearers: list[Subject]) -> float:
         individuals = self._individuals
@@ -129,12 +145,22 @@ class Quantities:
 
     def declarations(self) -> list[osc.ParameterDeclaration]:
         """Return the declaration of each dynamic parameter, its range as constraints."""
-        return [
-            osc.ParameterDeclaration(
-                name, osc.ParameterType.DOUBLE, format_double(value), self._constraints(name)
-            )
+        said = {
+            name: (osc.ParameterType.DOUBLE, format_double(value), self._constraints(name))
             for name, value in self.values.items()
-        ]
+        }
+        said |= {
+            name: (osc.ParameterType.STRING, word, self._alternatives(name))
+            for name, word in self.words.items()
+        }
+        return [osc.ParameterDeclaration(name, *said[name]) for name in sorted(said)]
+
+    def _alternatives(self, name: str) -> tuple[osc.ValueConstraintGroup, ...]:
+        """Return a group for each name of a category: one of them holds."""
+        return tuple(
+            osc.ValueConstraintGroup((osc.ValueConstraint(osc.Rule.EQUAL_TO, word),))
+            for word in self._allowed(self._nodes[name])
+        )
 
     def _constraints(self, name: str) -> tuple[osc.ValueConstraintGroup, ...]:
         low, high = self._range(self._nodes[name])

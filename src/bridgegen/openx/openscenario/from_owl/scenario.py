@@ -69,7 +69,7 @@ class _Converter:
         texts += self.actions.texts
         declarations = self.quantities.declarations()
         for text in texts:
-            if text.name in self.quantities.values:
+            if text.name in self.quantities.values or text.name in self.quantities.words:
                 raise OntologyError(f"a parameter must not have the reserved name {text.name}")
         name = plain_text(self.individuals, self.node, "has_name")
         controllers = tuple(self.signals.controllers)

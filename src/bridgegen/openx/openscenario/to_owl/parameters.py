@@ -6,7 +6,7 @@ weather, else ``participants``; the unit is that of the property that it gives.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 
 import pyoxigraph as ox
 
@@ -65,6 +65,11 @@ def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) 
     """Add the parameters, after all that is bound to them."""
     declared = builder.scenario_file.parameter_declarations
     ranges = {} if declared is None else {one.name: one for one in declared.parameters}
+    for name in _categories(notes, ranges):
+        with builder.attempt():
+            builder.put(
+                scenario, "has_parameter_declaration", _add_category(builder, ranges[name], notes)
+            )
     bound: dict[str, dict[str, list[ox.NamedNode]]] = defaultdict(dict)
     for node, name, parameter in builder.bindings:
         bound[parameter].setdefault(name, []).append(node)
@@ -81,6 +86,32 @@ def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) 
             _put_range(builder, node, ranges.get(name))
             builder.put(scenario, "has_parameter_declaration", node)
             _check_clear(ranges.get(name), name, bound.get(name, {}), free)
+
+
+def _categories(notes: Notes, declared: Mapping[str, osc.ParameterDeclaration]) -> Iterator[str]:
+    """Yield the parameters that are categories: texts of which the header says an axis."""
+    for name in notes.of[PARAMETER]:
+        one = declared.get(name)
+        if one is not None and one.parameter_type is osc.ParameterType.STRING:
+            yield name
+
+
+def _add_category(
+    builder: StoryBuilder, one: osc.ParameterDeclaration, notes: Notes
+) -> ox.NamedNode:
+    facts = notes.of[PARAMETER][one.name]
+    node = builder.state(builder.reserve(f"p_{one.name}"), "Parameter")
+    builder.put(node, "has_name", one.name)
+    builder.put(node, "has_axis", _said(builder, facts, "axis", str(Axis.PARTICIPANTS)))
+    builder.put(node, "has_unit", _said(builder, facts, "unit", "1"))
+    for group in one.constraint_groups:
+        for limit in group.constraints:
+            builder.put(node, "has_allowed_word", builder.text(limit.value))
+    builder.put(node, "has_word", builder.text(one.value))
+    builder.put(node, "has_parameter", node)
+    builder.put(node, "binds_property", "has_word")
+    _constrain(builder, node, facts, ["has_word"])
+    return node
 
 
 def _add_parameter(
@@ -106,12 +137,22 @@ def _add_parameter(
     units = [tbox().units[one] for one in names if one in tbox().units]
     builder.put(node, "has_axis", _said(builder, facts, "axis", str(axis)))
     builder.put(node, "has_unit", _said(builder, facts, "unit", units[0] if units else "1"))
+    _constrain(builder, node, facts, names)
+    return node
+
+
+def _constrain(
+    builder: StoryBuilder,
+    node: ox.NamedNode,
+    facts: dict[str, list[osc.Property]],
+    names: Iterable[str],
+) -> None:
+    """State the rules that the header says a parameter obeys."""
     for rule in facts.get("constraint", ()):
         text = builder.text(rule.value)
         builder.put(node, "constraint", text)
         for property_name in names:
             builder.quads.append(ox.Quad(bg(property_name), bg("constraint"), ox.Literal(text)))
-    return node
 
 
 def _said(
