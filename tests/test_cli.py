@@ -297,7 +297,7 @@ def test_a_run_folder_is_never_overwritten(cli, finished):
         (["search", "crosroads-s4"], ["unknown scenario 'crosroads-s4'", "crossroads-s4"]),
         (["search", "crossroads-s4", "--algorithm", "spo"], ["unknown algorithm 'spo'", "pso"]),
         (["search", "crossroads-s4", "--objective", "dmin=1"], ["unknown metric 'dmin'", "d_min"]),
-        (["search", "crossroads-s4", "--fix", "fog"], ["--fix must read NAME=NUMBER, got 'fog'"]),
+        (["search", "crossroads-s4", "--fix", "fog"], ["--fix must read NAME=VALUE, got 'fog'"]),
         (["search", "crossroads-s4", "--fix", "fog_density=nan"], ["fog_density", "nan"]),
         (["search", "crossroads-s4", "--budget", "-3"], ["budget", "-3"]),
         (["search", "nowhere.yaml"], ["nowhere.yaml"]),

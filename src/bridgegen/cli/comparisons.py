@@ -83,7 +83,7 @@ def compare(
             ideal=split(ideal or ""),
             time_limit=time_limit,
             axes=axes.split(",") if axes else None,
-            fixed=options.read_values(fix),
+            fixed=options.read_fixed(fix),
             road_map=road_map,
             junction=junction,
             objective=options.read_terms(objective),

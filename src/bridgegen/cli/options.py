@@ -48,7 +48,9 @@ TimeLimit = Annotated[
 Axes = Annotated[str | None, typer.Option(help="What to search, e.g. static,participants,weather.")]
 Fix = Annotated[
     list[str] | None,
-    typer.Option(help="Hold a parameter, e.g. --fix fog_density=80; may be repeated."),
+    typer.Option(
+        help="Hold a parameter, e.g. --fix fog_density=80; a category by name; may be repeated."
+    ),
 ]
 Objective = Annotated[
     str | None,
@@ -175,7 +177,7 @@ def read_names(text: str | None) -> list[str]:
     return [name.strip() for name in text.split(",")] if text else []
 
 
-def read_values(pairs: list[str] | None, option: str = "--fix") -> dict[str, float | str]:
+def read_fixed(pairs: list[str] | None) -> dict[str, float | str]:
     """Read ``name=value`` pairs: numbers, or names of categories' values."""
     values: dict[str, float | str] = {}
     problems = []
@@ -186,14 +188,14 @@ def read_values(pairs: list[str] | None, option: str = "--fix") -> dict[str, flo
         except ValueError:
             values[name] = text
         if not equals or not text:
-            problems.append(f"{option} must read NAME=VALUE, got '{pair}'")
+            problems.append(f"--fix must read NAME=VALUE, got '{pair}'")
     if problems:
         raise InputError(*problems)
     return values
 
 
-def read_numbers(pairs: list[str], option: str) -> dict[str, float]:
-    """Read ``name=number`` pairs."""
+def _read_weights(pairs: list[str]) -> dict[str, float]:
+    """Read ``metric=weight`` pairs."""
     values, problems = {}, []
     for pair in pairs:
         name, equals, text = pair.partition("=")
@@ -202,7 +204,7 @@ def read_numbers(pairs: list[str], option: str) -> dict[str, float]:
         except ValueError:
             equals = ""
         if not equals:
-            problems.append(f"{option} must read NAME=NUMBER, got '{pair}'")
+            problems.append(f"--objective must read NAME=NUMBER, got '{pair}'")
     if problems:
         raise InputError(*problems)
     return values
@@ -213,7 +215,7 @@ def read_terms(text: str | None) -> dict[str, float | None] | None:
     if not text:
         return None
     pairs = read_names(text)
-    weighted = read_numbers([pair for pair in pairs if "=" in pair], "--objective")
+    weighted = _read_weights([pair for pair in pairs if "=" in pair])
     return {name: weighted.get(name) for name in (pair.partition("=")[0] for pair in pairs)}
 
 

@@ -86,7 +86,7 @@ def search(
             ideal=split(ideal or ""),
             time_limit=time_limit,
             axes=axes.split(",") if axes else None,
-            fixed=options.read_values(fix),
+            fixed=options.read_fixed(fix),
             road_map=road_map,
             junction=junction,
             keep=keep,

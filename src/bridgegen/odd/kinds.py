@@ -232,7 +232,7 @@ class Kind(ABC):
         return f"{self.text(low, number)} to {self.text(high, number)}{unit}"
 
     def need_text(self, sign: str, limit: float, low: float, high: float, number: Show) -> str:
-        """Return what harm needs of a parameter, as people read it: ``>= 3``.
+        """Return what harm needs of a parameter, where sign and limit do not say it; else "".
 
         Args:
             sign: ">=" or "<=".
@@ -241,7 +241,7 @@ class Kind(ABC):
             high: of the declared range.
             number: how a number is written.
         """
-        return f"{sign} {number(limit)}"
+        return ""
 
     def within(self, low: float, high: float) -> tuple[str, ...]:
         """Return the names of the values from low to high; none where they are numbers."""

@@ -351,7 +351,7 @@ def _condition(space: SearchSpace, ladder: Ladder, at: Int, i: int, limit: int) 
     sign: Literal[">=", "<="] = ">=" if values[i] > ladder.nominal[i] else "<="
     needs = one.kind.need_text(sign, float(last[i]), one.low, one.high, "{:.3g}".format)
     return Condition(
-        name=name, unit=one.unit, sign=sign, needs=needs if one.kind.labels() else "",
+        name=name, unit=one.unit, sign=sign, needs=needs,
         limit=float(last[i]), step=float(ladder.step[i]), value=float(values[i]),
         nominal=float(ladder.nominal[i]),
     )  # fmt: skip
