@@ -14,18 +14,23 @@ from bridgegen.campaign.validate import validate_file
 from bridgegen.openx.openscenario.read import read
 from bridgegen.report.show import show_scenario
 from bridgegen.store import Store
+from bridgegen.verdict.of_run import Gate
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/braking-manner.yaml"
 NAMES = ("gentle", "firm", "emergency")
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def searched(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "run"
-    bg.run_search(
+    return bg.run_search(
         EXAMPLE, algorithm="random", budget=40, keep=4, ego="route-follower", out=out,
     )  # fmt: skip
-    return out
+
+
+@pytest.fixture(scope="module")
+def run(searched):
+    return searched.folder
 
 
 def rows(folder):
@@ -48,6 +53,13 @@ def test_exported_files_name_the_value_and_are_valid(run):
         assert wind == pytest.approx(x["wind_from"] % 360.0)
         said = {one.name: one.value for one in read(file).parameter_declarations.parameters}
         assert said["manner"] == word
+
+
+def test_the_verdict_names_the_values(searched, tmp_path):
+    Gate.read(["critical > 0"], tmp_path / "junit.xml").judge(searched)
+    text = (tmp_path / "junit.xml").read_text("utf-8")
+    assert re.search(f"manner = ({'|'.join(NAMES)})\n", text)
+    assert re.search(r"wind_from = [0-9.]+ deg\n", text)
 
 
 def test_the_report_names_the_values(run):

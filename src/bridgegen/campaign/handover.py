@@ -95,6 +95,15 @@ class Quantity(BaseModel):
     unit: str
 
 
+class ParameterValue(BaseModel):
+    """A parameter's value in a scenario's ``.json``: a number, or the name of a category's."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    value: float | Annotated[str, Field(max_length=1000)] | None
+    unit: str
+
+
 class _Handed(BaseModel):
     """Which evaluation a scenario's ``.json`` is of."""
 
@@ -104,7 +113,7 @@ class _Handed(BaseModel):
 class Facts(_Handed):
     """What a scenario's ``.json`` says, as far as a verdict needs it; see `_facts`."""
 
-    parameters: dict[str, Quantity]
+    parameters: dict[str, ParameterValue]
     metrics: dict[str, Quantity]
     cause: str | None
     quick_cause: str | None = None

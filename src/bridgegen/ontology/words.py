@@ -190,17 +190,22 @@ def _limit(individuals: Individuals, rule: Rule) -> str:
     if rule.limit is None:
         return ""
     given: dict[str, float] = {}
+    texts: dict[str, str] = {}
+    categories = dict(rule.limit.categories)
     for name in sorted(rule.limit.names):
         for node, property_name in carriers(individuals, name)[:1]:
+            text = _values(individuals, node, property_name)[0].strip("'")
+            words = categories.get(name)
             try:
-                given[name] = float(_values(individuals, node, property_name)[0])
+                given[name] = float(text) if words is None else float(words.index(text))
             except ValueError:
                 return ""
+            texts[name] = f"{given[name]:.6g}" if words is None else text
     if given.keys() != rule.limit.names:
         return ""
     with np.errstate(all="ignore"):
         value = float(rule.limit.evaluate(given))
-    names = ", ".join(f"{name} = {number:.6g}" for name, number in given.items())
+    names = ", ".join(f"{name} = {text}" for name, text in texts.items())
     return f" (= {value:.6g}{f' with {names}' if names else ''})"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridgegen.campaign.handover import Facts, Quantity, read_facts
+from bridgegen.campaign.handover import Facts, ParameterValue, Quantity, read_facts
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import CAUSES
@@ -219,9 +219,11 @@ def _is_to_blame(facts: Facts, figures: Sequence[str]) -> bool:
     return any(name == cause if name in _CAUSES else name not in _OF_THE_RUN for name in figures)
 
 
-def _told(one: Quantity) -> str:
+def _told(one: ParameterValue | Quantity) -> str:
     """Return a value with its unit; null is infinite, as what it is written from has no NaN."""
     if one.value is None:
         return "inf"
+    if isinstance(one.value, str):
+        return one.value
     unit = "" if one.unit in ("1", "count") else f" {one.unit}"
     return f"{one.value:.6g}{unit}"

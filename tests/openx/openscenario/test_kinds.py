@@ -86,6 +86,7 @@ def test_a_formula_that_the_names_break_is_found():
     found = [str(one) for one in check(with_word(them, "gentle"), SCENARIO)]
     assert len(found) == 1
     assert "deceleration = (2 if manner == gentle" in found[0]
+    assert "(= 2.2 with manner = gentle, wind_from = 360)" in found[0]
 
 
 # -- a file whose text varies ----------------------------------------------------------------------
