@@ -80,7 +80,7 @@ NumberOrName = Annotated[
     float | str,
     _number_or("the name of a category's value", _PARAMETER),
     WithJsonSchema(
-        {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_PARAMETER}$"}]}
+        {"anyOf": [{"type": "string", "pattern": f"^{_PARAMETER}$"}, {"type": "number"}]}
     ),
 ]
 KindName = Literal["float", "integer", "category", "angle"]
