@@ -179,6 +179,71 @@ def _called_at(_: Any, address: Any, arrays: Any) -> Any:
     return numba.types.void(address, arrays), generate
 
 
+DEMAND = numba.types.UniTuple(numba.types.float64, 2)
+"""What a kernel returns that is called by its address."""
+
+
+def _kernel_called_at(_: Any, address: Any, arguments: Any) -> Any:
+    """In a kernel: call another one by its address; see ``address_of``.
+
+    So that what calls it is compiled without it, and it only where it is called.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kinds, convention = signature.args[1].types, context.call_conv
+        values = [builder.extract_value(given[1], i) for i in range(len(kinds))]
+        code = convention.get_function_type(DEMAND, kinds)
+        answer = cgutils.alloca_once(builder, convention.get_return_type(DEMAND).pointee)
+        error = cgutils.alloca_once_value(builder, ir.Constant(code.args[1].pointee, None))
+        packed = context.get_arg_packer(kinds).as_arguments(builder, values)
+        callee = builder.inttoptr(given[0], code.as_pointer())
+        builder.call(callee, [answer, error, *packed])
+        return context.get_returned_value(builder, DEMAND, builder.load(answer))
+
+    return DEMAND(address, arguments), generate
+
+
+def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
+    """Compile a kernel for arguments of some types, if need be; return where its code lies.
+
+    Args:
+        function: a ``kernel`` that returns two float64.
+        kinds: Numba's types of its arguments; see ``row_type`` for those of bundles.
+    """
+    if numba.config.DISABLE_JIT:
+        if function not in _INTERPRETED:
+            _INTERPRETED.append(function)
+        return 1 + _INTERPRETED.index(function)
+    compiled: Any = function
+    compiled.compile(kinds)
+    found = compiled.overloads[kinds]
+    address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    return address
+
+
+def row_type(rows: Any, axes: int = 1) -> Any:
+    """Return the type of the bundle of one row of a named tuple of arrays.
+
+    Args:
+        rows: its arrays, of N rows, and numbers.
+        axes: how many first axes a row has not.
+    """
+    if numba.config.DISABLE_JIT:
+        return None
+    kinds = (numba.typeof(one) for one in rows)
+    arrays = numba.types.Array
+    one_row = (one.copy(ndim=one.ndim - axes) if isinstance(one, arrays) else one for one in kinds)
+    return Bundle(numba.types.NamedTuple(tuple(one_row), type(rows)))
+
+
+_INTERPRETED: list[Callable[..., Any]] = []
+"""The functions that have addresses where Numba does not compile, the first at 1."""
+
+
+def _interpreted_at(address: int, arguments: tuple[Any, ...]) -> Any:
+    return _INTERPRETED[address - 1](*arguments)
+
+
 def _itself(array: Any) -> Any:
     return array
 
@@ -192,6 +257,8 @@ def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
 
 if numba.config.DISABLE_JIT:
     borrowed = bundled = _itself
-    call_at = call_from_python
+    call_at, call_kernel_at = call_from_python, _interpreted_at
 else:
-    borrowed, bundled, call_at = map(numba.extending.intrinsic, (_borrowed, _bundled, _called_at))
+    borrowed, bundled, call_at, call_kernel_at = map(
+        numba.extending.intrinsic, (_borrowed, _bundled, _called_at, _kernel_called_at)
+    )

@@ -14,7 +14,7 @@ from bridgegen.conflict.harm import NEAR_MISS, Count, decisive
 from bridgegen.conflict.place import place_on_route
 from bridgegen.conflict.plausibility import plausibility
 from bridgegen.simulation.embedded.intentions import Intentions
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.rollout import Rollout
 
 

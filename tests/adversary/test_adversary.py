@@ -15,7 +15,7 @@ from bridgegen.odd.adversary import MARGIN, adversarial
 from bridgegen.odd.reader import load
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
-from bridgegen.simulation.embedded._steering_kernels import steer
+from bridgegen.simulation.embedded.motion._steering_kernels import steer
 
 DT = 0.05
 

@@ -23,7 +23,7 @@ from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.model import OpenDrive, Priority
 from bridgegen.openx.opendrive.routes import Route
 from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.embedded.ways import Ways
+from bridgegen.simulation.embedded.places.ways import Ways
 
 CROSSING = """
 scenario: signs

@@ -11,7 +11,7 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.errors import InputError
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.courses import rounded
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 if TYPE_CHECKING:

@@ -49,7 +49,9 @@ class Course:
         self, lane: Lane, station: float, speed: float, top: float, limits: tuple[float, float],
         room: float, time_step: float, n_steps: int,
     ) -> None:  # fmt: skip
-        from bridgegen.simulation.embedded._steering_kernels import note  # numba is slow to import
+        from bridgegen.simulation.embedded.motion import (
+            note,  # numba is slow to import
+        )
 
         self._lane, self.top, self.room, self._dt = lane, top, room, time_step
         self._limits = limits
@@ -69,7 +71,9 @@ class Course:
             pace: the speed that it makes for, as a share of its highest.
             place: -1 at the right edge of the lane, 1 at the left one.
         """
-        from bridgegen.simulation.embedded._steering_kernels import steer  # numba is slow to import
+        from bridgegen.simulation.embedded.motion import (
+            steer,  # numba is slow to import
+        )
 
         steer(
             self._lane.path, len(self._lane.path), self._lane.step, self.state, pace * self.top,
@@ -86,7 +90,9 @@ class Course:
 
         The way that is left is for those who look where the participant is going.
         """
-        from bridgegen.simulation.embedded._steering_kernels import note  # numba is slow to import
+        from bridgegen.simulation.embedded.motion import (
+            note,  # numba is slow to import
+        )
 
         lane = self._lane
         end, now = (len(lane.path) - 1) * lane.step, self.state.copy()

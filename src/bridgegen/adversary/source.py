@@ -11,8 +11,8 @@ from bridgegen.odd.adversary import first_speed, limits, room, top_speed
 from bridgegen.odd.story import Adversary
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.source import ConcreteScenario, OntologySource
+from bridgegen.simulation.embedded.places.ways import Ways
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-from bridgegen.simulation.embedded.ways import Ways
 
 
 class AdversarySource:

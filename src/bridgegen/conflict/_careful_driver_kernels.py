@@ -5,6 +5,9 @@ somebody was forced to brake, comfortable braking takes its place, after the sam
 a near miss the careful driver must avoid the near miss, not the contact.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

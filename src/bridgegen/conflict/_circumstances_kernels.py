@@ -1,5 +1,8 @@
 """Compiled: what was the case around a conflict: lights, crosswalks, who slowed down or steered."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -4,6 +4,9 @@ Each pair gets a row of whole numbers and one of floats; ``_codes`` names their 
 happens up to the ego's first contact with anybody counts.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -1,5 +1,8 @@
 """Compiled geometry of a pair of bodies: how they meet, where, and who is in whose path."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 from typing import NamedTuple
 

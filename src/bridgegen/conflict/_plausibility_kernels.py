@@ -3,6 +3,9 @@
 One scenario after the other, each from its own numbers alone.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 import numpy as np

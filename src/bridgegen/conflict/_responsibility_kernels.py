@@ -4,6 +4,9 @@ One question recurs: could a careful driver, from some instant on, have avoided 
 on its own path? See ``_careful_driver_kernels``.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 from bridgegen.compiled import kernel
 from bridgegen.conflict._careful_driver_kernels import CLEAR, COLLIDES, COMES_NEAR, braked
 from bridgegen.conflict._circumstances_kernels import (

@@ -1,5 +1,8 @@
 """Compiled typology of a conflict; the types are those of ``types.ConflictType``."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -4,6 +4,9 @@ Only what goes the ego's way counts, or stands along it: crossing and oncoming t
 in the disturbances of UN Regulation 157.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

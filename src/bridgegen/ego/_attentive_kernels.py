@@ -23,6 +23,9 @@ Sources: UN Regulation 157, 01 series of amendments, annex 3 (reaction, braking,
 (cut-in); those of the kernels named above.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import inlined_kernel, kernel

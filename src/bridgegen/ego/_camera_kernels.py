@@ -4,6 +4,9 @@ How well a target is seen is the number of pixels across it, times the share of 
 reaches the picture.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -17,10 +17,14 @@ Source: Mattas et al., Accident Analysis & Prevention 148 (2020) 105794 (PFS, CF
 106743 (the driver); its parameters are those of UN Regulation 157, 01 series, annex 3.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._conflict_kernels import LEADER, NOBODY, foresee
+from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
 from bridgegen.ego._fsm_kernels import (
     COMFORT_BRAKING,
@@ -33,7 +37,7 @@ from bridgegen.ego._fsm_kernels import (
     STANDSTILL,
     braking,
 )
-from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
 
 RISK, ASKED = 0, 1
 
@@ -88,3 +92,15 @@ def drive_careful_fsm(
             asked = min(wanted, max(asked - JERK * dt, -needed))
     attention[0, ASKED] = asked
     return asked
+
+
+@kernel
+def drive(k, plan, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m]."""
+    planned, asked = cruise(k, plan, roads, state, record)
+    demanded = drive_careful_fsm(
+        k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
+        planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
+        state.attention,
+    )  # fmt: skip
+    return min(demanded, asked), keep_to_route(k, roads, state, record)

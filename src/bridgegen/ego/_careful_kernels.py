@@ -26,6 +26,9 @@ Source: UN Regulation 157, 01 series of amendments, annex 3; Mattas et al., Acci
 Prevention 174 (2022) 106743, who call it the CC human driver.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 from bridgegen.compiled import kernel
 from bridgegen.ego._conflict_kernels import (
     ASIDE,
@@ -36,8 +39,9 @@ from bridgegen.ego._conflict_kernels import (
     WANDERING,
     foresee,
 )
+from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
-from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
 
 EVALUATION = 0.4  # s, until the risk is perceived
 BRAKES_HARD = 5.0  # m/s², of who drives ahead
@@ -110,3 +114,15 @@ def drive_careful(
         asked = max(asked - JERK * dt, -BRAKING)
     attention[0, ASKED] = asked
     return asked
+
+
+@kernel
+def drive(k, plan, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m]."""
+    planned, asked = cruise(k, plan, roads, state, record)
+    demanded = drive_careful(
+        k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
+        planned, state.present, record.x, record.y, record.h, record.v, plan.bodies,
+        state.attention,
+    )  # fmt: skip
+    return min(demanded, asked), keep_to_route(k, roads, state, record)

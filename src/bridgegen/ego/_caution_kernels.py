@@ -5,6 +5,9 @@ seconds. Up to the speed from which the ego stops in that time nothing can happe
 late finds it past, who steps out early finds it standing.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -14,6 +14,9 @@ the caller keeps of each: how far its centre is to the side of the ego's way now
 that it has been [m]; zeros before the first instant.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

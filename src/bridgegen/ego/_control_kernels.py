@@ -6,6 +6,9 @@ together; the steering has one. Ideal control has neither. Tyres and full lock a
 (``simulation.embedded._motion_kernels``).
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -1,5 +1,8 @@
 """The last resort: full braking where two boxes will meet and nothing else was in time."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -5,6 +5,9 @@ rounded; Kesting, Treiber, Helbing, Phil. Trans. R. Soc. A 368 (2010) 4585 (cons
 heuristic: a short gap to somebody who is not slower needs no hard braking).
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

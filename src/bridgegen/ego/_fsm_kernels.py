@@ -30,6 +30,9 @@ Source: Mattas et al., Accident Analysis & Prevention 148 (2020) 105794 (PFS, CF
 European Commission, JRC-FSM.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel
@@ -43,8 +46,9 @@ from bridgegen.ego._conflict_kernels import (
     WANDERING,
     foresee,
 )
+from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
-from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
 from bridgegen.ego.kinds import PEDESTRIAN
 
 REACTION = 0.75  # s
@@ -198,3 +202,15 @@ def drive_fsm(
                 pressed = 1.0 - min(asked, 0.0)
     attention[0, ASKED], attention[0, PRESSED] = asked, pressed
     return asked
+
+
+@kernel
+def drive(k, plan, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m]."""
+    planned, asked = cruise(k, plan, roads, state, record)
+    demanded = drive_fsm(
+        k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
+        planned, state.present, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
+        state.attention,
+    )  # fmt: skip
+    return min(demanded, asked), keep_to_route(k, roads, state, record)

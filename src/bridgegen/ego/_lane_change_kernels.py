@@ -9,6 +9,9 @@ What it keeps in mind is the shift (``_shift_kernels``), and for how long somebo
 way.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -1,5 +1,8 @@
 """The LiDAR: beams on target, of which those return whose signal is above the noise."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -1,5 +1,8 @@
 """Traffic lights and stop signs: where to stop, or to go on at yellow because one no longer can."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

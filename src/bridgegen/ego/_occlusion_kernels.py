@@ -9,6 +9,9 @@ edge [rad], cosine and sine of its heading; and of each ray at it the direction,
 body [m], and the share of the body's height that is hidden there.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

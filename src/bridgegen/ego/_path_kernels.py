@@ -4,6 +4,9 @@ A path is ``(L, 6)`` float64: x, y [m], heading [rad], its cosine and sine, curv
 its L rows the first n are real, and row i is at station i · ds.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

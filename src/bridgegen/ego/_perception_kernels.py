@@ -4,6 +4,9 @@ A camera and a LiDAR look all round from the middle of the ego's box. Every 0.1 
 others are (`place`), who hides whom, what the sensors detect, and what the tracker makes of it.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

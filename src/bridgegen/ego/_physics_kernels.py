@@ -4,6 +4,9 @@ Where no source is named the figure is ours, chosen to give the ranges that its 
 Lengths in metres, angles in radians, extinctions in 1/m, luminances in cd/m², illuminances in lx.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -11,6 +11,9 @@ behind that station [m], the track, how its speed changes [m/s²], and who waits
 - The ideal prediction knows everybody's true way, and the one that a lane change leads to.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

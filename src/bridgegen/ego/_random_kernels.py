@@ -8,6 +8,9 @@ SC11 (2011), doi:10.1145/2063384.2063405; normal numbers by Box and Muller, Ann.
 (1958) 610.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 import numpy as np

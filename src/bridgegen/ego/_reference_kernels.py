@@ -5,9 +5,12 @@ times a second; control acts at every instant. What the driver keeps in mind bet
 ``mind`` ``(MIND,)``, zeros before the first.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego import _control_kernels as control
 from bridgegen.ego._caution_kernels import careful_speed
 from bridgegen.ego._emergency_kernels import must_brake
@@ -25,7 +28,7 @@ from bridgegen.ego._lane_change_kernels import (
 from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._perception_kernels import perceive
 from bridgegen.ego._prediction_kernels import predict, predict_truly
-from bridgegen.ego._route_follower_kernels import hold_speed, preview
+from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route, preview
 from bridgegen.ego._shift_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, sight
 from bridgegen.ego._speed_kernels import (
@@ -37,6 +40,7 @@ from bridgegen.ego._speed_kernels import (
     sight_speed,
 )
 from bridgegen.ego._surroundings_kernels import BEHIND, surround
+from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego._yielding_kernels import yield_to_all
 
 PLANNED, NEXT_PLAN, STOPS_FOR = control.SIZE, control.SIZE + 1, control.SIZE + 2
@@ -126,20 +130,20 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
     return max(wanted, -friction_limit)
 
 
-@inlined_kernel
-def drive(k, curvature, friction_limit, plan_, roads, state, record):
+@kernel
+def drive(k, plan_, roads, state, record):
     """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m].
 
     Args:
         k: the instant.
-        curvature: that of the path to its preview point [1/m].
-        friction_limit: [m/s²].
         plan_: the compiled storyboard, see ``simulation.embedded._memory_kernels``.
         roads: the row's, of the same.
         state: the row's.
         record: the row's.
     """
     s, v, mind = state.station[0], record.v[0, k], state.mind
+    friction_limit = state.weather[FRICTION]
+    curvature = keep_to_route(k, roads, state, record)
     perceive(
         k, plan_.dt, state.key[0], plan_.ideal_perception, state.present, record.x, record.y,
         record.h, record.v, plan_.bodies, plan_.kinds, state.weather, state.sensors, state.tracks,

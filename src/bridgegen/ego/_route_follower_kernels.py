@@ -1,5 +1,8 @@
 """The paper's baseline ego: holds its target speed on its route and sees nobody (Section V-A)."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pursue
 
@@ -24,3 +27,19 @@ def steer(path, n, ds, s, x, y, h, v):
 def hold_speed(v, target):
     """Return the acceleration [m/s²] that brings the speed to its target."""
     return (target - v) / SPEED_TIME
+
+
+@kernel
+def keep_to_route(k, roads, state, record):
+    """Return the curvature [1/m] that keeps the ego to its route at instant k."""
+    p = state.on[0]
+    return steer(
+        roads.paths[p], roads.counts[p], roads.steps[p], state.station[0], record.x[0, k],
+        record.y[0, k], record.h[0, k], record.v[0, k],
+    )  # fmt: skip
+
+
+@kernel
+def drive(k, plan, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m]."""
+    return hold_speed(record.v[0, k], state.command[0]), keep_to_route(k, roads, state, record)

@@ -6,6 +6,9 @@ two-state Markov chain. So the worse of two weathers never shows what the better
 are first-order autoregressive.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -5,6 +5,9 @@ where the change begins, and its length [m]. Between them is a quintic whose slo
 both ends.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -1,5 +1,8 @@
 """How fast the road lets one drive: limits, bends, and what can be seen in time."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

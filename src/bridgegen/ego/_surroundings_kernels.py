@@ -3,6 +3,9 @@
 ``around`` ``(E, AROUND)`` has a row per track; it is what following, avoidance and caution go by.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -6,6 +6,9 @@ tentative until enough of its last frames have seen it, coasts on at its velocit
 it, and is dropped when they go on doing so.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -30,12 +30,16 @@ competent and careful human driver; European Commission, JRC-FSM, its "CC human 
 al., Accident Analysis & Prevention 174 (2022) 106743.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._ahead_kernels import place_on_way
+from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
-from bridgegen.ego._route_follower_kernels import hold_speed
+from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
 from bridgegen.ego.kinds import PEDESTRIAN
 
 CRITICAL_TTC = 2.0  # s, up to which a cut-in is dangerous
@@ -137,3 +141,15 @@ def drive_un_r157(
     asked = min(asked, wanted)
     attention[0, ASKED] = asked
     return asked
+
+
+@kernel
+def drive(k, plan, roads, state, record):
+    """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m]."""
+    planned, asked = cruise(k, plan, roads, state, record)
+    demanded = drive_un_r157(
+        k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, planned,
+        state.present, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
+        state.attention,
+    )  # fmt: skip
+    return min(demanded, asked), keep_to_route(k, roads, state, record)

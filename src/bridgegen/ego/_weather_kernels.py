@@ -3,6 +3,9 @@
 ``weather`` ``(WEATHER,)`` float64 is one scenario's, now; ``_weather_columns`` tells its columns.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -14,6 +14,9 @@ stop. An ego that stands or creeps with its bumper in the zone waits there until
 one that is faster stops again only if both would meet and it can still stop before the edge.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Self
 
 from bridgegen.errors import InputError, UnknownNameError
@@ -10,12 +11,19 @@ from bridgegen.errors import InputError, UnknownNameError
 STAGES = ("perception", "prediction", "control")
 """What of a driver can be made ideal, in the order of the work; planning is what is left."""
 
-OWN = -1
-"""The code of the user's own drivers, which are no branch of the compiled rollout."""
-NOBODY = -2
-"""The code where the storyboard moves the ego."""
-GUEST = -3
-"""The code of drivers that live in another simulator than the embedded one."""
+
+class Origin(Enum):
+    """Where a driver's code comes from."""
+
+    SHIPPED = "shipped"
+    """With BridgeGen, compiled."""
+    OWN = "own"
+    """From the user."""
+    STORYBOARD = "storyboard"
+    """There is none: the storyboard moves the ego."""
+    GUEST = "guest"
+    """From another simulator than the embedded one."""
+
 
 TIME_LIMIT = 10.0
 """Seconds that one call of a user's driver may take, where the user says nothing else."""
@@ -38,26 +46,26 @@ class Driver:
 
     Attributes:
         name: as given to ``--ego`` and written to the file's Controller.
-        code: which branch of the compiled rollout it is; or ``OWN``, ``NOBODY`` or ``GUEST``.
         description: one sentence.
         stages: those of `STAGES` that it has, and that can be made ideal.
         ideal: those that are.
         time_limit: [s] that one call of a user's own may take.
         home: the only simulator that it drives in; empty: it drives in all.
+        origin: where its code comes from.
     """
 
     name: str
-    code: int
     description: str
     stages: frozenset[str] = frozenset()
     ideal: frozenset[str] = frozenset()
     time_limit: float = TIME_LIMIT
     home: str = ""
+    origin: Origin = Origin.SHIPPED
 
     @property
     def is_own(self) -> bool:
         """Whether it is the user's, in Python or a co-simulation unit."""
-        return self.code == OWN
+        return self.origin is Origin.OWN
 
     @property
     def perceives(self) -> bool:
@@ -90,40 +98,37 @@ class Driver:
 
 
 ROUTE_FOLLOWER = Driver(
-    "route-follower", 0, "Holds its target speed on its route and sees nobody (paper, Section V-A)."
+    "route-follower", "Holds its target speed on its route and sees nobody (paper, Section V-A)."
 )
 REFERENCE = Driver(
     "reference",
-    1,
     "Perceives, predicts, plans and controls: follows its route, slows for bends, keeps its "
     "distance, goes round who stands, stops at red, yields and brakes by predicted conflict.",
     frozenset(STAGES),
 )
 UN_R157 = Driver(
     "un-r157",
-    2,
     "The competent and careful human driver of UN Regulation 157, exact in its three disturbances "
     "(cut-in, cut-out, deceleration): brakes after 0.75 s, by up to 0.774 g; follows otherwise.",
 )
 CAREFUL = Driver(
     "careful",
-    4,
     "UN R157's driver extended to any road: reacts to who crosses, walks or stands in its way as "
     "well, after 0.4 s of perception and 0.75 s; sees everybody.",
 )
 FSM = Driver(
     "fsm",
-    3,
     "The fuzzy safety model: brakes in anticipation, up to 6 m/s², by how unsafe its distances "
     "are; in UN R157's disturbances as in the Commission's code.",
 )
 CAREFUL_FSM = Driver(
     "careful-fsm",
-    5,
     "The fuzzy safety model extended to any road: sees through the vehicle ahead, and keeps more "
     "room; sees everybody.",
 )
-STORYBOARD = Driver("storyboard", NOBODY, "Nobody: the file's own actions move the ego.")
+STORYBOARD = Driver(
+    "storyboard", "None: the file's own actions move the ego.", origin=Origin.STORYBOARD
+)
 """What an ego without a driver says it is driven by; not to be chosen."""
 
 DRIVERS = {
@@ -136,21 +141,21 @@ GUESTS = {
     for driver in (
         Driver(
             "carla-autopilot",
-            GUEST,
             "CARLA's own, its Traffic Manager, along the route (with --simulator carla alone).",
             home="carla",
+            origin=Origin.GUEST,
         ),
         Driver(
             "carla-agent",
-            GUEST,
             "An agent of your CARLA's Python package 'agents' (with --simulator carla alone).",
             home="carla",
+            origin=Origin.GUEST,
         ),
         Driver(
             "carla-external",
-            GUEST,
             "A client of yours that takes over the actor 'hero' (with --simulator carla alone).",
             home="carla",
+            origin=Origin.GUEST,
         ),
     )
 }
@@ -178,7 +183,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
     if is_spec(name):
         what = "A driver of the user's own."
         sees = frozenset({"perception"})
-        own = Driver(name, OWN, what, stages=sees, time_limit=time_limit or TIME_LIMIT)
+        limit = time_limit or TIME_LIMIT
+        own = Driver(name, what, stages=sees, time_limit=limit, origin=Origin.OWN)
         return own.idealised(ideal)
     try:
         driver = DRIVERS[name] if name in DRIVERS else GUESTS[name]

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from bridgegen.simulation.embedded._course_kernels import (
+from bridgegen.simulation.embedded._motion_kernels import progress
+from bridgegen.simulation.embedded.motion._course_kernels import (
     change_time,
     changed,
     lay_out,
@@ -15,7 +16,6 @@ from bridgegen.simulation.embedded._course_kernels import (
     profile_speed,
     spring,
 )
-from bridgegen.simulation.embedded._motion_kernels import progress
 
 STEP, LINEAR, CUBIC, SINUSOIDAL = range(4)
 RATE, TIME, DISTANCE = range(3)

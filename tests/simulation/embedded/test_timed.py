@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from bridgegen.ego import DRIVERS
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario.read import read
-from bridgegen.simulation.embedded._follow_kernels import at_time
 from bridgegen.simulation.embedded.compiler.trajectories import timetable
+from bridgegen.simulation.embedded.motion._follow_kernels import at_time
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 from .storyboards import (

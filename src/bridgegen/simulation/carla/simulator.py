@@ -32,7 +32,7 @@ from bridgegen.simulation.carla.settings import TIME_STEP, Access, CarlaSettings
 from bridgegen.simulation.carla.stage import Stage
 from bridgegen.simulation.carla.weather import Weather
 from bridgegen.simulation.carla.worlds import Generated, Town, check, loader
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined

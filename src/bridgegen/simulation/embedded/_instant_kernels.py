@@ -1,12 +1,13 @@
 """One instant of one scenario, in two halves: what comes before the ego's driver, and after it."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import inlined_kernel
-from bridgegen.ego.drivers import ATTENTIVE, NOBODY
+from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
-from bridgegen.simulation.embedded._control_kernels import is_steered, move_paced, move_steered
-from bridgegen.simulation.embedded._follow_kernels import arrive, move_by_timetable
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NOT_FINITE,
@@ -14,14 +15,25 @@ from bridgegen.simulation.embedded._memory_kernels import (
     STATUS,
     STOPS,
 )
-from bridgegen.simulation.embedded._others_kernels import begin_waiting, heed, move_heeding
-from bridgegen.simulation.embedded._place_kernels import fail
-from bridgegen.simulation.embedded._presence_kernels import stay_away
-from bridgegen.simulation.embedded._signal_kernels import run_controllers
-from bridgegen.simulation.embedded._speed_kernels import command_speed
-from bridgegen.simulation.embedded._storyboard_kernels import decide, finish
-from bridgegen.simulation.embedded._travel_kernels import move_along_path
-from bridgegen.simulation.embedded._trigger_kernels import observe
+from bridgegen.simulation.embedded.conditions import observe
+from bridgegen.simulation.embedded.drivers import (
+    begin_waiting,
+    heed,
+    is_steered,
+    move_heeding,
+    move_paced,
+    move_steered,
+)
+from bridgegen.simulation.embedded.motion import (
+    arrive,
+    command_speed,
+    move_along_path,
+    move_by_timetable,
+    stay_away,
+)
+from bridgegen.simulation.embedded.places._place_kernels import fail
+from bridgegen.simulation.embedded.storyboard import decide, finish
+from bridgegen.simulation.embedded.world import run_controllers
 
 
 @inlined_kernel
@@ -39,7 +51,7 @@ def before_driver(k, plan, roads, state, record):
         begin_waiting(k, plan, roads, state, record)
     command_speed(0, k, plan, roads, state, record)
     drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
-    if plan.driver != NOBODY and drives and state.on[0] < 0:  # drivers keep to lanes
+    if plan.is_driven and drives and state.on[0] < 0:  # drivers keep to lanes
         fail(OFF_LANES, state)
     for i in range(state.lights.shape[0]):
         record.lights[i, k] = state.lights[i]
@@ -55,7 +67,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     if is_steered(plan, state):
         x, y, h = move_steered(k, demanded, curvature, plan, roads, state, record)
         first = 1
-    elif plan.driver != NOBODY and state.drives[LONGITUDINALLY] == 1:
+    elif plan.is_driven and state.drives[LONGITUDINALLY] == 1:
         move_paced(k, demanded, plan, roads, state, record)
         first = 1
     for e in range(first, record.x.shape[0]):  # those who look at nobody come first

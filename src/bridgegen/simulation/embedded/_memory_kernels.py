@@ -5,8 +5,11 @@
 all other kernels see. ``State`` is all that a row needs to go on from one instant to the next.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -65,8 +68,9 @@ class Plan(NamedTuple):
     scene: Float
     others: Int
     attends: int
-    driver: int
+    is_driven: int
     driver_code: int
+    own_code: int
     ideal_perception: int
     ideal_prediction: int
     ideal_control: int
@@ -117,6 +121,9 @@ class Roads(NamedTuple):
 
 class State(NamedTuple):
     """One row between two instants; with a first axis N, all of them.
+
+    Each array is declared here alone, with the names or numbers of its axes; `Batch` gives these
+    sizes, sets what is not 0 before a row starts, and makes the rest zeros.
 
     Attributes:
         slots: ``(S,)`` the row's values.
@@ -195,77 +202,77 @@ class State(NamedTuple):
         answer: ``(·,)`` and what it answers.
     """
 
-    slots: Float
-    weather: Float
-    ending: Int
-    observed: Bool
-    history: Bool
-    phase: Int
-    executions: Int
-    stamps: Int
-    looked: Int
-    held: Float
-    marks: Float
-    along: Int
-    action_ended: Bool
-    selected: Bool
-    values: Float
-    clock: Float
-    lights: npt.NDArray[np.int8]
-    phase_now: Int
-    phase_until: Float
-    present: Bool
-    drives: Int
-    travelled: Float
-    stood: Float
-    route: Int
-    on: Int
-    station: Float
-    aside: Float
-    turn: Float
-    line: Float
-    to: Int
-    foot: Float
-    lateral_action: Int
-    lateral_lasts: Float
-    lateral_passed: Float
-    lateral_origin: Float
-    lateral_target: Float
-    follow: Int
-    follow_action: Int
-    follow_began: Float
-    timed: Bool
-    placed: Bool
-    goal: Float
-    goal_action: Int
-    wanted: Int
-    speed_action: Int
-    speed_began: Float
-    speed_lasts: Float
-    command: Float
-    origin: Float
-    target: Float
-    rate: Float
-    course: Float
-    profile: Float
-    profile_rows: Int
-    waits: Int
-    allowed: Float
-    minds: Float
-    seen: Float
-    far: Float
-    attention: Float
-    key: npt.NDArray[np.uint64]
-    sensors: Float
-    tracks: Float
-    around: Float
-    passages: Float
-    feet: Float
-    mind: Float
-    told: Float
-    ahead: Float
-    others: Float
-    answer: Float
+    slots: Annotated[Float, "slots"]
+    weather: Annotated[Float, "weather"]
+    ending: Annotated[Int, 4]
+    observed: Annotated[Bool, "probes"]
+    history: Annotated[Bool, "conditions", "instants"]
+    phase: Annotated[Int, "elements"]
+    executions: Annotated[Int, "elements"]
+    stamps: Annotated[Int, "elements", 4]
+    looked: Annotated[Int, "probes", 2]
+    held: Annotated[Float, "probes"]
+    marks: Annotated[Float, "marks", 3]
+    along: Annotated[Int, "probes"]
+    action_ended: Annotated[Bool, "actions"]
+    selected: Annotated[Bool, "entities"]
+    values: Annotated[Float, "values"]
+    clock: Annotated[Float, 3]
+    lights: Annotated[npt.NDArray[np.int8], "lights"]
+    phase_now: Annotated[Int, "controllers"]
+    phase_until: Annotated[Float, "controllers"]
+    present: Annotated[Bool, "entities"]
+    drives: Annotated[Int, 2]
+    travelled: Annotated[Float, "entities"]
+    stood: Annotated[Float, "entities"]
+    route: Annotated[Int, "entities"]
+    on: Annotated[Int, "entities"]
+    station: Annotated[Float, "entities"]
+    aside: Annotated[Float, "entities"]
+    turn: Annotated[Float, "entities"]
+    line: Annotated[Float, "entities", 3]
+    to: Annotated[Int, "entities"]
+    foot: Annotated[Float, "entities"]
+    lateral_action: Annotated[Int, "entities"]
+    lateral_lasts: Annotated[Float, "entities"]
+    lateral_passed: Annotated[Float, "entities"]
+    lateral_origin: Annotated[Float, "entities"]
+    lateral_target: Annotated[Float, "entities"]
+    follow: Annotated[Int, "entities"]
+    follow_action: Annotated[Int, "entities"]
+    follow_began: Annotated[Float, "entities"]
+    timed: Annotated[Bool, "entities"]
+    placed: Annotated[Bool, "entities"]
+    goal: Annotated[Float, "entities", 2]
+    goal_action: Annotated[Int, "entities"]
+    wanted: Annotated[Int, 2]
+    speed_action: Annotated[Int, "entities"]
+    speed_began: Annotated[Float, "entities"]
+    speed_lasts: Annotated[Float, "entities"]
+    command: Annotated[Float, "entities"]
+    origin: Annotated[Float, "entities"]
+    target: Annotated[Float, "entities"]
+    rate: Annotated[Float, "entities"]
+    course: Annotated[Float, "entities", "course"]
+    profile: Annotated[Float, "entities", "profile", 4]
+    profile_rows: Annotated[Int, "entities"]
+    waits: Annotated[Int, "entities"]
+    allowed: Annotated[Float, "entities"]
+    minds: Annotated[Float, "entities", "heed"]
+    seen: Annotated[Float, "seen", "entities"]
+    far: Annotated[Float, "entities"]
+    attention: Annotated[Float, "entities", 3]
+    key: Annotated[npt.NDArray[np.uint64], 1]
+    sensors: Annotated[Float, "entities", "sensors"]
+    tracks: Annotated[Float, "entities", "track"]
+    around: Annotated[Float, "entities", "around"]
+    passages: Annotated[Float, "passages", "passage"]
+    feet: Annotated[Float, "hypotheses"]
+    mind: Annotated[Float, "mind"]
+    told: Annotated[Float, "told"]
+    ahead: Annotated[Float, "ahead", 4]
+    others: Annotated[Float, "others", "track"]
+    answer: Annotated[Float, "answer"]
 
 
 class Record(NamedTuple):
@@ -285,6 +292,24 @@ class Record(NamedTuple):
     lights: npt.NDArray[np.int8]
     present: Bool
     began: Int
+
+
+def states(n: int, sizes: Mapping[str, int], given: Mapping[str, np.ndarray]) -> State:
+    """Return the state of N rows: zeros, but for the arrays that are given.
+
+    Args:
+        n: N.
+        sizes: of the axes that `State` names.
+        given: ``(N, …)`` arrays by name.
+    """
+    arrays: dict[str, Any] = dict(given)
+    for name, declared in get_type_hints(State, include_extras=True).items():
+        array, *axes = get_args(declared)
+        if name not in arrays:
+            number = get_args(get_args(array)[1])[0]
+            shape = (one if isinstance(one, int) else sizes[one] for one in axes)
+            arrays[name] = np.zeros((n, *shape), dtype=number)
+    return State(**arrays)
 
 
 def view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:

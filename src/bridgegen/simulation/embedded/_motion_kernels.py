@@ -1,5 +1,8 @@
 """How bodies move: the bicycle of the ego, and speeds and lanes that change by a shape."""
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 import math
 
 from bridgegen.compiled import kernel

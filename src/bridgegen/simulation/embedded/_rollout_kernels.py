@@ -3,8 +3,10 @@
 Both ways run the same functions on the same arrays, so they give the same bits.
 """
 
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 from bridgegen.compiled import kernel
-from bridgegen.simulation.embedded._ego_kernels import demand
 from bridgegen.simulation.embedded._instant_kernels import after_driver, before_driver
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
@@ -13,7 +15,8 @@ from bridgegen.simulation.embedded._memory_kernels import (
     roads_of,
     state_of,
 )
-from bridgegen.simulation.embedded._start_kernels import start
+from bridgegen.simulation.embedded.drivers import demand
+from bridgegen.simulation.embedded.storyboard import start
 
 
 @kernel

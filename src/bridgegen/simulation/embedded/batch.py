@@ -16,16 +16,23 @@ from bridgegen.ego._surroundings_kernels import AROUND
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego._weather_columns import FRICTION, WEATHER
 from bridgegen.ego.detections import DETECTION
+from bridgegen.ego.drivers import STAGES, STORYBOARD
 from bridgegen.ego.interface import ROUTE_POINTS
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import InputError
-from bridgegen.simulation.embedded import _imposed_kernels as imposed_kernels
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
+from bridgegen.simulation.embedded import drivers
 from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
-from bridgegen.simulation.embedded._observation_kernels import observe_rows
-from bridgegen.simulation.embedded._own_driver_kernels import ANSWER, TOLD, tell_rows
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.drivers import (
+    ANSWER,
+    DEMANDS,
+    TOLD,
+    code_of,
+    observe_rows,
+    tell_rows,
+)
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
 
@@ -72,6 +79,9 @@ class Batch:
         state = _state(program, roads, rows, slots, key, own_memory)
         self._block, self.state = _packed(state)
         self.record = _record(program, n)
+        if demands := DEMANDS.get(program.driver.name):
+            code = code_of(demands, self._plan, roads.tables, self.state, self.record)
+            self._plan = self._plan._replace(driver_code=code)
         self._messages: dict[int, str] = {}
 
     @property
@@ -164,16 +174,14 @@ class Batch:
 
     def impose(self, k: int, bodies: Int, states: Float) -> None:
         """Put bodies ``(B,)`` of the rows that run where ``(N, B, 4)`` says; see `CoSimulation`."""
-        imposed_kernels.impose_rows(
+        drivers.impose_rows(
             k, bodies, states, self._plan, self._roads.tables, self._rows, self.state, self.record
         )
 
     def egos_are_through(self) -> Bool:
         """Return ``(N,)``: whether a driven ego is at the end of its route, or of the road."""
         through = np.zeros(len(self._rows), dtype=np.bool_)
-        imposed_kernels.egos_are_through(
-            self._plan, self._roads.tables, self._rows, self.state, through
-        )
+        drivers.egos_are_through(self._plan, self._roads.tables, self._rows, self.state, through)
         return through
 
     def tell(self, k: int) -> None:
@@ -247,54 +255,22 @@ def _known(program: Program, values: Mapping[str, npt.ArrayLike]) -> dict[str, n
 
 
 def _plan(program: Program) -> memory.Plan:
-    return memory.Plan(
-        bodies=program.bodies,
-        kinds=program.kinds,
-        objects=program.objects,
-        init=program.init,
-        routes=program.routes,
-        follows=program.follows,
-        starts=program.starts,
-        places=program.places,
-        trajectories=program.trajectories,
-        triggers=program.triggers,
-        groups=program.groups,
-        conditions=program.conditions,
-        probes=program.probes,
-        marks=program.marks,
-        clearances=program.clearances,
-        ranges=program.ranges,
-        looks_closely=int(program.probes[:, CLOSELY].any()),
-        elements=program.elements,
-        courses=program.courses,
-        entries=program.entries,
-        order=program.order,
-        initial=program.initial,
-        actions=program.actions,
-        laterals=program.laterals,
-        values=program.values,
-        first_states=program.first_states,
-        first_phases=program.first_phases,
-        controllers=program.controllers,
-        phases=program.phases,
-        changes=program.changes,
-        first_time=program.first_time,
-        time_passes=program.time_passes,
-        absent=program.absent,
-        comes_and_goes=int(program.comes_and_goes),
-        leaves=int(program.leaves),
-        drives=program.drives,
-        weathers=program.weathers,
-        scene=_scene(program),
-        others=program.others,
-        attends=int(program.attends.size > 0),
-        driver=program.driver.code,
-        driver_code=0,
-        ideal_perception=int("perception" in program.driver.ideal),
-        ideal_prediction=int("prediction" in program.driver.ideal),
-        ideal_control=int("control" in program.driver.ideal),
-        dt=program.time_step,
-    )
+    """Return the program's tables, and what else a plan says."""
+    stages = {f"ideal_{stage}": int(stage in program.driver.ideal) for stage in STAGES}
+    given: dict[str, Any] = {
+        "looks_closely": int(program.probes[:, CLOSELY].any()),
+        "comes_and_goes": int(program.comes_and_goes),
+        "leaves": int(program.leaves),
+        "scene": _scene(program),
+        "attends": int(program.attends.size > 0),
+        "is_driven": int(program.driver != STORYBOARD),
+        "driver_code": 0,
+        "own_code": 0,
+        "dt": program.time_step,
+        **stages,
+    }
+    tables = {name: getattr(program, name) for name in memory.Plan._fields if name not in given}
+    return memory.Plan(**tables, **given)
 
 
 def _scene(program: Program) -> Float:
@@ -351,68 +327,50 @@ def _state(
     key: npt.NDArray[np.uint64],
     own_memory: int | None,
 ) -> memory.State:
-    """Return the state of N rows before they start; ``start`` sets what is not 0."""
-    n, n_entities = len(rows), len(program.names)
-
-    def zeros(*shape: int) -> Float:
-        return np.zeros((n, *shape))
-
-    def numbers(*shape: int) -> Int:
-        return np.zeros((n, *shape), dtype=np.int64)
-
-    def flags(*shape: int) -> Bool:
-        return np.zeros((n, *shape), dtype=np.bool_)
-
-    e, n_ways = n_entities, roads.scene.hypotheses.shape[1]
+    """Return the state of N rows before they start; ``start`` sets what else is not 0."""
+    n, e = len(rows), len(program.names)
     a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
     at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
-    longest_delay = int(program.conditions[:, DELAY].max(initial=0))
-
-    def shown(*shape: int) -> tuple[int, ...]:
-        return (0, *shape[1:]) if own_memory is None else shape
-
-    profile_size = 3 * len(program.entries) + 5 if len(program.entries) else 0
-    return memory.State(
-        slots=slots,
-        weather=zeros(WEATHER),
-        ending=numbers(4),
-        observed=flags(len(program.probes)),
-        history=flags(len(program.conditions), longest_delay + 2),
-        phase=numbers(len(program.elements)), executions=numbers(len(program.elements)),
-        stamps=numbers(len(program.elements), 4), looked=numbers(len(program.probes), 2),
-        held=zeros(len(program.probes)),
-        marks=zeros(len(program.marks), 3),
-        along=numbers(len(program.probes)),
-        action_ended=flags(len(program.actions)),
-        selected=flags(e),
-        values=zeros(len(program.values)),
-        clock=zeros(3),
-        lights=np.zeros((n, len(program.lights)), dtype=np.int8),
-        phase_now=numbers(len(program.controllers)),
-        phase_until=zeros(len(program.controllers)),
-        present=flags(e),
-        drives=numbers(2),
-        travelled=zeros(e), stood=zeros(e),
-        route=numbers(e), on=numbers(e), station=np.ascontiguousarray(a + b * at),
-        aside=np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
-        turn=zeros(e), line=zeros(e, 3), to=numbers(e), foot=zeros(e),
-        lateral_action=numbers(e), lateral_lasts=zeros(e), lateral_passed=zeros(e),
-        lateral_origin=zeros(e), lateral_target=zeros(e), follow=numbers(e),
-        follow_action=numbers(e), follow_began=zeros(e), timed=flags(e), placed=flags(e),
-        goal=zeros(e, 2), goal_action=numbers(e), wanted=numbers(2),
-        speed_action=numbers(e), speed_began=zeros(e), speed_lasts=zeros(e),
-        command=zeros(e), origin=zeros(e), target=zeros(e), rate=zeros(e),
-        course=zeros(e, COURSE_MEMORY), profile=zeros(e, profile_size, 4), profile_rows=numbers(e),
-        waits=numbers(e), allowed=zeros(e), minds=zeros(e, HEED),
-        seen=zeros(SEEN, e), far=zeros(e),
-        attention=zeros(e, 3),
-        key=key[:, None], sensors=zeros(e, MEMORY), tracks=zeros(e, TRACK), around=zeros(e, AROUND),
-        passages=zeros(2 * e + n_ways, PASSAGE), feet=np.full((n, n_ways), LOST),
-        mind=zeros(MIND if own_memory is None else own_memory),
-        told=zeros(TOLD), ahead=zeros(*shown(ROUTE_POINTS, 4)), others=zeros(*shown(e - 1, TRACK)),
-        answer=zeros(ANSWER),
-    )  # fmt: skip
+    hypotheses = roads.scene.hypotheses.shape[1]
+    has_own = own_memory is not None
+    sizes = {
+        "entities": e,
+        "slots": slots.shape[1],
+        "weather": WEATHER,
+        "probes": len(program.probes),
+        "conditions": len(program.conditions),
+        "instants": int(program.conditions[:, DELAY].max(initial=0)) + 2,
+        "elements": len(program.elements),
+        "marks": len(program.marks),
+        "actions": len(program.actions),
+        "values": len(program.values),
+        "lights": len(program.lights),
+        "controllers": len(program.controllers),
+        "course": COURSE_MEMORY,
+        "profile": 3 * len(program.entries) + 5 if len(program.entries) else 0,
+        "heed": HEED,
+        "seen": SEEN,
+        "sensors": MEMORY,
+        "track": TRACK,
+        "around": AROUND,
+        "passages": 2 * e + hypotheses,
+        "passage": PASSAGE,
+        "hypotheses": hypotheses,
+        "mind": MIND if own_memory is None else own_memory,
+        "told": TOLD,
+        "ahead": ROUTE_POINTS if has_own else 0,
+        "others": e - 1 if has_own else 0,
+        "answer": ANSWER,
+    }
+    given = {
+        "slots": slots,
+        "station": np.ascontiguousarray(a + b * at),
+        "aside": np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
+        "key": key[:, None],
+        "feet": np.full((n, hypotheses), LOST),
+    }
+    return memory.states(n, sizes, given)
 
 
 def _record(program: Program, n: int) -> memory.Record:

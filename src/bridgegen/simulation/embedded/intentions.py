@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
-from bridgegen.ego.drivers import NOBODY, REFERENCE
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.ego.drivers import REFERENCE, STORYBOARD
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
 
@@ -66,9 +66,9 @@ def intentions(
     found = Intentions(
         steps, np.full(nothing.shape, -1), nothing.copy(), nothing, np.zeros((*nothing.shape, 4))
     )
-    if program.driver.code == REFERENCE.code:
+    if program.driver.name == REFERENCE.name:
         _ask(program, roads, rows, values, found)
-    elif program.driver.code != NOBODY:
+    elif program.driver != STORYBOARD:
         _follow(roads, rows, rollout, found)
     return found
 

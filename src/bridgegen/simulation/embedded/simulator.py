@@ -15,14 +15,14 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.intentions import Intentions, intentions
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.weathers import weathers
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
-    from bridgegen.simulation.embedded.own_driver import OwnDriver
+    from bridgegen.simulation.embedded.own_drivers import OwnDriver
 
 
 CHUNK = 128
@@ -239,7 +239,9 @@ class EmbeddedSimulator:
 
     @cached_property
     def _own(self) -> "OwnDriver":
-        from bridgegen.simulation.embedded.own_driver import OwnDriver  # numba is slow to import
+        from bridgegen.simulation.embedded.own_drivers import (
+            OwnDriver,  # numba is slow to import
+        )
 
         return OwnDriver(self.program.driver)
 

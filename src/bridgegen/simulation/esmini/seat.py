@@ -17,8 +17,8 @@ from bridgegen.simulation.esmini.log import error_in
 
 if TYPE_CHECKING:  # the process greets as soon as it has the library
     from bridgegen.ego import Driver
-    from bridgegen.simulation.embedded.network import Network
-    from bridgegen.simulation.embedded.shared_arrays import Layout
+    from bridgegen.simulation.embedded.own_drivers import Layout
+    from bridgegen.simulation.embedded.places.network import Network
     from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
     from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
     from bridgegen.simulation.rollout import Rollout
@@ -81,7 +81,7 @@ class Seat:
     """
 
     def __init__(self, library: Path, job: Job, seconds: float) -> None:
-        from bridgegen.simulation.embedded.shared_arrays import SharedArrays
+        from bridgegen.simulation.embedded.own_drivers import SharedArrays
         from bridgegen.simulation.esmini.files import Folder
 
         self._job, self._seconds = job, seconds
@@ -191,7 +191,7 @@ class Answers:
             raise CallError(kind, str(error)) from None
 
     def _take(self, job: Job, layout: "Layout") -> None:
-        from bridgegen.simulation.embedded.shared_arrays import seen
+        from bridgegen.simulation.embedded.own_drivers import seen
 
         self._job, (self._beats,) = job, seen(layout)
         LEFT.add(Path(layout.path))

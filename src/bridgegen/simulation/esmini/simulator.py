@@ -17,7 +17,7 @@ from bridgegen.isolated import CallError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.around import AroundEmbedded
-from bridgegen.simulation.embedded.network import Network
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
 from bridgegen.simulation.esmini.seat import Job, Row, Seat

@@ -25,9 +25,10 @@ from bridgegen.simulation.embedded.compiler.actions import Actions
 from bridgegen.simulation.embedded.compiler.bodies import Body, kind, measures
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.nodes import nodes
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.start import Start
-from bridgegen.simulation.embedded.compiler.storyboard import elements, nodes
+from bridgegen.simulation.embedded.compiler.storyboard import elements
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.embedded.compiler.triggers import MAX_STEPS, Triggers
 from bridgegen.simulation.embedded.program import (

@@ -3,19 +3,16 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.nodes import Node
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.values import EQUALITY, seconds
-
-if TYPE_CHECKING:
-    from bridgegen.simulation.embedded.compiler.storyboard import Node
 
 _RULES = {
     osc.Rule.GREATER_THAN: codes.GREATER, osc.Rule.LESS_THAN: codes.LESS,

@@ -2,17 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.nodes import Node
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.probes import Probe, Probes
 from bridgegen.simulation.embedded.compiler.tables import Tables
-
-if TYPE_CHECKING:
-    from bridgegen.simulation.embedded.compiler.storyboard import Node
 
 _EDGES = {
     osc.ConditionEdge.NONE: codes.NO_EDGE, osc.ConditionEdge.RISING: codes.RISING,

@@ -1,0 +1,236 @@
+"""What is asked for seldom: relative speeds, accelerations, angles, contacts, distances to places.
+
+One function, for the code of all instants would grow by it.
+"""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+import math
+
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.ego._path_kernels import pose, project
+from bridgegen.simulation.embedded._codes import (
+    ACCELERATING,
+    ANGLE,
+    CLEARANCE,
+    CLOSELY,
+    COLLISION,
+    COLLISION_WITH_TYPE,
+    DISTANCE,
+    END_OF_ROAD,
+    ENTITY_SYSTEM,
+    EQUAL,
+    GREATER,
+    GREATER_EQUAL,
+    LATERAL,
+    LESS,
+    LESS_EQUAL,
+    LIGHT_PHASE,
+    LIGHT_STATE,
+    LIMIT,
+    LONGITUDINAL,
+    MEASURE,
+    OFFROAD,
+    OTHER,
+    PATH_SYSTEM,
+    PROBE,
+    RELATIVE_ANGLE,
+    ROAD_SYSTEM,
+    RULE,
+    SPEED_DIFFERENCE,
+    SYSTEM,
+    TIME_OF_DAY,
+    TOTAL,
+    VALUE,
+    WHO,
+    WITHIN,
+)
+from bridgegen.simulation.embedded.conditions._clearance_kernels import find_cell, is_clear
+from bridgegen.simulation.embedded.conditions._distance_kernels import (
+    apart,
+    borrow_scene,
+    look_ahead,
+)
+from bridgegen.simulation.embedded.places._lane_kernels import (
+    LEAVE,
+    NODE,
+    STATION,
+    T_LEAVE,
+    WAY,
+    T,
+    span_at,
+    turned,
+)
+from bridgegen.simulation.embedded.world import time_of_day
+
+AT_END = 1e-6  # m
+SAME_TIME = 1e-6  # s, the rounding of a date
+SAME_VALUE = 1e-9  # of any unit, the rounding of what is summed up step by step
+SAME_ANGLE = 1e-9  # rad, the rounding of a turn
+
+
+@kernel
+def compare(value, rule, limit):
+    """Apply an OpenSCENARIO Rule; what is the limit up to rounding is the limit."""
+    if abs(value - limit) <= SAME_VALUE:
+        value = limit
+    if rule == GREATER:
+        return value > limit
+    if rule == LESS:
+        return value < limit
+    if rule == GREATER_EQUAL:
+        return value >= limit
+    if rule == LESS_EQUAL:
+        return value <= limit
+    if rule == EQUAL:
+        return value == limit
+    return value != limit
+
+
+@kernel
+def compare_times(now, rule, limit):
+    """Apply a Rule to a time [s], an instant being a multiple of the step up to rounding."""
+    if not math.isfinite(now):
+        return False
+    return compare(limit if abs(now - limit) <= SAME_TIME else now, rule, limit)
+
+
+@kernel
+def look_closely(k, scene):
+    """Take down what the probes see at instant k that are seldom asked for."""
+    scene = borrow_scene(scene)
+    for p in range(scene.probes.shape[0]):
+        if scene.probes[p, CLOSELY]:
+            scene.observed[p] = look_one(p, k, scene)
+
+
+@inlined_kernel
+def look_one(p, k, scene):
+    """Return whether probe p sees at instant k what its condition asks for."""
+    kind, e, other = scene.probes[p, PROBE], scene.probes[p, WHO], scene.probes[p, OTHER]
+    rule, limit = scene.probes[p, RULE], scene.slots[scene.probes[p, LIMIT]]
+    measure = scene.probes[p, MEASURE]
+    if kind == VALUE:
+        return compare(scene.values[other], rule, limit)
+    if kind == TIME_OF_DAY:
+        return compare_times(time_of_day(k * scene.dt, scene.clock), rule, limit)
+    if kind == LIGHT_STATE:
+        return scene.lights[other] == limit
+    if kind == LIGHT_PHASE:
+        return scene.phase_now[other] == limit
+    if kind >= DISTANCE:
+        defined, value = look_ahead(p, k, scene)
+        return defined and compare(value, rule, limit)
+    if kind == COLLISION:
+        return touch(e, other, k, scene)
+    if kind == COLLISION_WITH_TYPE:
+        for i in range(scene.x.shape[0]):
+            there = i != e and scene.present[i]
+            if there and scene.objects[i] == other and touch(e, i, k, scene):
+                return True
+        return False
+    if kind in (ANGLE, RELATIVE_ANGLE):
+        defined, angle = angle_of(p, k, scene)
+        if not defined:
+            return False
+        off = abs(turned(angle, limit))
+        return off <= scene.slots[scene.probes[p, WITHIN]] + SAME_ANGLE
+    if kind == END_OF_ROAD:
+        path = scene.on[e]
+        length = (scene.counts[path] - 1) * scene.steps[path]
+        return lasts(p, k, path >= 0 and scene.station[e] >= length - AT_END, limit, scene)
+    if kind == OFFROAD:
+        on_road = find_cell(scene.cells, 0, scene.x[e, k], scene.y[e, k]) >= 0
+        return lasts(p, k, not on_road, limit, scene)
+    if kind == CLEARANCE:
+        return is_clear(p, k, scene)
+    if kind == SPEED_DIFFERENCE:
+        turn = scene.h[other, k] - scene.h[e, k]
+        along, aside = scene.v[other, k] * math.cos(turn), scene.v[other, k] * math.sin(turn)
+        if measure == TOTAL:
+            return compare(scene.v[e, k] - scene.v[other, k], rule, limit)
+        if measure == LONGITUDINAL:
+            return compare(scene.v[e, k] - along, rule, limit)
+        return compare(-aside if measure == LATERAL else 0.0, rule, limit)
+    if kind == ACCELERATING:
+        along, aside = accelerations(e, k, scene)
+        if measure == TOTAL:
+            return compare(math.hypot(along, aside), rule, limit)
+        if measure == LONGITUDINAL:
+            return compare(along, rule, limit)
+        return compare(aside if measure == LATERAL else 0.0, rule, limit)
+    return compare(scene.v[e, k] if measure == LONGITUDINAL else 0.0, rule, limit)  # SPEED
+
+
+@inlined_kernel
+def touch(e, other, k, scene):
+    """Return whether the boxes of two entities touch."""
+    return (
+        apart(
+            scene.bodies[e], scene.bodies[other, 0], scene.bodies[other, 1], scene.bodies[other, 2],
+            scene.x[other, k] - scene.x[e, k], scene.y[other, k] - scene.y[e, k],
+            scene.h[e, k], scene.h[other, k],
+        )
+        == 0.0
+    )  # fmt: skip
+
+
+@inlined_kernel
+def lasts(p, k, seen, limit, scene):
+    """Return whether a probe has seen so long [s] what it sees now."""
+    seen = seen and scene.present[scene.probes[p, WHO]]
+    before = scene.held[p] if k > 0 else -scene.dt
+    scene.held[p] = before + scene.dt if seen else -scene.dt
+    return seen and scene.held[p] >= limit - AT_END
+
+
+@inlined_kernel
+def angle_of(p, k, scene):
+    """Return (whether it is defined, the heading that a condition looks at [rad]).
+
+    It is measured from the axis of its system; of one entity from another's, the one's by its axis
+    from the other's by its own.
+    """
+    e, other, system = scene.probes[p, WHO], scene.probes[p, OTHER], scene.probes[p, SYSTEM]
+    h, axis = scene.h[e, k], axis_of(e, k, system, scene)
+    if scene.probes[p, PROBE] == ANGLE:
+        if system == ENTITY_SYSTEM:
+            return True, 0.0
+        return not math.isnan(axis), h - axis
+    other_axis = axis_of(other, k, system, scene)
+    defined = not (math.isnan(axis) or math.isnan(other_axis))
+    return defined, (scene.h[other, k] - other_axis) - (h - axis)
+
+
+@inlined_kernel
+def axis_of(e, k, system, scene):
+    """Return the heading of an entity's path, or of the reference line of its road [rad].
+
+    0 in other systems; NaN where it has none: off the paths, or off the lanes.
+    """
+    path = scene.on[e]
+    if system not in (PATH_SYSTEM, ROAD_SYSTEM):
+        return 0.0
+    if path < 0 or (system == ROAD_SYSTEM and scene.span_counts[path] == 0):
+        return math.nan
+    table, n, ds = scene.paths[path], scene.counts[path], scene.steps[path]
+    s, _ = project(table, n, ds, scene.station[e], scene.x[e, k], scene.y[e, k])
+    h = pose(table, n, ds, s)[2]
+    if system == PATH_SYSTEM:
+        return h
+    spans = scene.spans[path]
+    i = span_at(spans, scene.span_counts[path], s)
+    way = scene.nodes[int(spans[i, NODE]), WAY]
+    length = spans[i, LEAVE] - spans[i, STATION]
+    slope = way * (spans[i, T_LEAVE] - spans[i, T]) / length if length > 0.0 else 0.0
+    return h - math.asin(min(max(slope, -1.0), 1.0)) - (0.0 if way > 0 else math.pi)
+
+
+@inlined_kernel
+def accelerations(e, k, scene):
+    """Return an entity's acceleration forward and to its left [m/s²], over the last step."""
+    if k == 0:
+        return 0.0, 0.0
+    turn = (scene.h[e, k] - scene.h[e, k - 1]) / scene.dt
+    return scene.a[e, k - 1], scene.v[e, k] * turn

@@ -1,0 +1,186 @@
+"""Triggers: which conditions hold at an instant, with their edges and delays, and what fires."""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+from typing import NamedTuple
+
+from bridgegen.arrays import Bool, Int
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.simulation.embedded._codes import (
+    ALL,
+    ANY,
+    CLEARANCE,
+    CLOSELY,
+    DELAY,
+    EDGE,
+    ELEMENT_STATE,
+    FALLING,
+    FIRST_BY_ENTITY,
+    NO_EDGE,
+    PROBE,
+    PROBES,
+    PROBES_END,
+    QUANTITY,
+    RISING,
+    WHO,
+)
+from bridgegen.simulation.embedded._memory_kernels import TICKS, view
+from bridgegen.simulation.embedded.conditions._distance_kernels import scene_of
+from bridgegen.simulation.embedded.conditions._probe_kernels import is_in_state, look
+from bridgegen.simulation.embedded.conditions._relation_kernels import look_closely
+from bridgegen.simulation.embedded.motion import leave_out_absent
+from bridgegen.simulation.embedded.places._place_kernels import pose_of, way_ahead
+
+
+@inlined_kernel
+def observe(k, plan, roads, state, record):
+    """Take down what all probes see at instant k, and which conditions that makes true."""
+    for i in range(plan.marks.shape[0]):
+        state.marks[i, 0], state.marks[i, 1], state.marks[i, 2] = pose_of(
+            plan.marks[i], k, plan, roads, state, record
+        )
+    if plan.looks_closely:
+        for p in range(plan.probes.shape[0]):
+            if plan.probes[p, PROBE] == CLEARANCE:
+                state.along[p] = way_ahead(plan.probes[p, WHO], roads, state)
+        look_closely(k, scene_of(plan, roads, state, record))
+    for p in range(plan.probes.shape[0]):
+        if plan.probes[p, CLOSELY] == 0:
+            state.looked[p, 0] = state.looked[p, 1]
+            state.observed[p] = look(p, k, plan, state, record)
+            state.looked[p, 1] = state.ending[TICKS]
+    if plan.comes_and_goes:
+        leave_out_absent(plan.conditions, plan.probes, state.present, state.observed)
+    for c in range(plan.conditions.shape[0]):
+        conclude(c, k, plan.conditions, state.observed, state.history)
+
+
+@kernel
+def conclude(c, k, conditions, observed, history):
+    """Take down whether condition c is true at instant k, by any or all of its probes."""
+    first, last, count = conditions[c, PROBES], conditions[c, PROBES_END], 0
+    for p in range(first, last):
+        count += observed[p]
+    quantity = conditions[c, QUANTITY]
+    if quantity == ANY:
+        met = count > 0
+    elif quantity == ALL:
+        met = count == last - first
+    else:
+        met = count == 0
+    history[c, k % history.shape[1]] = met
+
+
+@kernel
+def holds(c, k, conditions, history):
+    """Return whether the condition, with its edge and delay, is met at instant k.
+
+    An edge needs an earlier observation, so none is seen at the first instant.
+    """
+    edge, j = conditions[c, EDGE], k - conditions[c, DELAY]
+    if j < 0:
+        return False
+    depth = history.shape[1]
+    then = history[c, j % depth]
+    if edge == NO_EDGE:
+        return then
+    if j == 0:
+        return False
+    before = history[c, (j - 1) % depth]
+    rises = then and not before
+    falls = before and not then
+    return (edge != FALLING and rises) or (edge != RISING and falls)
+
+
+class Checks(NamedTuple):
+    """What a trigger reads: a few arrays, for it is a function of its own and called often."""
+
+    triggers: Int
+    groups: Int
+    conditions: Int
+    probes: Int
+    observed: Bool
+    history: Bool
+    phase: Int
+    stamps: Int
+    looked: Int
+    ending: Int
+
+
+borrow_checks = view(Checks)
+
+
+@inlined_kernel
+def checks_of(plan, state):
+    """Return what triggers read."""
+    return Checks(
+        plan.triggers, plan.groups, plan.conditions, plan.probes, state.observed, state.history,
+        state.phase, state.stamps, state.looked, state.ending,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def group_fires(g, k, checks):
+    """Return whether a condition group is met as a whole.
+
+    What it asks of the storyboard's elements is looked at anew: they may have changed since.
+    """
+    conditions, probes = checks.conditions, checks.probes
+    for c in range(checks.groups[g, 0], checks.groups[g, 1]):
+        first = conditions[c, PROBES]
+        if probes[first, PROBE] == ELEMENT_STATE:
+            for p in range(first, conditions[c, PROBES_END]):
+                checks.observed[p] = is_in_state(
+                    p, probes, checks.phase, checks.stamps, checks.looked
+                )
+                checks.looked[p, 1] = checks.ending[TICKS]
+            conclude(c, k, conditions, checks.observed, checks.history)
+        if not holds(c, k, conditions, checks.history):
+            return False
+    return checks.groups[g, 1] > checks.groups[g, 0]
+
+
+@kernel
+def fires_by(trigger, k, checks):
+    """Return whether any condition group of a trigger is met."""
+    checks = borrow_checks(checks)
+    for g in range(checks.triggers[trigger, 0], checks.triggers[trigger, 1]):
+        if group_fires(g, k, checks):
+            return True
+    return False
+
+
+@inlined_kernel
+def fires(trigger, k, plan, state):
+    """Return whether a trigger fires at instant k; one that is missing (-1) always does."""
+    return trigger < 0 or fires_by(trigger, k, checks_of(plan, state))
+
+
+@inlined_kernel
+def select(trigger, k, plan, state):
+    """Take down which entities made a trigger fire, for actions that select them.
+
+    They are those whose probes see it in a group that fires; where none does (the condition was
+    true a while ago, or has just ceased to be), all that the condition names.
+    """
+    for e in range(state.selected.shape[0]):
+        state.selected[e] = False
+    if trigger >= 0:
+        for g in range(plan.triggers[trigger, 0], plan.triggers[trigger, 1]):
+            if group_fires(g, k, checks_of(plan, state)):
+                for c in range(plan.groups[g, 0], plan.groups[g, 1]):
+                    select_by(c, plan.conditions, plan.probes, state.observed, state.selected)
+
+
+@kernel
+def select_by(c, conditions, probes, observed, selected):
+    """Add the entities that make condition c true."""
+    first, last, seen = conditions[c, PROBES], conditions[c, PROBES_END], False
+    if probes[first, PROBE] < FIRST_BY_ENTITY:
+        return
+    for p in range(first, last):
+        seen = seen or observed[p]
+    for p in range(first, last):
+        if observed[p] or not seen:
+            selected[probes[p, WHO]] = True

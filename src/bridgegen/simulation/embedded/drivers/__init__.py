@@ -1,0 +1,48 @@
+"""What drives the ego and attentive participants, and how their demands move them."""
+
+from bridgegen.simulation.embedded.drivers._control_kernels import (
+    begin_control,
+    is_steered,
+    move_paced,
+    move_steered,
+)
+from bridgegen.simulation.embedded.drivers._ego_kernels import demand, ego_is_through
+from bridgegen.simulation.embedded.drivers._imposed_kernels import egos_are_through, impose_rows
+from bridgegen.simulation.embedded.drivers._observation_kernels import observe_rows
+from bridgegen.simulation.embedded.drivers._others_kernels import begin_waiting, heed, move_heeding
+from bridgegen.simulation.embedded.drivers._own_driver_kernels import (
+    ACCELERATION,
+    ANSWER,
+    CURVATURE,
+    EGO,
+    RETURNED,
+    TOLD,
+    ask,
+    tell_rows,
+)
+from bridgegen.simulation.embedded.drivers.demands import DEMANDS, code_of
+
+__all__ = [
+    "ACCELERATION",
+    "ANSWER",
+    "CURVATURE",
+    "DEMANDS",
+    "EGO",
+    "RETURNED",
+    "TOLD",
+    "ask",
+    "begin_control",
+    "begin_waiting",
+    "code_of",
+    "demand",
+    "ego_is_through",
+    "egos_are_through",
+    "heed",
+    "impose_rows",
+    "is_steered",
+    "move_heeding",
+    "move_paced",
+    "move_steered",
+    "observe_rows",
+    "tell_rows",
+]

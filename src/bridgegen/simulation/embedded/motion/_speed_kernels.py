@@ -1,0 +1,71 @@
+"""The speeds that the storyboard asks for: how a change begins, and what it asks at an instant."""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+import math
+
+from bridgegen.compiled import inlined_kernel
+from bridgegen.simulation.embedded._codes import RELATIVE_SPEED
+from bridgegen.simulation.embedded._motion_kernels import LINEAR, RATE, SAME_SPEED, STEP, ramped
+from bridgegen.simulation.embedded.motion._course_kernels import change_time, changed
+from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course, follow_course
+
+
+@inlined_kernel
+def begin_longitudinal(j, k, plan, roads, state, record):
+    """Begin action j, which moves an entity along its path; an earlier one ends."""
+    e = plan.actions[j, 0]
+    if state.speed_action[e] >= 0:
+        state.action_ended[state.speed_action[e]] = True
+    state.speed_action[e] = j
+    if plan.actions[j, 1] >= RELATIVE_SPEED:
+        begin_course(j, k, plan, roads, state, record)
+    else:
+        begin_speed_change(j, k, plan, state)
+
+
+@inlined_kernel
+def begin_speed_change(j, k, plan, state):
+    """Begin action j, a SpeedAction to a speed of its own."""
+    e, shape, dimension = plan.actions[j, 0], plan.actions[j, 2], plan.actions[j, 3]
+    value = state.slots[plan.actions[j, 5]]
+    before, after = state.command[e], min(state.slots[plan.actions[j, 4]], plan.bodies[e, 3])
+    most = plan.bodies[e, 4] if after > before else plan.bodies[e, 5]
+    state.target[e], state.origin[e], state.speed_began[e] = after, before, k * plan.dt
+    state.rate[e] = math.inf
+    if shape == LINEAR and dimension == RATE:
+        state.rate[e] = min(abs(value), most)
+    elif shape != STEP:
+        lasts = change_time(shape, dimension, value, before, after, most)
+        state.speed_lasts[e] = max(lasts, 1e-9)
+        if shape == LINEAR:
+            state.rate[e] = abs(after - before) / state.speed_lasts[e]
+
+
+@inlined_kernel
+def stop_longitudinal(j, plan, state):
+    """Stop action j: its entity keeps the speed that it has."""
+    e = plan.actions[j, 0]
+    if state.speed_action[e] == j:
+        state.target[e], state.speed_action[e] = state.command[e], -1
+        state.rate[e] = math.inf
+
+
+@inlined_kernel
+def command_speed(e, k, plan, roads, state, record):
+    """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
+    j = state.speed_action[e]
+    if j >= 0 and plan.actions[j, 1] >= RELATIVE_SPEED:
+        follow_course(j, k, plan, roads, state, record)
+        return
+    if j >= 0 and plan.actions[j, 2] > LINEAR:
+        passed = k * plan.dt + plan.dt - state.speed_began[e]
+        state.command[e] = changed(
+            plan.actions[j, 2], state.origin[e], state.target[e], passed / state.speed_lasts[e]
+        )
+    else:
+        state.command[e] = ramped(state.command[e], state.target[e], state.rate[e] * plan.dt)
+    if j >= 0 and abs(state.command[e] - state.target[e]) <= SAME_SPEED:
+        state.action_ended[j] = True
+        state.speed_action[e] = -1

@@ -1,0 +1,103 @@
+"""How bodies that the storyboard moves go on from one instant to the next."""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.ego._path_kernels import shrinks
+from bridgegen.simulation.embedded._codes import KEEP_ASIDE
+from bridgegen.simulation.embedded._motion_kernels import SAME_TIME, standing
+from bridgegen.simulation.embedded.motion._across_kernels import CONTINUOUS
+from bridgegen.simulation.embedded.motion._aside_kernels import keep_aside
+from bridgegen.simulation.embedded.motion._lateral_kernels import glide
+from bridgegen.simulation.embedded.motion._presence_kernels import keep_place, leave
+from bridgegen.simulation.embedded.places._lane_kernels import continued
+from bridgegen.simulation.embedded.places._place_kernels import (
+    LANES,
+    ask,
+    body_pose,
+    end_follow,
+    put_in_world,
+    way_from,
+)
+
+ENDS, ASKS, LANDS = -1, -2, -3
+"""What ``roads.follows`` says of a path that no node goes on from: the road ends; the lanes of the
+road network are to be looked at; a trajectory ends, on whichever lane is there."""
+
+
+@inlined_kernel
+def move_along_path(e, k, plan, roads, state, record):
+    """Move an entity on from instant k at the commanded speed, along its path and across it."""
+    dt, before = plan.dt, record.v[e, k]
+    step = 0.0 if state.placed[e] else 0.5 * (before + state.command[e]) * dt
+    state.placed[e] = False
+    ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
+    j = state.lateral_action[e]
+    keeps_aside = j >= 0 and plan.actions[j, 1] == KEEP_ASIDE
+    if keeps_aside:
+        ahead, tilt, reached = keep_aside(j, k, step, plan, roads, state, record)
+    elif j >= 0:
+        state.aside[e], ahead, state.lateral_passed[e], tilt = glide(
+            plan.actions[j, 2], plan.actions[j, 3], state.lateral_lasts[e],
+            state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], step, dt,
+            plan.bodies[e, 6],
+        )  # fmt: skip
+        state.foot[e] += ahead
+    p = state.on[e]
+    if p >= 0:
+        middle, across = state.station[e] + 0.5 * ahead, 0.5 * (aside + state.aside[e])
+        ahead /= shrinks(roads.paths[p], roads.counts[p], roads.steps[p], middle, across)
+    station = state.station[e] + ahead
+    if p >= 0 and station >= (roads.counts[p] - 1) * roads.steps[p]:
+        length = (roads.counts[p] - 1) * roads.steps[p]
+        if pass_end(e, station - length, roads, state):
+            station = state.station[e]
+        elif plan.leaves and e > 0 and ahead > 0.0 and roads.follows[p] == ENDS:
+            record.a[e, k] = (state.command[e] - before) / dt
+            leave(e, plan, roads, state)
+            keep_place(e, k, record)
+            return
+        else:
+            station, step = length, 0.5 * before * dt
+            state.command[e] = state.target[e] = 0.0
+    state.travelled[e] += step
+    state.stood[e] = standing(state.stood[e], before, state.command[e], dt)
+    record.a[e, k] = (state.command[e] - before) / dt
+    state.station[e] = station
+    over = state.lateral_passed[e] >= state.lateral_lasts[e] - SAME_TIME
+    if not keeps_aside and j >= 0 and over:
+        state.to[e] = -1
+        reached = not plan.laterals[plan.actions[j, 6], CONTINUOUS]
+    if reached:
+        state.action_ended[j] = True
+        state.lateral_action[e] = -1
+    if k == record.x.shape[1] - 1:
+        return
+    record.v[e, k + 1] = state.command[e]
+    record.offset[e, k + 1] = 0.0
+    record.x[e, k + 1], record.y[e, k + 1], h = body_pose(e, roads, state)
+    record.h[e, k + 1] = continued(h + tilt, record.h[e, k])  # another path may count them anew
+
+
+@kernel
+def pass_end(e, beyond, roads, state):
+    """Put an entity so far beyond the end of its path [m]; False: the road ends, or it waits."""
+    follows = roads.follows[state.on[e]]
+    if follows == ENDS:
+        return False
+    if roads.nodes.shape[0] == 0:
+        ask(0, LANES, state)
+        return False
+    if follows == LANDS:
+        end_follow(e, state)
+        state.station[e] = (roads.counts[state.on[e]] - 1) * roads.steps[state.on[e]]
+        x, y, h = body_pose(e, roads, state)
+        put_in_world(e, x, y, h, roads, state)
+        state.station[e] += beyond
+        return True
+    p = way_from(state.route[e], follows, roads, state)
+    if p < 0:
+        return False
+    state.on[e], state.station[e] = p, beyond
+    return True

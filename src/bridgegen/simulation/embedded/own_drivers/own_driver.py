@@ -1,0 +1,281 @@
+"""The user's own driver in the simulator: in lock-step if it is Python, else in the rollout.
+
+A compiled driver is called by the compiled rollout, in a process of its own for each thread that
+asks for rollouts: what it does to its memory, or an endless loop, ends that process alone.
+"""
+
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.compiled import call_from_python
+from bridgegen.ego import Driver
+from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
+from bridgegen.simulation.embedded._memory_kernels import (
+    N_STEPS,
+    NO_CONTROL,
+    RAISED,
+    STATUS,
+    Plan,
+    Record,
+    Roads,
+    State,
+)
+from bridgegen.simulation.embedded._rollout_kernels import simulate_rows
+from bridgegen.simulation.embedded.batch import Batch
+from bridgegen.simulation.embedded.drivers import (
+    ACCELERATION,
+    ANSWER,
+    CURVATURE,
+    EGO,
+    RETURNED,
+    ask,
+    code_of,
+)
+from bridgegen.simulation.embedded.own_drivers.lock_step import Wheel, drive_in_lock_step
+from bridgegen.simulation.embedded.own_drivers.shared_arrays import Layout, SharedArrays, seen
+from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.rollout import FAILURES, Rollout, joined
+
+
+class OwnDriver:
+    """A driver of the user's own, and the processes that it lives in.
+
+    Args:
+        driver: it.
+    """
+
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+        self._lock, self._turn = threading.Lock(), threading.Lock()
+        self._first = self._seat()
+        self._idle, self._seats = [self._first], [self._first]
+        self._is_stopped = threading.Event()
+        self._is_known = False
+
+    @property
+    def memory(self) -> int | None:
+        """How many numbers a compiled driver keeps; None of one in Python.
+
+        Raises:
+            InputError: the driver cannot be made.
+        """
+        with self._lock:
+            if not self._is_known:
+                self._first.process.start()
+                self._is_known = True
+        return self._first.process.memory
+
+    def drive(self, program: Program, setup: Callable[[Int], Batch], n: int) -> Rollout:
+        """Roll out rows 0 … n − 1.
+
+        Args:
+            program: the compiled storyboard.
+            setup: makes a batch of some of the rows.
+            n: how many there are.
+
+        Raises:
+            InputError: the driver cannot be made.
+        """
+        if self.memory is None:
+            with self._turn:  # it is one, and has all rows at once
+                return drive_in_lock_step(
+                    program, setup, n, self._first.process, self._is_stopped.is_set
+                )
+        with self._lock:
+            if not self._idle:
+                self._idle.append(self._seat())
+                self._seats.append(self._idle[0])
+            seat = self._idle.pop()
+        try:
+            return _drive(setup, n, seat, self._is_stopped.is_set)
+        finally:
+            with self._lock:
+                self._idle.append(seat)
+
+    def wheel(self, program: Program, batch: Batch) -> Callable[[int], tuple[Float, Float]]:
+        """Return what asks the driver at an instant of a batch of one row that has started.
+
+        Raises:
+            InputError: the driver cannot be made.
+            DriverError: it failed as it began, or when it is asked.
+        """
+        if self.memory is None:
+            return Wheel(program, batch, self._first.process).demand
+        return partial(_ask, self._first.process, batch)
+
+    def stop(self) -> None:
+        """End the processes: what is being driven ends in a `DriverError`, and nothing follows."""
+        self._is_stopped.set()
+        with self._lock:
+            for seat in self._seats:
+                seat.process.kill()
+
+    def _seat(self) -> "Seat":
+        return Seat(DriverProcess(self._driver.name, self._driver.time_limit))
+
+
+class Seat:
+    """A process in which a compiled driver drives, and the arrays that it shares with this one."""
+
+    def __init__(self, process: DriverProcess) -> None:
+        self.process = process
+        self._arrays = SharedArrays()
+        self._roads: Roads | None = None  # those that it has been sent
+
+    def simulate_rows(
+        self, plan: Plan, roads: Roads, rows: Int, state: State, record: Record
+    ) -> dict[int, str]:
+        """Have the kernel of this name run there; return messages by row.
+
+        Raises:
+            DriverError: the driver timed out or died; ``ending`` tells which rows had ended.
+        """
+        if self._roads is None:
+            self._begin(plan, roads, state, record)
+        whole: tuple[np.ndarray, ...] = (*state, *record)
+        layout, views = self._arrays.put(whole)
+        ending = views[State._fields.index("ending")]
+
+        def ended() -> int:
+            return int(np.count_nonzero(ending[:, N_STEPS]))
+
+        sent = None if roads is self._roads else roads
+        self._roads = None  # until it is known to have them
+        try:
+            messages: dict[int, str] = self.process.call(
+                _simulate, layout, plan, sent, rows, progress=ended
+            )
+        except DriverError:
+            state.ending[:] = ending
+            raise
+        self._roads = roads
+        for array, view in zip(whole, views, strict=True):
+            array[...] = view
+        return messages
+
+    def _begin(self, plan: Plan, roads: Roads, state: State, record: Record) -> None:
+        """Let the kernel be compiled here, if need be, and loaded there: no driver's time."""
+        rows = np.zeros(0, dtype=np.int64)
+        states: Any = [array[:0] for array in state]
+        records: Any = [array[:0] for array in record]
+        simulate_rows(plan, roads, rows, State(*states), Record(*records))
+        code_of(ask, plan, roads, State(*states), Record(*records))
+        layout, _ = self._arrays.put((*states, *records))
+        self.process.start()
+        self.process.call(_simulate, layout, plan, roads, rows, seconds=START_SECONDS)
+        self._roads = roads
+
+
+def _drive(
+    setup: Callable[[Int], Batch], n: int, seat: Seat, is_stopped: Callable[[], bool]
+) -> Rollout:
+    """Roll rows out with a compiled driver; one that it does not bring to an end costs itself.
+
+    Raises:
+        DriverError: it has been stopped.
+    """
+    parts: list[tuple[Int, Rollout]] = []
+    waiting = [np.arange(n)]
+    while waiting:
+        rows = waiting.pop()
+        batch = setup(rows)
+        try:
+            parts.append((rows, batch.run(seat.simulate_rows)))
+        except DriverError as error:
+            if is_stopped():
+                raise
+            at = int(np.argmax(batch.running))  # they are driven one after the other
+            waiting += [each for each in (rows[at + 1 :], rows[:at]) if len(each)]
+            culprit = setup(rows[at : at + 1])
+            culprit.start()
+            culprit.fail(FAILURES[error.kind], str(error))
+            parts.append((rows[at : at + 1], culprit.rollout()))
+    return parts[0][1] if len(parts) == 1 else joined(parts)
+
+
+def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
+    """Ask a compiled driver at one instant of one row.
+
+    Raises:
+        DriverError: it failed.
+    """
+    batch.tell(k)
+    state = batch.state
+    answer, memory, raised = process.call(
+        _answer, state.told[0], state.ahead[0], state.others[0], state.mind[0]
+    )
+    if answer[RETURNED] == 0.0:
+        raise DriverError("raised", raised)
+    if problem := _not_finite(answer):
+        raise DriverError("answered nonsense", problem)
+    state.mind[0] = memory
+    return answer[[ACCELERATION]], answer[[CURVATURE]]
+
+
+def _not_finite(answer: Float) -> str | None:
+    """Say what is wrong with an answer."""
+    for name, column in (("acceleration", ACCELERATION), ("curvature", CURVATURE)):
+        if not np.isfinite(answer[column]):
+            return f"{name} must be finite, got {answer[column]}"
+    return None
+
+
+# --- In the other process -------------------------------------------------------------------------
+
+_roads: list[Roads] = []
+"""The road networks that were sent last."""
+
+
+def _simulate(
+    address: int, layout: Layout, plan: Plan, roads: Roads | None, rows: Int
+) -> dict[int, str]:
+    """Roll out the rows whose arrays are shared; return messages by row that failed."""
+    if roads is not None:
+        _roads[:] = [roads]
+    arrays: Any = seen(layout)
+    state, record = State(*arrays[: len(State._fields)]), Record(*arrays[len(State._fields) :])
+    raised: list[str] = []
+    sys.unraisablehook = lambda error: raised.append(_told(error))
+    try:
+        code = code_of(ask, plan, _roads[0], state, record)
+        plan = plan._replace(driver_code=code, own_code=address)
+        simulate_rows(plan, _roads[0], rows, state, record)
+    finally:
+        sys.unraisablehook = sys.__unraisablehook__
+    status = state.ending[:, STATUS]
+    messages = dict(zip(np.flatnonzero(status == RAISED).tolist(), raised, strict=False))
+    for row in np.flatnonzero(status == NO_CONTROL).tolist():
+        if problem := _not_finite(state.answer[row]):
+            messages[row] = problem
+    return messages
+
+
+def _answer(
+    address: int, told: Float, ahead: Float, others: Float, memory: Float
+) -> tuple[Float, Float, str]:
+    """Ask the driver; return its answer, what it keeps, and what it raised."""
+    answer = np.zeros(ANSWER)
+    raised: list[str] = []
+    sys.unraisablehook = lambda error: raised.append(_told(error))
+    try:
+        call_from_python(address, (told[EGO:], told[:EGO], ahead, others, memory, answer))
+    finally:
+        sys.unraisablehook = sys.__unraisablehook__
+    return answer, memory, "".join(raised)
+
+
+def _told(unraisable: Any) -> str:
+    """Return in one line what a compiled driver raised; numba knows the line of most."""
+    error, here = unraisable.exc_value, Path(__file__).name
+    for place in reversed(traceback.extract_tb(unraisable.exc_traceback)):
+        if Path(place.filename).name != here:
+            return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+    return f"{type(error).__name__}: {error}"

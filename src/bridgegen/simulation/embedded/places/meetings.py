@@ -1,0 +1,83 @@
+"""What attentive participants know of the map: where their paths meet others', lights and signs."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.ego.scene import stop_lines, stop_signs
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.simulation.embedded.places.ways import Ways
+from bridgegen.simulation.embedded.program import Program
+
+
+class Meetings(NamedTuple):
+    """The same for all E participants of P road networks; without rows where nobody is attentive.
+
+    Attributes:
+        meets: ``(P, E)`` int64, whether there is anything in the following.
+        meetings: ``(P, E, E, ZONE)`` where an attentive participant's first path meets each
+            other's, see ``bridgegen.ego._yielding_kernels``; infinite where it does not.
+        lines: ``(P, E, S)`` [m], the stations of the stop lines of S lights on its path, else +inf.
+        signs: ``(P, E, H)`` [m], the stations of the lines of stop signs on it; +inf pads.
+    """
+
+    meets: Int
+    meetings: Float
+    lines: Float
+    signs: Float
+
+
+def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]) -> Meetings:
+    """Return what the attentive participants of a storyboard know of its road networks."""
+    from bridgegen.ego._yielding_kernels import ZONE  # numba is slow to import
+
+    p, e, lights = len(models), len(program.names), len(program.lights)
+    if not program.attends.size:
+        return Meetings(
+            np.zeros((p, 0), np.int64),
+            np.zeros((p, 0, 0, ZONE)),
+            np.zeros((p, 0, 0)),
+            np.zeros((p, 0, 0)),
+        )
+    zones, lines = np.full((p, e, e, ZONE), np.inf), np.full((p, e, lights), np.inf)
+    signs: dict[tuple[int, int], list[float]] = {}
+    for number, (model, known) in enumerate(zip(models, ways, strict=True)):
+        for one in program.attends.tolist():
+            _find_zones(zones[number, one], one, program, known)
+            route = known.routes[one]
+            if route is None:
+                continue
+            for line in reversed(stop_lines(model, route, program.lights)):
+                lines[number, one, program.lights.index(line.light)] = line.station
+            signs[number, one] = stop_signs(model, route)
+    halts = np.full((p, e, max(map(len, signs.values()), default=0)), np.inf)
+    for (number, one), stations in signs.items():
+        halts[number, one, : len(stations)] = stations
+    meets = np.isfinite(zones[..., 0]).any(axis=2).astype(np.int64)
+    return Meetings(meets, zones, lines, halts)
+
+
+def _find_zones(zones: Float, one: int, program: Program, ways: Ways) -> None:
+    """Fill ``(E, ZONE)`` with where a participant's path meets the others'."""
+    from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
+
+    own, bodies = ways.paths[one], program.bodies
+    for other in range(len(program.names)):
+        path = ways.paths[other]
+        if other == one or _follows(ways, one, other):
+            continue
+        find_zone(
+            own.table, len(own.table), own.step, bodies[one],
+            path.table, len(path.table), path.step, bodies[other], zones[other],
+        )  # fmt: skip
+
+
+def _follows(ways: Ways, one: int, other: int) -> bool:
+    """Say whether two paths begin on the same lane: then the one behind follows the other."""
+    a, b = ways.routes[one], ways.routes[other]
+    if a is None or b is None:
+        return False
+    first, second = a.steps[0], b.steps[0]
+    return (first.road_id, first.lane_id) == (second.road_id, second.lane_id)

@@ -1,0 +1,304 @@
+"""The roads of a compiled storyboard: P road networks, and the paths on them that are known."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.ego.scene import Scene, beside, stacked, stop_lines, survey
+from bridgegen.openx.opendrive.lane_graph import Cells, Ground
+from bridgegen.openx.opendrive.lanes import section_index
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.routes import Stretch
+from bridgegen.simulation.embedded._memory_kernels import Roads
+from bridgegen.simulation.embedded.compiler.trajectories import timetable
+from bridgegen.simulation.embedded.places.meetings import meetings
+from bridgegen.simulation.embedded.places.ways import UNKNOWN, Ways, padded, position
+from bridgegen.simulation.embedded.program import Program
+
+NO_GROUND = Ground(np.empty((0, 4)), np.empty(0, np.int64))
+NO_CELLS = Cells(np.empty((0, 8)), np.empty(0, np.int64))
+
+
+class Network:
+    """P road networks as the rollout reads them; it grows as rows ask for ways.
+
+    What is planned depends on the road network and on what is asked for, not on when or by which
+    row; so rows may share it between threads.
+
+    Attributes:
+        tables: all arrays, as they are now; a newer one holds all that an older one does.
+        station: ``(P, E, 2)`` float64: an entity that starts at s on its road starts a + b·s along
+            its path.
+        sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
+            against it; what is to its left, then, of what is to the road's.
+        scene: what a driver with stages knows of them.
+        stop_entities: ``(L,)`` int64, whose first route crosses each stop line of a light.
+        stop_lights: ``(L,)`` int64, the light of each.
+        stop_lines: ``(P, L, 3)`` float64, where: x, y [m] and heading [rad], NaN in a road network
+            where the route does not cross it.
+        crosswalks: ``(P, C, 5)`` float64 of the ego's first route; see `Rollout.crosswalks`.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        models: Sequence[OpenDrive],
+        courses: Sequence[Mapping[str, Float]] = (),
+    ) -> None:
+        self._program = program
+        told = courses or [{}] * len(models)
+        self._ways = [
+            Ways(program.on_course(course), model)
+            for model, course in zip(models, told, strict=True)
+        ]
+        self._lock = Lock()
+        self._points = np.zeros((len(models), len(program.points), 2))
+        for p, model in enumerate(models):
+            for i, point in enumerate(program.points):
+                self._points[p, i] = position(program, model, point)
+        e = len(program.names)
+        self.station: Float = np.array([each.station[:e] for each in self._ways])
+        self.sides: Float = np.array([each.sides[:e] for each in self._ways], dtype=np.float64)
+        self._zones: list[list[Float]] = [[] for _ in models]
+        pairs = zip(models, self._ways, strict=True)
+        self.scene = stacked([_scene(program, model, ways) for model, ways in pairs])
+        self._meetings = meetings(program, models, self._ways)
+        self.stop_entities, self.stop_lights, self.stop_lines = _stop_lines(
+            program, models, self._ways
+        )
+        self.crosswalks = _crosswalks(self.scene, self._ways)
+        self.tables = self._tables()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process has the same ways, and plans more of them by itself."""
+        with self._lock:
+            return {name: one for name, one in vars(self).items() if name != "_lock"}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        vars(self).update(state, _lock=Lock())
+
+    @property
+    def n_networks(self) -> int:
+        """P."""
+        return len(self._ways)
+
+    def way(self, p: int, number: int) -> Float:
+        """Return the samples x, y of a way on road network p, ``(n, 2)`` float64 [m]."""
+        way: Float = self.tables.paths[p, number, : self.tables.counts[p, number], :2]
+        return way
+
+    def in_junctions(self, p: int) -> Float:
+        """Return where the ego's first path leads through junctions on road network p.
+
+        Returns:
+            ``(J, 2)`` float64 [m], stations along the path, in its order; without rows where it
+            leads through none, or along no lanes.
+        """
+        found: list[list[float]] = []
+        ways, at = self._ways[p], 0.0
+        route = ways.routes[0]
+        for step in route.steps if route is not None else ():
+            end = at + abs(step.s_end - step.s)
+            if ways.is_in_junction(step.road_id):
+                if found and found[-1][1] == at:
+                    found[-1][1] = end
+                else:
+                    found.append([at, end])
+            at = end
+        return np.array(found, dtype=np.float64).reshape(len(found), 2)
+
+    def amend(self, name: str, first: int, part: Float) -> None:
+        """Change a stretch of an entity's timed trajectory on each road network.
+
+        Args:
+            name: of the entity, which follows one.
+            first: the vertex that the stretch begins at.
+            part: ``(P, S + 1, 4)`` time [s], x, y [m], heading [rad] of its vertices.
+        """
+        m = self._program.trajectory_of(name)
+        with self._lock:
+            for p, (ways, course) in enumerate(zip(self._ways, part.tolist(), strict=True)):
+                corners = [(x, y, h) for _, x, y, h in course]
+                rows = timetable(corners, [t for t, *_ in course])
+                table = ways.timetables[m]
+                rows[:, 8:] += table[first, 8]
+                table[first : first + len(rows)] = rows
+                self.tables.timetables[p, m, : len(table)] = table
+
+    def zones(self, name: str) -> Float:
+        """Return where the ego's way meets the timed trajectory of an entity, ``(P, ZONE)``."""
+        path = self._program.trajectories[self._program.trajectory_of(name)]
+        zones: Float = self.tables.zones[:, path]
+        return zones
+
+    def plan(self, wanted: Iterable[tuple[int, int, int]]) -> None:
+        """Plan what rows have asked for.
+
+        Args:
+            wanted: road network, route and node of each way; see `Ways.plan`.
+        """
+        with self._lock:
+            for p, route, node in sorted(set(wanted)):
+                self._ways[p].plan(route, node)
+            self.tables = self._tables()
+
+    def _tables(self) -> Roads:
+        ways = self._ways
+        paths = padded([[path.table for path in each.paths] for each in ways], 6)
+        spans = padded([[path.spans for path in each.paths] for each in ways], 11)
+        counts = _numbers([[len(path.table) for path in each.paths] for each in ways])
+        steps = padded([[np.full((1, 1), path.step) for path in each.paths] for each in ways], 1)
+        lanes = [each.lanes for each in ways]
+        known = int(any(lanes))  # that there are none is known, too
+        grounds = [
+            each.lanes.graph.ground if each.lanes and each.has_ground else NO_GROUND
+            for each in ways
+        ]
+        cells = [
+            each.graph.cells if each and self._program.looks_at_lanes else NO_CELLS
+            for each in lanes
+        ]
+        nodes = max(each.numbers.shape[1] for each in ways)
+        return Roads(
+            paths=paths,
+            counts=counts,
+            steps=np.ascontiguousarray(steps[:, :, 0, 0]),
+            follows=_numbers([[path.follows for path in each.paths] for each in ways]),
+            spans=spans,
+            span_counts=_numbers([[len(path.spans) for path in each.paths] for each in ways]),
+            zones=self._find_zones(paths, counts, steps[:, :, 0, 0]),
+            points=self._points,
+            spots=np.array([each.spots for each in ways]),
+            timetables=padded([each.timetables for each in ways], 10),
+            timetable_counts=_numbers([list(map(len, each.timetables)) for each in ways]),
+            nodes=_stacked(
+                [each.nodes if each else np.empty((0, 7), np.int64) for each in lanes], known
+            ),
+            ends=_stacked([each.graph.ends if each else np.empty((0, 2)) for each in lanes], known),
+            ways=np.stack(
+                [
+                    np.pad(
+                        each.numbers,
+                        ((0, 0), (0, nodes - each.numbers.shape[1])),
+                        constant_values=UNKNOWN,
+                    )
+                    for each in ways
+                ]
+            ),
+            ground=_stacked([ground.points for ground in grounds]),
+            ground_nodes=_stacked([ground.nodes for ground in grounds]),
+            cells=_stacked([each.corners for each in cells]),
+            cell_nodes=_stacked([each.nodes for each in cells]),
+            **self.scene._asdict(),
+            **self._meetings._asdict(),
+        )
+
+    def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
+        """Return where the ego's first path meets each other one, ``(P, K, ZONE)``."""
+        from bridgegen.ego._yielding_kernels import ZONE, find_zone  # numba is slow to import
+
+        bodies = self._program.bodies
+        widest = bodies[int(np.argmax(bodies[:, 1]))]
+        for p, found in enumerate(self._zones):
+            for k in range(len(found), len(self._ways[p].paths)):
+                zone = np.full(ZONE, np.inf)
+                if k > 0:
+                    find_zone(
+                        paths[p, 0], counts[p, 0], steps[p, 0], bodies[0],
+                        paths[p, k], counts[p, k], steps[p, k],
+                        bodies[k] if k < len(bodies) else widest, zone,
+                    )  # fmt: skip
+                found.append(zone)
+        whole = np.full((*counts.shape, ZONE), np.inf)
+        for p, found in enumerate(self._zones):
+            whole[p, : len(found)] = found
+        return whole
+
+
+def _stop_lines(
+    program: Program, models: Sequence[OpenDrive], each: Sequence[Ways]
+) -> tuple[Int, Int, Float]:
+    """Return the stop lines of lights that the participants' first routes cross, the ego's first.
+
+    Returns:
+        ``(L,)`` int64, whose route crosses each; ``(L,)`` int64, its light; ``(P, L, 3)`` float64,
+        where: x, y [m] and heading [rad], NaN in a road network where it does not.
+    """
+    found: list[dict[tuple[int, int], Float]] = []
+    for model, ways in zip(models, each, strict=True):
+        lines: dict[tuple[int, int], Float] = {}
+        for entity, route in enumerate(ways.routes if program.lights else ()):
+            if route is None:
+                continue
+            path = ways.paths[entity]
+            stations = np.arange(len(path.table)) * path.step
+            for line in reversed(stop_lines(model, route, program.lights)):
+                pose = [np.interp(line.station, stations, path.table[:, i]) for i in range(3)]
+                lines[entity, program.lights.index(line.light)] = np.array(pose)
+        found.append(lines)
+    keys = sorted({key for lines in found for key in lines})
+    poses = np.full((len(found), len(keys), 3), np.nan)
+    for p, lines in enumerate(found):
+        for j, key in enumerate(keys):
+            poses[p, j] = lines.get(key, np.nan)
+    entities, lights = np.array(keys, dtype=np.int64).reshape(len(keys), 2).T
+    return entities, lights, poses
+
+
+def _crosswalks(scene: Scene, each: Sequence[Ways]) -> Float:
+    """Return the crosswalks that the ego's route leads over, see `Rollout.crosswalks`; ``(P, …)``.
+
+    What pads has NaN.
+    """
+    found = np.full((*scene.crosswalks.shape[:2], 5), np.nan)
+    for p, ways in enumerate(each):
+        path = ways.paths[0]
+        stations = np.arange(len(path.table)) * path.step
+        for j, (enters, leaves, right, left) in enumerate(scene.crosswalks[p]):
+            if np.isfinite(enters):
+                middle = 0.5 * (enters + leaves)
+                x, y, c, s = (np.interp(middle, stations, path.table[:, i]) for i in (0, 1, 3, 4))
+                aside = 0.5 * (left + right)
+                half = 0.5 * (leaves - enters + path.step)
+                found[p, j] = (
+                    x - aside * s, y + aside * c, np.arctan2(s, c), half, 0.5 * (left - right)
+                )  # fmt: skip
+    return found
+
+
+def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
+    """Return what the driver knows of a road network; without stages, nothing of the others."""
+    starts: list[list[tuple[Stretch, float]]] = [[] for _ in program.names]
+    for entity, route in enumerate(ways.routes if program.driver.stages else ()):
+        if route is not None and entity > 0:
+            step = route.steps[0]
+            road = model.road(step.road_id)
+            section = section_index(road, 0.5 * (step.s + step.s_end))
+            starts[entity] = [
+                (Stretch(step.road_id, section, lane), step.s)
+                for lane in beside(road, section, step.lane_id)
+            ]
+    path = ways.paths[0]
+    return survey(model, ways.routes, path.table, path.step, program.lights, starts, program.bodies)
+
+
+def _numbers(rows: Sequence[Sequence[int]]) -> Int:
+    """Return rows of numbers as one array, shorter ones filled up with 0."""
+    whole = np.zeros((len(rows), max(map(len, rows))), dtype=np.int64)
+    for row, each in zip(whole, rows, strict=True):
+        row[: len(each)] = each
+    return whole
+
+
+def _stacked(tables: Sequence[np.ndarray], least: int = 0) -> np.ndarray:
+    """Return tables as one array; shorter ones are filled up with rows of -1: nobody's."""
+    longest = max(least, *map(len, tables))
+    return np.stack(
+        [
+            np.concatenate([one, np.full((longest - len(one), *one.shape[1:]), -1, one.dtype)])
+            for one in tables
+        ]
+    )

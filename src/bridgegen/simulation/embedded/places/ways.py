@@ -1,0 +1,315 @@
+"""The ways of a compiled storyboard on one road network: planned beforehand, or on demand."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bridgegen.arrays import Float, Int
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
+from bridgegen.openx.opendrive.lanes import lane_pose, section_index
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.routes import (
+    Route,
+    Step,
+    Stretch,
+    next_stretches,
+    plan_route,
+)
+from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
+from bridgegen.simulation.embedded.compiler import clothoids
+from bridgegen.simulation.embedded.compiler.trajectories import Corner, polyline, timetable
+from bridgegen.simulation.embedded.places.lanes import Lanes, Path, sampled
+from bridgegen.simulation.embedded.program import (
+    AlongLanes,
+    AlongTrajectory,
+    LaneCheck,
+    LanePoint,
+    Nowhere,
+    Point,
+    Program,
+)
+
+UNKNOWN, NONE = -1, -2  # in Ways.numbers: not asked for yet; there is no such way
+ENDS, ASKS, LANDS = -1, -2, -3  # in Path.follows, see ``_travel_kernels``
+LANES, GROUND = -1, -2  # asked for instead of a node, see ``_place_kernels``
+
+_MOST_STRETCHES = 1000
+_NO_SPANS = np.empty((0, 11))
+_NO_TIMES = np.empty((0, 10))
+
+
+class Ways:
+    """The paths of a storyboard on one road network.
+
+    Attributes:
+        paths: first those that the entities start on, then those that were asked for.
+        routes: per entity the lanes that its first path leads along; None off the lanes.
+        station: per entity a, b: who starts at s on the first road starts a + b·s along its path.
+        sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
+            trajectory.
+        timetables: per trajectory ``trajectories.timetable``, without rows if it has no times.
+        spots: ``(C, 5)`` per position of the file: number of its road, lane, s, left of its centre,
+            the way from which headings count; see `Lanes.locate`.
+        lanes: the lanes of the road network, None while nobody has asked for them.
+        has_ground: whether somebody has asked where all of them are.
+        numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
+
+    Raises:
+        InputError: a position that is not on a road, or a way that no lane leads along.
+    """
+
+    def __init__(self, program: Program, model: OpenDrive) -> None:
+        self._program, self._model = program, model
+        self.routes: list[Route | None] = []
+        self.paths: list[Path] = []
+        self.station: list[tuple[float, float]] = []
+        self.sides: list[int] = []
+        self.timetables: list[Float] = []
+        self.lanes: Lanes | None = None
+        self.has_ground = False
+        self.numbers: Int = np.empty((len(program.waypoints) + 1, 0), dtype=np.int64)
+        for number, spec in enumerate(program.paths):
+            try:
+                if isinstance(spec, AlongTrajectory):
+                    self._add_trajectory(spec)
+                elif isinstance(spec, Nowhere):
+                    self._add_line(polyline([(0.0, 0.0, 0.0)], may_stand=True), ENDS)
+                else:
+                    self._add_lanes(number, spec)
+            except InputError as error:
+                who = f"trajectory {number - len(program.names)}"
+                if number < len(program.names):
+                    who = f"route of '{program.names[number]}'"
+                raise InputError(f"{program.place}: {who}: {error}") from None
+        self.spots = np.full((len(program.spots), 5), np.nan)
+        if len(program.laterals) or len(program.spots) or program.looks_at_lanes:
+            self.plan(0, LANES)
+            self._check_lane_changes()
+            self._find_spots()
+
+    def plan(self, route: int, node: int) -> None:
+        """Plan what a row has asked for; see ``ask`` in ``_place_kernels``."""
+        if node < 0:
+            self._learn_lanes()
+            self.has_ground = self.has_ground or node == GROUND
+            return
+        assert self.lanes is not None
+        if self.numbers[route, node] == UNKNOWN:
+            path = self.lanes.plan(route, node)
+            self.numbers[route, node] = NONE if path is None else len(self.paths)
+            if path is not None:
+                self.paths.append(path)
+
+    def is_in_junction(self, road_id: str) -> bool:
+        """Say whether a road of the network is part of a junction."""
+        return self._model.road(road_id).is_connecting
+
+    def _learn_lanes(self) -> None:
+        """Make the tables of all lanes, and tell which ones the known paths lead along."""
+        if self.lanes is not None:
+            return
+        program = self._program
+        self.lanes = lanes = Lanes(self._model)
+        for spots in program.waypoints:
+            lanes.add_route(spots)
+        self.numbers = np.full((len(lanes.ways), len(lanes.nodes)), UNKNOWN)
+        for i, route in enumerate(self.routes):
+            if route is not None:
+                chain = [lanes.graph.numbers[_node(self._model, step)] for step in route.steps]
+                follows = int(lanes.graph.straight[chain[-1]])
+                spans = lanes.spans(route, chain)
+                self.paths[i] = self.paths[i]._replace(spans=spans, follows=follows)
+
+    def _check_lane_changes(self) -> None:
+        """Refuse what can be seen not to work: a lane that is nowhere beside an entity's way."""
+        assert self.lanes is not None
+        graph = self.lanes.graph
+        reached: dict[int, list[int]] = {}
+        for check in self._program.lane_checks:
+            spans = self.paths[check.entity].spans
+            known = spans[:, 4].astype(int).tolist()
+            there = reached.setdefault(check.entity, list(dict.fromkeys(known)))
+            targets = [
+                target for one in there if (target := _target(graph, one, check)) is not None
+            ]
+            if there and not targets:
+                which = str(check.lane)
+                if check.lanes is not None:
+                    which = f"{abs(check.lanes)} to the {'left' if check.lanes > 0 else 'right'}"
+                line = f" (line {check.line})" if check.line else ""
+                who = f"lane change of '{self._program.names[check.entity]}'"
+                raise InputError(
+                    f"{self._program.place}: {who}: there is no lane {which} to change to{line}"
+                )
+            onward = (node for target in targets for node in graph.onward(target))
+            reached[check.entity] = list(dict.fromkeys([*there, *onward]))
+
+    def _add_lanes(self, number: int, spec: AlongLanes) -> None:
+        route = self._along(spec)
+        side = self._model.road(spec.start.road).direction(spec.start.lane)
+        table, step = sampled(route)
+        # the ego's driver keeps to a path beside the lane's; the others' offsets are added as
+        # they are run, whether rows vary them or not
+        if number == 0 and self._program.aside_slots[0] < 0 and isinstance(spec.aside, float):
+            table = _shifted(table, spec.aside * side)
+        self.routes.append(route)
+        last = _stretch(self._model, route.steps[-1])
+        goes_on = next(next_stretches(self._model, last), None) is not None
+        self.paths.append(Path(table, step, _NO_SPANS, ASKS if goes_on else ENDS))
+        self.station.append(route.station(*_known(self._program, spec.start)))
+        self.sides.append(side)
+
+    def _along(self, spec: AlongLanes) -> Route:
+        """Plan from where the start's road is entered to where the last waypoint's road is left.
+
+        Without a route, an entity goes straight on.
+        """
+        start, waypoints = spec.start, list(spec.via)
+        if not waypoints:
+            return self._onward(start.road, start.lane, _known(self._program, start)[1])
+        while waypoints and (waypoints[0].road, waypoints[0].lane) == (start.road, start.lane):
+            del waypoints[0]
+        last = waypoints[-1] if waypoints else start
+        via = [_place(self._program, point) for point in waypoints[:-1]]
+        first = _end(self._model, start.road, start.lane, entry=True)
+        return plan_route(
+            self._model, first, via, _end(self._model, last.road, last.lane, entry=False)
+        )
+
+    def _onward(self, road_id: str, lane_id: int, s: float) -> Route:
+        """Return the way from the start of a road along a lane, up to the first fork or the end."""
+        model = self._model
+        road = model.road(road_id)
+        stretch = Stretch(road_id, section_index(road, min(max(s, 0.0), road.length)), lane_id)
+        last = stretch
+        for _ in range(_MOST_STRETCHES):
+            following = list(next_stretches(model, last))
+            if len(following) != 1 or following[0] == stretch:
+                break
+            last = following[0]
+        first = _end(model, road_id, lane_id, entry=True)
+        if stretch.section not in (0, len(road.sections) - 1) or len(road.sections) > 1:
+            first = (road_id, lane_id, s)  # its lane may not reach back to the road's end
+        end = model.road(last.road_id)
+        forward = end.direction(last.lane_id) > 0
+        low, high = end.sections[last.section].s, end.length
+        if last.section + 1 < len(end.sections):  # the lane ends on the road: its last place
+            high = math.nextafter(end.sections[last.section + 1].s, low)
+        return plan_route(model, first, [], (last.road_id, last.lane_id, high if forward else low))
+
+    def _add_trajectory(self, spec: AlongTrajectory) -> None:
+        corners = [_corner(self._program, self._model, point) for point in spec.points]
+        if spec.bends:
+            x, y, h = corners[0]
+            line = clothoids.sampled(x, y, h or 0.0, spec.bends)
+            corners = [(x, y, h) for x, y, h in line[0][:, :3].tolist()]
+        else:
+            line = polyline(corners, may_stand=bool(spec.times))
+        times: Sequence[float] = spec.times
+        if spec.bends and times:
+            knots = np.cumsum([0.0, *(bend.length for bend in spec.bends)])
+            times = np.interp(np.arange(len(corners)) * line[1], knots, times).tolist()
+        self.timetables.append(timetable(corners, times) if times else _NO_TIMES)
+        self._add_line(line, LANDS, spec.start)
+
+    def _add_line(self, line: tuple[Float, float], follows: int, start: float = 0.0) -> None:
+        self.routes.append(None)
+        self.paths.append(Path(*line, _NO_SPANS, follows))
+        table, step = line
+        self.station.append((min(start, (len(table) - 1) * step), 0.0))
+        self.sides.append(0)
+
+    def _find_spots(self) -> None:
+        """Find the positions of the file that do not depend on where entities are."""
+        assert self.lanes is not None
+        for row, spot in zip(self.spots, self._program.spots, strict=True):
+            if spot is not None:
+                try:
+                    row[:] = self.lanes.locate(spot)
+                except InputError as error:
+                    place = f"{self._program.place}, line {spot.line}"
+                    raise InputError(f"{place}: {error}") from None
+
+
+def position(program: Program, model: OpenDrive, point: Point) -> tuple[float, float]:
+    """Return where a condition's point is [m].
+
+    Raises:
+        InputError: it is not on a road.
+    """
+    return _corner(program, model, point)[:2]
+
+
+def _target(graph: LaneGraph, node: int, check: LaneCheck) -> int | None:
+    """Return the lane beside a node that a lane change leads to, if it is there."""
+    own = graph.nodes[node]
+    lane = check.lane
+    if lane is None:
+        assert check.lanes is not None
+        lane = own.lane_id + check.lanes * own.way
+        if lane == 0 or (lane > 0) != (own.lane_id > 0):  # there is no lane 0
+            lane += int(math.copysign(1, check.lanes * own.way))
+    return graph.in_section(node, lane)
+
+
+def _corner(program: Program, model: OpenDrive, point: Point) -> Corner:
+    if not isinstance(point, LanePoint):
+        return point.x, point.y, point.h
+    road_id, s = _known(program, point)
+    road = model.road(road_id)
+    pose = lane_pose(road, point.lane, s)
+    aside = point.aside * road.direction(point.lane)  # its sign is the road's, the pose the lane's
+    return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h), None
+
+
+def _stretch(model: OpenDrive, step: Step) -> Stretch:
+    road = model.road(step.road_id)
+    return Stretch(step.road_id, section_index(road, 0.5 * (step.s + step.s_end)), step.lane_id)
+
+
+def _node(model: OpenDrive, step: Step) -> Node:
+    way = model.road(step.road_id).direction(step.lane_id)
+    return Node(*_stretch(model, step), way)
+
+
+def _end(model: OpenDrive, road_id: str, lane: int, *, entry: bool) -> tuple[str, int, float]:
+    road = model.road(road_id)
+    forward = road.direction(lane) > 0
+    return road_id, lane, 0.0 if forward == entry else road.length
+
+
+def _place(program: Program, point: LanePoint) -> tuple[str, int, float]:
+    road, s = _known(program, point)
+    return road, point.lane, s
+
+
+def _known(program: Program, point: LanePoint) -> tuple[str, float]:
+    """Return the point's road and its s by the declared values of the parameters."""
+    return point.road, _declared(program, point.s)
+
+
+def _declared(program: Program, value: Value) -> float:
+    if isinstance(value, ParameterRef | Expr):
+        return float(value.resolve(program.parameters))
+    return float(value)
+
+
+def _shifted(table: Float, aside: float) -> Float:
+    """Return a path that runs beside another one; its samples are where the other's are."""
+    moved = table.copy()
+    moved[:, 0] -= aside * table[:, 4]
+    moved[:, 1] += aside * table[:, 3]
+    return moved
+
+
+def padded(tables: Sequence[Sequence[Float]], width: int) -> Float:
+    """Return K tables of each of P networks as one array, ``(P, K, L, width)``."""
+    k = max(len(each) for each in tables)
+    longest = max((len(table) for each in tables for table in each), default=0)
+    whole = np.zeros((len(tables), k, longest, width))
+    for p, each in enumerate(tables):
+        for i, table in enumerate(each):
+            whole[p, i, : len(table)] = table
+    return whole

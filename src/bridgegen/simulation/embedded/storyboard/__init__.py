@@ -1,0 +1,6 @@
+"""Stories, acts, maneuvers, events and actions: how they begin, go on and end."""
+
+from bridgegen.simulation.embedded.storyboard._start_kernels import start
+from bridgegen.simulation.embedded.storyboard._storyboard_kernels import decide, finish
+
+__all__ = ["decide", "finish", "start"]
