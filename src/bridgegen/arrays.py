@@ -1,6 +1,6 @@
 """Checks on arrays at the border to compiled code, which does not check them itself."""
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -34,3 +34,36 @@ def as_float(
         bad: Any = np.argwhere(~np.isfinite(array))[0].tolist()
         raise ValueError(f"{name} must be finite, got {array[tuple(bad)]} at {bad}")
     return array
+
+
+class Numbers(Protocol):
+    """A table of numbers that may be too long for memory: an array, or what reads rows of one.
+
+    ``a[3]`` is a row, ``a[rows]`` the rows of a mask, of positions or of a stretch, ``a[:, 2]`` a
+    column and ``a[rows, 2]`` some values of one; each an array of float64.
+    """
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+
+    def __getitem__(self, at: Any, /) -> Any:
+        """Return rows, a column, or values of one."""
+
+
+class Taken:
+    """Some rows of a table, read when they are asked for.
+
+    Args:
+        table: of which.
+        rows: ``(n,)`` positions.
+    """
+
+    def __init__(self, table: Numbers, rows: Int) -> None:
+        self._table, self._rows = table, rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, at: Any, /) -> Any:
+        rows, *column = at if isinstance(at, tuple) else (at,)
+        return self._table[(self._rows[rows], *column) if column else self._rows[rows]]

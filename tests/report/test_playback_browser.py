@@ -37,6 +37,7 @@ class Case:
         rows: Any = SimpleNamespace(
             X=self.X, metrics=np.zeros((n, len(self.pipeline.metrics))),
             critical=np.ones(n, dtype=bool), cause=np.zeros(n, dtype=np.int8),
+            take=lambda at: rows,
         )  # fmt: skip
         kept = [(f"{k + 1:04d}", k, ()) for k in range(n)]
         self.kept = playbacks(self.pipeline, rows, kept)

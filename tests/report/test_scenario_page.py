@@ -143,8 +143,9 @@ def test_a_report_has_no_place_for_who_is_not_there(monkeypatch):
     gone = replace(replay, rollout=replace(replay.rollout, present=present))
     monkeypatch.setattr(pipeline, "replay", lambda _, plans: gone)
     rows = SimpleNamespace(
-        X=X, metrics=np.zeros((1, len(pipeline.metrics))), critical=[True], cause=np.zeros(1, int)
-    )
+        X=X, metrics=np.zeros((1, len(pipeline.metrics))), critical=[True], cause=np.zeros(1, int),
+        take=lambda at: rows,
+    )  # fmt: skip
     (shown,) = playbacks(pipeline, rows, [("0001", 0, ())])
     for name in "xyva":
         assert (np.isnan(getattr(shown, name)) == ~present[0]).all()

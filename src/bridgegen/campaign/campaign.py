@@ -21,9 +21,10 @@ from bridgegen.cause import Cause
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.pipeline import Pipeline
+from bridgegen.report.data import WHOLE
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.store import Store, refuse_used
+from bridgegen.store import Recorded, Store, refuse_used
 from bridgegen.triage.record import write_record
 from bridgegen.triage.triage import triage
 from bridgegen.workers import Choice, Workers, open_workers
@@ -315,7 +316,7 @@ def _workers_lost(error: WorkersError, store: Store) -> WorkersError:
 
 def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> None:
     watch.stage("triage")
-    rows, found = store.read(), None
+    rows, found = Recorded(store, whole=WHOLE), None
     best = np.zeros(0, dtype=np.int64)
     if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
         triaged = triage(
@@ -325,7 +326,8 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
         write_record(store.folder, found)
     if pipeline.objective.rule == "thresholds" and len(best) < settings.keep:
         # What the paper calls critical is kept besides, in the paper's order.
-        more = most_critical(rows.U, rows.F, rows.critical, settings.keep)
+        at = np.flatnonzero(rows.critical)
+        more = at[most_critical(rows.U[at], rows.F[at], rows.critical[at], settings.keep)]
         best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]
     watch.stage("hand over")
     kept = hand_over(pipeline, rows.take(best), store.folder, watch.written, found)

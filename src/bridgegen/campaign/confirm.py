@@ -24,9 +24,10 @@ from bridgegen.confirmation.schema import Record, Scenario
 from bridgegen.confirmation.summary import Summary, summarise
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.pipeline import Pipeline
+from bridgegen.report.data import WHOLE
 from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.store import Rows, Store
+from bridgegen.store import Recorded, Rows, Store
 from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.triage.record import read_record as read_triage
 from bridgegen.workers import Choice, open_workers
@@ -148,7 +149,7 @@ def confirm(
         stage("report")
         try:
             with Store.open(folder) as store:
-                rows_now = store.read()
+                rows_now = Recorded(store, whole=WHOLE)
                 kept = handed_over(place, len(rows_now))
                 files.append(write_run_report(here, store, settings, rows_now, kept))
         except KeyboardInterrupt:

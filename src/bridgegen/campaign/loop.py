@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from hashlib import blake2b
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int, as_float
+from bridgegen.arrays import Float, as_float
+from bridgegen.campaign.met import Met
 from bridgegen.campaign.told import Told
 from bridgegen.errors import InputError, StorageError
 from bridgegen.search import Algorithm, Restorable, TakesNotes
@@ -159,8 +159,7 @@ class _Session:
         self._store, self._budget, self._on_batch = store, budget, on_batch
         self._recorded, self._seconds_before = len(store), store.seconds
         self._began: float | None = None
-        # id of every row of X met so far, by a 16-byte digest: some 200 MB for a million rows.
-        self._known: dict[bytes, int] = {}
+        self._known = Met()
         self._told = Told(store.n_obj, len(store.metrics))
         self._idle = 0
 
@@ -178,7 +177,7 @@ class _Session:
         for rows in self._store.rows(0, saved.evaluations):
             X = as_float("X", self._decode(rows.U), rows.X.shape) + 0.0
             self._compare("X", X, rows.X, int(rows.id[0]))
-            self._identify(X)
+            self._known.meet(X, self._budget)
             self._told.add(rows)
             self._report(int(rows.id[-1]) + 1, rows, replayed=True)
         self._idle = saved.idle
@@ -200,7 +199,7 @@ class _Session:
             return self._nothing_new(Reason.EXHAUSTED)
         # No −0.0: SQLite would not keep its sign, and what is simulated is what is recorded.
         X = as_float("X", self._decode(U), (len(U), len(self._store.parameters))) + 0.0
-        ids, fresh = self._identify(X)
+        ids, fresh = self._known.meet(X, self._budget)
         old = fresh[: max(0, self._recorded - done)]
         for rows, take in ((old, self._replay), (fresh[len(old) :], self._simulate)):
             if rows:
@@ -243,19 +242,6 @@ class _Session:
             got = f"{U.min():g} .. {U.max():g}"
             raise InputError(f"algorithm '{name}': its rows must be in [0, 1], got {got}")
         return U
-
-    def _identify(self, X: Float) -> tuple[Int, list[int]]:
-        """Return each row's id, −1 where the budget has no room for it, and the new rows."""
-        ids, fresh = np.full(len(X), -1), []
-        for k, row in enumerate(X):
-            key = blake2b(row.tobytes(), digest_size=16).digest()
-            if key not in self._known:
-                if len(self._known) >= self._budget:
-                    continue
-                self._known[key] = len(self._known)
-                fresh.append(k)
-            ids[k] = self._known[key]
-        return ids, fresh
 
     def _replay(self, U: Float, X: Float, start: int) -> Rows:
         """Return what is recorded for rows that must be those asked at the time."""

@@ -21,8 +21,9 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
 from bridgegen.regions.owl import carriers, classes, statable
 from bridgegen.regions.record import JSON_FILE, to_json
+from bridgegen.report.data import WHOLE
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.store import Store
+from bridgegen.store import Recorded, Store
 from bridgegen.workers import Choice, open_workers
 
 OWL_FILE = "regions.owl"
@@ -129,7 +130,7 @@ def regions_of(
     if (place / REPORT).is_file():
         stage("report")
         with Store.open(folder) as store:
-            every = store.read()
+            every = Recorded(store, whole=WHOLE)
             kept = handed_over(place, len(every))
             files.append(write_run_report(pipeline, store, settings, every, kept))
     return RunRegions(

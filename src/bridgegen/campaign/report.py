@@ -14,7 +14,7 @@ from bridgegen.regions.record import JSON_FILE, read_record
 from bridgegen.report.build import build_report
 from bridgegen.report.data import ReportData
 from bridgegen.report.page import write_report
-from bridgegen.store import Rows, Store
+from bridgegen.store import Recorded, Rows, Store
 from bridgegen.store.summary import summarise
 from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.triage.record import Triage
@@ -22,7 +22,11 @@ from bridgegen.triage.record import read_record as read_triage
 
 
 def write_run_report(
-    pipeline: Pipeline, store: Store, settings: Settings, rows: Rows, kept: Sequence[Kept]
+    pipeline: Pipeline,
+    store: Store,
+    settings: Settings,
+    rows: Rows | Recorded,
+    kept: Sequence[Kept],
 ) -> Path:
     """Write a run's report, its critical regions included if they are known; return its path.
 
@@ -49,7 +53,7 @@ def run_data(
     pipeline: Pipeline,
     store: Store,
     settings: Settings,
-    rows: Rows,
+    rows: Rows | Recorded,
     kept: Sequence[Kept],
     *,
     coverage: bool = True,
@@ -72,7 +76,10 @@ def run_data(
         FileFormatError: the file of the triage, the regions or a confirmation is not one, or is
             another run's.
     """
-    metric, results = store.metrics.index, rows.digest()
+    metric = store.metrics.index
+    # Of a run that goes on, results change before they are read; they take time to digest.
+    known = store.finished is not None or (store.folder / TRIAGE_FILE).is_file()
+    results = rows.digest() if known else None
     summary = summarise(
         rows.critical, rows.status == 0,
         rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
@@ -100,17 +107,19 @@ def minimal_files(folder: Path) -> tuple[str, ...]:
     return tuple(f"{FOLDER}/{name}" for name in names if name in found)
 
 
-def _triage(folder: Path, results: str) -> Triage | None:
+def _triage(folder: Path, results: str | None) -> Triage | None:
     """Return the triage of these results; None where the run has grown since it was made."""
     found = read_triage(folder / TRIAGE_FILE)
     return found if found is not None and found.results == results else None
 
 
-def _hashes(settings: Settings, results: str) -> dict[str, str]:
+def _hashes(settings: Settings, results: str | None) -> dict[str, str]:
     found = {"Scenario, SHA-256": settings.fingerprint}
     if settings.map_digest is not None:
         found["Map, SHA-256"] = settings.map_digest
-    return {**found, "Results, SHA-256": f"{results} (the command above gives the same)"}
+    if results is not None:
+        found["Results, SHA-256"] = f"{results} (the command above gives the same)"
+    return found
 
 
 def view_command(folder: Path) -> str:

@@ -6,11 +6,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bridgegen.campaign.handover import FOLDER, MINIMAL, Refused, not_exported
 from bridgegen.campaign.settings import Settings
 from bridgegen.simulation.rollout import STATUS_MESSAGES
-from bridgegen.store import Store
-from bridgegen.store.rows import Rows
+from bridgegen.store import Recorded, Store
 from bridgegen.store.summary import summarise
 from bridgegen.triage.record import JSON_FILE, Mode, Triage, read_record
 
@@ -44,7 +45,7 @@ class Run:
             self.settings = Settings.from_dict(store.settings, self.folder)
             self.finished = store.finished is not None
             self.notes = store.notes
-            rows = store.read()
+            rows = Recorded(store, whole=("d_min", "v_d"))
             self.failures = _in_words(rows, store.failures())
             self.summary = summarise(
                 rows.critical,
@@ -81,7 +82,7 @@ class Run:
         if not path.is_file():
             return None
         with Store.open(self.folder) as store:
-            return read_record(path, store.read().digest())
+            return read_record(path, Recorded(store).digest())
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -103,11 +104,11 @@ class Run:
         return f"Run({str(self.folder)!r}: {s.critical} critical of {s.evaluations} evaluations)"
 
 
-def _in_words(rows: Rows, said: Mapping[int, str]) -> Counter[str]:
+def _in_words(rows: Recorded, said: Mapping[int, str]) -> Counter[str]:
     """Return why evaluations failed, the most frequent reason first."""
+    failed = np.flatnonzero(rows.status)
     reasons = Counter(
         ": ".join([STATUS_MESSAGES.get(status, f"status {status}"), *filter(None, [said.get(i)])])
-        for i, status in zip(rows.id.tolist(), rows.status.tolist(), strict=True)
-        if status != 0
+        for i, status in zip(failed.tolist(), rows.status[failed].tolist(), strict=True)
     )
     return Counter(dict(reasons.most_common()))

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Float, Numbers
 from bridgegen.confirmation.schema import Record, Scenario
 from bridgegen.disk import write_whole
 from bridgegen.errors import FileFormatError
@@ -57,7 +57,7 @@ def _not_ours(path: Path, why: str) -> FileFormatError:
     )
 
 
-def read_records(folder: Path, X: Float, metrics: Float) -> tuple[Record, ...]:
+def read_records(folder: Path, X: Numbers, metrics: Numbers) -> tuple[Record, ...]:
     """Return the records of all simulators in a run's folder, by their names.
 
     Args:
@@ -78,7 +78,7 @@ def read_records(folder: Path, X: Float, metrics: Float) -> tuple[Record, ...]:
     return tuple(records)
 
 
-def check_rows(path: Path, scenarios: Iterable[Scenario], X: Float, metrics: Float) -> None:
+def check_rows(path: Path, scenarios: Iterable[Scenario], X: Numbers, metrics: Numbers) -> None:
     """Refuse a record that is not of these evaluations.
 
     Args:

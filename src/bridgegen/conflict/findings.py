@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from sys import intern
 from typing import Any, Self
 
 import numpy as np
@@ -102,7 +103,8 @@ def unpacked(rows: Sequence[Sequence[Any]]) -> Findings:
     for name, column in zip(COLUMNS, columns, strict=False):
         if odd := {*map(type, column)} - {str, type(None)}:
             raise TypeError(f"{name} must be a text, got a {odd.pop().__name__}")
-    texts = [[one or "" for one in column] for column in columns]
+    # Each text once: there are few different ones, and SQL makes a new object of each.
+    texts = [[intern(one) if one else "" for one in column] for column in columns]
     if not texts:
         return Findings.none(0)
     return Findings(*(np.array(column, dtype=object) for column in texts))

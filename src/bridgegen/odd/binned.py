@@ -6,7 +6,7 @@ from math import prod
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.arrays import Bool, Float, Int, Numbers, as_float
 from bridgegen.odd.space import SearchSpace
 
 # Rows decoded at a time, and cells of a table that marks combinations: both bound the memory.
@@ -28,7 +28,7 @@ class BinnedRows:
 
     Args:
         space: what was searched.
-        X: ``(N, len(space.names))`` float64.
+        X: ``(N, len(space.names))`` float64; read a stretch at a time.
         critical: ``(N,)`` bool.
         bins: equal bins over the declared range; a parameter of whole numbers has one for each.
         sample: random points of the space.
@@ -39,9 +39,8 @@ class BinnedRows:
     """
 
     def __init__(
-        self, space: SearchSpace, X: Float, critical: Bool, bins: int, sample: int
+        self, space: SearchSpace, X: Numbers, critical: Bool, bins: int, sample: int
     ) -> None:
-        X = as_float("X", X, (None, len(space.names)))
         hit = np.asarray(critical, np.bool_)
         if hit.shape != (len(X),):
             raise ValueError(f"critical must have shape ({len(X)},), got {hit.shape}")
@@ -51,9 +50,15 @@ class BinnedRows:
         self.sizes = [len(one) - 1 for one in self.edges]
         self.n_rows, self.n_critical = len(X), int(hit.sum())
         # Sorted into critical rows, other rows, sample: each is a stretch of columns.
-        order = np.argsort(~hit, kind="stable")
-        seen = [self._bin(X[order]), *self._sampled(sample)]
-        self._where = np.concatenate(seen, axis=1)
+        kind = np.min_scalar_type(max(self.sizes, default=0))
+        self._where = np.empty((len(self.names), len(X) + sample), kind)
+        place, end = np.argsort(np.argsort(~hit, kind="stable")), len(X)
+        for start in range(0, len(X), _CHUNK):
+            part = as_float("X", X[start : start + _CHUNK], (None, len(space.names)))
+            self._where[:, place[start : start + len(part)]] = self._bin(part)
+        for sampled in self._sampled(sample):
+            self._where[:, end : end + sampled.shape[1]] = sampled
+            end += sampled.shape[1]
         self._ends = (self.n_critical, self.n_rows, self._where.shape[1])
 
     def counts(self, chosen: Sequence[int]) -> tuple[Int, Int, Int]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.arrays import Bool, Float, Int, Numbers
 from bridgegen.errors import InputError
 from bridgegen.odd.binned import BinnedRows
 from bridgegen.odd.space import SearchSpace
@@ -140,7 +140,7 @@ class CoverageMap:
 
 def coverage(
     space: SearchSpace,
-    X: Float,
+    X: Numbers,
     critical: Bool,
     *,
     bins: int = 5,
@@ -169,7 +169,7 @@ def coverage(
 
 def coverage_map(
     space: SearchSpace,
-    X: Float,
+    X: Numbers,
     critical: Bool,
     *,
     bins: int = 5,

@@ -1,12 +1,13 @@
 """From a run's rows to the report's data: the kept scenarios are rolled out again for playback."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import comb
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bridgegen.arrays import Taken
 from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict import quantities
@@ -16,8 +17,11 @@ from bridgegen.objective import Objective
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
+    WHOLE,
     Column,
+    Deferred,
     Evaluations,
+    Held,
     ReportData,
     RunSummary,
 )
@@ -26,7 +30,7 @@ from bridgegen.report.notes import tables
 from bridgegen.report.playback import Playback
 from bridgegen.report.playbacks import minimal_playbacks, playbacks
 from bridgegen.search.dominance import by_merit
-from bridgegen.store import Rows
+from bridgegen.store import Recorded, Rows
 from bridgegen.store.summary import Summary
 from bridgegen.triage.record import Mode, Triage
 
@@ -51,7 +55,7 @@ TRIPLES = 25_000_000
 
 def build_report(
     pipeline: Pipeline,
-    rows: Rows,
+    rows: Rows | Recorded,
     summary: Summary,
     *,
     kept: Sequence[tuple[str, int, tuple[str, ...]]],
@@ -184,14 +188,15 @@ def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
     return rule if cause is None else f"{rule}, put down to {cause.label}"
 
 
-def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
+def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
     space, declared = pipeline.space, pipeline.scenario.parameters
+    X, measured = Held(rows.X), Held(rows.metrics)
     lines = {line.name: line for line in pipeline.scenario.table()}
     parameters = tuple(
         Column(
             name,
             unit,
-            np.ascontiguousarray(rows.X[:, i]),
+            Deferred(X, i),
             lines[name].description,
             declared[name].low if name in declared else None,
             declared[name].high if name in declared else None,
@@ -202,15 +207,17 @@ def _evaluations(pipeline: Pipeline, rows: Rows) -> Evaluations:
         if name not in {*pipeline.source.unused_names, *space.decisions}
     )
     metrics = tuple(
-        Column(name, quantities.get(name).unit, np.ascontiguousarray(rows.metrics[:, j]),
-               quantities.get(name).description)
+        Column(
+            name,
+            quantities.get(name).unit,
+            rows.metrics[:, j] if name in WHOLE else Deferred(measured, j),
+            quantities.get(name).description,
+        )
         for j, name in enumerate(pipeline.metrics)
-    )  # fmt: skip
+    )
     one = pipeline.objective.objectives == "one"
     names = ("F",) if one else tuple(f"F of {name}" for name in pipeline.objective.names)
-    objectives = tuple(
-        Column(name, "1", np.ascontiguousarray(rows.F[:, j])) for j, name in enumerate(names)
-    )
+    objectives = tuple(Column(name, "1", rows.F[:, j]) for j, name in enumerate(names))
     cause = rows.cause if rows.cause.any() else None
     return Evaluations(
         rows.batch, parameters, metrics, objectives, rows.critical, rows.status, cause,
@@ -236,29 +243,44 @@ def _minimal(
 
 
 def _more(
-    pipeline: Pipeline, rows: Rows, kept: set[int], wanted: Sequence[int]
-) -> tuple[Playback, ...]:
+    pipeline: Pipeline, rows: Rows | Recorded, kept: set[int], wanted: Sequence[int]
+) -> "_More":
     """Return the playbacks of scenarios besides those that were kept.
 
     First those that are wanted, then the most critical ones.
     """
     critical = np.flatnonzero(rows.critical & (rows.status == 0))
-    order = [i for i in critical[by_merit(rows.F[critical])].tolist() if i not in kept]
+    best = critical[by_merit(rows.F[critical])]
+    best = best[~np.isin(best, list(kept))]
     space = pipeline.space
     own = space.decisions or {*pipeline.source.static_names} & {*space.variables}
     most = MOTIONS_OF_THEIR_OWN if own else max(MOTIONS, len(rows) // 10)
     first = [evaluation for evaluation in wanted if evaluation not in kept]
-    order = [] if pipeline.driver.is_own else list(dict.fromkeys([*first, *order]))[:most]
-    found: list[Playback] = []
-    for start in range(0, len(order), AT_A_TIME):
-        some = [(f"evaluation {i + 1}", i, ()) for i in order[start : start + AT_A_TIME]]
-        found += playbacks(pipeline, rows, some, brief=True)
-    return tuple(found)
+    order = list(dict.fromkeys([*first, *best[:most].tolist()]))[:most]
+    if pipeline.driver.is_own:
+        order = []
+    return _More(pipeline, rows, order)
 
 
-def _coverage(pipeline: Pipeline, rows: Rows) -> CoverageMap:
+class _More:
+    """Playbacks of some evaluations, each rolled out when it is asked for, a few at a time.
+
+    There are many of a long run, and the page has room for some.
+    """
+
+    def __init__(self, pipeline: Pipeline, rows: Rows | Recorded, order: Sequence[int]) -> None:
+        self._pipeline, self._rows, self._order = pipeline, rows, order
+
+    def __iter__(self) -> Iterator[Playback]:
+        for start in range(0, len(self._order), AT_A_TIME):
+            numbers = self._order[start : start + AT_A_TIME]
+            some = [(f"evaluation {i + 1}", i, ()) for i in numbers]
+            yield from playbacks(self._pipeline, self._rows, some, brief=True)
+
+
+def _coverage(pipeline: Pipeline, rows: Rows | Recorded) -> CoverageMap:
     space, ok = pipeline.space, rows.status == 0
-    X, critical = rows.X[ok], rows.critical[ok]
+    X, critical = Taken(rows.X, np.flatnonzero(ok)), rows.critical[ok]
     n_var = len({*space.variables} - space.decisions)
     strength = 3 if comb(n_var, 3) * (len(X) + SAMPLE) <= TRIPLES else 2
     try:

@@ -102,11 +102,12 @@ def telling_parameters(columns: tuple[Column, ...], critical: Bool, ok: Bool) ->
         critical: ``(N,)`` bool.
         ok: ``(N,)`` bool, the rows that count.
     """
-    varied = [c for c in columns if c.searched and _varies(c.values[ok])]
-    hit, other = ok & critical, ok & ~critical
-    if not hit.any() or not other.any():
-        return [column.name for column in varied]
-    score = {c.name: _smirnov(c.values[hit], c.values[other]) for c in varied}
+    values = {c.name: c.values[ok] for c in columns if c.searched}
+    varied = {name: x for name, x in values.items() if _varies(x)}
+    hit = critical[ok]
+    if not hit.any() or hit.all():
+        return list(varied)
+    score = {name: _smirnov(x[hit], x[~hit]) for name, x in varied.items()}
     return sorted(score, key=lambda name: -score[name])
 
 

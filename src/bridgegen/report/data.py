@@ -4,14 +4,14 @@ Numbers may be NaN or infinite wherever a quantity does not exist (no critical s
 time to collision); the page shows a dash there.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int, as_float
+from bridgegen.arrays import Bool, Float, Int, Numbers, as_float
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict.findings import Findings
 from bridgegen.odd.coverage import CoverageMap
@@ -90,6 +90,57 @@ class RunSummary:
     settings: Mapping[str, str] | None = None
 
 
+WHOLE = ("d_min", "v_d", "n_collision", "harm", "harm_any", "severity")
+"""The metrics of which the page says something over the whole run."""
+
+
+class Deferred:
+    """The values of a column that are read when the page asks for those of the rows it holds.
+
+    Args:
+        held: the columns that are read together.
+        place: of this one among them.
+    """
+
+    def __init__(self, held: "Held", place: int) -> None:
+        self._held, self._place = held, place
+
+    @property
+    def size(self) -> int:
+        """N."""
+        return len(self._held.table)
+
+    def __getitem__(self, rows: Bool) -> Float:
+        """Return the values of some rows, ``(N,)`` bool: of these, not of others."""
+        return self._held.of(rows)[:, self._place]
+
+
+class Held:
+    """The rows of a table that a page holds: read once, when they are known.
+
+    Args:
+        table: ``(N, k)``, longer than memory, perhaps.
+
+    Attributes:
+        table: the same.
+    """
+
+    def __init__(self, table: Numbers) -> None:
+        self.table = table
+        self._rows: Bool | None = None
+        self._values = np.empty((0, 0))
+
+    def of(self, rows: Bool) -> Float:
+        """Return some rows, ``(n, k)``.
+
+        Args:
+            rows: ``(N,)`` bool.
+        """
+        if self._rows is None or not np.array_equal(rows, self._rows):
+            self._rows, self._values = rows.copy(), self.table[rows]
+        return self._values
+
+
 @dataclass(frozen=True)
 class Column:
     """One quantity of every evaluation.
@@ -97,7 +148,8 @@ class Column:
     Attributes:
         name: the parameter's, metric's or objective's name, unique over all columns.
         unit: "m", "m/s", "%", "deg", "s", "count" …; "1" or "" for a pure number.
-        values: ``(N,)`` float64 in that unit; NaN or ±inf where it does not exist.
+        values: ``(N,)`` float64 in that unit; NaN or ±inf where it does not exist. Those of
+            objectives and of the metrics of `WHOLE` must be in memory.
         description: one line for people; may be empty.
         low: lower end of the declared range, in the unit; None where there is none.
         high: upper end.
@@ -107,12 +159,23 @@ class Column:
 
     name: str
     unit: str
-    values: Float
+    values: "Float | Deferred"
     description: str = ""
     low: float | None = None
     high: float | None = None
     searched: bool = False
     labels: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def whole(self) -> Float:
+        """The values of all rows.
+
+        Raises:
+            ValueError: they are not in memory.
+        """
+        if isinstance(self.values, Deferred):
+            raise ValueError(f"the values of {self.name} must be in memory")
+        return self.values
 
 
 @dataclass(frozen=True)
@@ -147,7 +210,10 @@ class Evaluations:
             twice = sorted({name for name in names if names.count(name) > 1})
             raise ValueError(f"column names must be unique, got {', '.join(twice)} twice")
         for column in self.columns:
-            as_float(f"{column.name} [{column.unit}]", column.values, (n,), finite=False)
+            if not isinstance(column.values, Deferred):
+                as_float(f"{column.name} [{column.unit}]", column.values, (n,), finite=False)
+            elif column.values.size != n:
+                raise ValueError(f"{column.name} must have {n} values, got {column.values.size}")
         arrays = {"critical": self.critical, "status": self.status, "cause": self.cause}
         for name, array in arrays.items():
             if array is not None and array.shape != (n,):
@@ -171,7 +237,8 @@ class ReportData:
         summary: the run in figures.
         evaluations: every row.
         kept: the scenarios that were handed over, most critical first; may be empty.
-        more: further scenarios, whose motion the page holds as far as there is room, likewise.
+        more: further scenarios, whose motion the page holds as far as there is room, likewise;
+            gone through once for each page, so that they can be rolled out then.
         files: those of the kept scenarios, by their paths relative to the page, in the order in
             which they matter; the page holds them as far as there is room.
         coverage: which bins and pairs of bins were evaluated, if it is to be shown.
@@ -188,7 +255,7 @@ class ReportData:
     coverage: CoverageMap | None = None
     notes: tuple[NoteTable, ...] = ()
     regions: Mapping[str, Any] | None = None
-    more: tuple[Playback, ...] = ()
+    more: Iterable[Playback] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     confirmations: Sequence[Record] = ()
     triage: Triage | None = None
@@ -196,7 +263,7 @@ class ReportData:
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size
-        for playback in (*self.kept, *self.more, *self.minimal):
+        for playback in (*self.kept, *self.minimal):
             if not 0 <= playback.evaluation < n:
                 raise ValueError(
                     f"evaluation of playback '{playback.name}' must be in 0..{n - 1}, "

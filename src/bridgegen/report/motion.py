@@ -6,7 +6,7 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.playback_payload import playback_payload, road_payload
 from bridgegen.report.playbacks import playbacks
-from bridgegen.store import Rows
+from bridgegen.store import Recorded, Rows
 
 
 class Named(Protocol):
@@ -22,7 +22,7 @@ class Named(Protocol):
 
 
 def motion_payload(
-    pipeline: Pipeline, rows: Rows, evaluation: int, handed: Named | None = None
+    pipeline: Pipeline, rows: Rows | Recorded, evaluation: int, handed: Named | None = None
 ) -> dict[str, Any]:
     """Return a scenario's playback, with the road and the picture that belong to it.
 

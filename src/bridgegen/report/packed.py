@@ -3,7 +3,8 @@
 import json
 import zlib
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from itertools import islice
 from typing import Any
 
 from bridgegen.report.playback import Playback
@@ -24,21 +25,20 @@ def deflated(data: bytes) -> str:
     return b64encode(zlib.compress(data, 9)).decode("ascii")
 
 
-def packed_motions(playbacks: Sequence[Playback], roads: Mapping[Any, int]) -> dict[str, Any]:
+def packed_motions(playbacks: Iterable[Playback], roads: Mapping[Any, int]) -> dict[str, Any]:
     """Return the motions of scenarios, as many of the first as there is room for.
 
     Each text is a chunk: JSON of ``playbacks`` as in the page's own data, and of ``roads``, those
     of them that the page has not got; number −1 is the first of these.
 
     Args:
-        playbacks: the scenarios.
+        playbacks: the scenarios; those that find no room are not asked for, a few excepted.
         roads: the numbers of the page's roads, by `road_key`.
     """
     texts: list[str] = []
     evaluations: list[int] = []
-    room = MOST_MOTION
-    for start in range(0, len(playbacks), CHUNK):
-        some = playbacks[start : start + CHUNK]
+    room, left = MOST_MOTION, iter(playbacks)
+    while some := tuple(islice(left, CHUNK)):
         own: dict[Any, int] = {}
         told, drawn = [], []
         for one in some:

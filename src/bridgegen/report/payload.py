@@ -71,11 +71,6 @@ def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
     elsewhere = confirmations_payload(data.confirmations)
     harm = data.summary.harm
-    wanted = [one.evaluation for one in (*data.kept, *data.more)]
-    wanted += [one["evaluation"] for each in elsewhere for one in each["scenarios"]]
-    modes = data.triage.modes if data.triage else ()
-    wanted += [one.shown for one in modes]
-    shown = _shown(data.evaluations, wanted)
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
@@ -87,6 +82,12 @@ def payload(data: ReportData) -> dict[str, Any]:
             index[key] = len(roads)
             roads.append(road_payload(playback))
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
+    motions = packed_motions(data.more, index)
+    wanted = [*(one.evaluation for one in data.kept), *motions["evaluations"]]
+    wanted += [one["evaluation"] for each in elsewhere for one in each["scenarios"]]
+    modes = data.triage.modes if data.triage else ()
+    wanted += [one.shown for one in modes]
+    shown = _shown(data.evaluations, wanted)
     return {
         "live": False,
         "summary": _summary(data),
@@ -101,7 +102,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
         "kept": kept,
-        "packed": packed_motions(data.more, index),
+        "packed": motions,
         "files": packed_files(data.files),
         "coverage": coverage_payload(data.coverage) if data.coverage else None,
         "notes": [
@@ -195,14 +196,14 @@ def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
     critical = np.flatnonzero(e.critical & (e.status == 0))
     rank = np.zeros(e.critical.size, dtype=np.int64)
     F = (
-        np.stack([c.values for c in e.objectives], axis=1)
+        np.stack([c.whole[critical] for c in e.objectives], axis=1)
         if e.objectives
-        else np.zeros((rank.size, 1))
+        else np.zeros((critical.size, 1))
     )
-    order = critical[by_merit(F[critical])]
+    order = critical[by_merit(F)]
     for column in e.metrics:
         if column.name == harm:
-            order = order[np.argsort(-column.values[order], kind="stable")]
+            order = order[np.argsort(-column.whole[order], kind="stable")]
     rank[order] = np.arange(1, critical.size + 1)
     told: list[int] = rank[ok].tolist()
     return told
@@ -250,7 +251,7 @@ def _batches(e: Evaluations, trends_of: Mapping[str, bool] = TRENDS) -> dict[str
     trends = {}
     for column in e.metrics:
         if column.name in trends_of:
-            values = np.where(e.status == 0, column.values, np.nan)
+            values = np.where(e.status == 0, column.whole, np.nan)
             t = convergence.trend(values, found.group, n, larger_is_worse=trends_of[column.name])
             trends[column.name] = {
                 "unit": column.unit,

@@ -21,7 +21,7 @@ from bridgegen.report.painter import paint
 from bridgegen.report.playback import Conflict, Course, Playback, Weather
 from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.report.sensing import sensed
-from bridgegen.store import Rows
+from bridgegen.store import Recorded, Rows
 from bridgegen.triage.record import Minimal
 
 THIN = 0.01
@@ -53,7 +53,7 @@ class Shown:
 
 def playbacks(
     pipeline: Pipeline,
-    rows: Rows,
+    rows: Rows | Recorded,
     kept: Sequence[tuple[str, int, tuple[str, ...]]],
     *,
     brief: bool = False,
@@ -69,15 +69,15 @@ def playbacks(
     """
     if not kept:
         return ()
-    at = [evaluation for _, evaluation, _ in kept]
+    some = rows.take(np.array([evaluation for _, evaluation, _ in kept]))
     shown = [
         Shown(
-            name, evaluation, files, rows.X[evaluation], rows.metrics[evaluation],
-            bool(rows.critical[evaluation]), Cause(rows.cause[evaluation]).label,
+            name, evaluation, files, some.X[k], some.metrics[k], bool(some.critical[k]),
+            Cause(some.cause[k]).label,
         )
-        for name, evaluation, files in kept
+        for k, (name, evaluation, files) in enumerate(kept)
     ]  # fmt: skip
-    return _played(pipeline, shown, pipeline.replay(rows.X[at], plans=not brief), brief=brief)
+    return _played(pipeline, shown, pipeline.replay(some.X, plans=not brief), brief=brief)
 
 
 def minimal_playbacks(

@@ -25,10 +25,10 @@ def regions_payload(
     told = []
     for one in record["regions"]:
         box = {name: one["box"][name] for name in one["named"]}
-        inside = shown.copy()
+        inside = np.ones(int(shown.sum()), np.bool_)
         for name, ends in box.items():
-            x = columns.get(name)
-            inside &= False if x is None else (ends["low"] <= x) & (x <= ends["high"])
+            x = columns[name][shown] if name in columns else np.full(inside.size, np.nan)
+            inside &= (ends["low"] <= x) & (x <= ends["high"])
         told.append(
             {
                 **{key: one[key] for key in ("number", "confirmed", "rule", "sentence")},
@@ -37,7 +37,7 @@ def regions_payload(
                 "box": {name: [ends["low"], ends["high"]] for name, ends in box.items()},
                 "fresh": _evidence(one["fresh"]),
                 "search": _evidence(one["search"]),
-                "rows": np.flatnonzero(inside[shown]).tolist(),
+                "rows": np.flatnonzero(inside).tolist(),
             }
         )
     return {**{key: record[key] for key in keys}, "regions": told}

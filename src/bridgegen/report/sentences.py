@@ -91,10 +91,10 @@ def _of_harm(data: ReportData) -> list[tuple[str, str]]:
     ]
     for column in e.metrics:
         if column.name == "severity":
-            worst = float(column.values[contact].max()) if contact.any() else float("nan")
+            worst = float(column.whole[contact].max()) if contact.any() else float("nan")
             rows.append(("Severity (MAIS3+), highest", share(worst)))
         if column.name == data.summary.harm:
-            values = column.values[(e.status == 0) & np.isfinite(column.values)]
+            values = column.whole[(e.status == 0) & np.isfinite(column.whole)]
             rows.append(("Harm, highest", f"{values.max():.3f}" if values.size else "–"))
     return rows
 
@@ -219,7 +219,7 @@ def _worst_harm(data: ReportData) -> str:
     if not n_contact:
         return f"{'It is a near miss' if n_near == 1 else 'All are near misses'}; no collision."
     text = f"{_count(n_contact, 'collision')}"
-    severity = next((one.values for one in e.metrics if one.name == "severity"), None)
+    severity = next((one.whole for one in e.metrics if one.name == "severity"), None)
     if severity is not None:
         worst = float(severity[contact].max())
         text += f", the most severe with a probability of {share(worst)} of a MAIS3+ injury"
@@ -228,7 +228,7 @@ def _worst_harm(data: ReportData) -> str:
 
 def _worst(data: ReportData) -> str:
     e = data.evaluations
-    columns = {column.name: column.values for column in e.metrics}
+    columns = {one.name: one.whole for one in e.metrics if one.name in ("n_collision", "v_d")}
     ok = e.status == 0
     hits = columns.get("n_collision")
     n_hits = 0 if hits is None else int(np.count_nonzero(hits[ok] > 0))

@@ -4,8 +4,9 @@
 """
 
 from bridgegen.store.checkpoint import Checkpoint
+from bridgegen.store.recorded import Recorded
 from bridgegen.store.rows import Evaluated, Rows
 from bridgegen.store.run_file import refuse_used
 from bridgegen.store.store import Store
 
-__all__ = ["Checkpoint", "Evaluated", "Rows", "Store", "refuse_used"]
+__all__ = ["Checkpoint", "Evaluated", "Recorded", "Rows", "Store", "refuse_used"]

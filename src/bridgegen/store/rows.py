@@ -18,6 +18,9 @@ LAST = ("status", "critical", "cause", *COLUMNS)
 LAST_OF_SCHEMA = {1: LAST[:2], 2: LAST[:3], 3: LAST}
 """The last columns by the schema of the store."""
 
+DIGESTED = 4096
+"""Rows that are digested at a time."""
+
 
 class Evaluated(Protocol):
     """What an evaluation of n rows hands over; any object with these arrays will do.
@@ -88,6 +91,8 @@ class Rows:
     @classmethod
     def join(cls, parts: Sequence["Rows"]) -> "Rows":
         """Return the rows of several parts, at least one, in their order."""
+        if len(parts) == 1:
+            return parts[0]
         names = [one.name for one in fields(cls) if one.name != "findings"]
         return cls(
             **{name: np.concatenate([getattr(p, name) for p in parts]) for name in names},
@@ -99,12 +104,7 @@ class Rows:
 
         One seed gives one digest.
         """
-        digest = sha256()
-        for array in (self.U, self.X, self.metrics, self.F, self.status, self.critical, self.cause):
-            digest.update(array.astype(array.dtype.newbyteorder("<")).tobytes())
-        for texts in self.findings.columns().values():
-            digest.update("\0".join(texts.tolist()).encode())
-        return digest.hexdigest()
+        return digest_of(self)
 
     def take(self, at: Int) -> "Rows":
         """Return the rows at some positions, in that order."""
@@ -240,24 +240,18 @@ class Columns:
         X, metrics, F = np.split(
             numbers, np.cumsum([len(self.X), len(self.metrics)]).tolist(), axis=1
         )
-        if any(type(row[3]) is not bytes or len(row[3]) != 8 * self.n_var for row in rows):
-            raise ValueError(f"a row of the unit cube is not {self.n_var} numbers")
-        blob = b"".join(row[3] for row in rows)
-        U = np.frombuffer(blob, dtype="<f8").reshape(n, self.n_var)
-        if not np.isfinite(U).all():
-            raise ValueError("a row of the unit cube is not finite")
         last = first + n_float
         causes = [row[last + 2] if len(self.last) > 2 else None for row in rows]
         return Rows(
-            id=_column(rows, names, 0, np.int64),
-            batch=_column(rows, names, 1, np.int64),
-            seconds=_column(rows, names, 2, np.float64),
-            U=U.astype(np.float64),
+            id=column(rows, names[0], 0, np.int64),
+            batch=column(rows, names[1], 1, np.int64),
+            seconds=column(rows, names[2], 2, np.float64),
+            U=unit_rows(rows, 3, self.n_var),
             X=np.ascontiguousarray(X),
             metrics=np.ascontiguousarray(metrics),
             F=np.ascontiguousarray(F),
-            status=_column(rows, names, last, np.int64),
-            critical=_column(rows, names, last + 1, np.bool_),
+            status=column(rows, names[last], last, np.int64),
+            critical=column(rows, names[last + 1], last + 1, np.bool_),
             cause=np.array([Cause.named(one) if one else Cause.NONE for one in causes], np.int8),
             findings=unpacked([row[last + 3 :] for row in rows])
             if len(self.last) > 3
@@ -270,13 +264,63 @@ def quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"'
 
 
-def _column(rows: Sequence[tuple[Any, ...]], names: Sequence[str], at: int, kind: type[Any]) -> Any:
+def column(rows: Sequence[tuple[Any, ...]], name: str, at: int, kind: type[Any]) -> Any:
+    """Return a column of what SQL read, ``(n,)``.
+
+    Args:
+        rows: n of them.
+        name: of the column, for the message.
+        at: its place in a row.
+        kind: of the array.
+
+    Raises:
+        TypeError: a value is not a number of that kind.
+    """
     values = [row[at] for row in rows]
     wanted = {int, float} if kind is np.float64 else {int}
     if odd := {*map(type, values)} - wanted:
         what = "a number" if kind is np.float64 else "a whole number"
-        raise TypeError(f"{names[at]} must be {what}, got a {odd.pop().__name__}")
+        raise TypeError(f"{name} must be {what}, got a {odd.pop().__name__}")
     return np.array(values, dtype=kind)
+
+
+def unit_rows(rows: Sequence[tuple[Any, ...]], at: int, n_var: int) -> Float:
+    """Return the unit-cube rows of what SQL read, ``(n, n_var)``.
+
+    Args:
+        rows: n of them.
+        at: the place of ``u`` in a row.
+        n_var: searched parameters.
+
+    Raises:
+        ValueError: a value is not n_var finite numbers.
+    """
+    if any(type(row[at]) is not bytes or len(row[at]) != 8 * n_var for row in rows):
+        raise ValueError(f"a row of the unit cube is not {n_var} numbers")
+    blob = b"".join(row[at] for row in rows)
+    U = np.frombuffer(blob, dtype="<f8").reshape(len(rows), n_var)
+    if not np.isfinite(U).all():
+        raise ValueError("a row of the unit cube is not finite")
+    return U.astype(np.float64)
+
+
+def digest_of(rows: Any) -> str:
+    """Return `Rows.digest` of evaluations, be they in memory or not.
+
+    Args:
+        rows: with the arrays of `Rows`, or what reads stretches of them.
+    """
+    digest, n = sha256(), len(rows)
+    for name in ("U", "X", "metrics", "F", "status", "critical", "cause"):
+        values = getattr(rows, name)
+        for start in range(0, n, DIGESTED):
+            part = values[start : start + DIGESTED]
+            digest.update(part.astype(part.dtype.newbyteorder("<")).tobytes())
+    for texts in rows.findings.columns().values():
+        for start in range(0, n, DIGESTED):
+            said = "\0".join(texts[start : start + DIGESTED].tolist())
+            digest.update(("\0" * (start > 0) + said).encode())
+    return digest.hexdigest()
 
 
 def _free(names: Iterable[str], kind: str, taken: set[str]) -> tuple[str, ...]:

@@ -2,14 +2,16 @@
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from bridgegen.arrays import Float
+import numpy as np
+
+from bridgegen.arrays import Float, Int
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, StorageError
 from bridgegen.store.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
 
 CHUNK = 4096
 """Rows that are read from SQL at a time."""
+
+MARKS = 900
+"""Rows that are asked for by their ids at a time; SQLite takes at least 999."""
 
 
 class Store:
@@ -349,20 +354,86 @@ class Store:
         """
         n = len(self)
         stop = n if stop is None else min(stop, n)
-        if stop - start > CHUNK:
-            # SQL's rows are Python objects, ten times the size of the arrays.
-            return Rows.join(list(self.rows(start, stop)))
-        names = ", ".join(map(quoted, self.columns.all))
-        sql = f"SELECT {names} FROM evaluations WHERE id >= ? AND id < ? ORDER BY id"
+        # A part at a time: SQL's rows are Python objects, ten times the size of the arrays.
+        return self._joined(self.select(self.columns.all, start, stop), range(start, stop))
+
+    def at(self, ids: Int) -> Rows:
+        """Return the evaluations of some ids, in that order.
+
+        Args:
+            ids: ``(n,)`` int64, each recorded; one may be given more than once.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
+        wanted, places = np.unique(ids, return_inverse=True)
+        return self._joined(self.select_at(self.columns.all, wanted), wanted.tolist()).take(places)
+
+    def _joined(self, found: Iterable[list[tuple[Any, ...]]], ids: Sequence[int]) -> Rows:
+        parts, at = [], 0
+        for some in found:
+            with self.damage():
+                parts.append(self.columns.unpack(some))
+            if parts[-1].id.tolist() != list(ids[at : at + len(some)]):
+                raise self._damaged(f"evaluations between {ids[0]} and {ids[-1]} are missing")
+            at += len(some)
+        return Rows.join(parts) if parts else self.columns.unpack([])
+
+    def select(
+        self, columns: Sequence[str], start: int, stop: int
+    ) -> Iterator[list[tuple[Any, ...]]]:
+        """Yield columns of the evaluations with ``start <= id < stop``, as SQL has them.
+
+        They come in the order of ids, at most ``CHUNK`` at a time.
+
+        Args:
+            columns: names of the table's columns.
+            start: the first id.
+            stop: behind the last one, all of them recorded.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
+        sql = f"SELECT {_names(columns)} FROM evaluations WHERE id >= ? AND id < ? ORDER BY id"
+        for at in range(start, stop, CHUNK):
+            end = min(at + CHUNK, stop)
+            yield self._found(sql, (at, end), end - at, (at, end - 1))
+
+    def select_at(self, columns: Sequence[str], ids: Int) -> Iterator[list[tuple[Any, ...]]]:
+        """Yield columns of the evaluations of some ids, as `select` does.
+
+        Args:
+            columns: names of the table's columns.
+            ids: ``(n,)`` int64, ascending, each recorded.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
+        if len(ids) and ids[-1] - ids[0] == len(ids) - 1:  # all that are between
+            yield from self.select(columns, int(ids[0]), int(ids[-1]) + 1)
+            return
+        for at in range(0, len(ids), MARKS):
+            some = ids[at : at + MARKS].tolist()
+            marks = ", ".join("?" * len(some))
+            sql = f"SELECT {_names(columns)} FROM evaluations WHERE id IN ({marks}) ORDER BY id"
+            yield self._found(sql, some, len(some), (some[0], some[-1]))
+
+    def _found(
+        self, sql: str, values: Sequence[int], n: int, ends: tuple[int, int]
+    ) -> list[tuple[Any, ...]]:
         with self._reading():
-            found = self._connection.execute(sql, (start, stop)).fetchall()
+            found = self._connection.execute(sql, values).fetchall()
+        if len(found) != n:
+            raise self._damaged(f"evaluations between {ends[0]} and {ends[1]} are missing")
+        return found
+
+    @contextmanager
+    def damage(self) -> Iterator[None]:
+        """Turn what is raised by values that no store writes into a StorageError."""
         try:
-            rows = self.columns.unpack(found)
+            yield
         except (TypeError, ValueError, OverflowError, InputError) as error:
             raise self._damaged(str(error)) from error
-        if rows.id.tolist() != list(range(start, stop)):
-            raise self._damaged(f"evaluations between {start} and {stop - 1} are missing")
-        return rows
 
     def rows(self, start: int = 0, stop: int | None = None, chunk: int = CHUNK) -> Iterator[Rows]:
         """Yield the evaluations with ``start <= id < stop``, ``chunk`` at a time.
@@ -375,7 +446,6 @@ class Store:
 
     def frame(self) -> "pd.DataFrame":
         """Return every evaluation as a table, without u; the index is id."""
-        import numpy as np
         import pandas as pd
 
         n, columns = len(self), self.columns
@@ -414,3 +484,7 @@ class Store:
         if not isinstance(found, int) or found < 0:
             raise self._damaged(f"a number of evaluations or batches is {found!r}")
         return found
+
+
+def _names(columns: Sequence[str]) -> str:
+    return ", ".join(map(quoted, columns))

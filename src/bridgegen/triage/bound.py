@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.arrays import Bool, Float, Int, Numbers
 from bridgegen.conflict.harm import COURSE, NEAR_MISS
 from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.regions.evidence import clopper_pearson
@@ -48,7 +48,7 @@ def estimate(drawn: Drawn, harmful: int, rows: int) -> Estimate:
 
 
 def least_margins(
-    metrics: Float, names: Sequence[str], harm: Float, ids: Int, fit: Bool
+    metrics: Numbers, names: Sequence[str], harm: Float, ids: Int, fit: Bool
 ) -> tuple[Least, ...]:
     """Return the rows that come nearest to harm, one for each of ``MARGINS`` that is recorded.
 

@@ -84,7 +84,8 @@ def keys_of(
     partner = [kinds.get(name, "") for name in findings.partner.tolist()]
     texts = (findings.conflict, findings.conflict_type, findings.responsible, findings.rule)
     columns = zip(*(one.tolist() for one in texts), partner, place, cause, strict=True)
-    return [Key(*one) for one in columns]
+    known: dict[tuple[str, ...], Key] = {}
+    return [known.setdefault(one, Key(*one)) for one in columns]
 
 
 def by_harm(harm: Float, U: Float) -> Int:

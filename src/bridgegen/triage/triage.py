@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.arrays import Bool, Float, Int, Numbers
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import NEAR_MISS
@@ -56,15 +56,15 @@ class Evaluations(Protocol):
         """``(N,)``."""
 
     @property
-    def U(self) -> Float:
+    def U(self) -> Numbers:
         """``(N, n_var)``."""
 
     @property
-    def X(self) -> Float:
+    def X(self) -> Numbers:
         """``(N, len(space.names))``."""
 
     @property
-    def metrics(self) -> Float:
+    def metrics(self) -> Numbers:
         """``(N, M)``."""
 
     @property
@@ -118,7 +118,7 @@ def triage(
 
 
 def harmful_rows(
-    metrics: Float, names: Sequence[str], harm: str, status: npt.NDArray[Any], findings: Findings
+    metrics: Numbers, names: Sequence[str], harm: str, status: npt.NDArray[Any], findings: Findings
 ) -> tuple[Bool, Float]:
     """Return which rows are a failure of the ego, ``(N,)``, and the harm of each, ``(N,)``.
 
@@ -154,6 +154,7 @@ class _Triage:
         if pipeline.cause is not None:  # harm of another cause does not count
             harmful &= rows.critical
         self._at = np.flatnonzero(harmful)
+        self._U: Float = rows.U[self._at]
         self._found: dict[int, Neighbourhood] = {}
         self._as_is: AsIs = {}
         self._unrecorded = 0
@@ -161,7 +162,7 @@ class _Triage:
     def run(self) -> Triaged:
         """Go through the stages."""
         rows, tries = self._rows, self._pipeline.tries
-        U, harm = rows.U[self._at], self._harm[self._at]
+        U, harm = self._U, self._harm[self._at]
         place = self._places(U) if tries else [""] * len(self._at)
         quick = [Cause(one).label for one in rows.cause[self._at].tolist()]
         kinds = self._pipeline.kinds
@@ -262,7 +263,7 @@ class _Triage:
 
     def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
         """Return what orders findings: robust ones first, then the worst."""
-        return self._is_knife_edge(i), -float(harm[i]), *self._rows.U[self._at[i]].tolist()
+        return self._is_knife_edge(i), -float(harm[i]), *self._U[i].tolist()
 
     def _by_tested_cause(
         self, groups: Sequence[Group], shown: Sequence[int], U: Float, harm: Float
@@ -314,7 +315,7 @@ class _Triage:
         came = self._pipeline.try_all(self._space.decode(U) + 0.0)
         keys = keys_of(came.findings, self._pipeline.kinds, came.place.tolist(), [""] * FRESH)
         held = [0] * len(groups)
-        own = rows.U[self._at]
+        own = self._U
         for i in np.flatnonzero(came.harmful).tolist():
             same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
             if same:  # several where they differ in cause: the one with the nearest row
@@ -340,8 +341,8 @@ class _Triage:
         names = {i: f"{k:04d}" for k, i in enumerate(exports, start=1)}
         modes = []
         for k, (one, i) in enumerate(zip(groups, shown, strict=True), start=1):
-            members = set(one.rows.tolist())
-            kept = [names[j] for j in exports if j in members and j != i]
+            members = np.isin(exports, one.rows).tolist()
+            kept = [names[j] for j, has in zip(exports, members, strict=True) if has and j != i]
             near = self._found.get(i)
             modes.append(
                 Mode(
@@ -392,9 +393,12 @@ class _Triage:
         others = [g.rows for g in groups if g is not one and g.key == one.key]
         if not one.part or not others:
             return text
-        X = searched(self._space, self._rows.X[self._at])
-        names = self._space.variables
-        found = where(X[one.rows], X[np.concatenate(others)], names)
+        names, at = self._space.variables, self._at
+        X, rest = (
+            searched(self._space, self._rows.X[at[rows]])
+            for rows in (one.rows, np.concatenate(others))
+        )
+        found = where(X, rest, names)
         if found is None:
             return text
         k, low, high = found

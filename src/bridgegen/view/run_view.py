@@ -15,11 +15,12 @@ from bridgegen.confirmation.schema import Record
 from bridgegen.disk import read_inside
 from bridgegen.errors import InputError
 from bridgegen.regions.record import JSON_FILE
+from bridgegen.report.data import WHOLE
 from bridgegen.report.motion import motion_payload
 from bridgegen.report.page import report_page
 from bridgegen.report.payload import news
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice
-from bridgegen.store import Rows, Store
+from bridgegen.store import Recorded, Store
 from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 
 
@@ -46,9 +47,9 @@ class RunView:
         simulator: SimulatorChoice | None = None,
     ) -> None:
         self.folder = Path(folder)
+        self._rows: Recorded | None = None
         with Store.open(folder) as store:
             self.settings = Settings.from_dict(store.settings, store.folder)
-            self._rows = store.read()
             metrics = store.metrics
         self._pipeline = pipeline_of(
             self.settings, metrics, self.folder, ego=ego, command="view", causes=False,
@@ -62,10 +63,12 @@ class RunView:
         Raises:
             InputError: there is none, or it failed.
         """
-        n = len(self._rows)
+        with self._lock, Store.open(self.folder) as store:
+            rows = self._read(store)
+            n, failed = len(rows), rows.status != 0
         if not 1 <= evaluation <= n:
             raise InputError(f"1 <= evaluation <= {n} must hold in {self.folder}, got {evaluation}")
-        if self._rows.status[evaluation - 1] != 0:
+        if failed[evaluation - 1]:
             raise InputError(f"{self.folder}: evaluation {evaluation} failed: it has no motion")
         return f"#evaluation-{evaluation}"
 
@@ -75,7 +78,7 @@ class RunView:
             rows = self._read(store)
             kept = handed_over(self.folder, len(rows))
             data = run_data(self._pipeline, store, self.settings, rows, kept)
-        return b"".join(report_page(data, live=True))
+            return b"".join(report_page(data, live=True))
 
     def news(self, after: int) -> Mapping[str, Any]:
         """Return what is new since the page knew of so many evaluations."""
@@ -89,18 +92,16 @@ class RunView:
             if len(rows) == after:
                 return state
             data = run_data(self._pipeline, store, self.settings, rows, (), coverage=False)
-        return {**state, **news(data, after)}
+            return {**state, **news(data, after)}
 
     def motion(self, evaluation: int) -> Mapping[str, Any] | None:
         """Return the motion of an evaluation; None if there is none, or if it failed."""
-        with self._lock:
-            if evaluation >= len(self._rows):
-                with Store.open(self.folder) as store:
-                    self._read(store)
-            if evaluation >= len(self._rows) or self._rows.status[evaluation] != 0:
+        with self._lock, Store.open(self.folder) as store:
+            rows = self._read(store)
+            if evaluation >= len(rows) or rows.status[evaluation] != 0:
                 return None
             known = {one.evaluation: one for one in self._kept()}
-            return motion_payload(self._pipeline, self._rows, evaluation, known.get(evaluation))
+            return motion_payload(self._pipeline, rows, evaluation, known.get(evaluation))
 
     def file(self, name: str) -> bytes | None:
         """Return a handed-over file, or a record of what came later; None of any other name."""
@@ -115,14 +116,10 @@ class RunView:
     def _kept(self) -> tuple[Kept, ...]:
         return handed_over(self.folder)
 
-    def _elsewhere(self, rows: Rows) -> tuple[Record, ...]:
+    def _elsewhere(self, rows: Recorded) -> tuple[Record, ...]:
         return read_records(self.folder, rows.X, rows.metrics)
 
-    def _read(self, store: Store) -> Rows:
-        """Return all rows; only those are read that are new."""
-        known, n = len(self._rows), len(store)
-        if n < known:  # another run took its place
-            self._rows = store.read()
-        elif n > known:
-            self._rows = Rows.join([self._rows, store.read(known)])
+    def _read(self, store: Store) -> Recorded:
+        """Return all rows, to be used while the store is open; only what is new is read."""
+        self._rows = Recorded(store, self._rows, whole=WHOLE)
         return self._rows
