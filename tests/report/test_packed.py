@@ -62,6 +62,19 @@ def test_there_is_room_for_the_first_only(more, monkeypatch):
     assert list(packed.packed_files(files)) == ["a"]
 
 
+def test_motions_that_find_no_room_are_not_asked_for(more, monkeypatch):
+    asked = []
+
+    def endless():
+        while True:
+            asked.append(more.more[0])
+            yield asked[-1]
+
+    monkeypatch.setattr(packed, "MOST_MOTION", 1000)
+    assert packed.packed_motions(endless(), {})["evaluations"] == []
+    assert len(asked) == packed.CHUNK
+
+
 @pytest.fixture(scope="module")
 def long(report):
     """10,000 evaluations in numbers that do not compress, nearly all critical; packed full."""

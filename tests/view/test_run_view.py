@@ -65,7 +65,8 @@ def test_the_digest_of_the_results_is_theirs(view, growing):
 
 def test_any_evaluation_has_its_motion(view, finished):
     kept = data_of(view.page())["kept"]
-    rows = view._rows
+    with Store.open(finished) as store:
+        rows = store.read()
     others = [i for i in range(len(rows)) if i not in {one["evaluation"] for one in kept}]
     told = view.motion(others[7])
     assert told["playback"]["evaluation"] == others[7]
