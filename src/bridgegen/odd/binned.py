@@ -41,6 +41,7 @@ class BinnedRows:
     def __init__(
         self, space: SearchSpace, X: Numbers, critical: Bool, bins: int, sample: int
     ) -> None:
+        as_float("X", X[:0], (None, len(space.names)))  # no row may be there to be checked
         hit = np.asarray(critical, np.bool_)
         if hit.shape != (len(X),):
             raise ValueError(f"critical must have shape ({len(X)},), got {hit.shape}")
