@@ -1,7 +1,8 @@
 """All quantities of a scenario by name: the metrics, and what the conflict analysis measures."""
 
+from collections import ChainMap
 from collections.abc import Collection, Mapping, Sequence
-from types import MappingProxyType
+from typing import cast
 
 import numpy as np
 
@@ -39,9 +40,9 @@ _MEASURED = (
 MEASURED = tuple(one.name for one in _MEASURED)
 """The names of what the conflict analysis measures; a search records them all."""
 
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
-    {**METRICS, **{one.name: one for one in _MEASURED}}
-)
+_BY_NAME: dict[str, Quantity] = {one.name: one for one in _MEASURED}
+
+QUANTITIES: Mapping[str, Quantity] = ChainMap(_BY_NAME, cast(dict[str, Quantity], METRICS))
 """The metrics, then what the conflict analysis measures."""
 
 
@@ -63,7 +64,7 @@ def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str
     """
     for name in names:
         get(name)
-    measures.require([name for name in names if name in METRICS], held, who)
+    measures.require([name for name in names if name not in _BY_NAME], held, who)
     return tuple(names)
 
 
@@ -79,15 +80,14 @@ def evaluate(rollout: Rollout, names: Sequence[str]) -> Float:
         UnknownNameError: a name is not a quantity's.
         ValueError: the rollout does not hold what a quantity needs, or what it holds is malformed.
     """
-    metrics = [name for name in names if name in METRICS]
+    metrics = [name for name in names if name not in _BY_NAME]
     out = np.empty((rollout.shape[0], len(names)))
-    at = [j for j, name in enumerate(names) if name in METRICS]
+    at = [j for j, name in enumerate(names) if name not in _BY_NAME]
     out[:, at] = measures.evaluate(rollout, metrics)
     if len(metrics) < len(names):
         measured = _measured(rollout)
         for j, name in enumerate(names):
-            if name not in METRICS:
-                get(name)
+            if name in _BY_NAME:
                 out[:, j] = measured[name]
     return out
 

@@ -1,12 +1,15 @@
-"""All metrics by name. A new one: its own file with a ``METRIC``, and one entry here."""
+"""All metrics by name. A new one: its own file with a ``METRIC``, and one entry here.
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+Or a package's: an entry point of the group ``bridgegen.metrics``.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.errors import UnknownNameError
+from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.metrics import (
     a_change,
     btn,
@@ -28,6 +31,7 @@ from bridgegen.metrics import (
     v_d,
 )
 from bridgegen.metrics.metric import Metric
+from bridgegen.plugins import PlugIns
 from bridgegen.simulation.rollout import Rollout
 
 _TABLE_I = (
@@ -37,10 +41,75 @@ _TABLE_I = (
 
 _BEYOND = (pet, drac, btn, thw, tet, tit, rss)
 
-METRICS: Mapping[str, Metric] = MappingProxyType(
-    {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
-)
-"""In the order of Table I, then those beyond it."""
+_OURS = {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
+
+ADDED = PlugIns("metric", "bridgegen.metrics")
+
+
+class _Metrics(Mapping[str, Metric]):
+    """Ours, and those of installed packages, which are imported when they are asked for."""
+
+    def __init__(self) -> None:
+        self._known = dict(_OURS)
+
+    def __getitem__(self, name: str) -> Metric:
+        if name not in self._known:
+            if name not in ADDED.names(_OURS):
+                raise KeyError(name)
+            self._known[name] = _added(name)
+        return self._known[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._known or name in ADDED.names(_OURS)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(ADDED.names(_OURS))
+
+    def __len__(self) -> int:
+        return len(ADDED.names(_OURS))
+
+
+def _added(name: str) -> Metric:
+    """Return a package's metric, whose results are checked.
+
+    Raises:
+        InputError: it cannot be loaded, or is no metric of that name.
+    """
+    found = ADDED.load(name, _OURS)
+    if not isinstance(found, Metric):
+        raise InputError(
+            f"{ADDED.place(name)} must be a bridgegen.metrics.Metric, got {type(found).__name__}"
+        )
+    if found.name != name:
+        raise InputError(
+            f"{ADDED.place(name)} calls itself '{found.name}'; the two names must agree"
+        )
+
+    def compute(rollout: Rollout) -> Float:
+        try:
+            values = np.asarray(found.compute(rollout), dtype=np.float64)
+        except Exception as error:
+            raise InputError(
+                f"{ADDED.place(name)} fails: {type(error).__name__}: {error}"
+            ) from error
+        n, failed = rollout.shape[0], np.asarray(rollout.status) != 0
+        if values.shape != (n,):
+            raise InputError(
+                f"{ADDED.place(name)} must return {n} numbers, one for each scenario, got an array "
+                f"of the shape {values.shape}"
+            )
+        if bad := np.flatnonzero(np.isnan(values) != failed).size:
+            raise InputError(
+                f"{ADDED.place(name)} must be NaN exactly where a scenario failed; it is otherwise "
+                f"in {bad} of {n}"
+            )
+        return values
+
+    return replace(found, compute=compute)
+
+
+METRICS: Mapping[str, Metric] = _Metrics()
+"""In the order of Table I, then ours beyond it, then those of installed packages."""
 
 TABLE_I = tuple(module.METRIC.name for module in _TABLE_I)
 """The names of the paper's eleven, which every run records as far as its rollouts hold them."""
@@ -51,6 +120,7 @@ def get(name: str) -> Metric:
 
     Raises:
         UnknownNameError: there is none; the message suggests the nearest.
+        InputError: an installed package's that cannot be loaded.
     """
     if name not in METRICS:
         raise UnknownNameError("metric", name, METRICS)

@@ -1,8 +1,7 @@
 """The algorithms by name: ours, and those that installed packages add."""
 
-from typing import TYPE_CHECKING
-
-from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.errors import InputError
+from bridgegen.plugins import PlugIns
 from bridgegen.search.algorithm import Algorithm
 from bridgegen.search.cma_es import CMAES
 from bridgegen.search.ddpg import DDPG
@@ -22,10 +21,7 @@ from bridgegen.search.random import Random
 from bridgegen.search.sobol import Sobol
 from bridgegen.search.spea2 import SPEA2
 
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
-GROUP = "bridgegen.algorithms"
+ADDED = PlugIns("algorithm", "bridgegen.algorithms")
 
 ALGORITHMS: dict[str, type[Algorithm]] = {
     cls.name: cls
@@ -53,7 +49,7 @@ ALGORITHMS: dict[str, type[Algorithm]] = {
 
 def names() -> list[str]:
     """Return every algorithm's name, ours first; imports no other package."""
-    return [*ALGORITHMS, *sorted(set(_entry_points()) - set(ALGORITHMS))]
+    return ADDED.names(ALGORITHMS)
 
 
 def get(name: str) -> type[Algorithm]:
@@ -64,36 +60,17 @@ def get(name: str) -> type[Algorithm]:
         InputError: an installed package's algorithm that cannot be loaded, lacks a part of the
             protocol, or takes a name that is in use.
     """
-    added = _entry_points().get(name, [])
-    if len(added) > (0 if name in ALGORITHMS else 1):
-        places = [*(["bridgegen"] if name in ALGORITHMS else []), *(e.value for e in added)]
-        raise InputError(f"algorithm '{name}' is declared more than once: {', '.join(places)}")
-    if name in ALGORITHMS:
+    found = ADDED.load(name, ALGORITHMS)
+    if found is None:
         return ALGORITHMS[name]
-    if not added:
-        raise UnknownNameError("algorithm", name, names())
-    place = f"algorithm '{name}' ({added[0].value}, entry point of '{GROUP}')"
-    try:
-        found = added[0].load()
-    except Exception as error:  # whatever a stranger's module raises while it is imported
-        raise InputError(f"{place} cannot be loaded: {type(error).__name__}: {error}") from error
     parts = ("name", "description", "source", "settings", "objectives", "ask", "tell")
     missing = [part for part in parts if not hasattr(found, part)]
     if missing or not isinstance(found, type):
         lack = f"lacks {', '.join(missing)}" if missing else "is not a class"
-        raise InputError(f"{place} {lack}; see bridgegen.search.Algorithm")
+        raise InputError(f"{ADDED.place(name)} {lack}; see bridgegen.search.Algorithm")
     algorithm: type[Algorithm] = found
     if algorithm.name != name:
-        raise InputError(f"{place} calls itself '{algorithm.name}'; the two names must agree")
+        raise InputError(
+            f"{ADDED.place(name)} calls itself '{algorithm.name}'; the two names must agree"
+        )
     return algorithm
-
-
-def _entry_points() -> dict[str, list["EntryPoint"]]:
-    from importlib.metadata import entry_points
-
-    found: dict[str, list[EntryPoint]] = {}
-    for point in entry_points(group=GROUP):
-        # A package installed twice (a wheel beside an editable copy) lists the same object twice.
-        if all(point.value != other.value for other in found.setdefault(point.name, [])):
-            found[point.name].append(point)
-    return found
