@@ -26,11 +26,13 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.openx.openscenario.values import Expr
 from bridgegen.simulation.embedded._codes import (
+    DOES,
     EVENT,
     EVENT_NUMBER,
     FIRST,
     KIND,
     LAST,
+    ROW,
     WEATHER_CHANGE,
 )
 from bridgegen.simulation.embedded.program import Program
@@ -64,7 +66,6 @@ PRESET = {
 
 _CLEAR, _THICK = 1e4, 200.0  # m: visibility without fog; and how many times less at 100 %
 _DRIZZLE, _CLOUDBURST = 0.1, 500.0  # mm/h: just above 0 %; and how many times more at 100 %
-_ACTION_KIND, _WEATHER_ROW = 1, 6  # columns of ``Program.actions``
 
 
 @dataclass(frozen=True)
@@ -199,11 +200,11 @@ def _environments(storyboard: osc.OpenScenario) -> list[list[osc.Environment]]:
 def _changes(program: Program) -> list[tuple[int, int]]:
     """Return the events that change the weather, and the row of ``weathers`` that each brings."""
     return [
-        (int(element[EVENT_NUMBER]), int(program.actions[j, _WEATHER_ROW]))
+        (int(element[EVENT_NUMBER]), int(program.actions[j, ROW]))
         for element in program.elements.tolist()
         if element[KIND] == EVENT
         for j in range(element[FIRST], element[LAST])
-        if program.actions[j, _ACTION_KIND] == WEATHER_CHANGE
+        if program.actions[j, DOES] == WEATHER_CHANGE
     ]
 
 

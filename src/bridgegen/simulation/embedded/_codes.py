@@ -14,8 +14,13 @@ OFF, STANDBY, RUNNING, COMPLETE = range(4)
 # State.stamps: the columns.
 STARTED, ENDED, STOPPED, SKIPPED = range(4)
 
-# Program.actions, columns that the storyboard reads; the others are their kinds' own.
-WHOM, SELECTS = 0, 7
+# Program.actions: the entity that it is about; what it does; shape and dimension of its course;
+# slots of its target and of what it lasts; a row of ``laterals``, ``weathers``, ``courses``,
+# places, routes or trajectories; whether the trigger selects the entity.
+WHOM, DOES, SHAPE, DIMENSION, TARGET, LASTS, ROW, SELECTS = range(8)
+STEERS, SETS_SPEED = 2, 3  # of a control: whether the driver does, -1 as before
+DETAIL = 3  # of a route, its position; of a trajectory, whether its times are relative
+PASSES = 2  # of a date: whether time passes
 SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = range(5)
 ADD_ENTITY, DELETE_ENTITY, CONTROL = 20, 21, 22
 FIRST_GLOBAL = 100  # whose first column is a light, a controller, a value, not an entity
@@ -49,8 +54,7 @@ ENTITY_SYSTEM, PATH_SYSTEM, WORLD_SYSTEM, ROAD_SYSTEM = range(4)
 # entity whether it counts.
 RANGES, RANGES_END, OPPOSITE, COUNTS = range(4)
 
-# Program.actions: the kinds that move along the road by Program.courses; the others are numbered
-# in _action_kernels.
+# Program.actions: the kinds that move along the road by Program.courses.
 RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE = range(40, 44)
 
 # Program.courses: the entity that it goes by, -1 if none; then by kind, slots where not said else.

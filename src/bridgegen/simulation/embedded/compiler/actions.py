@@ -11,6 +11,8 @@ from bridgegen.simulation.embedded._codes import (
     ASSIGN_ROUTE,
     DELETE_ENTITY,
     FOLLOW,
+    LANE_CHANGE,
+    LANE_OFFSET,
     LATERALLY,
     TELEPORT,
 )
@@ -26,9 +28,6 @@ from bridgegen.simulation.embedded.program import (
     PathSpec,
     Spot,
 )
-
-_SPEED_CHANGE, _LANE_CHANGE, _LANE_OFFSET = 0, 1, 4
-
 
 _BY_TIME = 1
 
@@ -207,7 +206,7 @@ class Actions:
             self.lane_checks.append(LaneCheck(entity, lanes, lane, action.line))
         offset = self._tables.slot(action.target_lane_offset or 0.0)
         row = self._lateral(other, lanes if lane is None else lane)
-        self.rows.append((entity, _LANE_CHANGE, shape, dimension, offset, value, row))
+        self.rows.append((entity, LANE_CHANGE, shape, dimension, offset, value, row))
 
     def _lane_offset(self, action: osc.LaneOffsetAction, entity: int) -> None:
         target, other = action.lane_offset_target.target, -1
@@ -223,7 +222,7 @@ class Actions:
         if isinstance(action.continuous, osc.ParameterRef):
             self._tables.unsupported(action, f'continuous="{action.continuous}"')
         row = self._lateral(other, 0, continuous=action.continuous is True)
-        self.rows.append((entity, _LANE_OFFSET, shape, _BY_TIME, *slots, row))
+        self.rows.append((entity, LANE_OFFSET, shape, _BY_TIME, *slots, row))
 
     def _lateral(self, other: int, count: int | None, *, continuous: bool = False) -> int:
         self.laterals.append((other, count or 0, int(continuous)))

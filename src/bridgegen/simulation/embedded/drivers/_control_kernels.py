@@ -10,7 +10,7 @@ it does not do, the storyboard does as of anybody else.
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
+from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY, SETS_SPEED, STEERS
 from bridgegen.simulation.embedded.drivers._ego_kernels import move_ego
 from bridgegen.simulation.embedded.motion import move_along_path, stop_follow, stop_longitudinal
 from bridgegen.simulation.embedded.places._place_kernels import end_lateral
@@ -23,7 +23,7 @@ def begin_control(j, k, plan, roads, state, record):
     The storyboard takes over the ego where it is and as fast as it is, on its way's heading. What
     it asked for meanwhile was asked of the driver, and is over.
     """
-    lateral, longitudinal = plan.actions[j, 2], plan.actions[j, 3]
+    lateral, longitudinal = plan.actions[j, STEERS], plan.actions[j, SETS_SPEED]
     state.action_ended[j] = True
     if lateral >= 0 and lateral != state.drives[LATERALLY]:
         state.drives[LATERALLY] = lateral

@@ -15,7 +15,7 @@ from bridgegen.ego._attentive_kernels import ASKED, LOOK, look, react, see
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego.drivers import ATTENTIVE
-from bridgegen.simulation.embedded._codes import KEEP_ASIDE
+from bridgegen.simulation.embedded._codes import DOES, KEEP_ASIDE
 from bridgegen.simulation.embedded._memory_kernels import STOPS
 from bridgegen.simulation.embedded._motion_kernels import SAME_SPEED
 from bridgegen.simulation.embedded.motion import (
@@ -46,7 +46,7 @@ def heed(k, plan, roads, state, record):
             if state.waits[e] >= 0 and roads.follows[p] == ENDS:
                 stop = (roads.counts[p] - 1) * roads.steps[p]
             j = state.lateral_action[e]
-            if j >= 0 and plan.actions[j, 1] != KEEP_ASIDE:
+            if j >= 0 and plan.actions[j, DOES] != KEEP_ASIDE:
                 target = state.lateral_target[e]
             mind[ASKED] = look(
                 e, state.command[e], stop, state.weather[FRICTION], roads.paths, roads.counts,

@@ -12,6 +12,7 @@ from bridgegen.ego._conflict_kernels import LEAST_PACE
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego.drivers import ATTENTIVE
+from bridgegen.simulation.embedded._codes import DIMENSION, LASTS, ROW, SHAPE, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE
 from bridgegen.simulation.embedded._motion_kernels import DISTANCE, STEP, nearest
 from bridgegen.simulation.embedded.motion._lateral_kernels import (
@@ -51,7 +52,7 @@ the left; whether the offset is kept until another action moves the entity acros
 @inlined_kernel
 def stop_lateral(j, plan, state):
     """Stop action j, which moves an entity across: it goes on as far aside as it is."""
-    e = plan.actions[j, 0]
+    e = plan.actions[j, WHOM]
     if state.lateral_action[e] == j:
         state.lateral_action[e] = state.to[e] = -1
     if state.waits[e] == j:
@@ -105,7 +106,7 @@ def begin_lane_change(j, k, plan, roads, state, record):
 
     An attentive driver waits until the gap there is free.
     """
-    e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
+    e, row = plan.actions[j, WHOM], plan.laterals[plan.actions[j, ROW]]
     node, s, _ = take_lane(e, k, roads, state, record)
     if node < 0:
         return
@@ -138,15 +139,15 @@ def begin_lane_change(j, k, plan, roads, state, record):
     )
     if target != node:
         state.to[e], state.foot[e] = left, left_at
-    offset = way * state.slots[plan.actions[j, 4]]
-    value = state.slots[plan.actions[j, 5]]
+    offset = way * state.slots[plan.actions[j, TARGET]]
+    value = state.slots[plan.actions[j, LASTS]]
     metres = offset - state.aside[e]
     state.lateral_action[e] = j
     state.lateral_lasts[e] = lane_change_lasts(
-        plan.actions[j, 2], plan.actions[j, 3], value, metres
+        plan.actions[j, SHAPE], plan.actions[j, DIMENSION], value, metres
     )
-    if plan.actions[j, 3] == DISTANCE and plan.actions[j, 2] != STEP:
-        least = least_length(plan.actions[j, 2], plan.bodies[e, 6], metres)
+    if plan.actions[j, DIMENSION] == DISTANCE and plan.actions[j, SHAPE] != STEP:
+        least = least_length(plan.actions[j, SHAPE], plan.bodies[e, 6], metres)
         state.lateral_lasts[e] = max(state.lateral_lasts[e], least)
     state.lateral_passed[e] = 0.0
     state.lateral_origin[e], state.lateral_target[e] = state.aside[e], offset
@@ -158,13 +159,16 @@ def _waits(j, k, p, station, way, plan, roads, state, record):
 
     The entity is about abreast of ``station`` of that path, whose lane goes ``way`` along its road.
     """
-    e, path, n, ds = plan.actions[j, 0], roads.paths[p], roads.counts[p], roads.steps[p]
+    e, path, n, ds = plan.actions[j, WHOM], roads.paths[p], roads.counts[p], roads.steps[p]
     s, aside = project(path, n, ds, station, record.x[e, k], record.y[e, k])
-    target = way * state.slots[plan.actions[j, 4]]
+    target = way * state.slots[plan.actions[j, TARGET]]
     lasts = lane_change_lasts(
-        plan.actions[j, 2], plan.actions[j, 3], state.slots[plan.actions[j, 5]], target - aside
+        plan.actions[j, SHAPE],
+        plan.actions[j, DIMENSION],
+        state.slots[plan.actions[j, LASTS]],
+        target - aside,
     )
-    if plan.actions[j, 3] == DISTANCE:
+    if plan.actions[j, DIMENSION] == DISTANCE:
         lasts /= max(record.v[e, k], LEAST_PACE)
     if gap_is_free(
         e, k, path, n, ds, s, target, lasts, state.weather[FRICTION], state.present, record.x,
@@ -180,11 +184,11 @@ def _waits(j, k, p, station, way, plan, roads, state, record):
 @kernel
 def begin_lane_offset(j, k, plan, roads, state, record):
     """Begin action j, a LaneOffsetAction; an offset counts to the left of the reference line."""
-    e, row = plan.actions[j, 0], plan.laterals[plan.actions[j, 6]]
+    e, row = plan.actions[j, WHOM], plan.laterals[plan.actions[j, ROW]]
     node, _, t = take_lane(e, k, roads, state, record)
     if node < 0:
         return
-    way, value = roads.nodes[node, WAY], state.slots[plan.actions[j, 4]]
+    way, value = roads.nodes[node, WAY], state.slots[plan.actions[j, TARGET]]
     target = way * value
     if row[OF] >= 0:  # as far to the left of another entity as it says
         other, its_t = _lane_of(row[OF], k, roads, state, record)
@@ -195,7 +199,7 @@ def begin_lane_offset(j, k, plan, roads, state, record):
     end_lateral(e, state)
     state.turn[e] = 0.0
     state.lateral_action[e] = j
-    most = state.slots[plan.actions[j, 5]]
-    state.lateral_lasts[e] = offset_lasts(plan.actions[j, 2], most, target - state.aside[e])
+    most = state.slots[plan.actions[j, LASTS]]
+    state.lateral_lasts[e] = offset_lasts(plan.actions[j, SHAPE], most, target - state.aside[e])
     state.lateral_passed[e] = 0.0
     state.lateral_origin[e], state.lateral_target[e] = state.aside[e], target

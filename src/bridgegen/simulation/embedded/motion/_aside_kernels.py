@@ -21,8 +21,11 @@ from bridgegen.simulation.embedded._codes import (
     MOST,
     REF,
     RIGHT_SIDE,
+    ROW,
     SIDE,
+    TARGET,
     UNLIMITED,
+    WHOM,
 )
 from bridgegen.simulation.embedded._motion_kernels import nearest
 from bridgegen.simulation.embedded.motion._across_kernels import take_lane
@@ -39,7 +42,7 @@ MOST_ACROSS_ON_WHEELS = 0.5  # of a step: wheels turn a body by 30 degrees from 
 @kernel
 def begin_lateral_distance(j, k, plan, roads, state, record):
     """Begin action j, a LateralDistanceAction."""
-    e, row = plan.actions[j, 0], plan.courses[plan.actions[j, 6]]
+    e, row = plan.actions[j, WHOM], plan.courses[plan.actions[j, ROW]]
     node, _, _ = take_lane(e, k, roads, state, record)
     if node < 0:
         return
@@ -50,7 +53,7 @@ def begin_lateral_distance(j, k, plan, roads, state, record):
     side = row[SIDE]
     if side == EITHER_SIDE:
         side = LEFT_SIDE if present >= 0.0 else RIGHT_SIDE
-    distance = state.slots[plan.actions[j, 4]]
+    distance = state.slots[plan.actions[j, TARGET]]
     if row[IS_PRESENT]:
         distance = abs(present)
     elif row[FREESPACE]:
@@ -65,7 +68,7 @@ def keep_aside(j, k, step, plan, roads, state, record):
 
     Without limits it is there at once; else it never moves farther than its step.
     """
-    e, row = plan.actions[j, 0], plan.courses[plan.actions[j, 6]]
+    e, row = plan.actions[j, WHOM], plan.courses[plan.actions[j, ROW]]
     seen = seen_at(e, row[REF], k, plan, state, record)
     middle, way = _beside(e, row, state.station[e] + step, seen, roads, state, record)
     left = middle + way * state.lateral_target[e] - state.aside[e]

@@ -9,7 +9,7 @@ A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the colu
 import math
 
 from bridgegen.compiled import inlined_kernel, kernel
-from bridgegen.simulation.embedded._codes import ACQUIRE
+from bridgegen.simulation.embedded._codes import ACQUIRE, DETAIL, DOES, ROW, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
 from bridgegen.simulation.embedded._motion_kernels import standing
 from bridgegen.simulation.embedded.places._lane_kernels import continued, station_of
@@ -38,10 +38,10 @@ SAME_TIME = 1e-9  # s, an instant this close to a vertex's is the vertex's
 @kernel
 def begin_teleport(j, k, plan, roads, state, record):
     """Begin, and end, action j, a TeleportAction: the entity is there at the next instant."""
-    e = plan.actions[j, 0]
+    e = plan.actions[j, WHOM]
     end_lateral(e, state)
     end_follow(e, state)
-    put(e, plan.actions[j, 6], k, plan, roads, state, record)
+    put(e, plan.actions[j, ROW], k, plan, roads, state, record)
     state.placed[e] = True
     state.action_ended[j] = True
 
@@ -52,7 +52,7 @@ def begin_route(j, k, plan, roads, state, record):
 
     An AssignRouteAction is over at once, an AcquirePositionAction when it is there.
     """
-    e, route = plan.actions[j, 0], plan.actions[j, 6]
+    e, route = plan.actions[j, WHOM], plan.actions[j, ROW]
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
         return
@@ -69,9 +69,9 @@ def begin_route(j, k, plan, roads, state, record):
         state.station[e] = station_of(roads.spans[p], roads.span_counts[p], node, s)
     state.route[e] = route
     end_quest(e, state)
-    if plan.actions[j, 1] == ACQUIRE:
+    if plan.actions[j, DOES] == ACQUIRE:
         state.goal[e, 0], state.goal[e, 1], _ = pose_of(
-            plan.actions[j, 3], k, plan, roads, state, record
+            plan.actions[j, DETAIL], k, plan, roads, state, record
         )
         state.goal_action[e] = j
     else:
@@ -89,8 +89,8 @@ def end_quest(e, state):
 @inlined_kernel
 def stop_route(j, plan, state):
     """Stop action j, an AcquirePositionAction: the entity keeps its route."""
-    if state.goal_action[plan.actions[j, 0]] == j:
-        state.goal_action[plan.actions[j, 0]] = -1
+    if state.goal_action[plan.actions[j, WHOM]] == j:
+        state.goal_action[plan.actions[j, WHOM]] = -1
 
 
 @inlined_kernel
@@ -112,21 +112,21 @@ def arrive(k, plan, state, record):
 @kernel
 def begin_follow(j, k, plan, roads, state):
     """Begin action j, a FollowTrajectoryAction."""
-    e, m = plan.actions[j, 0], plan.actions[j, 6]
+    e, m = plan.actions[j, WHOM], plan.actions[j, ROW]
     end_lateral(e, state)
     end_follow(e, state)
     end_quest(e, state)
     state.on[e], state.aside[e], state.turn[e] = plan.trajectories[m], 0.0, 0.0
-    state.station[e] = state.slots[plan.actions[j, 4]]
+    state.station[e] = state.slots[plan.actions[j, TARGET]]
     state.follow_action[e] = j
     state.follow[e] = m if roads.timetable_counts[m] > 0 else -1
-    state.follow_began[e] = k * plan.dt if plan.actions[j, 3] else 0.0
+    state.follow_began[e] = k * plan.dt if plan.actions[j, DETAIL] else 0.0
 
 
 @kernel
 def stop_follow(j, k, plan, roads, state, record):
     """Stop action j, a FollowTrajectoryAction: the entity goes on along the lane where it is."""
-    e = plan.actions[j, 0]
+    e = plan.actions[j, WHOM]
     if state.follow_action[e] == j:
         state.follow_action[e] = state.follow[e] = -1
         put_in_world(e, record.x[e, k], record.y[e, k], record.h[e, k], roads, state)

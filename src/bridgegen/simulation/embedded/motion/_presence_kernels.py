@@ -16,6 +16,7 @@ from bridgegen.simulation.embedded._codes import (
     ALL,
     COLLISION,
     DISTANCE,
+    DOES,
     FIRST_BY_ENTITY,
     FIRST_GLOBAL,
     KEEP_ASIDE,
@@ -29,6 +30,7 @@ from bridgegen.simulation.embedded._codes import (
     REF,
     RELATIVE_ANGLE,
     RELATIVE_SPEED,
+    ROW,
     SPEED_DIFFERENCE,
     WHO,
     WHOM,
@@ -43,18 +45,18 @@ from bridgegen.simulation.embedded.places._place_kernels import body_pose, end_f
 @inlined_kernel
 def goes_by(j, plan):
     """Return the entity by which action j moves its own, -1 if none."""
-    kind = plan.actions[j, 1]
+    kind = plan.actions[j, DOES]
     if RELATIVE_SPEED <= kind < FIRST_GLOBAL or kind == KEEP_ASIDE:
-        return plan.courses[plan.actions[j, 6], REF]
+        return plan.courses[plan.actions[j, ROW], REF]
     if kind in (LANE_CHANGE, LANE_OFFSET):
-        return plan.laterals[plan.actions[j, 6], OF]
+        return plan.laterals[plan.actions[j, ROW], OF]
     return -1
 
 
 @inlined_kernel
 def is_pointless(j, plan, state):
     """Return whether action j is of, or goes by, an entity that is not there."""
-    kind, other = plan.actions[j, 1], goes_by(j, plan)
+    kind, other = plan.actions[j, DOES], goes_by(j, plan)
     if kind >= FIRST_GLOBAL or kind == ADD_ENTITY:
         return False
     return not state.present[plan.actions[j, WHOM]] or (other >= 0 and not state.present[other])
@@ -70,7 +72,7 @@ def begin_add(j, k, plan, roads, state, record):
     state.action_ended[j] = True
     if state.present[e]:
         return
-    put(e, plan.actions[j, 6], k, plan, roads, state, record)
+    put(e, plan.actions[j, ROW], k, plan, roads, state, record)
     if state.ending[STATUS] != OK:
         return
     state.present[e] = record.present[e, k] = True

@@ -17,6 +17,8 @@ from bridgegen.simulation.embedded._codes import (
     ACCELERATION,
     BY_BODY,
     CONTINUOUS,
+    DIMENSION,
+    DOES,
     EITHER_SIDE,
     FINAL,
     FINAL_DELTA,
@@ -30,6 +32,7 @@ from bridgegen.simulation.embedded._codes import (
     IS_FACTOR,
     IS_TIME_GAP,
     KEEP_DISTANCE,
+    LASTS,
     LEFT,
     MASTER_LEFT,
     MASTER_PLACE,
@@ -44,14 +47,18 @@ from bridgegen.simulation.embedded._codes import (
     PAST_ENTRY,
     REF,
     RELATIVE_SPEED,
+    ROW,
+    SHAPE,
     SIDE,
     SIDE_TAKEN,
     SPEED_PROFILE,
     STEADY,
     STEADY_TIME,
     STEADY_VALUE,
+    TARGET,
     TOLERANCE,
     UNLIMITED,
+    WHOM,
 )
 from bridgegen.simulation.embedded._memory_kernels import OK, STATUS
 from bridgegen.simulation.embedded._motion_kernels import (
@@ -79,15 +86,15 @@ SLOW = 1e-6  # m/s, a master that is slower is not on its way
 @kernel
 def begin_course(j, k, plan, roads, state, record):
     """Begin action j, whose kind is one of those of ``_codes``."""
-    e, kind = plan.actions[j, 0], plan.actions[j, 1]
-    row = plan.courses[plan.actions[j, 6]]
+    e, kind = plan.actions[j, WHOM], plan.actions[j, DOES]
+    row = plan.courses[plan.actions[j, ROW]]
     state.origin[e], state.speed_began[e] = state.command[e], k * plan.dt
     if kind == RELATIVE_SPEED:
         before, after = state.command[e], _wanted(j, e, record.v[row[REF], k], plan, state)
         most = plan.bodies[e, 4] if after > before else plan.bodies[e, 5]
-        value = state.slots[plan.actions[j, 5]]
+        value = state.slots[plan.actions[j, LASTS]]
         state.speed_lasts[e] = change_time(
-            plan.actions[j, 2], plan.actions[j, 3], value, before, after, most
+            plan.actions[j, SHAPE], plan.actions[j, DIMENSION], value, before, after, most
         )
     elif kind == SPEED_PROFILE:
         base = record.v[row[REF], k] if row[REF] >= 0 else 0.0
@@ -123,8 +130,8 @@ def begin_course(j, k, plan, roads, state, record):
 @kernel
 def start_at_speed(j, plan, state, record):
     """Let an entity start at the speed that action j, a SpeedAction, sets at once by another's."""
-    e = plan.actions[j, 0]
-    v = _wanted(j, e, record.v[plan.courses[plan.actions[j, 6], REF], 0], plan, state)
+    e = plan.actions[j, WHOM]
+    v = _wanted(j, e, record.v[plan.courses[plan.actions[j, ROW], REF], 0], plan, state)
     state.command[e] = state.target[e] = record.v[e, 0] = v
 
 
@@ -133,7 +140,7 @@ def follow_course(j, k, plan, roads, state, record):
     """Set the speed that action j asks of its entity at the instant after k; say if it is over."""
     if state.ending[STATUS] != OK:  # its places are not known: the row ends, or begins again
         return
-    e, kind = plan.actions[j, 0], plan.actions[j, 1]
+    e, kind = plan.actions[j, WHOM], plan.actions[j, DOES]
     passed = (k + 1) * plan.dt - state.speed_began[e]
     if kind == RELATIVE_SPEED:
         over = _follow_speed(j, e, k, passed, plan, state, record)
@@ -162,15 +169,15 @@ def seen_at(e, other, k, plan, state, record):
 @inlined_kernel
 def _wanted(j, e, v, plan, state):
     """Return the speed that a relative one is, by the other's."""
-    value = state.slots[plan.actions[j, 4]]
-    is_factor = plan.courses[plan.actions[j, 6], IS_FACTOR]
+    value = state.slots[plan.actions[j, TARGET]]
+    is_factor = plan.courses[plan.actions[j, ROW], IS_FACTOR]
     return min(max(v * value if is_factor else v + value, 0.0), plan.bodies[e, 3])
 
 
 @kernel
 def _follow_speed(j, e, k, passed, plan, state, record):
-    row = plan.courses[plan.actions[j, 6]]
-    ref, shape = row[REF], plan.actions[j, 2]
+    row = plan.courses[plan.actions[j, ROW]]
+    ref, shape = row[REF], plan.actions[j, SHAPE]
     target = _wanted(j, e, record.v[ref, seen_at(e, ref, k, plan, state, record)], plan, state)
     if shape == STEP:
         state.command[e] = target
@@ -224,10 +231,10 @@ def _ahead(e, row, k, seen, plan, roads, state, record):
 @kernel
 def _keep_distance(j, e, k, plan, roads, state, record):
     """Keep, or reach, a distance: at once if nothing limits it, else as by a spring."""
-    row = plan.courses[plan.actions[j, 6]]
+    row = plan.courses[plan.actions[j, ROW]]
     ref, side = row[REF], state.course[e, SIDE_TAKEN]
     seen = seen_at(e, ref, k, plan, state, record) if row[UNLIMITED] and e > 0 else k
-    gap = state.slots[plan.actions[j, 4]]
+    gap = state.slots[plan.actions[j, TARGET]]
     if row[IS_TIME_GAP]:
         gap *= record.v[ref, seen]
     if row[FREESPACE]:  # from the front of the one behind to the rear of the one ahead
@@ -269,7 +276,7 @@ def _way_left(e, k, x, y, plan, roads, state, record):
 @kernel
 def _synchronise(j, e, k, plan, roads, state, record):
     """Go so as to be at a place when the master is at one of its own, by its present speed."""
-    row, memory = plan.courses[plan.actions[j, 6]], state.course[e]
+    row, memory = plan.courses[plan.actions[j, ROW]], state.course[e]
     master = row[REF]
     left = _way_left(e, k, memory[OWN_X], memory[OWN_Y], plan, roads, state, record)
     other = _way_left(master, k, memory[MASTER_X], memory[MASTER_Y], plan, roads, state, record)

@@ -6,7 +6,15 @@
 import math
 
 from bridgegen.compiled import inlined_kernel
-from bridgegen.simulation.embedded._codes import RELATIVE_SPEED
+from bridgegen.simulation.embedded._codes import (
+    DIMENSION,
+    DOES,
+    LASTS,
+    RELATIVE_SPEED,
+    SHAPE,
+    TARGET,
+    WHOM,
+)
 from bridgegen.simulation.embedded._motion_kernels import LINEAR, RATE, SAME_SPEED, STEP, ramped
 from bridgegen.simulation.embedded.motion._course_kernels import change_time, changed
 from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course, follow_course
@@ -15,11 +23,11 @@ from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course, 
 @inlined_kernel
 def begin_longitudinal(j, k, plan, roads, state, record):
     """Begin action j, which moves an entity along its path; an earlier one ends."""
-    e = plan.actions[j, 0]
+    e = plan.actions[j, WHOM]
     if state.speed_action[e] >= 0:
         state.action_ended[state.speed_action[e]] = True
     state.speed_action[e] = j
-    if plan.actions[j, 1] >= RELATIVE_SPEED:
+    if plan.actions[j, DOES] >= RELATIVE_SPEED:
         begin_course(j, k, plan, roads, state, record)
     else:
         begin_speed_change(j, k, plan, state)
@@ -28,9 +36,9 @@ def begin_longitudinal(j, k, plan, roads, state, record):
 @inlined_kernel
 def begin_speed_change(j, k, plan, state):
     """Begin action j, a SpeedAction to a speed of its own."""
-    e, shape, dimension = plan.actions[j, 0], plan.actions[j, 2], plan.actions[j, 3]
-    value = state.slots[plan.actions[j, 5]]
-    before, after = state.command[e], min(state.slots[plan.actions[j, 4]], plan.bodies[e, 3])
+    e, shape, dimension = plan.actions[j, WHOM], plan.actions[j, SHAPE], plan.actions[j, DIMENSION]
+    value = state.slots[plan.actions[j, LASTS]]
+    before, after = state.command[e], min(state.slots[plan.actions[j, TARGET]], plan.bodies[e, 3])
     most = plan.bodies[e, 4] if after > before else plan.bodies[e, 5]
     state.target[e], state.origin[e], state.speed_began[e] = after, before, k * plan.dt
     state.rate[e] = math.inf
@@ -46,7 +54,7 @@ def begin_speed_change(j, k, plan, state):
 @inlined_kernel
 def stop_longitudinal(j, plan, state):
     """Stop action j: its entity keeps the speed that it has."""
-    e = plan.actions[j, 0]
+    e = plan.actions[j, WHOM]
     if state.speed_action[e] == j:
         state.target[e], state.speed_action[e] = state.command[e], -1
         state.rate[e] = math.inf
@@ -56,13 +64,13 @@ def stop_longitudinal(j, plan, state):
 def command_speed(e, k, plan, roads, state, record):
     """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
     j = state.speed_action[e]
-    if j >= 0 and plan.actions[j, 1] >= RELATIVE_SPEED:
+    if j >= 0 and plan.actions[j, DOES] >= RELATIVE_SPEED:
         follow_course(j, k, plan, roads, state, record)
         return
-    if j >= 0 and plan.actions[j, 2] > LINEAR:
+    if j >= 0 and plan.actions[j, SHAPE] > LINEAR:
         passed = k * plan.dt + plan.dt - state.speed_began[e]
         state.command[e] = changed(
-            plan.actions[j, 2], state.origin[e], state.target[e], passed / state.speed_lasts[e]
+            plan.actions[j, SHAPE], state.origin[e], state.target[e], passed / state.speed_lasts[e]
         )
     else:
         state.command[e] = ramped(state.command[e], state.target[e], state.rate[e] * plan.dt)

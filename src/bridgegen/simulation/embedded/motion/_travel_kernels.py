@@ -5,7 +5,7 @@
 
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import shrinks
-from bridgegen.simulation.embedded._codes import KEEP_ASIDE
+from bridgegen.simulation.embedded._codes import DIMENSION, DOES, KEEP_ASIDE, ROW, SHAPE
 from bridgegen.simulation.embedded._motion_kernels import SAME_TIME, standing
 from bridgegen.simulation.embedded.motion._across_kernels import CONTINUOUS
 from bridgegen.simulation.embedded.motion._aside_kernels import keep_aside
@@ -34,12 +34,12 @@ def move_along_path(e, k, plan, roads, state, record):
     state.placed[e] = False
     ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
     j = state.lateral_action[e]
-    keeps_aside = j >= 0 and plan.actions[j, 1] == KEEP_ASIDE
+    keeps_aside = j >= 0 and plan.actions[j, DOES] == KEEP_ASIDE
     if keeps_aside:
         ahead, tilt, reached = keep_aside(j, k, step, plan, roads, state, record)
     elif j >= 0:
         state.aside[e], ahead, state.lateral_passed[e], tilt = glide(
-            plan.actions[j, 2], plan.actions[j, 3], state.lateral_lasts[e],
+            plan.actions[j, SHAPE], plan.actions[j, DIMENSION], state.lateral_lasts[e],
             state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], step, dt,
             plan.bodies[e, 6],
         )  # fmt: skip
@@ -68,7 +68,7 @@ def move_along_path(e, k, plan, roads, state, record):
     over = state.lateral_passed[e] >= state.lateral_lasts[e] - SAME_TIME
     if not keeps_aside and j >= 0 and over:
         state.to[e] = -1
-        reached = not plan.laterals[plan.actions[j, 6], CONTINUOUS]
+        reached = not plan.laterals[plan.actions[j, ROW], CONTINUOUS]
     if reached:
         state.action_ended[j] = True
         state.lateral_action[e] = -1

@@ -10,14 +10,17 @@ from bridgegen.simulation.embedded._codes import (
     ASSIGN_ROUTE,
     CONTROL,
     DELETE_ENTITY,
+    DOES,
     FIRST_GLOBAL,
     FOLLOW,
     KEEP_ASIDE,
     LANE_CHANGE,
     LANE_OFFSET,
     RELATIVE_SPEED,
+    SHAPE,
     SPEED_CHANGE,
     TELEPORT,
+    WHOM,
 )
 from bridgegen.simulation.embedded._motion_kernels import STEP
 from bridgegen.simulation.embedded.drivers import begin_control, is_steered
@@ -45,8 +48,10 @@ from bridgegen.simulation.embedded.world import begin_global
 @inlined_kernel
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k: a branch per kind; what is over at once says so."""
-    kind = plan.actions[j, 1]
-    steers_ego = kind in (LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE, FOLLOW) and plan.actions[j, 0] == 0
+    kind = plan.actions[j, DOES]
+    steers_ego = (
+        kind in (LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE, FOLLOW) and plan.actions[j, WHOM] == 0
+    )
     in_vain = steers_ego and is_steered(plan, state)  # its driver does
     if in_vain or (plan.comes_and_goes and is_pointless(j, plan, state)):
         state.action_ended[j] = True
@@ -80,10 +85,10 @@ def begin_initially(plan, roads, state, record):
     for i in range(plan.initial.shape[0]):
         j = plan.initial[i]
         begin(j, 0, plan, roads, state, record)
-        if plan.actions[j, 1] == RELATIVE_SPEED and plan.actions[j, 2] == STEP:
+        if plan.actions[j, DOES] == RELATIVE_SPEED and plan.actions[j, SHAPE] == STEP:
             start_at_speed(j, plan, state, record)
-        elif plan.actions[j, 1] == TELEPORT:
-            e = plan.actions[j, 0]
+        elif plan.actions[j, DOES] == TELEPORT:
+            e = plan.actions[j, WHOM]
             state.placed[e] = False
             record.x[e, 0], record.y[e, 0], record.h[e, 0] = body_pose(e, roads, state)
 
@@ -91,7 +96,7 @@ def begin_initially(plan, roads, state, record):
 @inlined_kernel
 def stop(j, k, plan, roads, state, record):
     """Stop action j, which has not ended: whoever it moved goes on as it is."""
-    kind = plan.actions[j, 1]
+    kind = plan.actions[j, DOES]
     if kind == SPEED_CHANGE or RELATIVE_SPEED <= kind < FIRST_GLOBAL:
         stop_longitudinal(j, plan, state)
     elif kind in (LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE):

@@ -10,6 +10,7 @@ from bridgegen.simulation.embedded._codes import (
     COMPLETE,
     CONTROL,
     COUNT,
+    DOES,
     END,
     EVENT_NUMBER,
     FIRST,
@@ -68,7 +69,7 @@ def trigger_event(x, k, plan, roads, state, record):
     # All begin at once: who is there, and who drives, is clear before anybody is told what to do.
     for turn in range(2):
         for j in range(plan.elements[x, FIRST], plan.elements[x, LAST]):
-            if (plan.actions[j, 1] in (ADD_ENTITY, CONTROL)) != (turn == 0):
+            if (plan.actions[j, DOES] in (ADD_ENTITY, CONTROL)) != (turn == 0):
                 continue
             state.action_ended[j] = False
             if plan.actions[j, SELECTS] and not state.selected[plan.actions[j, WHOM]]:

@@ -8,13 +8,18 @@ import numpy as np
 from bridgegen.compiled import inlined_kernel
 from bridgegen.ego._weather_kernels import change
 from bridgegen.simulation.embedded._codes import (
+    DOES,
     LIGHT,
+    PASSES,
     PHASE_CHANGE,
+    ROW,
+    TARGET,
     TIME_CHANGE,
     VALUE_ADD,
     VALUE_MULTIPLY,
     VALUE_SET,
     WEATHER_CHANGE,
+    WHOM,
 )
 from bridgegen.simulation.embedded.world._signal_kernels import DURATION, enter_phase
 
@@ -22,16 +27,16 @@ from bridgegen.simulation.embedded.world._signal_kernels import DURATION, enter_
 @inlined_kernel
 def begin_global(j, k, plan, state):
     """Begin action j, which is over at once."""
-    which, kind = plan.actions[j, 0], plan.actions[j, 1]
-    value = state.slots[plan.actions[j, 4]]
+    which, kind = plan.actions[j, WHOM], plan.actions[j, DOES]
+    value = state.slots[plan.actions[j, TARGET]]
     if kind == WEATHER_CHANGE:
-        change(state.weather, plan.weathers, plan.actions[j, 6], state.slots)
+        change(state.weather, plan.weathers, plan.actions[j, ROW], state.slots)
     elif kind == TIME_CHANGE:
-        set_clock(value, plan.actions[j, 2], k * plan.dt, state.clock)
+        set_clock(value, plan.actions[j, PASSES], k * plan.dt, state.clock)
     elif kind == LIGHT:
         state.lights[which] = np.int8(value)
     elif kind == PHASE_CHANGE:
-        phase = plan.actions[j, 6]
+        phase = plan.actions[j, ROW]
         until = k * plan.dt + max(state.slots[plan.phases[phase, DURATION]], 0.0)
         enter_phase(
             which, phase, until, plan.phases, plan.changes, state.phase_now, state.phase_until,
