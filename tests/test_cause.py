@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from bridgegen.cause import CAUSES, Cause, causes, counterfactuals, require
 from bridgegen.ego import DRIVERS, STORYBOARD
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.objective import Objective, Thresholds
+from bridgegen.objective import Objective
 from bridgegen.odd.others import with_others
 from bridgegen.odd.reader import load
+from bridgegen.odd.thresholds import Thresholds
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.embedded import simulator
 

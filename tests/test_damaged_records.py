@@ -17,7 +17,8 @@ from bridgegen.comparison.plan import begin, make_plan
 from bridgegen.confirmation.record import read_record as read_confirmation
 from bridgegen.confirmation.schema import Outcome, Record, Scenario
 from bridgegen.errors import BridgeGenError
-from bridgegen.objective import Objective, Thresholds
+from bridgegen.objective import Objective
+from bridgegen.odd.thresholds import Thresholds
 from bridgegen.regions.record import read_record as read_regions
 from bridgegen.store import Store
 from bridgegen.triage.record import read_record as read_triage

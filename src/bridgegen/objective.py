@@ -6,7 +6,7 @@ default of all scenarios but the paper's is ``harm`` (`bridgegen.conflict.harm`)
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from math import isfinite
 from typing import Any, Literal, Self
 
@@ -17,6 +17,7 @@ from bridgegen.arrays import Bool, Float, as_float
 from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.conflict.quantities import HARM, HARM_ANY, get
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.thresholds import Thresholds
 
 Weights = Literal["fixed", "entropy"]
 Scale = Literal["raw", "standardised"]
@@ -29,32 +30,6 @@ CLASSIFYING = ("n_collision", "d_min", "v_d")
 
 # The unit of a metric in the paper's fitness, as a factor on ours: its v_d is in km/h.
 PAPER_FACTOR = {"v_d": 3.6}
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """The paper: a scenario is critical if it has a collision, or comes close to one in motion.
-
-    Attributes:
-        n_collision_above: [count]; critical if n_collision > this.
-        d_min_below: [m]; critical if d_min < this while v_d ≥ ``v_d_at_least``.
-        v_d_at_least: [m/s].
-
-    Source: paper, table "Thresholds for Scenario Classifications".
-    """
-
-    n_collision_above: float = 0.0
-    d_min_below: float = 2.0
-    v_d_at_least: float = 1.0
-
-    def __post_init__(self) -> None:
-        problems = [
-            f"the threshold {name} must be finite, got {value}"
-            for name, value in asdict(self).items()
-            if not isfinite(value)
-        ]
-        if problems:
-            raise InputError(*problems)
 
 
 @dataclass(frozen=True)
@@ -91,7 +66,7 @@ class Objective:
     weights: tuple[float, ...]
     scale: Scale = "raw"
     objectives: Objectives = "one"
-    thresholds: Thresholds = Thresholds()
+    thresholds: Thresholds = field(default_factory=Thresholds)
     low: tuple[float, ...] = ()
     span: tuple[float, ...] = ()
     rule: Rule = "thresholds"

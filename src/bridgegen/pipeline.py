@@ -25,7 +25,7 @@ from bridgegen.conflict.plausibility import Implausible, plausibility
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError
 from bridgegen.evaluation import Evaluation, Replay, Trials
-from bridgegen.objective import CLASSIFYING, Objective, Objectives, Thresholds, needs_sample
+from bridgegen.objective import CLASSIFYING, Objective, Objectives, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
@@ -196,15 +196,12 @@ class Pipeline:
                 lost = np.full((1, len(self.metrics)), np.nan)
                 rows = [lost if isinstance(one.came, Lost) else one.came for one in parts]
                 sample = (np.concatenate(rows), self.metrics)
-            limits = spec.critical
             objective = Objective.build(
                 [(term.metric, term.weight) for term in spec.terms],
                 weights=spec.weights,
                 scale=spec.scale,
                 objectives=objectives,
-                thresholds=Thresholds(
-                    limits.n_collision_above, limits.d_min_below, limits.v_d_at_least
-                ),
+                thresholds=spec.critical,
                 rule=spec.rule,
                 count=spec.count,
                 sample=sample,

@@ -19,7 +19,7 @@ from bridgegen.confirmation.differences import (
 )
 from bridgegen.confirmation.schema import Differences, Outcome
 from bridgegen.confirmation.words import explanation
-from bridgegen.objective import Thresholds
+from bridgegen.odd.thresholds import Thresholds
 from bridgegen.simulation.rollout import Rollout
 
 STEP = 0.1

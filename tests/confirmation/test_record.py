@@ -20,7 +20,7 @@ from bridgegen.confirmation.record import (
 )
 from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Record, Scenario
 from bridgegen.errors import FileFormatError, StorageError
-from bridgegen.objective import Thresholds
+from bridgegen.odd.thresholds import Thresholds
 
 X, METRICS = np.arange(8.0).reshape(4, 2), np.array([[1.0, np.nan]] * 4)
 

@@ -15,7 +15,7 @@ from bridgegen.confirmation.differences import (
 )
 from bridgegen.confirmation.schema import Differences, Outcome
 from bridgegen.confirmation.words import explanation
-from bridgegen.objective import Thresholds
+from bridgegen.odd.thresholds import Thresholds
 
 LIMITS = Thresholds()
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import Critical
 from bridgegen.odd.story import Change, SpeedChange
+from bridgegen.odd.thresholds import Thresholds
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_entropy_weights_and_own_thresholds(write, s4_text):
     objective = load(write(text)).objective
     assert (objective.weights, objective.scale) == ("entropy", "standardised")
     assert [term.weight for term in objective.terms] == [None, None]
-    assert objective.critical == Critical(d_min_below=1.5)
+    assert objective.critical == Thresholds(d_min_below=1.5)
 
 
 def test_all_mistakes_of_a_file_and_its_fragment_at_once(refuse, write, s4_text):

@@ -8,7 +8,7 @@ import pytest
 
 from bridgegen.confirmation.differences import Contact, Parting, Track
 from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Record, Scenario
-from bridgegen.objective import Thresholds
+from bridgegen.odd.thresholds import Thresholds
 from bridgegen.report import confirmation_payload
 from bridgegen.report.confirmation_payload import confirmations_payload
 from bridgegen.report.page import write_report

@@ -5,7 +5,7 @@ import pytest
 
 from bridgegen.confirmation.record import digest_of, write_record
 from bridgegen.confirmation.schema import Outcome, Record, Scenario
-from bridgegen.objective import Thresholds
+from bridgegen.odd.thresholds import Thresholds
 from bridgegen.screen.view import _redirect
 from bridgegen.view.run_view import RunView
 from bridgegen.view.server import Server

@@ -22,7 +22,8 @@ from bridgegen.confirmation.differences import (
     Track,
 )
 from bridgegen.conflict.harm import Count
-from bridgegen.objective import Rule, Thresholds
+from bridgegen.objective import Rule
+from bridgegen.odd.thresholds import Thresholds
 
 SCALE = {"x": 100, "y": 100, "h": 1000}
 """Units to 1 m or rad of what a track has as whole numbers."""

@@ -14,7 +14,8 @@ from bridgegen.confirmation.differences import (
 )
 from bridgegen.confirmation.schema import Differences, Outcome
 from bridgegen.conflict.harm import NEAR_MISS
-from bridgegen.objective import Rule, Thresholds
+from bridgegen.objective import Rule
+from bridgegen.odd.thresholds import Thresholds
 
 NARROW = (0.25, 0.25)
 """A scenario that misses a threshold by no more than this, on d_min [m] or v_d [m/s], misses it

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Callable
+from typing import Literal
 
 from bridgegen.odd.plain_yaml import Path
-from bridgegen.odd.scenario import Critical, ObjectiveSpec, Term
+from bridgegen.odd.scenario import ObjectiveSpec, Term
 from bridgegen.odd.schema import ObjectiveSection
+from bridgegen.odd.thresholds import Thresholds
 
 PAPERS = ObjectiveSpec((Term("d_min", 0.8297), Term("v_d", 0.1703)), "fixed", "raw")
 """The paper's objective and thresholds (Section V, Table III)."""
@@ -38,10 +40,10 @@ def read_objective(given: ObjectiveSection, say: Callable[[str, Path], None]) ->
             )
     by_harm = given.critical == "harm"
     limits = {} if isinstance(given.critical, str) else given.critical.model_dump()
-    for key, value in limits.items():
+    for key, value in list(limits.items()):
         if not 0.0 <= value < math.inf:
             say(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
+            del limits[key]
     terms = tuple(Term(one.metric, one.weight) for one in given.terms)
-    return ObjectiveSpec(
-        terms, given.weights, given.scale, Critical(**limits), "harm" if by_harm else "thresholds"
-    )
+    rule: Literal["harm", "thresholds"] = "harm" if by_harm else "thresholds"
+    return ObjectiveSpec(terms, given.weights, given.scale, Thresholds(**limits), rule)

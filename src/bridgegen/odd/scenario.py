@@ -10,6 +10,7 @@ from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.odd.space import SearchSpace
 from bridgegen.odd.story import Adversary, EventSpec, Participant, Story
+from bridgegen.odd.thresholds import Thresholds
 
 
 @dataclass(frozen=True)
@@ -23,19 +24,6 @@ class Term:
 
     metric: str
     weight: float | None = None
-
-
-@dataclass(frozen=True)
-class Critical:
-    """What makes a concrete scenario critical (paper, Table III).
-
-    More than ``n_collision_above`` collisions, or the smallest distance below ``d_min_below`` [m]
-    while the ego's speed there is at least ``v_d_at_least`` [m/s].
-    """
-
-    n_collision_above: float = 0.0
-    d_min_below: float = 2.0
-    v_d_at_least: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +44,7 @@ class ObjectiveSpec:
     terms: tuple[Term, ...]
     weights: Literal["fixed", "entropy"]
     scale: Literal["raw", "standardised"]
-    critical: Critical = field(default_factory=Critical)
+    critical: Thresholds = field(default_factory=Thresholds)
     rule: Literal["harm", "thresholds"] = "thresholds"
     count: Literal["ego", "any"] = "ego"
 
