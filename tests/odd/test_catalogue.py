@@ -8,6 +8,7 @@ import pytest
 from bridgegen.errors import UnknownNameError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load, names
+from bridgegen.odd.scenario import ObjectiveSpec, SearchedScenario, Term
 from bridgegen.odd.story import Change, ConditionSpec, EventSpec, SpeedChange, Waypoint
 
 PAPERS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
@@ -238,6 +239,14 @@ def test_fingerprint_is_of_the_content():
     prints = {load(name).fingerprint for name in names()}
     assert len(prints) == len(names())
     assert load("crossroads-s1").fingerprint in prints
+
+
+def test_a_fingerprint_is_what_runs_have_recorded():
+    """Held as the first version computed it: a run whose scenario has another is not resumed."""
+    objective = ObjectiveSpec((Term("d_min", 1.0),), "fixed", "raw")
+    scenario = SearchedScenario("s", "t", "d", "", (Axis.WEATHER,), {}, (), (), objective, None)
+    held = "ff651859804b3b165d777fa7bbbc4e5b49b288e32353205ffb183227414676a8"
+    assert scenario.fingerprint == held
 
 
 def test_table_lists_every_parameter_with_its_rules():

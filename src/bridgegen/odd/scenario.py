@@ -104,7 +104,7 @@ class SearchedScenario:
     @property
     def fingerprint(self) -> str:
         """A digest of all that it says: the same for the same scenario on any machine."""
-        return sha256(repr(self).encode()).hexdigest()
+        return sha256(_content(self).encode()).hexdigest()
 
     @property
     def rules(self) -> Constraints:
@@ -180,9 +180,9 @@ class LogicalScenario(SearchedScenario):
     @property
     def fingerprint(self) -> str:
         """See `SearchedScenario`; that of a scenario without drivers does not depend on them."""
-        said = repr(self)
+        content = _content(self)
         drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
-        return sha256((said + repr(drivers) if drivers else said).encode()).hexdigest()
+        return sha256((content + repr(drivers) if drivers else content).encode()).hexdigest()
 
     @property
     def decisions(self) -> tuple[str, ...]:
@@ -227,3 +227,11 @@ class LogicalScenario(SearchedScenario):
         }
         bounds = tuple(bound for bound in self.bounds if bound.target not in values)
         return replace(self, parameters=parameters, bounds=bounds)
+
+
+def _content(scenario: SearchedScenario) -> str:
+    """Return all that a scenario says, as text.
+
+    `Thresholds` is written as the class was called when the first runs recorded a digest of it.
+    """
+    return repr(scenario).replace("critical=Thresholds(", "critical=Critical(")
