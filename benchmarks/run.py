@@ -34,6 +34,7 @@ from bridgegen.openx.convert import import_file
 from bridgegen.openx.opendrive.read import read as read_map
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.source import on_map
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.search import Problem, Results, get, names
 from bridgegen.search.algorithm import EXTRAS
@@ -71,7 +72,7 @@ def rate(
     """Return how fast scenarios are evaluated, metrics and objective included."""
     scenario = load(SCENARIO)
     space = scenario.space(axes)
-    pipeline = Pipeline(scenario, space, ego=ego, also=also, seek_causes=causes)
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego, metrics=also, causes=causes))
     pipeline.choose_objective()
     X = space.decode(np.random.default_rng(0).random((n, space.n_var)))
     return rate_of(pipeline, X)
@@ -130,7 +131,7 @@ def triage() -> list[Row]:
     logical = replace(scenario, objective=replace(scenario.objective, rule="harm"))
     space, rows = logical.space(), []
     for ego in ("route-follower", "reference"):
-        pipeline = Pipeline(logical, space, ego=ego, seek_causes=True)
+        pipeline = Pipeline(logical, space, PipelineOptions(ego=ego, causes=True))
         pipeline.choose_objective()
         U = np.random.default_rng(0).random((1000, space.n_var))
         X = space.decode(U)
@@ -334,7 +335,9 @@ def town() -> list[Row]:
         scenario = load(SCENARIO)
         town05 = load_map(TOWN05, None, scenario)
         placed = on_map(scenario, town05)
-        pipeline = Pipeline(placed, placed.space(), ego="reference", road_map=town05)
+        pipeline = Pipeline(
+            placed, placed.space(), PipelineOptions(ego="reference"), road_map=town05
+        )
         model = pipeline.concrete(placed.space().row({})).roads
         ready = best(lambda: seconds(lambda: pipeline.simulator.roads([model])))
         tables = pipeline.simulator.roads([model]).tables

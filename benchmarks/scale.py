@@ -16,6 +16,7 @@ from rates import rate_of
 
 from bridgegen.campaign.campaign import MAX_BUDGET
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.workers import Threads
 
@@ -28,7 +29,9 @@ def cost(ego: str, causes: bool) -> float:
     """Return the processor time of a scenario [s], all of an evaluation included."""
     scenario = load(SCENARIO)
     space = scenario.space()
-    pipeline = Pipeline(scenario, space, ego=ego, seek_causes=causes, workers=Threads(1))
+    pipeline = Pipeline(
+        scenario, space, PipelineOptions(ego=ego, causes=causes), workers=Threads(1)
+    )
     pipeline.choose_objective()
     X = space.decode(np.random.default_rng(0).random((1500, space.n_var)))
     return rate_of(pipeline, X).cpu_seconds

@@ -17,6 +17,7 @@ from bridgegen import metrics
 from bridgegen.odd.others import with_others
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 ALL = tuple(metrics.METRICS)
@@ -80,7 +81,7 @@ def traffic_rate(
     """Return how fast scenarios of so many actors are evaluated, with more metrics or the usual."""
     scenario = with_others(traffic(actors), others)
     space = scenario.space()
-    pipeline = Pipeline(scenario, space, ego=ego, also=also)
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego, metrics=also))
     pipeline.choose_objective()
     X = space.decode(np.random.default_rng(0).random((rows, space.n_var)))
     return rate_of(pipeline, X)

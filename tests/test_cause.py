@@ -15,6 +15,7 @@ from bridgegen.objective import Objective
 from bridgegen.odd.others import with_others
 from bridgegen.odd.reader import load
 from bridgegen.odd.thresholds import Thresholds
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.embedded import simulator
 
@@ -100,7 +101,7 @@ def test_a_cause_that_cannot_be_is_refused():
 @pytest.mark.parametrize("ego", ["route-follower", "reference"])
 def test_a_row_s_cause_is_the_same_in_any_batch_and_order(ego, monkeypatch):
     scenario = load("crossroads-s3")
-    pipeline = Pipeline(scenario, scenario.space(), ego=ego, seek_causes=True)
+    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=ego, causes=True))
     pipeline.choose_objective()
     n = 60
     X = pipeline.space.decode(np.random.default_rng(5).random((n, pipeline.space.n_var)))
@@ -118,8 +119,8 @@ def test_only_the_cause_that_is_asked_for_counts_and_F_is_as_ever():
     scenario = load("crossroads-s3")
     X = scenario.space().decode(np.random.default_rng(5).random((40, scenario.space().n_var)))
     every, only = (
-        Pipeline(scenario, scenario.space(), seek_causes=True, cause=cause)
-        for cause in (None, Cause.PLANNING)
+        Pipeline(scenario, scenario.space(), PipelineOptions(causes=True, cause=cause))
+        for cause in (None, "planning")
     )
     for pipeline in (every, only):
         pipeline.choose_objective()
@@ -145,8 +146,8 @@ CLEAR = {
 def test_what_the_reference_does_not_see_in_thick_fog_is_perception_s_fault():
     scenario = with_others(load("left-across-path"), "scripted")
     space, moving = scenario.space(), scenario.space(axes=("participants",))
-    pipeline = Pipeline(scenario, space, ego="reference", seek_causes=True)
-    seeing = Pipeline(scenario, space, ego="reference", ideal=("perception",))
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego="reference", causes=True))
+    seeing = Pipeline(scenario, space, PipelineOptions(ego="reference", ideal=("perception",)))
     for one in (pipeline, seeing):
         one.choose_objective(BY_THRESHOLDS)
     # The same participants in both weathers, none faster than the fog allows.
@@ -171,7 +172,9 @@ def test_the_reference_s_harm_has_every_cause():
     found = set()
     for name in ("jam-tail-in-fog", "crossroads-s3"):
         scenario = load(name)
-        pipeline = Pipeline(scenario, scenario.space(), ego="reference", seek_causes=True)
+        pipeline = Pipeline(
+            scenario, scenario.space(), PipelineOptions(ego="reference", causes=True)
+        )
         pipeline.choose_objective(BY_THRESHOLDS)
         rows = np.random.default_rng(11).random((120, pipeline.space.n_var))
         found |= set(pipeline.evaluate(pipeline.space.decode(rows)).cause.tolist())

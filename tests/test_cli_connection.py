@@ -1,4 +1,4 @@
-"""The options that say where a simulator is."""
+"""The options of how a simulator is reached."""
 
 import inspect
 
@@ -6,7 +6,13 @@ import pytest
 
 from bridgegen.cli import runs
 from bridgegen.cli.confirmations import confirm
-from bridgegen.cli.where import NOWHERE, OPTIONS, Where, located, read_access
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    OPTIONS,
+    Connection,
+    read_access,
+    with_connection_options,
+)
 from bridgegen.simulation.choice import SIMULATORS
 
 
@@ -22,32 +28,32 @@ def test_commands_have_them_all(command):
     assert {*OPTIONS} <= {*inspect.signature(command).parameters}
 
 
-def test_a_command_is_told_what_was_said_by_the_options_names():
-    told = []
+def test_a_command_gets_the_values_by_their_options_spelling():
+    values = []
 
-    @located
-    def command(run: str, where: Where = NOWHERE) -> None:
-        told.append((run, where))
+    @with_connection_options
+    def command(run: str, connection: Connection = NO_CONNECTION) -> None:
+        values.append((run, connection))
 
     command(run="r", **dict.fromkeys(OPTIONS))
     command(run="r", **dict.fromkeys(OPTIONS) | {"host": "there", "carla_timeout": 3.0})
-    assert told == [("r", {}), ("r", {"--host": "there", "--carla-timeout": 3.0})]
+    assert values == [("r", {}), ("r", {"--host": "there", "--carla-timeout": 3.0})]
 
 
 def test_what_a_command_means_by_the_same_name_stays_its_own():
-    told = []
+    values = []
 
-    @located
-    def command(port: int = 0, where: Where = NOWHERE) -> None:
-        told.append((port, where))
+    @with_connection_options
+    def command(port: int = 0, connection: Connection = NO_CONNECTION) -> None:
+        values.append((port, connection))
 
     assert "carla_port" in inspect.signature(command).parameters
     rest = dict.fromkeys(inspect.signature(command).parameters)
     command(**rest | {"port": 80, "carla_port": 2000})
-    assert told == [(80, {"--port": 2000})]
+    assert values == [(80, {"--port": 2000})]
 
 
-def test_where_a_run_s_simulator_is():
+def test_the_choice_of_a_run_s_simulator():
     assert read_access({}) is None
     choice = read_access({"--esmini-lib": "there"})
     assert choice is not None

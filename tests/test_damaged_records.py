@@ -19,6 +19,7 @@ from bridgegen.confirmation.schema import Outcome, Record, Scenario
 from bridgegen.errors import BridgeGenError
 from bridgegen.objective import Objective
 from bridgegen.odd.thresholds import Thresholds
+from bridgegen.options import CommonOptions
 from bridgegen.regions.record import read_record as read_regions
 from bridgegen.store import Store
 from bridgegen.triage.record import read_record as read_triage
@@ -103,7 +104,7 @@ def run(tmp_path_factory):
 def plan(out):
     return make_plan(
         ["crossroads-s4"], ["random"], settings={}, seeds=1, budget=10, baseline=None, apart=0.1,
-        out=out, options={"ego": "route-follower", "fixed": {"bv_speed": 3.0}},
+        out=out, options=CommonOptions(ego="route-follower", fixed={"bv_speed": 3.0}),
     )  # fmt: skip
 
 
@@ -116,7 +117,7 @@ def read_stored_settings(path):
             text = path.read_text("utf-8")
             db.execute("UPDATE run SET value = ? WHERE key = 'settings'", (text,))
         found = bg.Run(folder)
-        Objective.from_dict(found.settings.objective)
+        Objective.from_dict(found.settings.optimised)
         return found.settings.command(folder)
     finally:
         shutil.move(folder / "kept.sqlite", folder / "run.sqlite")

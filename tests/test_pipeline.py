@@ -8,6 +8,7 @@ from bridgegen.conflict.quantities import MEASURED
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import Term
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.embedded import simulator
 
@@ -16,7 +17,7 @@ ALL_AXES = ("static", "participants", "weather")
 
 def made(axes=None, ego="route-follower", name="crossroads-s4") -> Pipeline:
     scenario = load(name)
-    pipeline = Pipeline(scenario, scenario.space(axes), ego=ego)
+    pipeline = Pipeline(scenario, scenario.space(axes), PipelineOptions(ego=ego))
     pipeline.choose_objective()
     return pipeline
 
@@ -102,7 +103,7 @@ def test_the_reference_driver_comes_through_the_nominal_scenario(name):
 def test_an_unknown_driver_is_named():
     scenario = load("crossroads-s4")
     with pytest.raises(UnknownNameError, match="did you mean 'reference'"):
-        Pipeline(scenario, scenario.space(), ego="refrence")
+        Pipeline(scenario, scenario.space(), PipelineOptions(ego="refrence"))
 
 
 BLIND = tuple(name for name in metrics.TABLE_I if name not in ("iou", "e_position", "map"))
@@ -130,7 +131,7 @@ def test_the_paper_s_metrics_are_recorded_as_far_as_the_driver_gives_rise_to_the
 def test_a_metric_that_the_driver_gives_no_rise_to_is_refused():
     scenario = with_objective("map", "ttc", "iou")
     with pytest.raises(InputError) as caught:
-        Pipeline(scenario, scenario.space(), ego="route-follower")
+        Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
     first, second = caught.value.problems
     assert first.startswith("the metric 'map' needs detections, and the driver 'route-follower' ")
     assert first.endswith("perceive (--ego): reference")

@@ -4,7 +4,7 @@ Read this first. `Pipeline.evaluate_rows` is the whole path of a batch, one line
 everything else here prepares it.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -30,6 +30,7 @@ from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
+from bridgegen.options import PipelineOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
@@ -65,15 +66,10 @@ class Pipeline:
         self,
         scenario: SearchedScenario,
         space: SearchSpace,
+        options: PipelineOptions | None = None,
         *,
-        ego: str | None = None,
-        ideal: Iterable[str] = (),
-        time_limit: float | None = None,
         road_map: RoadMap | None = None,
-        metrics: Sequence[str] | None = None,
-        also: Sequence[str] = (),
-        seek_causes: bool = False,
-        cause: Cause | None = None,
+        recorded: Sequence[str] | None = None,
         simulator: SimulatorChoice = EMBEDDED,
         workers: Workers | None = None,
     ) -> None:
@@ -82,15 +78,10 @@ class Pipeline:
         Args:
             scenario: the logical scenario.
             space: its search space.
-            ego: the driver; the scenario's choice by default.
-            ideal: stages of the driver to be ideal.
-            time_limit: [s] that one call of a user's own driver may take.
+            options: how its rows are evaluated; the defaults by default.
             road_map: the map that it takes place on; its own road network by default.
-            metrics: the names of all to record, CLASSIFYING and the objective's among them;
-                what ``metrics_of`` says by default.
-            also: the names of metrics to record besides, by default.
-            seek_causes: whether to find the cause of each critical scenario.
-            cause: of harm; a critical scenario of another one does not count.
+            recorded: the names of all metrics to record, CLASSIFYING and the objective's among
+                them; what ``metrics_of`` says by default.
             simulator: which one runs the scenarios.
             workers: who evaluates; threads by default, one for each core. No result depends on it.
 
@@ -101,18 +92,18 @@ class Pipeline:
         """
         self.scenario = scenario
         self.space = space
+        self._options = options = PipelineOptions.of(options or PipelineOptions())
         self._made_with: dict[str, Any] = {
-            "scenario": scenario, "space": space, "ego": ego, "ideal": tuple(ideal),
-            "time_limit": time_limit, "road_map": road_map, "seek_causes": seek_causes,
-            "cause": cause, "simulator": simulator,
+            "scenario": scenario, "space": space, "road_map": road_map, "simulator": simulator,
         }  # fmt: skip
         self._simulated_by = simulator
-        name = ego or scenario.driver
-        if name is None and tuple(ideal):
+        name = options.ego or scenario.driver
+        if name is None and options.ideal:
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
-        driver = egos.get(name, ideal, time_limit) if name else None
+        driver = egos.get(name, options.ideal, options.time_limit) if name else None
         self.source = _source(scenario, driver, road_map, space)
-        self.cause, self.seeks_causes = cause, seek_causes or cause is not None
+        self.cause = None if options.cause is None else Cause.named(options.cause)
+        self.seeks_causes = options.causes or self.cause is not None
         nominal = self.concrete(space.row({}), road_map.path.name if road_map else "")
         self._workers = workers or Threads()
         self._is_far = simulator != EMBEDDED and not self._workers.are_here
@@ -121,13 +112,13 @@ class Pipeline:
         self.driver = self.simulator.embedded.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
             self.source = _source(scenario, self.driver, road_map, space)
-        if cause is not None:
-            require(cause, self.driver)
+        if self.cause is not None:
+            require(self.cause, self.driver)
         sees = simulator.detects
-        if metrics is None:
-            metrics = metrics_of(scenario, self.driver, also, detects=sees)
+        if recorded is None:
+            recorded = metrics_of(scenario, self.driver, options.metrics, detects=sees)
         held = measures.held_by(self.driver, detects=sees)
-        self.metrics = quantities.require(metrics, held, f"the driver '{self.driver.name}'")
+        self.metrics = quantities.require(recorded, held, f"the driver '{self.driver.name}'")
         _refuse_fixed(scenario, space, self.simulator.fixed)
         self._roads: Any = None
         if not {*self._road_names} & {*space.variables}:
@@ -136,9 +127,10 @@ class Pipeline:
     @cached_property
     def recipe(self) -> Recipe:
         """Makes this pipeline in a worker, but for the objective, which is given with the rows."""
-        ego = self._made_with["ego"]
-        made_with = self._made_with | {"ego": CarriedDriver.of(ego) if ego else None}
-        return Recipe.of(_remade, metrics=self.metrics, **made_with)
+        ego = self._options.ego
+        carried = CarriedDriver.of(ego) if ego else None
+        options = replace(self._options, ego=None)
+        return Recipe.of(_remade, carried, options, recorded=self.metrics, **self._made_with)
 
     @property
     def rows_at_once(self) -> int:
@@ -433,9 +425,10 @@ class Pipeline:
         return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
 
 
-def _remade(*, ego: CarriedDriver | None, **made_with: Any) -> Pipeline:
+def _remade(ego: CarriedDriver | None, options: PipelineOptions, **made_with: Any) -> Pipeline:
     """Return a pipeline for a worker, which is one thread; its kernels are compiled by then."""
-    pipeline = Pipeline(**made_with, ego=ego.here() if ego else None, workers=Threads(1))
+    options = replace(options, ego=ego.here() if ego else None)
+    pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
     return pipeline
 

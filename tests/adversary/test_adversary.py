@@ -13,6 +13,7 @@ from bridgegen.campaign.handover import write_scenario
 from bridgegen.errors import InputError
 from bridgegen.odd.adversary import MARGIN, adversarial
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
 from bridgegen.simulation.embedded.motion._steering_kernels import steer
@@ -23,7 +24,7 @@ DT = 0.05
 @pytest.fixture(scope="module")
 def pipeline():
     scenario = adversarial(load("crossroads-s4"))
-    made = Pipeline(scenario, scenario.space(), ego="route-follower")
+    made = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
     made.choose_objective()
     return made
 
@@ -174,14 +175,16 @@ def test_who_cannot_be_asked_instant_by_instant_is_named(tmp_path):
         "utf-8",
     )
     scenario = adversarial(load("crossroads-s4"))
-    made = Pipeline(scenario, scenario.space(), ego=f"{own}:Driver")
+    made = Pipeline(scenario, scenario.space(), PipelineOptions(ego=f"{own}:Driver"))
     with pytest.raises(InputError, match="in closed loop meets the drivers of"):
         made.arena()
 
 
 def test_decisions_that_are_not_searched_are_named():
     scenario = adversarial(load("crossroads-s4"))
-    made = Pipeline(scenario, scenario.space(["participants"]), ego="route-follower")
+    made = Pipeline(
+        scenario, scenario.space(["participants"]), PipelineOptions(ego="route-follower")
+    )
     with pytest.raises(InputError, match="needs all of its decisions, got no bv_"):
         made.arena()
     plain = load("crossroads-s4")

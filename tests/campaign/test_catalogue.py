@@ -7,6 +7,7 @@ import bridgegen as bg
 from bridgegen.campaign.handover import write_scenario
 from bridgegen.campaign.validate import validate_file
 from bridgegen.odd.reader import load, names
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
 from bridgegen.store import Store
@@ -36,7 +37,7 @@ def test_neither_driver_is_never_or_always_at_risk(name):
     shares = []
     for ego in ("route-follower", "reference"):
         space = scenario.space()
-        pipeline = Pipeline(scenario, space, ego=ego)
+        pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego))
         pipeline.choose_objective()
         X = space.decode(np.random.default_rng(1).random((400, space.n_var)))
         shares.append(float(pipeline.evaluate(X).critical.mean()))

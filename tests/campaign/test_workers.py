@@ -14,6 +14,7 @@ import bridgegen as bg
 from bridgegen.campaign import Watch
 from bridgegen.errors import UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.simulation.rollout import WORKER_ENDED
 from bridgegen.store import Store
 from bridgegen.workers.processes import Processes
@@ -63,7 +64,7 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     space = scenario.space()
     X = space.decode(np.random.default_rng(0).random((4, space.n_var)))
     crew = Processes(2)
-    pipeline = Poisoned(scenario, space, seek_causes=True, workers=crew)
+    pipeline = Poisoned(scenario, space, PipelineOptions(causes=True), workers=crew)
     pipeline.choose_objective()
     pipeline.poison = X[3]
     found = pipeline.evaluate(X)
@@ -73,7 +74,7 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     assert np.isnan(found.metrics[3]).all()
     assert not found.critical[3]
     others = np.arange(3)
-    calm = bg.pipeline.Pipeline(scenario, space, seek_causes=True)
+    calm = bg.pipeline.Pipeline(scenario, space, PipelineOptions(causes=True))
     calm.choose_objective()
     expected = calm.evaluate(X[others])
     for name in ("metrics", "F", "critical", "cause"):

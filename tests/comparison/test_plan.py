@@ -9,6 +9,7 @@ import bridgegen as bg
 from bridgegen.cli import main
 from bridgegen.comparison.plan import Cell, begin, make_plan
 from bridgegen.errors import InputError, StorageError
+from bridgegen.options import CommonOptions
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def test_its_command_is_the_plan(plans, monkeypatch, tmp_path, options):
 def plan(budget=9, out=None, **options):
     given = {"settings": {}, "seeds": 2, "baseline": None, "apart": 0.1}
     names = ["crossroads-s4", "crossroads-s1"], ["pso", "nsga2"]
-    return make_plan(*names, **given, budget=budget, out=out, options=options)
+    return make_plan(*names, **given, budget=budget, out=out, options=CommonOptions(**options))
 
 
 def test_the_grid_in_the_order_of_running_and_of_telling():
@@ -70,12 +71,12 @@ def test_the_grid_in_the_order_of_running_and_of_telling():
 def test_weights_are_for_those_who_search_a_sum():
     one, many = Cell("crossroads-s4", "pso", 0), Cell("crossroads-s4", "nsga2", 0)
     made = plan(objective={"d_min": 0.5, "v_d": 1.0}, weights="fixed", objectives=None)
-    assert made.arguments(one)["objective"] == {"d_min": 0.5, "v_d": 1.0}
-    assert made.arguments(one)["weights"] == "fixed"
-    assert made.arguments(many)["objective"] == {"d_min": None, "v_d": None}
-    assert made.arguments(many)["weights"] is None
+    assert made.options_of(one).objective == {"d_min": 0.5, "v_d": 1.0}
+    assert made.options_of(one).weights == "fixed"
+    assert made.options_of(many).objective == {"d_min": None, "v_d": None}
+    assert made.options_of(many).weights is None
     asked = plan(objective={"d_min": 0.5, "v_d": 1.0}, weights="fixed", objectives="many")
-    assert asked.arguments(many)["weights"] == "fixed"  # and so it is refused
+    assert asked.options_of(many).weights == "fixed"  # and so it is refused
 
 
 def test_a_mistake_that_made_no_run_binds_nobody(tmp_path):

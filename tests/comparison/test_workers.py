@@ -5,6 +5,7 @@ from pathlib import Path
 
 from bridgegen.comparison.runs import Task, Watcher, evaluations_of
 from bridgegen.comparison.workers import run_all
+from bridgegen.options import SearchOptions
 
 
 class Bomb:
@@ -15,14 +16,14 @@ class Bomb:
 
 
 def task(folder: Path, name: str, **more: object) -> Task:
-    arguments = {"scenario": "crossroads-s4", "algorithm": "random", "budget": 40, "causes": False}
-    return Task(name, folder / name, {**arguments, **more})
+    options = {"algorithm": "random", "budget": 40, "causes": False, **more}
+    return Task(name, folder / name, "crossroads-s4", SearchOptions(**options))
 
 
 def test_a_process_that_dies_costs_one_run(tmp_path):
     told: list[tuple[str, bool]] = []
     watcher = Watcher(ended=lambda name, failure: told.append((name, failure is None)))
-    tasks = [task(tmp_path, "bomb", metrics=Bomb()), task(tmp_path, "0")]
+    tasks = [task(tmp_path, "bomb", junction=Bomb()), task(tmp_path, "0")]
     failures = run_all(tasks, 2, watcher)
     assert list(failures) == ["bomb"]
     assert failures["bomb"] in (

@@ -14,6 +14,7 @@ from bridgegen.openx.convert import roads_of
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.to_owl.scenario import individuals_from_openscenario
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
 
@@ -50,7 +51,9 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scenario file, with its map, that says which stages are ideal."""
     scenario = load("lead-brakes")
     space = scenario.space()
-    pipeline = Pipeline(scenario, space, ego="reference", ideal=["control", "perception"])
+    pipeline = Pipeline(
+        scenario, space, PipelineOptions(ego="reference", ideal=["control", "perception"])
+    )
     folder = tmp_path_factory.mktemp("written")
     return next(
         p for p in write_scenario(pipeline, space.row({}), folder, "a") if p.suffix == ".xosc"

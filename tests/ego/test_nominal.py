@@ -5,6 +5,7 @@ import pytest
 
 from bridgegen import metrics as measures
 from bridgegen.odd.reader import load, names
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 IDEAL = {"perceiving": (), "all ideal": ("perception", "prediction", "control")}
@@ -18,7 +19,7 @@ ROUND = {"cut-out": IDEAL, "jam-tail-in-fog": ("all ideal",)}
 def test_defaults_are_driven_without_harm(name: str, ideal: str) -> None:
     scenario = load(name)
     space = scenario.space()
-    pipeline = Pipeline(scenario, space, ego="reference", ideal=IDEAL[ideal])
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego="reference", ideal=IDEAL[ideal]))
     row = space.row({})
     rollout = pipeline.rollout(row[np.newaxis])
     wanted = ("n_collision", "r_red", "l_offset", "d_min")

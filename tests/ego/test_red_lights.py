@@ -8,6 +8,7 @@ import pytest
 
 from bridgegen import metrics as measures
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 
@@ -29,7 +30,7 @@ def red(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_stops_before_the_line_and_goes_on_at_green(red: Path, ego: str) -> None:
     scenario = load(red)
     space = scenario.space()
-    pipeline = Pipeline(scenario, space, ego=ego)
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego))
     rollout = pipeline.rollout(space.row({"runner_start": 20.0, "runner_speed": 13.0})[np.newaxis])
     (crossed,) = measures.evaluate(rollout, ("r_red",))[:, 0]
     v = rollout.v[0, 0, : rollout.n_steps[0]]

@@ -12,6 +12,7 @@ from bridgegen.ego import _weather_columns as column
 from bridgegen.metrics.perceived import perceived
 from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.page import write_report
 from bridgegen.report.playbacks import playbacks
@@ -28,7 +29,7 @@ class Case:
     def __init__(self, name: str, fixed: dict[str, float], ego: str = "reference") -> None:
         n, logical = 2, load(name)
         space = logical.space(fixed=fixed)
-        self.pipeline = Pipeline(logical, space, ego=ego)
+        self.pipeline = Pipeline(logical, space, PipelineOptions(ego=ego))
         self.X = space.decode(np.random.default_rng(5).random((n, space.n_var)))
         self.rollout = self.pipeline.rollout(self.X)
         if self.rollout.detections.size:

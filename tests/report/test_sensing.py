@@ -7,6 +7,7 @@ from bridgegen.ego.detections import DETECTION
 from bridgegen.metrics.e_position import e_position
 from bridgegen.metrics.perceived import perceived
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.sensing import TOLERANCE, sensed
 
@@ -15,7 +16,7 @@ from bridgegen.report.sensing import TOLERANCE, sensed
 def rollout():
     logical = load("jam-tail-in-fog")
     space = logical.space()
-    pipeline = Pipeline(logical, space, ego="reference")
+    pipeline = Pipeline(logical, space, PipelineOptions(ego="reference"))
     return pipeline.rollout(space.decode(np.random.default_rng(1).random((4, space.n_var))))
 
 
@@ -58,7 +59,7 @@ def test_displaced_is_what_is_no_hit_at_the_strictest_threshold(rollout):
 
 def test_without_sensors_there_is_nothing():
     logical = load("crossroads-s4")
-    pipeline = Pipeline(logical, logical.space(), ego="route-follower")
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="route-follower"))
     rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
     assert rollout.detections.shape[-1] == DETECTION
     assert sensed(rollout) == []

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.environment import ScenarioEnv, ScenarioVectorEnv
 from bridgegen.search.observation import ENCODINGS
@@ -18,7 +19,7 @@ from bridgegen.search.observation import ENCODINGS
 @pytest.fixture(scope="module")
 def pipeline():
     scenario = load("crossroads-s2")
-    made = Pipeline(scenario, scenario.space(), ego="route-follower")
+    made = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
     made.choose_objective()
     return made
 

@@ -189,7 +189,7 @@ def test_with_the_paper_s_rule_its_scenarios_are_kept_behind_the_failures(tmp_pa
     frame, found = run.frame(), [facts(path) for path in run.scenarios]
     assert len(found) == 8
     assert all(one["critical"] for one in found)
-    assert run.settings.objective["rule"] == "thresholds"
+    assert run.settings.optimised["rule"] == "thresholds"
     harmful = [bool(frame.loc[one["evaluation"], "harm"] >= NEAR_MISS) for one in found]
     assert harmful == sorted(harmful, reverse=True)
     shown = {one.shown for one in run.modes if frame.loc[one.shown, "critical"]}
@@ -202,11 +202,12 @@ def test_with_the_paper_s_rule_its_scenarios_are_kept_behind_the_failures(tmp_pa
 
 def test_neighbours_of_a_noisy_driver_have_its_random_numbers():
     from bridgegen.odd.reader import load
+    from bridgegen.options import PipelineOptions
     from bridgegen.pipeline import Pipeline
 
     scenario = load("crossroads-s4")
     space = scenario.space()
-    pipeline = Pipeline(scenario, space, ego="reference")
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego="reference"))
     X = space.decode(np.random.default_rng(0).random((2, space.n_var)))
     one, other = ({n: X[[k], i] for i, n in enumerate(space.names)} for k in (0, 1))
     simulator, roads = pipeline.simulator.embedded, pipeline._roads

@@ -1,29 +1,29 @@
 """A campaign from start to finish: search, hand over, report; and going on with one."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from bridgegen import search as toolkit
 from bridgegen.campaign.beforehand import refuse_beforehand
-from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of, counted
+from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.campaign.handover import hand_over, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
-from bridgegen.campaign.settings import MAX_BUDGET, MAX_KEEP, MAX_SEED, Settings
-from bridgegen.cause import Cause
+from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
+from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
-from bridgegen.search.algorithm import Problem, Value, resolve
-from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
+from bridgegen.search.algorithm import Problem, resolve
+from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Recorded, Store, refuse_used
 from bridgegen.triage.record import write_record
 from bridgegen.triage.triage import triage
@@ -47,81 +47,39 @@ class Watch:
     written: Callable[[int], None] = lambda count: None
 
 
-def run_search(
-    scenario: str | Path,
-    *,
-    distribution: Path | str | None = None,
-    algorithm: str = "pso",
-    settings: Mapping[str, Value] | None = None,
-    budget: int | None = None,
-    seed: int | None = None,
-    ego: str | None = None,
-    ideal: Iterable[str] = (),
-    time_limit: float | None = None,
-    axes: Iterable[str] | None = None,
-    fixed: Mapping[str, float | str] | None = None,
-    road_map: Path | str | None = None,
-    junction: str | None = None,
-    keep: int = 10,
-    out: Path | str | None = None,
-    objective: dict[str, float | None] | None = None,
-    weights: str | None = None,
-    scale: str | None = None,
-    objectives: str | None = None,
-    count: str | None = None,
-    metrics: Sequence[str] = (),
-    causes: bool = True,
-    cause: str | None = None,
-    adversary: str | None = None,
-    others: str | None = None,
-    simulator: SimulatorChoice | None = None,
-    deliver: bool = True,
-    workers: Choice = None,
-    watch: Watch | None = None,
-) -> Run:
-    """Search a logical scenario for its critical concrete ones, and hand them over.
+@dataclass(frozen=True, kw_only=True)
+class SearchArguments(SearchOptions):
+    """The arguments of ``run_search``: a run's options, and what no result depends on."""
 
-    Args:
-        scenario: a name of the catalogue, or the path of a YAML file or of an OpenSCENARIO file.
-        distribution: of the parameters of an OpenSCENARIO file, a file itself.
-        algorithm: a name of ``bridgegen list algorithms``.
-        settings: of the algorithm, where they are not to be its defaults.
-        budget: evaluations, exactly; 1000, or what a stochastic distribution says, by default.
-        seed: the same seed gives the same result; 0, or what a stochastic distribution says, by
-            default.
-        ego: a name of the ego's drivers, or a driver of your own: ``package.module:Class``,
-            ``file.py:Class`` or ``file.fmu``; the scenario's own choice by default.
-        ideal: stages of the driver to be ideal: perception, prediction, control.
-        time_limit: [s] that one call of a driver of your own may take; 10 by default.
-        axes: the axes of the search space; the scenario's own by default.
-        fixed: parameters to hold at a value, by name.
-        road_map: an OpenDRIVE map, or the ``.owl`` that it was imported as; by default the
-            scenario's own road network is generated.
-        junction: the id of the map's junction, where it has several with as many legs.
-        keep: how many critical scenarios to hand over.
-        out: the run's folder, new; ``runs/SCENARIO-ALGORITHM-SEED`` by default.
-        objective: metrics and their weights (None with entropy weights), instead of the
-            scenario's; ``{"harm": None}`` or ``{"paper": None}`` for one of these, with its rule
-            of what is critical.
-        weights: "fixed", or "entropy" of a random sample, instead of the scenario's way.
-        scale: "raw", or "standardised" by a random sample, instead of the scenario's.
-        objectives: "one", the terms' weighted sum, or "many", one for each term; what the
-            algorithm is made for, by default.
-        count: whose conflicts count as harm: "ego", those that the ego is responsible for or could
-            have prevented (the default), or "any".
-        metrics: names of those to record besides the objective's and the paper's.
-        causes: whether to find the cause of each critical scenario, by replaying it.
-        cause: "perception", "planning", "control" or "unavoidable": a critical scenario of another
-            cause does not count.
-        adversary: the participant that an adversary drives, see `bridgegen.odd.adversary`; with an
-            algorithm that is one, the first vehicle by default.
-        others: "attentive" or "scripted": who drives all participants but the ego (and the one
-            that an adversary drives); what the scenario says by default.
-        simulator: which one runs the scenarios; the embedded one by default.
-        deliver: whether to write the critical scenarios and the report; ``resume`` does it later.
-        workers: who evaluates: so many processes, or ``"ray"``, ``"ray://HOST:PORT"``; threads of
-            this process by default, one for each core. The results do not depend on it.
-        watch: told how it is getting on.
+    scenario: str | Path = field(
+        kw_only=False,
+        metadata={"help": "Name in the catalogue, or path of a YAML file or an OpenSCENARIO file."},
+    )
+    out: Path | str | None = field(
+        default=None,
+        metadata={"help": "Folder of the run, new; runs/SCENARIO-ALGORITHM-SEED by default."},
+    )
+    deliver: bool = field(
+        default=True,
+        metadata={
+            "help": "Whether to write critical scenarios and report; ``resume`` does it later."
+        },
+    )
+    workers: Choice = field(
+        default=None,
+        metadata={
+            "help": 'Number of worker processes, or ``"ray"`` / ``"ray://HOST:PORT"``; threads '
+            "of this process by default, one for each core. No result depends on it."
+        },
+    )
+    watch: Watch | None = field(
+        default=None, metadata={"help": "Told how the search is getting on."}
+    )
+
+
+@called_with(SearchArguments)
+def run_search(given: SearchArguments) -> Run:
+    """Search a logical scenario for its critical concrete ones, and export them.
 
     Returns:
         The finished run.
@@ -133,87 +91,64 @@ def run_search(
         WorkersError: there are no workers, or they are lost; ``resume`` goes on.
         Interrupted: Ctrl-C; likewise.
     """
-    watch, simulates = watch or Watch(), simulator or EMBEDDED
-    catalogue = driven_by(load(scenario, distribution), others)
-    budget = catalogue.budget if budget is None else budget
-    seed = catalogue.seed if seed is None else seed
-    _check_numbers(budget, seed, keep)
-    method = toolkit.get(algorithm)
-    columns = columns_of(method, objectives)
-    spec = chosen_objective(catalogue.objective, objective, weights, scale, columns, counted(count))
+    watch = given.watch or Watch()
+    catalogue = driven_by(load(given.scenario, given.distribution), given.others)
+    budget = catalogue.budget if given.budget is None else given.budget
+    seed = catalogue.seed if given.seed is None else given.seed
+    if problems := range_problems(replace(given, budget=budget, seed=seed)):
+        raise InputError(*problems)
+    method = toolkit.get(given.algorithm)
+    columns = columns_of(method, given.objectives)
+    spec = chosen_objective(catalogue.objective, given, columns)
     logical = as_judged(replace(catalogue, objective=spec), spec.rule)
-    logical, roads = placed(logical, road_map, junction)
+    logical, roads = placed(logical, given.road_map, given.junction)
     driven: str | None = None
-    if adversary is not None or getattr(method, "is_adversary", False):
-        logical = adversarial(logical, adversary)
+    if given.adversary is not None or getattr(method, "is_adversary", False):
+        logical = adversarial(logical, given.adversary)
         driven = logical.adversary.participant if logical.adversary else None
-    space = logical.space(axes, fixed)
+    space = logical.space(given.axes, given.fixed)
     if space.n_var == 0:
         refuse_standstill(logical)
     n_obj = 1 if columns == "one" else len(spec.terms)
-    values = resolve(method, Problem(space.variables, n_obj=n_obj), seed, settings or {})
-    folder = Path(out) if out is not None else Path("runs") / f"{logical.name}-{algorithm}-{seed}"
+    values = resolve(method, Problem(space.variables, n_obj=n_obj), seed, given.settings)
+    name = f"{logical.name}-{given.algorithm}-{seed}"
+    folder = Path(given.out) if given.out is not None else Path("runs") / name
     refuse_used(folder)
-    if cause is not None and not causes:
-        raise InputError(f"to search for the cause '{cause}', causes must be sought")
-    with open_workers(workers) as crew:
+    if given.cause is not None and not given.causes:
+        raise InputError(f"to search for the cause '{given.cause}', causes must be sought")
+    with open_workers(given.workers) as crew:
         watch.workers(crew)
         pipeline = Pipeline(
-            logical,
-            space,
-            ego=ego,
-            ideal=ideal,
-            time_limit=time_limit,
-            road_map=roads,
-            also=metrics,
-            seek_causes=causes,
-            cause=None if cause is None else Cause.named(cause),
-            simulator=simulates,
-            workers=crew,
+            logical, space, given, road_map=roads, simulator=given.simulator, workers=crew
         )
         watch.stage("compile")
         pipeline.warm_up()
         refuse_beforehand(pipeline)
         chosen = pipeline.choose_objective(objectives=columns, seed=seed)
-        made_with = Settings(
-            scenario=str(Path(scenario).resolve()) if is_file(scenario) else str(scenario),
-            distribution=str(Path(distribution).resolve()) if distribution is not None else None,
+        made_with = Settings.of(
+            given,
+            scenario=_absolute(given.scenario) if is_file(given.scenario) else str(given.scenario),
+            distribution=_absolute(given.distribution),
             fingerprint=catalogue.fingerprint,
             algorithm=method.name,
-            algorithm_settings=values,
+            settings=values,
             budget=budget,
             seed=seed,
             ego=pipeline.driver.name,
-            ideal=tuple(sorted(pipeline.driver.ideal)),
-            time_limit=time_limit,
-            axes=tuple(str(axis) for axis in space.axes),
-            fixed=space.fixed,
-            map=str(roads.path.resolve()) if roads else None,
+            ideal=sorted(pipeline.driver.ideal),
+            axes=[str(axis) for axis in space.axes],
+            road_map=_absolute(roads.path) if roads else None,
             map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
             junction=roads.site.junction_id if roads else None,
-            keep=keep,
-            causes=causes,
-            cause=cause,
             adversary=driven,
-            others=others,
-            simulator=simulates.name,
-            simulator_settings=dict(simulates.settings),
-            objective=chosen.to_dict(),
-            chosen={
-                "objective": objective,
-                "weights": weights,
-                "scale": scale,
-                "objectives": objectives,
-                "count": count,
-                "metrics": list(metrics),
-            },
+            optimised=chosen.to_dict(),
         )
         searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
         with Store.create(
             folder, made_with.to_dict(), space.names, pipeline.metrics,
             n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
         ) as store:  # fmt: skip
-            return _go(pipeline, searcher, store, made_with, watch, deliver)
+            return _go(pipeline, searcher, store, made_with, watch, given.deliver)
 
 
 def resume(
@@ -265,7 +200,7 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
         arena.warm_up()
     names, n_obj = pipeline.space.variables, pipeline.objective.n_obj
     problem = Problem(names, pipeline.metrics, n_obj, arena)
-    values = resolve(method, problem, settings.seed, settings.algorithm_settings)
+    values = resolve(method, problem, settings.seed, settings.settings)
     return method(problem, settings.seed, **values)
 
 
@@ -335,15 +270,5 @@ def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) 
     write_run_report(pipeline, store, settings, rows, kept)
 
 
-def _check_numbers(budget: int, seed: int, keep: int) -> None:
-    problems = [
-        f"{low} <= {name} <= {high} must hold, got {value}"
-        for name, value, low, high in (
-            ("budget", budget, 1, MAX_BUDGET),
-            ("seed", seed, 0, MAX_SEED),
-            ("keep", keep, 0, MAX_KEEP),
-        )
-        if not low <= value <= high
-    ]
-    if problems:
-        raise InputError(*problems)
+def _absolute(path: Path | str | None) -> str | None:
+    return None if path is None else str(Path(path).resolve())

@@ -1,6 +1,5 @@
 """What the user chooses of the objective, instead of the scenario's."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, cast, get_args
 
@@ -10,6 +9,7 @@ from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.objective import Objectives
 from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
+from bridgegen.options import CommonOptions
 from bridgegen.search import Algorithm
 
 PAPER = "paper"
@@ -56,27 +56,22 @@ def as_judged(scenario: SearchedScenario, rule: str | None) -> SearchedScenario:
 
 
 def chosen_objective(
-    spec: ObjectiveSpec,
-    metrics: Mapping[str, float | None] | None,
-    weights: str | None,
-    scale: str | None,
-    columns: Objectives,
-    count: Count | None = None,
+    spec: ObjectiveSpec, options: CommonOptions, columns: Objectives
 ) -> ObjectiveSpec:
     """Return the scenario's objective with what the user wants instead.
 
     Args:
         spec: the scenario's.
-        metrics: and their weights; ``{"harm": None}`` and ``{"paper": None}`` choose the rule of
-            what is critical, too.
-        weights: "fixed" or "entropy".
-        scale: "raw" or "standardised".
+        options: what the user wants; the objective ``{"harm": None}`` or ``{"paper": None}``
+            chooses the rule of what is critical, too.
         columns: one or many objectives.
-        count: whose conflicts are harm, "ego" or "any".
 
     Raises:
         InputError: weights where they have no part; ``paper`` among others.
+        UnknownNameError: no such choice of whose conflicts count.
     """
+    metrics, weights, scale = options.objective, options.weights, options.scale
+    count = counted(options.count)
     if metrics is not None and PAPER in metrics:
         if len(metrics) > 1 or metrics[PAPER] is not None:
             raise InputError(f"the objective '{PAPER}' stands alone, without a weight")

@@ -110,10 +110,10 @@ def confirm(
     with Store.open(folder) as store:
         settings = Settings.from_dict(store.settings, store.folder)
         every, names, place = store.read(), store.metrics, store.folder
-    if simulator.name == settings.simulator:
+    if simulator.name == settings.simulator.name:
         raise InputError(
-            f"{place}: was searched in the simulator {settings.simulator}; confirm it in another "
-            "one (--simulator)"
+            f"{place}: was searched in the simulator {simulator.name}; confirm it in another one "
+            "(--simulator)"
         )
     handed = {one.evaluation: one.name for one in handed_over(place, len(every))}
     asked = _chosen(place, every, handed, rows, settings.budget)
@@ -121,9 +121,7 @@ def confirm(
     here = pipeline_of(settings, names, place, ego=ego, command=command, causes=False)
     stage("compile")
     here.warm_up()
-    elsewhere = replace(
-        settings, simulator=simulator.name, simulator_settings=simulator.settings, cause=None
-    )
+    elsewhere = replace(settings, simulator=simulator, cause=None)
     with open_workers(workers) as crew:
         there = pipeline_of(
             elsewhere, names, place,
@@ -172,7 +170,7 @@ def _empty(
         simulator=simulator.name,
         label=f"{simulator.name} {version}" if known else simulator.name,
         settings=dict(simulator.settings),
-        reference=settings.simulator,
+        reference=settings.simulator.name,
         run=str(place),
         scenario=here.scenario.name,
         ego=here.driver.label,

@@ -13,6 +13,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 
@@ -61,7 +62,9 @@ def check_driver(
     """
     for name in scenarios:
         logical = load(name)
-        pipeline = Pipeline(logical, logical.space(), ego=spec, time_limit=time_limit)
+        pipeline = Pipeline(
+            logical, logical.space(), PipelineOptions(ego=spec, time_limit=time_limit)
+        )
         pipeline.warm_up()
         rng = np.random.default_rng(0)
         X = pipeline.space.decode(rng.random((ROWS, pipeline.space.n_var)))

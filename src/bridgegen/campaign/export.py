@@ -118,7 +118,7 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
 def _town_of(run: Path) -> str | None:
     """Return the town that a run was made on; None if it was made on another map."""
     with Store.open(run) as store:
-        made_on = Settings.from_dict(store.settings, run).map
+        made_on = Settings.from_dict(store.settings, run).road_map
     stem = Path(made_on).stem if made_on else ""
     return stem if _TOWN.fullmatch(stem) else None
 

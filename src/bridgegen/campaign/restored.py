@@ -8,7 +8,6 @@ from pathlib import Path
 from bridgegen.campaign.chosen import as_judged
 from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.campaign.settings import Settings
-from bridgegen.cause import Cause
 from bridgegen.ego import STORYBOARD, is_spec
 from bridgegen.errors import InputError, StorageError
 from bridgegen.objective import Objective
@@ -17,6 +16,7 @@ from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.openx.source import on_map
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.workers import Workers
@@ -56,17 +56,17 @@ def pipeline_of(
     pipeline = Pipeline(
         scenario,
         space,
-        ego=_ego(settings),
-        ideal=settings.ideal,
-        time_limit=settings.time_limit,
+        PipelineOptions.of(
+            settings,
+            ego=_ego(settings),
+            causes=settings.causes if causes is None else causes,
+        ),
         road_map=roads,
-        metrics=metrics,
-        seek_causes=settings.causes if causes is None else causes,
-        cause=Cause.named(settings.cause) if settings.cause else None,
+        recorded=metrics,
         simulator=_simulator(settings, simulator, folder),
         workers=workers,
     )
-    pipeline.choose_objective(Objective.from_dict(settings.objective))
+    pipeline.choose_objective(Objective.from_dict(settings.optimised))
     return pipeline
 
 
@@ -81,14 +81,14 @@ def _simulator(settings: Settings, given: SimulatorChoice | None, folder: Path) 
     Raises:
         InputError: another one is given.
     """
-    made_with = SimulatorChoice(settings.simulator, settings.simulator_settings)
     if given is None:
-        return made_with
-    if given.name != made_with.name:
+        return settings.simulator
+    if given.name != settings.simulator.name:
         raise InputError(
-            f"{folder}: the simulator of this run must be {made_with.name}, got {given.name}"
+            f"{folder}: the simulator of this run must be {settings.simulator.name}, got "
+            f"{given.name}"
         )
-    return replace(made_with, access=given.access)
+    return replace(settings.simulator, access=given.access)
 
 
 def _check_driver(settings: Settings, ego: str | None, folder: Path, command: str) -> None:
@@ -118,10 +118,12 @@ def searched(
             f"{folder}: scenario {settings.scenario}{what} is not what it was when the run began; "
             "its results can still be read"
         )
-    logical = as_judged(logical, settings.objective.get("rule"))
-    there, roads = placed(logical, settings.map, settings.junction)
+    logical = as_judged(logical, settings.optimised.get("rule"))
+    there, roads = placed(logical, settings.road_map, settings.junction)
     if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
-        raise StorageError(f"{folder}: map {settings.map} is not what it was when the run began")
+        raise StorageError(
+            f"{folder}: map {settings.road_map} is not what it was when the run began"
+        )
     if settings.adversary is not None:
         there = adversarial(there, settings.adversary)
     return there, there.space(settings.axes, settings.fixed), roads

@@ -103,7 +103,8 @@ def _write(name: str, folder: Path, path: Path, sample: float) -> Path:
 
 def _said(name: str, settings: Settings) -> tuple[str | int, ...]:
     scenario = Path(settings.scenario).stem
-    return name, scenario, settings.algorithm, settings.seed, settings.ego, settings.simulator
+    simulator = settings.simulator.name
+    return name, scenario, settings.algorithm, settings.seed, settings.ego, simulator
 
 
 def _schema(store: Store, said: dict[str, Any], settings: Settings, sample: float) -> "pa.Schema":

@@ -4,8 +4,10 @@ import errno
 import os
 import sys
 from contextlib import suppress
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from bridgegen.errors import BridgeGenError, Interrupted
 
@@ -13,7 +15,29 @@ FAILED = 3
 """The exit status if a criterion of ``--fail-if`` is met: 1 is Python's for a bug, 2 a mistake of
 the user's, 130 Ctrl-C."""
 
+SEARCH, RESULTS, FILES, ONTOLOGY = PANELS = ("Search", "Results", "Files", "Ontology")
+"""The panels in which ``bridgegen --help`` lists the commands."""
+
+
+class PanelledGroup(TyperGroup):
+    """Commands whose help lists them by panel; typer's own does it with rich's markup only."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the panels, each command with its summary."""
+        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
+        width = max(len(name) for name in commands)
+        for panel in PANELS:
+            rows = [
+                (name.ljust(width), one.get_short_help_str(formatter.width - width - 4))
+                for name, one in commands.items()
+                if getattr(one, "rich_help_panel", "") == panel
+            ]
+            with formatter.section(panel):
+                formatter.write_dl(rows)
+
+
 app = typer.Typer(
+    cls=PanelledGroup,
     name="bridgegen",
     help="Search an operational design domain for the scenarios in which a vehicle comes to harm.",
     no_args_is_help=True,
@@ -21,11 +45,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-listing = typer.Typer(help="List what there is.", no_args_is_help=True, rich_markup_mode=None)
-app.add_typer(listing, name="list")
+listing = typer.Typer(
+    help="List scenarios, algorithms, drivers, metrics …",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+app.add_typer(listing, name="list", rich_help_panel=SEARCH)
 
-ontology = typer.Typer(help="The ontology itself.", no_args_is_help=True, rich_markup_mode=None)
-app.add_typer(ontology, name="ontology")
+ontology = typer.Typer(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)
 
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -6,17 +6,17 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import FAILED, app
-from bridgegen.cli.where import NOWHERE, Where, located
+from bridgegen.cli.app import FAILED, RESULTS, app
+from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
 
 
-@app.command()
-@located
+@app.command(rich_help_panel=RESULTS)
+@with_connection_options
 def confirm(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
     simulator: Annotated[str, typer.Option(help="The other one: see 'bridgegen list simulators'.")],
     simulator_set: options.SimulatorSettings = None,
-    where: Where = NOWHERE,
+    connection: Connection = NO_CONNECTION,
     rows: Annotated[
         int | None,
         typer.Option(
@@ -33,14 +33,17 @@ def confirm(
     junit: options.Junit = None,
     as_json: options.Json = False,
 ) -> None:
-    """Run a run's critical scenarios in another simulator: are they critical there, too?"""
+    """Simulate a run's scenarios in another simulator.
+
+    Are its critical scenarios critical there, too?
+    """
     from bridgegen.campaign.confirm import confirm as confirm_run
     from bridgegen.screen.confirmation import ConfirmationScreen, print_confirmation
     from bridgegen.screen.verdict import print_outcomes
     from bridgegen.verdict.of_confirmation import ConfirmationGate
 
     gate = ConfirmationGate.read(fail_if or (), junit)
-    choice = options.read_simulator(simulator, simulator_set, where)
+    choice = options.read_simulator(simulator, simulator_set, connection)
     assert choice is not None
     with ConfirmationScreen() as screen:
         found = confirm_run(

@@ -7,13 +7,14 @@ from typing import Annotated, Literal
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import app, ontology
+from bridgegen.cli.app import FILES, ONTOLOGY, RESULTS, app, ontology
 from bridgegen.errors import InputError
+from bridgegen.options.forms import read_names
 
 SchemaKind = Literal["scenario", "fragment"]
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def export(
     source: Annotated[Path, typer.Argument(help="The folder of a run, or one .xosc file.")],
     flavour: Annotated[
@@ -38,7 +39,10 @@ def export(
         ),
     ] = None,
 ) -> None:
-    """Write handed-over scenarios as other tools want them, each with its map."""
+    """Export critical scenarios in formats of other tools.
+
+    Each with its map.
+    """
     from bridgegen.campaign.export import export as export_scenarios
 
     notes: list[str] = []
@@ -50,7 +54,7 @@ def export(
         print(f"bridgegen: warning: {note}", file=sys.stderr)
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def table(
     runs: Annotated[list[Path], typer.Argument(help="Folders of runs, finished or not.")],
     out: Annotated[Path, typer.Option(help="A folder: each run becomes a file in it.")],
@@ -62,21 +66,24 @@ def table(
         ),
     ] = 1.0,
 ) -> None:
-    """Write all evaluations of runs as Parquet files, one table to DuckDB, Polars or pandas."""
+    """Write all evaluations of runs as Parquet files.
+
+    DuckDB, Polars and pandas read them as one table.
+    """
     from bridgegen.campaign.table import write_tables
 
     for path in write_tables(runs, out, sample=sample):
         print(path)
 
 
-@app.command()
+@app.command(rich_help_panel=ONTOLOGY)
 def convert(
     file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
     out: Annotated[
         Path | None, typer.Option(help="Folder for the files; beside the .owl by default.")
     ] = None,
 ) -> None:
-    """Turn a scenario's individuals into OpenDRIVE and OpenSCENARIO files."""
+    """Convert individuals to OpenDRIVE and OpenSCENARIO."""
     from bridgegen.openx.convert import convert_file
 
     written, violations = convert_file(file, out)
@@ -86,7 +93,7 @@ def convert(
         print(f"bridgegen: warning: {violation}", file=sys.stderr)
 
 
-@app.command("import")
+@app.command("import", rich_help_panel=ONTOLOGY)
 def import_(
     file: Annotated[
         Path, typer.Argument(help="An OpenDRIVE map (.xodr) or an OpenSCENARIO file (.xosc).")
@@ -103,7 +110,7 @@ def import_(
         typer.Option(help="The entity under test in an .xosc, if it is not called ego."),
     ] = None,
 ) -> None:
-    """Turn a whole map, or a scenario on its map, into individuals."""
+    """Convert a map, or a scenario file, to individuals."""
     from bridgegen.openx.convert import import_file
 
     written, notes = import_file(file, out, partial=partial, ego=ego)
@@ -112,7 +119,7 @@ def import_(
         print(f"bridgegen: note: {note}", file=sys.stderr)
 
 
-@app.command()
+@app.command(rich_help_panel=FILES)
 def validate(
     files: Annotated[list[Path], typer.Argument(help="Files: .owl, .xodr, .xosc or .yaml.")],
     reason: Annotated[
@@ -120,7 +127,10 @@ def validate(
         typer.Option("--reason", help="Ask the reasoner HermiT about .owl files, too (extra)."),
     ] = False,
 ) -> None:
-    """Check files against their rules; exit status 2 if one breaks any."""
+    """Check files against their rules.
+
+    The exit status is 2 if one breaks any.
+    """
     from bridgegen.campaign.validate import validate_file
 
     broken: list[str] = []
@@ -133,7 +143,7 @@ def validate(
         raise InputError(*broken)
 
 
-@app.command()
+@app.command(rich_help_panel=FILES)
 def schema(
     kind: Annotated[
         SchemaKind, typer.Argument(help="Of which files: scenario or fragment.")
@@ -142,7 +152,10 @@ def schema(
         Path | None, typer.Option(help="A file for it, new or an earlier schema; else printed.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of scenario files, from which editors complete them."""
+    """Print the JSON Schema of scenario files.
+
+    Editors complete and check scenario files with it.
+    """
     from bridgegen.odd.json_schema import schema_text, write_schema
 
     if out is None:
@@ -152,7 +165,7 @@ def schema(
     print(out)
 
 
-@app.command()
+@app.command(rich_help_panel=FILES)
 def show(
     what: Annotated[
         str,
@@ -162,7 +175,10 @@ def show(
         Path | None, typer.Option(help="The page (.html); beside the file by default.")
     ] = None,
 ) -> None:
-    """Draw a scenario: its individuals, violated constraints in red; or explain a logical one."""
+    """Draw a scenario: its individuals, or its YAML file.
+
+    Violated constraints are red; a logical scenario is explained.
+    """
     from bridgegen.report.show import show_file, show_scenario
 
     file = Path(what)
@@ -176,7 +192,7 @@ def show(
         print(f"bridgegen: warning: {file}: {count}, shown in red", file=sys.stderr)
 
 
-@app.command()
+@app.command(rich_help_panel=ONTOLOGY)
 def ask(
     file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
     question: Annotated[
@@ -195,7 +211,7 @@ def ask(
     print_table(answer.columns, answer.rows, as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=FILES)
 def metrics(
     file: Annotated[
         Path,
@@ -214,12 +230,15 @@ def metrics(
     only: options.OnlyMetrics = None,
     as_json: options.Json = False,
 ) -> None:
-    """Print conflict and metrics of a recording that another simulator, or the road, made."""
+    """Measure a recording; print its metrics.
+
+    And its decisive conflict. Another simulator, or the road, made the recording.
+    """
     from bridgegen.conflict.recorded import measure_recording
     from bridgegen.screen.files import print_measured
 
     measured = measure_recording(
-        file, ego=ego, boxes=boxes, metrics=options.read_names(only) or None, time_step=dt
+        file, ego=ego, boxes=boxes, metrics=read_names(only) or None, time_step=dt
     )
     for note in measured.notes:
         print(f"bridgegen: note: {file}: {note}", file=sys.stderr)
@@ -230,7 +249,7 @@ def metrics(
 def ontology_docs(
     out: Annotated[Path, typer.Option(help="The page (.html).")] = Path("bridgegen-ontology.html"),
 ) -> None:
-    """Write all classes and properties of the ontology as one page, with what each means."""
+    """Write all classes and properties as one page."""
     from bridgegen.ontology.docs import write_docs
 
     write_docs(out)

@@ -11,7 +11,7 @@ from bridgegen.cli.app import listing
 
 @listing.command("scenarios")
 def list_scenarios(as_json: options.Json = False) -> None:
-    """The logical scenarios that ship."""
+    """Logical scenarios of the catalogue."""
     from bridgegen.odd.reader import load, names
     from bridgegen.screen.tables import print_table
 
@@ -21,7 +21,7 @@ def list_scenarios(as_json: options.Json = False) -> None:
 
 @listing.command("algorithms")
 def list_algorithms(as_json: options.Json = False) -> None:
-    """The search algorithms."""
+    """Search algorithms."""
     from bridgegen import search as toolkit
     from bridgegen.screen.tables import print_table
 
@@ -34,7 +34,7 @@ def list_algorithms(as_json: options.Json = False) -> None:
 
 @listing.command("drivers")
 def list_drivers(as_json: options.Json = False) -> None:
-    """The drivers that an ego can have, and those of other participants."""
+    """Drivers of the ego, and of other participants."""
     from bridgegen.ego import DRIVERS, GUESTS, OTHERS
     from bridgegen.ego.drivers import join
     from bridgegen.screen.tables import print_table
@@ -46,7 +46,7 @@ def list_drivers(as_json: options.Json = False) -> None:
 
 @listing.command("simulators")
 def list_simulators(as_json: options.Json = False) -> None:
-    """The simulators that can run the scenarios."""
+    """Simulators that can run the scenarios."""
     from bridgegen.screen.tables import print_table
     from bridgegen.simulation.choice import SIMULATORS
 
@@ -62,7 +62,7 @@ def list_simulators(as_json: options.Json = False) -> None:
 
 @listing.command("metrics")
 def list_metrics(as_json: options.Json = False) -> None:
-    """The criticality metrics."""
+    """Criticality metrics."""
     from bridgegen.conflict.quantities import MEASURED, QUANTITIES
     from bridgegen.metrics import TABLE_I
     from bridgegen.screen.tables import print_table
@@ -80,7 +80,10 @@ def list_metrics(as_json: options.Json = False) -> None:
 
 @listing.command("sight")
 def list_sight(as_json: options.Json = False) -> None:
-    """How far the reference driver's sensors detect a car and a pedestrian in each weather [m]."""
+    """Distances at which the reference driver detects.
+
+    A car and a pedestrian, in each weather [m].
+    """
     from bridgegen.ego.sight import HEAD, table
     from bridgegen.screen.tables import print_table
 
@@ -92,7 +95,7 @@ def list_parameters(
     scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
     as_json: options.Json = False,
 ) -> None:
-    """The parameters of a scenario, with ranges and constraints."""
+    """Parameters of a scenario: ranges and constraints."""
     from bridgegen.odd.reader import load
     from bridgegen.screen.tables import print_parameters
 

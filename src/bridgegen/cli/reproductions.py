@@ -6,11 +6,12 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import app
+from bridgegen.cli.app import SEARCH, app
 from bridgegen.errors import InputError
+from bridgegen.options.forms import read_names
 
 
-@app.command()
+@app.command(rich_help_panel=SEARCH)
 def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="One seed of everything, in a minute or two.")
@@ -36,13 +37,16 @@ def reproduce(
         Path, typer.Option(help="The reproduction's folder; one that was stopped goes on.")
     ] = Path("reproduction"),
 ) -> None:
-    """Make the paper's evaluation, Section V, again: tables, figures and a page."""
+    """Reproduce the paper's evaluation, Section V.
+
+    Writes its tables, figures and a page.
+    """
     if quick and seeds is not None:
         raise InputError(f"--quick is one seed; leave out --seeds {seeds}, or --quick")
     from bridgegen import reproduction
     from bridgegen.screen.reproduction import ReproductionScreen, print_reproduction
 
-    chosen = {} if scenarios is None else {"scenarios": options.read_names(scenarios)}
+    chosen = {} if scenarios is None else {"scenarios": read_names(scenarios)}
     with ReproductionScreen() as screen:
         result = reproduction.reproduce(
             seeds=1 if quick else 10 if seeds is None else seeds,

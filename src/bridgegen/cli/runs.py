@@ -3,117 +3,71 @@
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bridgegen.cli import options
-from bridgegen.cli.app import FAILED, app
-from bridgegen.cli.where import NOWHERE, Where, located, read_access
+from bridgegen.cli import options as common
+from bridgegen.cli.app import FAILED, FILES, RESULTS, SEARCH, app
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    read_access,
+    with_connection_options,
+)
+from bridgegen.cli.declared import with_declared_options
 from bridgegen.ego import split
+from bridgegen.options import SearchOptions
+from bridgegen.options.forms import read_names
+from bridgegen.simulation.choice import EMBEDDED
 
 if TYPE_CHECKING:
     from bridgegen.verdict.criteria import Outcome
 
 
-@app.command()
-@located
+@app.command(rich_help_panel=SEARCH)
+@with_connection_options
+@with_declared_options
 def search(
     scenario: Annotated[
         str,
         typer.Argument(help="A catalogue name, or the path of a YAML or an OpenSCENARIO file."),
     ],
-    distribution: options.Distribution = None,
-    algorithm: Annotated[str, typer.Option(help="See 'bridgegen list algorithms'.")] = "pso",
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="A setting of the algorithm, NAME=VALUE; may be repeated."),
+    options: SearchOptions,
+    simulator: common.Simulator = None,
+    simulator_set: common.SimulatorSettings = None,
+    connection: Connection = NO_CONNECTION,
+    workers: common.Workers = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the run, new.", show_default="runs/SCENARIO-ALGORITHM-SEED"),
     ] = None,
-    budget: Annotated[
-        int | None,
-        typer.Option(
-            help="Evaluations, exactly.", show_default="1000, or a distribution's test runs"
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            help="The same seed gives the same result.", show_default="0, or a distribution's"
-        ),
-    ] = None,
-    ego: options.Ego = None,
-    ideal: options.Ideal = None,
-    time_limit: options.TimeLimit = None,
-    axes: options.Axes = None,
-    fix: options.Fix = None,
-    objective: options.Objective = None,
-    weights: options.Weights = None,
-    scale: options.Scale = None,
-    objectives: options.Objectives = None,
-    count: options.Count = None,
-    metrics: options.Metrics = None,
-    causes: options.Causes = True,
-    cause: options.Cause = None,
-    adversary: options.Adversary = None,
-    others: options.Others = None,
-    simulator: options.Simulator = None,
-    simulator_set: options.SimulatorSettings = None,
-    where: Where = NOWHERE,
-    road_map: options.RoadMap = None,
-    junction: options.Junction = None,
-    keep: Annotated[int, typer.Option(help="How many critical scenarios to hand over.")] = 10,
-    workers: options.Workers = None,
-    out: Annotated[Path | None, typer.Option(help="The run's folder, new.")] = None,
-    fail_if: options.FailIf = None,
-    junit: options.Junit = None,
+    fail_if: common.FailIf = None,
+    junit: common.Junit = None,
 ) -> None:
-    """Search a logical scenario for its critical concrete ones."""
+    """Search a scenario for critical concrete scenarios."""
     from bridgegen import campaign
     from bridgegen.screen.search import SearchScreen, print_summary
     from bridgegen.verdict.of_run import Gate
 
-    gate = Gate.read(fail_if or (), junit, causes=causes)
-    with SearchScreen(budget) as screen:
+    gate = Gate.read(fail_if or (), junit, causes=options.causes)
+    chosen = common.read_simulator(simulator, simulator_set, connection)
+    options = replace(options, simulator=chosen or EMBEDDED)
+    with SearchScreen(options.budget) as screen:
         run = campaign.run_search(
-            scenario,
-            distribution=distribution,
-            algorithm=algorithm,
-            settings=options.read_settings(settings),
-            budget=budget,
-            seed=seed,
-            ego=ego,
-            ideal=split(ideal or ""),
-            time_limit=time_limit,
-            axes=axes.split(",") if axes else None,
-            fixed=options.read_fixed(fix),
-            road_map=road_map,
-            junction=junction,
-            keep=keep,
-            out=out,
-            objective=options.read_terms(objective),
-            weights=weights,
-            scale=scale,
-            objectives=objectives,
-            count=count,
-            metrics=options.read_names(metrics),
-            causes=causes,
-            cause=cause,
-            adversary=adversary,
-            others=others,
-            simulator=options.read_simulator(simulator, simulator_set, where),
-            workers=workers,
-            watch=screen.watch,
+            scenario, **vars(options), out=out, workers=workers, watch=screen.watch
         )
     print_summary(run, screen.seconds)
     _end(gate.judge(run))
 
 
-@app.command()
+@app.command(rich_help_panel=FILES)
 def new(
     name: Annotated[
         str,
-        typer.Argument(help="Of your scenario; NAME.yaml is written, and a schema for editors."),
+        typer.Argument(help="Name of the new scenario; writes NAME.yaml and its JSON schema."),
     ],
     like: Annotated[
         str | None, typer.Option(help="Start from a copy of this one of the catalogue.")
@@ -126,17 +80,20 @@ def new(
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 
-@app.command()
-@located
+@app.command(rich_help_panel=SEARCH)
+@with_connection_options
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
-    ego: options.OwnEgo = None,
-    where: Where = NOWHERE,
-    workers: options.Workers = None,
-    fail_if: options.FailIf = None,
-    junit: options.Junit = None,
+    ego: common.OwnEgo = None,
+    connection: Connection = NO_CONNECTION,
+    workers: common.Workers = None,
+    fail_if: common.FailIf = None,
+    junit: common.Junit = None,
 ) -> None:
-    """Go on with a run that was interrupted; the result is as if it had not been."""
+    """Resume an interrupted run.
+
+    The result is as if it had not been interrupted.
+    """
     from bridgegen import campaign
     from bridgegen.screen.search import SearchScreen, print_summary
     from bridgegen.verdict.of_run import Gate
@@ -146,7 +103,7 @@ def resume(
         run = campaign.resume(
             folder,
             ego=ego,
-            simulator=read_access(where),
+            simulator=read_access(connection),
             workers=workers,
             watch=screen.watch,
         )
@@ -154,19 +111,24 @@ def resume(
     _end(gate.judge(run))
 
 
-@app.command()
-@located
+@app.command(rich_help_panel=RESULTS)
+@with_connection_options
 def view(
     run: Annotated[Path, typer.Argument(help="The folder of a run, which may still grow.")],
-    port: Annotated[int, typer.Option(help="On 127.0.0.1.", show_default="one that is free")] = 0,
+    port: Annotated[
+        int, typer.Option(help="TCP port of the local server.", show_default="any free one")
+    ] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in your browser.")] = True,
     evaluation: Annotated[
         int | None, typer.Option(help="Show this evaluation's scenario, counted from 1.")
     ] = None,
-    ego: options.OwnEgo = None,
-    where: Where = NOWHERE,
+    ego: common.OwnEgo = None,
+    connection: Connection = NO_CONNECTION,
 ) -> None:
-    """Serve a run's report on this machine, live while the search goes on; any scenario plays."""
+    """Serve a run's report in the browser.
+
+    It is live while the search goes on, and plays any scenario of the run.
+    """
     from bridgegen.screen.view import serve
     from bridgegen.view.run_view import RunView
     from bridgegen.view.server import Server
@@ -174,13 +136,13 @@ def view(
     site = RunView(
         run,
         ego=ego,
-        simulator=read_access(where),
+        simulator=read_access(connection),
     )
     fragment = "" if evaluation is None else site.fragment(evaluation)
     serve(Server(site, port), browser=browser, fragment=fragment)
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def coverage(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     bins: Annotated[
@@ -189,9 +151,12 @@ def coverage(
     strength: Annotated[
         int, typer.Option(help="Count combinations of up to so many parameters' bins: 1, 2, 3.")
     ] = 3,
-    as_json: options.Json = False,
+    as_json: common.Json = False,
 ) -> None:
-    """Show which bins, and combinations of bins, a run evaluated and where it was critical."""
+    """Show which bins of the parameters a run evaluated.
+
+    And which combinations of bins, and where it was critical.
+    """
     from bridgegen.campaign.coverage import coverage_of
     from bridgegen.screen.coverage import print_coverage
 
@@ -199,8 +164,8 @@ def coverage(
     print_coverage(run, settings, found, as_json=as_json)
 
 
-@app.command()
-@located
+@app.command(rich_help_panel=RESULTS)
+@with_connection_options
 def regions(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
     samples: Annotated[
@@ -217,12 +182,15 @@ def regions(
         int | None,
         typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
     ] = None,
-    ego: options.OwnEgo = None,
-    where: Where = NOWHERE,
-    workers: options.Workers = None,
-    as_json: options.Json = False,
+    ego: common.OwnEgo = None,
+    connection: Connection = NO_CONNECTION,
+    workers: common.Workers = None,
+    as_json: common.Json = False,
 ) -> None:
-    """Find where scenarios are critical: readable rules, each verified by fresh scenarios."""
+    """Find regions in which most scenarios are critical.
+
+    Each is a readable rule, verified by fresh scenarios.
+    """
     from bridgegen.campaign.regions import regions_of
     from bridgegen.screen.regions import RegionsScreen, print_regions
 
@@ -230,7 +198,7 @@ def regions(
         found = regions_of(
             run,
             ego=ego,
-            simulator=read_access(where),
+            simulator=read_access(connection),
             samples=samples,
             at_least=at_least,
             seed=seed,
@@ -241,16 +209,16 @@ def regions(
     print_regions(found, as_json=as_json)
 
 
-@app.command()
-@located
+@app.command(rich_help_panel=FILES)
+@with_connection_options
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[
         str | None, typer.Option(help="Who drives; what the file says by default.")
     ] = None,
-    ideal: options.Ideal = None,
-    others: options.Others = None,
-    time_limit: options.TimeLimit = None,
+    ideal: common.Ideal = None,
+    others: common.Others = None,
+    time_limit: common.TimeLimit = None,
     dt: Annotated[
         float | None,
         typer.Option(help="Time step [s].", show_default="what the file's header says, or 0.05"),
@@ -259,21 +227,23 @@ def simulate(
         Path | None,
         typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
     ] = None,
-    metrics: options.OnlyMetrics = None,
-    simulator: options.Simulator = None,
-    simulator_set: options.SimulatorSettings = None,
-    where: Where = NOWHERE,
+    metrics: common.OnlyMetrics = None,
+    simulator: common.Simulator = None,
+    simulator_set: common.SimulatorSettings = None,
+    connection: Connection = NO_CONNECTION,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
-    fail_if: options.FileFailIf = None,
-    junit: options.Junit = None,
-    as_json: options.Json = False,
+    fail_if: common.FileFailIf = None,
+    junit: common.Junit = None,
+    as_json: common.Json = False,
 ) -> None:
-    """Run one scenario file and print its conflict and its metrics."""
+    """Simulate one scenario file; print its metrics.
+
+    And its decisive conflict.
+    """
     from bridgegen.screen.files import conflict_facts, print_file_result
     from bridgegen.simulate import simulate_file
-    from bridgegen.simulation.choice import EMBEDDED
     from bridgegen.simulation.trace import write_trace
     from bridgegen.verdict.of_file import FileGate
 
@@ -286,11 +256,11 @@ def simulate(
         ideal=stages,
         others=others,
         time_limit=time_limit,
-        metrics=options.read_names(metrics),
+        metrics=read_names(metrics),
         also=gate.metrics,
         time_step=dt,
         skipped=skipped,
-        simulator=options.read_simulator(simulator, simulator_set, where) or EMBEDDED,
+        simulator=common.read_simulator(simulator, simulator_set, connection) or EMBEDDED,
     )
     for one in skipped or ():
         print(f"bridgegen: warning: left out: {one}", file=sys.stderr)
@@ -317,7 +287,7 @@ def simulate(
     _end(gate.judge(file, result))
 
 
-@app.command("check-driver")
+@app.command("check-driver", rich_help_panel=SEARCH)
 def check_driver(
     driver: Annotated[
         str, typer.Argument(help="module:Class, file.py:Class, file.py:function, file.fmu.")
@@ -326,10 +296,13 @@ def check_driver(
         list[str] | None,
         typer.Option(help="Try it in this one; may be repeated.", show_default="four that ship"),
     ] = None,
-    time_limit: options.TimeLimit = None,
-    as_json: options.Json = False,
+    time_limit: common.TimeLimit = None,
+    as_json: common.Json = False,
 ) -> None:
-    """Try a driver of your own: does a scenario's result depend on that scenario alone?"""
+    """Check that your driver gives repeatable results.
+
+    A scenario's result must depend on that scenario alone.
+    """
     from bridgegen.campaign.driver_contract import SCENARIOS, check_driver
     from bridgegen.screen.files import print_checks
 

@@ -1,8 +1,8 @@
 """A comparison from start to finish: run what is missing, measure, test, draw, write."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridgegen.comparison.distinct import APART
@@ -16,6 +16,7 @@ from bridgegen.comparison.table import summarise, write_tables
 from bridgegen.comparison.workers import run_all
 from bridgegen.errors import Interrupted, StorageError
 from bridgegen.odd.space import SearchSpace
+from bridgegen.options import CommonOptions, called_with
 from bridgegen.search.algorithm import Value
 from bridgegen.store.sqlite import Lock
 from bridgegen.workers import read_choice
@@ -36,78 +37,68 @@ class Watch(Watcher):
     stage: Callable[[str], None] = lambda stage: None
 
 
-def compare(
-    scenarios: str | Path | Sequence[str | Path],
-    *,
-    algorithms: str | Sequence[str] = ("random", "pso"),
-    settings: Mapping[str, Mapping[str, Value]] | None = None,
-    seeds: int = 10,
-    budget: int = 1000,
-    baseline: str | None = None,
-    apart: float = APART,
-    workers: int | str | None = None,
-    out: Path | str | None = None,
-    distribution: Path | str | None = None,
-    ego: str | None = None,
-    ideal: Iterable[str] = (),
-    time_limit: float | None = None,
-    axes: Iterable[str] | None = None,
-    fixed: Mapping[str, float | str] | None = None,
-    road_map: Path | str | None = None,
-    junction: str | None = None,
-    objective: Mapping[str, float | None] | None = None,
-    weights: str | None = None,
-    scale: str | None = None,
-    objectives: str | None = None,
-    count: str | None = None,
-    metrics: Sequence[str] = (),
-    causes: bool = False,
-    cause: str | None = None,
-    adversary: str | None = None,
-    others: str | None = None,
-    deliver: bool = True,
-    watch: Watch | None = None,
-) -> Comparison:
+@dataclass(frozen=True, kw_only=True)
+class ComparisonArguments(CommonOptions):
+    """The arguments of ``compare``: the options that all runs share, and what is the grid's."""
+
+    scenarios: str | Path | Sequence[str | Path] = field(
+        kw_only=False, metadata={"help": "One or several, each as for ``run_search``."}
+    )
+    algorithms: str | Sequence[str] = field(
+        default=("random", "pso"),
+        metadata={"help": "One or several names of ``bridgegen list algorithms``."},
+    )
+    settings: Mapping[str, Mapping[str, Value]] | None = field(
+        default=None,
+        metadata={
+            "help": "Settings of algorithms, by their names, that are not to be their defaults."
+        },
+    )
+    seeds: int = field(
+        default=10,
+        metadata={"help": "Runs of each algorithm in each scenario, with the seeds 0, 1, 2 …"},
+    )
+    budget: int = field(default=1000, metadata={"help": "Evaluations of each run."})
+    baseline: str | None = field(
+        default=None,
+        metadata={"help": "Algorithm that the others are tested against; the first by default."},
+    )
+    apart: float = field(
+        default=APART,
+        metadata={
+            "help": "Critical scenarios are different if their searched parameters differ by "
+            "this share of their ranges, in root mean square."
+        },
+    )
+    workers: int | str | None = field(
+        default=None,
+        metadata={
+            "help": "Number of runs at a time, each in a process and one thread; as many as "
+            'there are cores by default. Or ``"ray"`` / ``"ray://HOST:PORT"``: that many, whose '
+            "scenarios are simulated in a Ray cluster. No result depends on it."
+        },
+    )
+    out: Path | str | None = field(
+        default=None,
+        metadata={"help": "Folder of the comparison; ``comparisons/SCENARIOS`` by default."},
+    )
+    deliver: bool = field(
+        default=True,
+        metadata={"help": "Whether to write tables, figures and page; a later call can do it."},
+    )
+    watch: Watch | None = field(
+        default=None, metadata={"help": "Told how the comparison is getting on."}
+    )
+
+
+@called_with(ComparisonArguments)
+def compare(given: ComparisonArguments) -> Comparison:
     """Run algorithms on scenarios with several seeds, and say which is better at what.
 
-    A grid of runs, each an ordinary run's folder under ``OUT/runs`` (``resume`` hands its critical
-    scenarios over); then ``runs.csv``, ``summary.csv``, ``times.csv``, figures and a page. Killed
-    at any moment and called again, it goes on; called with more scenarios, algorithms or seeds, it
-    makes those runs besides.
-
-    Args:
-        scenarios: one or several, each as for ``run_search``.
-        algorithms: one or several names of ``bridgegen list algorithms``.
-        settings: of algorithms by their names, where they are not to be their defaults.
-        seeds: runs of each algorithm in each scenario, with the seeds 0, 1, 2 …
-        budget: evaluations of each run.
-        baseline: the algorithm that the others are tested against; the first by default.
-        apart: critical scenarios are different if their searched parameters differ by this share
-            of their ranges, in root mean square.
-        workers: so many runs at a time, each in a process and one thread; as many as there are
-            cores by default. Or "ray", "ray://HOST:PORT": that many, whose scenarios are simulated
-            in a Ray cluster. No result depends on it.
-        out: the comparison's folder; ``comparisons/SCENARIOS`` by default.
-        distribution: as for ``run_search``, where one scenario file is compared.
-        ego: as for ``run_search``, and so on.
-        ideal: stages of the driver to be ideal.
-        time_limit: [s] that one call of a driver of your own may take.
-        axes: the axes of the search space.
-        fixed: parameters to hold at a value.
-        road_map: a map to search on.
-        junction: which junction of the map.
-        objective: metrics and their weights.
-        weights: "fixed" or "entropy".
-        scale: "raw" or "standardised".
-        objectives: "one" or "many" with every algorithm; what each is made for, by default.
-        count: whose conflicts count as harm, as for ``run_search``.
-        metrics: to record besides.
-        causes: whether to find the cause of each critical scenario; takes longer.
-        cause: the only one that counts.
-        adversary: the participant that an adversary drives, with every algorithm.
-        others: who drives the other participants.
-        deliver: whether to write tables, figures and page; the same call with True does it later.
-        watch: told how it is getting on.
+    A grid of runs, each an ordinary run's folder under ``OUT/runs`` (``resume`` exports its
+    critical scenarios); then ``runs.csv``, ``summary.csv``, ``times.csv``, figures and a page.
+    Killed at any moment and called again, it resumes; called with more scenarios, algorithms or
+    seeds, it makes those runs besides.
 
     Returns:
         The comparison. A run that failed is a gap in it.
@@ -117,44 +108,30 @@ def compare(
         StorageError: the folder holds something else, is being written, or cannot be.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
-    watch = watch or Watch()
-    who = read_choice(workers)
+    watch, scenarios, algorithms = given.watch or Watch(), given.scenarios, given.algorithms
+    who = read_choice(given.workers)
     plan = make_plan(
         [scenarios] if isinstance(scenarios, str | Path) else scenarios,
         [algorithms] if isinstance(algorithms, str) else algorithms,
-        settings=settings or {},
-        seeds=seeds,
-        budget=budget,
-        baseline=baseline,
-        apart=apart,
-        out=None if out is None else Path(out),
-        options={
-            "distribution": _absolute(distribution),
-            "ego": ego,
-            "ideal": tuple(ideal),
-            "time_limit": time_limit,
-            "axes": None if axes is None else tuple(axes),
-            "fixed": dict(fixed or {}),
-            "road_map": _absolute(road_map),
-            "junction": junction,
-            "objective": None if objective is None else dict(objective),
-            "weights": weights,
-            "scale": scale,
-            "objectives": objectives,
-            "count": count,
-            "metrics": tuple(metrics),
-            "causes": causes or cause is not None,
-            "cause": cause,
-            "adversary": adversary,
-            **({} if others is None else {"others": others}),
-        },
+        settings=given.settings or {},
+        seeds=given.seeds,
+        budget=given.budget,
+        baseline=given.baseline,
+        apart=given.apart,
+        out=None if given.out is None else Path(given.out),
+        options=CommonOptions.of(
+            given,
+            distribution=_absolute(given.distribution),
+            road_map=_absolute(given.road_map),
+            causes=given.causes or given.cause is not None,
+        ),
     )
     begin(plan)
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:
         failures = _run(plan, who, watch, done)
-        return _conclude(plan, failures, watch, deliver=deliver)
+        return _conclude(plan, failures, watch, deliver=given.deliver)
     except KeyboardInterrupt:
         raise Interrupted(
             plan.out, len(done), len(plan.cells), what="runs", command=plan.command()
@@ -184,7 +161,7 @@ def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> di
             done.append(cell.name)
             made += evaluations
         else:
-            tasks.append(Task(cell.name, folder, plan.arguments(cell)))
+            tasks.append(_task(plan, cell))
     watch.begun(plan, len(done), made)
 
     def ended(name: str, failure: str | None) -> None:
@@ -229,6 +206,11 @@ def _conclude(
         watch.stage("draw")
         write_page(result)
     return result
+
+
+def _task(plan: Plan, cell: Cell) -> Task:
+    scenario, options = plan.scenarios[cell.scenario], plan.options_of(cell)
+    return Task(cell.name, plan.folder(cell), scenario, options)
 
 
 def _absolute(path: Path | str | None) -> str | None:

@@ -55,7 +55,7 @@ def _facts(comparison: Comparison) -> Iterable[str]:
     yield _many(plan.seeds, "seed")
     yield f"{plan.budget:,} evaluations a run"
     yield f"baseline: {plan.baseline}"
-    for name, value in plan.options.items():
+    for name, value in vars(plan.options).items():
         if value not in (None, False, (), {}):
             shown = value
             if isinstance(value, tuple):

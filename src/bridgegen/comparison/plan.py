@@ -4,7 +4,7 @@ import hashlib
 import json
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from bridgegen.campaign.scenarios import is_file, load
 from bridgegen.comparison.distinct import APART
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.options import CommonOptions, SearchOptions, options_of
 from bridgegen.records import parse_json, read_bytes
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.store.run_file import FILE as RUN_FILE
@@ -60,7 +61,7 @@ class Plan:
         budget: evaluations of each run.
         baseline: the algorithm that the others are tested against.
         apart: from which distance two critical scenarios are different ones.
-        options: the other arguments of ``run_search``, the same in all runs.
+        options: of all runs.
     """
 
     out: Path
@@ -71,7 +72,7 @@ class Plan:
     budget: int
     baseline: str
     apart: float
-    options: Mapping[str, Any]
+    options: CommonOptions
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -97,26 +98,24 @@ class Plan:
         """Return the folder of a run."""
         return self.out / RUNS / cell.name
 
-    def arguments(self, cell: Cell) -> dict[str, Any]:
-        """Return the arguments of ``run_search`` that make a run, but for its folder.
+    def options_of(self, cell: Cell) -> SearchOptions:
+        """Return the options of a run.
 
-        Weights are for the algorithms that search one sum; who searches many objectives is not
-        given any, unless the user asks for many of all algorithms.
+        Weights are for the algorithms that search one sum; one that searches many objectives is
+        not given any, unless the user asks for many of all algorithms.
         """
-        options = dict(self.options)
+        options = self.options
         of_many = toolkit.get(cell.algorithm).objectives == "many"
-        if of_many and options.get("objectives") is None:
-            options["weights"] = None
-            if options.get("objective"):
-                options["objective"] = dict.fromkeys(options["objective"])
-        return {
-            **options,
-            "scenario": self.scenarios[cell.scenario],
-            "algorithm": cell.algorithm,
-            "settings": dict(self.algorithms[cell.algorithm]),
-            "budget": self.budget,
-            "seed": cell.seed,
-        }
+        if of_many and options.objectives is None:
+            terms = options.objective and dict.fromkeys(options.objective)
+            options = replace(options, weights=None, objective=terms)
+        return SearchOptions.of(
+            options,
+            algorithm=cell.algorithm,
+            settings=self.algorithms[cell.algorithm],
+            budget=self.budget,
+            seed=cell.seed,
+        )
 
     def command(self) -> str:
         """Return the command line that begins this comparison, or goes on with it."""
@@ -128,15 +127,16 @@ class Plan:
         for name, settings in self.algorithms.items():
             for key, value in settings.items():
                 words += ["--set", f"{name}.{key}={json.dumps(value)}"]
-        words += _as_words(self.options)
+        for one in options_of(CommonOptions):
+            words += one.words(getattr(self.options, one.name))
         if self.apart != APART:
             words += ["--distinct", repr(self.apart)]
         return shlex.join([*words, "--out", str(self.out)])
 
     def identity(self) -> dict[str, Any]:
         """Return what may not differ between the runs of one folder, as JSON's types."""
-        given = {name: value for name, value in self.options.items() if name != "road_map"}
-        road_map = self.options.get("road_map")
+        given = asdict(self.options)
+        road_map = given.pop("road_map")
         same = {
             "version": version("bridgegen"),
             "budget": self.budget,
@@ -161,7 +161,7 @@ def make_plan(
     baseline: str | None,
     apart: float,
     out: Path | None,
-    options: Mapping[str, Any],
+    options: CommonOptions,
 ) -> Plan:
     """Return a plan, its names and numbers checked.
 
@@ -177,7 +177,7 @@ def make_plan(
     ]
     if not 0.0 < apart <= 1.0:
         problems.append(f"0 < distinct <= 1 must hold, got {apart:g}")
-    if options.get("distribution") and len(scenarios) > 1:
+    if options.distribution and len(scenarios) > 1:
         problems.append("a distribution belongs to one scenario file; compare that one alone")
     if problems:
         raise InputError(*problems)
@@ -186,7 +186,7 @@ def make_plan(
     for name in [*settings, *([baseline] if baseline else [])]:
         if name not in algorithms:
             raise UnknownNameError("algorithm of this comparison", name, algorithms)
-    loaded = [(str(one), load(one, options.get("distribution"))) for one in scenarios]
+    loaded = [(str(one), load(one, options.distribution)) for one in scenarios]
     if problems := _twice("scenario called", [one.name for _, one in loaded]):
         raise InputError(*problems)
     return Plan(
@@ -271,22 +271,3 @@ def _digest(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _as_words(options: Mapping[str, Any]) -> list[str]:
-    """Return options of ``run_search`` as the command line has them."""
-    words: list[str] = []
-    for name, value in options.items():
-        if value is None or value is False or value in ({}, [], ()):
-            continue
-        if name == "fixed":
-            words += [word for key, one in value.items() for word in ("--fix", f"{key}={one}")]
-        elif name == "objective":
-            terms = (key if one is None else f"{key}={one!r}" for key, one in value.items())
-            words += ["--objective", ",".join(terms)]
-        elif value is True:
-            words.append(f"--{name}")
-        else:
-            option = {"road_map": "map", "time_limit": "time-limit"}.get(name, name)
-            words += [f"--{option}", ",".join(value) if isinstance(value, tuple) else str(value)]
-    return words

@@ -104,7 +104,7 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
     """
     with Store.open(folder) as store:
         settings = Settings.from_dict(store.settings, folder)
-        terms = Objective.from_dict(settings.objective).names
+        terms = Objective.from_dict(settings.optimised).names
         reader = _Reader(terms, store.metrics, points(budget))
         for rows in store.rows():
             reader.take(rows)

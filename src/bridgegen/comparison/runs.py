@@ -1,6 +1,6 @@
 """One run of a comparison: begun, or gone on with; and what became of it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 from bridgegen.campaign import Watch, resume, run_search
 from bridgegen.campaign.loop import Progress
 from bridgegen.errors import BridgeGenError, InputError, Interrupted
+from bridgegen.options import SearchOptions
 from bridgegen.store import Store
 from bridgegen.store.run_file import FILE
 from bridgegen.workers import Threads
@@ -20,12 +21,14 @@ class Task:
     Attributes:
         name: what people call it.
         folder: its own.
-        arguments: of ``run_search``, but for the folder.
+        scenario: that is searched, as ``run_search`` takes it.
+        options: of the run.
     """
 
     name: str
     folder: Path
-    arguments: Mapping[str, Any]
+    scenario: str
+    options: SearchOptions
 
 
 @dataclass(frozen=True)
@@ -85,10 +88,9 @@ def attempt(
     begun = (task.folder / FILE).exists()
     try:
         if begun:
-            ego = task.arguments.get("ego")
-            resume(task.folder, ego=ego, **how)
+            resume(task.folder, ego=task.options.ego, **how)
         else:
-            run_search(**task.arguments, out=task.folder, **how)
+            run_search(task.scenario, **vars(task.options), out=task.folder, **how)
     except Interrupted:
         raise KeyboardInterrupt from None
     except InputError as error:

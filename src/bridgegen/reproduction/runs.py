@@ -88,7 +88,7 @@ def read_run(folder: Path, name: str, replay: str) -> Run:
     return Run(
         folder=name,
         command=settings.command(Path(replay)),
-        settings=settings.algorithm_settings,
+        settings=settings.settings,
         parameters=store.parameters,
         X=rows.X,
         d_min=known(column["d_min"]),

@@ -82,7 +82,7 @@ def print_summary(run: "Run", seconds: float) -> None:
     What was found comes first; with the paper's rule of what is critical, after the figures.
     """
     s, settings, found = run.summary, run.settings, run.triage
-    leads = settings.objective.get("rule") == "harm"
+    leads = settings.optimised.get("rule") == "harm"
     if found is not None and leads:
         _print_found(found)
         print()

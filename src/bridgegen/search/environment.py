@@ -23,6 +23,7 @@ from gymnasium.vector.utils import batch_space
 from bridgegen.arrays import Bool, Float
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.algorithm import Problem
 from bridgegen.search.observation import ENCODINGS, Encoding, Observation, Observer, step_from
@@ -88,7 +89,7 @@ class Episodes:
             raise InputError(*problems)
         if not isinstance(scenario, Pipeline):
             logical = load(scenario)
-            self.pipeline = Pipeline(logical, logical.space(), ego=ego)
+            self.pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego=ego))
             self.pipeline.choose_objective(objectives="one")
         space, objective = self.pipeline.space, self.pipeline.objective
         if objective.n_obj != 1 or space.n_var == 0:

@@ -9,6 +9,7 @@ carla = pytest.importorskip("carla", reason="the package 'carla' is not installe
 
 from bridgegen.odd.reader import load  # noqa: E402
 from bridgegen.openx.opendrive.write import to_xml  # noqa: E402
+from bridgegen.options import PipelineOptions  # noqa: E402
 from bridgegen.pipeline import Pipeline  # noqa: E402
 from bridgegen.simulation.carla import server  # noqa: E402
 from bridgegen.simulation.choice import SimulatorChoice  # noqa: E402
@@ -27,7 +28,7 @@ def _no_real_server(monkeypatch: pytest.MonkeyPatch) -> None:
 def crossroads() -> str:
     """The roads of a crossroads, as OpenDRIVE."""
     logical = load("crossroads-s1")
-    pipeline = Pipeline(logical, logical.space(), ego="route-follower")
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="route-follower"))
     return to_xml(pipeline.concrete(pipeline.space.row({})).roads).decode()
 
 
@@ -51,6 +52,6 @@ def made(machine: Any) -> Any:
     def make(scenario: str, driver: str | None, /, **settings: Any) -> Pipeline:
         logical = load(scenario)
         choice = SimulatorChoice("carla", settings, {"--port": machine.port})
-        return Pipeline(logical, logical.space(), ego=driver, simulator=choice)
+        return Pipeline(logical, logical.space(), PipelineOptions(ego=driver), simulator=choice)
 
     return make

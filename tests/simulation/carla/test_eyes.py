@@ -14,6 +14,7 @@ from bridgegen.ego.detector import Boxes, checked, load
 from bridgegen.ego.kinds import CAR
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import load as logical_of
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla.matching import Truth, matched
 from bridgegen.simulation.carla.view import View, overlap
@@ -126,7 +127,9 @@ def watched(machine, scenario="lead-brakes", ego="kinematic", **access):
     logical = logical_of(scenario)
     given = {"--port": machine.port, **{f"--{name}": one for name, one in access.items()}}
     choice = SimulatorChoice("carla", {"ego": ego, "sensor_period": 0.5}, given)
-    return Pipeline(logical, logical.space(), ego="route-follower", simulator=choice)
+    return Pipeline(
+        logical, logical.space(), PipelineOptions(ego="route-follower"), simulator=choice
+    )
 
 
 @pytest.mark.parametrize("name", ["SeesRed", "SeesCorners"])

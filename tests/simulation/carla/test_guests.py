@@ -10,6 +10,7 @@ import pytest
 from bridgegen.ego import DRIVERS, GUESTS, get
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla import guests
 
@@ -155,7 +156,7 @@ def test_a_client_takes_the_ego_over(made, machine, monkeypatch):
 
 def embedded_start(X):
     logical = load("crossroads-s1")
-    return Pipeline(logical, logical.space(), ego="route-follower").rollout(X)
+    return Pipeline(logical, logical.space(), PipelineOptions(ego="route-follower")).rollout(X)
 
 
 def test_a_client_that_does_not_come_fails_the_row(made, machine, monkeypatch):
@@ -171,7 +172,7 @@ def test_a_client_that_does_not_come_fails_the_row(made, machine, monkeypatch):
 def test_they_drive_nowhere_else(name):
     logical = load("crossroads-s1")
     with pytest.raises(InputError, match=rf"'{name}' drives in the simulator carla alone"):
-        Pipeline(logical, logical.space(), ego=name)
+        Pipeline(logical, logical.space(), PipelineOptions(ego=name))
 
 
 def test_they_are_not_offered_where_a_name_is_wrong():

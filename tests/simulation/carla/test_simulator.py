@@ -13,6 +13,7 @@ from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.source import on_map
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla import frame, server
 from bridgegen.simulation.carla.turn import turn_at
@@ -26,7 +27,7 @@ FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "beg
 
 def embedded(name, driver):
     logical = load(name)
-    return Pipeline(logical, logical.space(), ego=driver)
+    return Pipeline(logical, logical.space(), PipelineOptions(ego=driver))
 
 
 def rows(pipeline, n, seed=4):
@@ -298,7 +299,9 @@ def test_it_is_started_by_the_command(machine, monkeypatch, tmp_path):
     logical = load("crossroads-s1")
     access = {"--port": machine.port, "--carla-command": "./CarlaUE4.sh -RenderOffScreen"}
     choice = SimulatorChoice("carla", {"ego": "kinematic"}, access)
-    pipeline = Pipeline(logical, logical.space(), ego="route-follower", simulator=choice)
+    pipeline = Pipeline(
+        logical, logical.space(), PipelineOptions(ego="route-follower"), simulator=choice
+    )
     assert [one[0] for one in started] == ["./CarlaUE4.sh -RenderOffScreen"]
     machine.faults[machine.ticks + 100] = die
     assert (pipeline.rollout(rows(pipeline, 2)).status == 0).all()
@@ -396,14 +399,20 @@ def test_a_run_on_a_town_s_map_is_in_that_town(machine, tmp_path):
         logical = on_map(logical, road_map)
         choice = SimulatorChoice("carla", {"ego": "kinematic"}, {"--port": machine.port})
         pipeline = Pipeline(
-            logical, logical.space(), ego="reference", road_map=road_map, simulator=choice
+            logical,
+            logical.space(),
+            PipelineOptions(ego="reference"),
+            road_map=road_map,
+            simulator=choice,
         )
         assert (pipeline.rollout(rows(pipeline, 1)).status == 0).all()
         assert machine.loads[-1] == loaded
 
 
 def test_a_route_must_be_on_the_servers_map(machine, made):
-    other = Pipeline(logical := load("cut-in"), logical.space(), ego="route-follower")
+    other = Pipeline(
+        logical := load("cut-in"), logical.space(), PipelineOptions(ego="route-follower")
+    )
     from bridgegen.openx.opendrive.write import to_xml
 
     text = to_xml(other.concrete(other.space.row({})).roads).decode()

@@ -11,6 +11,7 @@ from bridgegen.odd.reader import load
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla.weather import RANGES, Weather, clamped, of_quantities
 from bridgegen.simulation.choice import SimulatorChoice
@@ -28,7 +29,7 @@ FROM_ONTOLOGY = (
 @pytest.fixture(scope="module")
 def pipeline():
     logical = load("crossroads-s4")
-    return Pipeline(logical, logical.space(), ego="route-follower")
+    return Pipeline(logical, logical.space(), PipelineOptions(ego="route-follower"))
 
 
 def sky_of(pipeline, values, storyboard=None):

@@ -5,6 +5,7 @@ import pytest
 
 from bridgegen.odd.others import with_others
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.boxes import box_distance
 
@@ -59,10 +60,12 @@ def test_who_turns_left_waits_for_who_comes_towards():
 def test_it_stops_at_a_red_light():
     scenario_ = with_others(load("red-light-runner"), "attentive")
     space = scenario_.space()
-    pipeline = Pipeline(scenario_, space, ego="route-follower")
+    pipeline = Pipeline(scenario_, space, PipelineOptions(ego="route-follower"))
     X = space.decode(np.random.default_rng(0).random((30, space.n_var)))
     rollout = pipeline.rollout(X)
-    scripted = Pipeline(with_others(scenario_, "scripted"), space, ego="route-follower").rollout(X)
+    scripted = Pipeline(
+        with_others(scenario_, "scripted"), space, PipelineOptions(ego="route-follower")
+    ).rollout(X)
     (line,) = np.flatnonzero(rollout.stop_entities == 1)
     x, y, h = rollout.stop_lines[:, line].T
     light = rollout.stop_lights[line]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.embedded.batch import Batch
 
@@ -26,7 +27,7 @@ def in_lock_step(batch: Batch):
 def test_lock_step_gives_the_bits_of_the_rollout(name, ego):
     logical = load(name)
     space = logical.space()
-    pipeline = Pipeline(logical, space, ego=ego)
+    pipeline = Pipeline(logical, space, PipelineOptions(ego=ego))
     X = space.decode(np.random.default_rng(0).random((20, space.n_var)))
     columns = {parameter: X[:, i] for i, parameter in enumerate(space.names)}
     made = pipeline.simulator

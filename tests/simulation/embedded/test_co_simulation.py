@@ -7,6 +7,7 @@ import pytest
 
 from bridgegen.ego.driver_process import DriverError
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 EGO = Path(__file__).parents[2] / "ego"
@@ -15,7 +16,7 @@ FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status", "detections", 
 
 def made(scenario, ego):
     logical = load(scenario)
-    return Pipeline(logical, logical.space(), ego=ego)
+    return Pipeline(logical, logical.space(), PipelineOptions(ego=ego))
 
 
 def begun(pipeline, seed=4):

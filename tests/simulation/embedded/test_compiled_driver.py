@@ -10,6 +10,7 @@ from bridgegen.cause import Cause, counterfactuals
 from bridgegen.ego.driver_process import DriverError
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 DRIVERS = Path(__file__).parents[2] / "ego"
@@ -19,7 +20,9 @@ N = 12
 
 def made(name, scenario="crossroads-s1", *, file="compiled_drivers.py", **kwargs):
     logical = load(scenario)
-    return Pipeline(logical, logical.space(), ego=f"{DRIVERS / file}:{name}", **kwargs)
+    return Pipeline(
+        logical, logical.space(), PipelineOptions(ego=f"{DRIVERS / file}:{name}", **kwargs)
+    )
 
 
 def rows(pipeline, n=N):
@@ -136,7 +139,7 @@ def test_a_replay_with_ideal_perception_is_just_that(file, name):
 
 
 def test_causes_are_found():
-    pipeline = made("looks_ahead", seek_causes=True)
+    pipeline = made("looks_ahead", causes=True)
     pipeline.choose_objective()
     found = pipeline.evaluate(rows(pipeline, 40))
     assert found.critical.any()

@@ -5,6 +5,7 @@ import pytest
 
 from bridgegen.ego.detections import BOTH, CAMERA, LIDAR, NO_FRAME, NOBODY, SEEN_BY, X, Y
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 ROWS = 24
@@ -13,7 +14,7 @@ ROWS = 24
 @pytest.fixture(scope="module")
 def pipeline() -> Pipeline:
     scenario = load("crossroads-s4")
-    return Pipeline(scenario, scenario.space(), ego="reference")
+    return Pipeline(scenario, scenario.space(), PipelineOptions(ego="reference"))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,9 @@ def test_thick_fog_hides_the_other(pipeline):
 
 def test_ideal_perception_misses_nothing(pipeline, X_random):
     scenario = load("crossroads-s4")
-    ideal = Pipeline(scenario, scenario.space(), ego="reference", ideal=("perception",))
+    ideal = Pipeline(
+        scenario, scenario.space(), PipelineOptions(ego="reference", ideal=("perception",))
+    )
     rollout = ideal.rollout(X_random)
     frames = frames_of(rollout)
     assert (rollout.detections[:, 1, :, SEEN_BY][frames] == BOTH).all()
@@ -89,6 +92,6 @@ def test_ideal_perception_misses_nothing(pipeline, X_random):
 
 def test_a_driver_without_sensors_records_nothing():
     scenario = load("crossroads-s4")
-    follower = Pipeline(scenario, scenario.space(), ego="route-follower")
+    follower = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
     rollout = follower.rollout(follower.space.row({})[np.newaxis])
     assert rollout.detections.size == 0

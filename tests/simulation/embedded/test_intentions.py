@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.intentions import EVERY
@@ -16,7 +17,7 @@ N = 6
 def replayed(name: str, ego: str, ideal=()):
     logical = load(name)
     space = logical.space()
-    pipeline = Pipeline(logical, space, ego=ego, ideal=ideal)
+    pipeline = Pipeline(logical, space, PipelineOptions(ego=ego, ideal=ideal))
     X = space.decode(np.random.default_rng(3).random((N, space.n_var)))
     return pipeline, X, pipeline.replay(X)
 

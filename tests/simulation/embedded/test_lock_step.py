@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 
 DRIVERS = Path(__file__).parents[2] / "ego" / "drivers.py"
@@ -15,7 +16,7 @@ N = 12
 
 def made(name, scenario="crossroads-s1", **kwargs):
     logical = load(scenario)
-    return Pipeline(logical, logical.space(), ego=f"{DRIVERS}:{name}", **kwargs)
+    return Pipeline(logical, logical.space(), PipelineOptions(ego=f"{DRIVERS}:{name}", **kwargs))
 
 
 def rows(pipeline, n=N):

@@ -8,6 +8,7 @@ import pytest
 from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
 
@@ -19,8 +20,8 @@ pytestmark = pytest.mark.esmini
 def both(logical, esmini, n=4, **options):
     """Return pipelines with the embedded simulator and with esmini, and rows."""
     space = logical.space()
-    here = Pipeline(logical, space, **options)
-    there = Pipeline(logical, space, simulator=esmini, **options)
+    here = Pipeline(logical, space, PipelineOptions(**options))
+    there = Pipeline(logical, space, PipelineOptions(**options), simulator=esmini)
     return here, there, space.decode(np.random.default_rng(4).random((n, space.n_var)))
 
 
@@ -60,7 +61,7 @@ def test_threads_give_the_same_bits(esmini):
 
 
 def test_causes_are_found_by_replays_there(esmini):
-    here, there, X = both(load("crossroads-s2"), esmini, n=6, ego="reference", seek_causes=True)
+    here, there, X = both(load("crossroads-s2"), esmini, n=6, ego="reference", causes=True)
     for pipeline in (here, there):
         pipeline.choose_objective()
     expected, got = here.evaluate(X), there.evaluate(X)

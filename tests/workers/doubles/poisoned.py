@@ -16,7 +16,8 @@ class Poisoned(Pipeline):
 
     @property
     def recipe(self) -> Recipe:
-        return Recipe.of(_poisoned, self.poison, metrics=self.metrics, **self._made_with)
+        made_with = {"options": self._options, "recorded": self.metrics, **self._made_with}
+        return Recipe.of(_poisoned, self.poison, **made_with)
 
     def evaluate_rows(self, X, objective):
         if (self.poison == X).all(axis=1).any():

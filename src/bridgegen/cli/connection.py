@@ -1,0 +1,85 @@
+"""The options of how a simulator is reached on this machine; several commands have them all."""
+
+from collections.abc import Callable, Mapping
+from inspect import signature
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bridgegen.cli.expansion import expand
+from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
+
+Connection = Mapping[str, Value]
+"""How a simulator is reached on this machine: values by the spelling of their options."""
+
+NO_CONNECTION: Connection = {}
+
+OPTIONS: Mapping[str, Any] = {
+    "esmini_lib": Annotated[
+        Path | None,
+        typer.Option(
+            help="esmini's library, libesminiLib.so, for --simulator esmini.",
+            show_default="ESMINI_LIB of the environment",
+        ),
+    ],
+    "host": Annotated[
+        str | None,
+        typer.Option(help="The server's machine, for --simulator carla.", show_default="localhost"),
+    ],
+    "port": Annotated[
+        int | None,
+        typer.Option(help="The server's port, for --simulator carla.", show_default="2000"),
+    ],
+    "carla_command": Annotated[
+        str | None,
+        typer.Option(
+            help="Starts a CARLA server, and again when it has ended.", show_default="none"
+        ),
+    ],
+    "carla_timeout": Annotated[
+        float | None,
+        typer.Option(help="Seconds that an answer of CARLA's may take.", show_default="20"),
+    ],
+    "record": Annotated[
+        Path | None,
+        typer.Option(
+            help="A new folder for camera images, LiDAR points, boxes and incidents, with "
+            "--simulator carla."
+        ),
+    ],
+    "detector": Annotated[
+        str | None,
+        typer.Option(
+            help="A detector of your own that looks at CARLA's images: module:Class, file.py:Class."
+        ),
+    ],
+}
+"""By parameter: those that the simulators declare."""
+
+
+def with_connection_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command these options, in the place of its parameter ``connection``.
+
+    Where it has one of the same name for something else, ours begins with ``--carla-``.
+    """
+    own = signature(command).parameters
+    known_as = {f"carla_{name}" if name in own else name: name for name in OPTIONS}
+
+    def fold(values: dict[str, Any]) -> Connection:
+        return {
+            f"--{known_as[name].replace('_', '-')}": str(value)
+            if isinstance(value, Path)
+            else value
+            for name, value in values.items()
+            if value is not None
+        }
+
+    options = {name: (OPTIONS[known], None) for name, known in known_as.items()}
+    return expand(command, "connection", options, fold)
+
+
+def read_access(connection: Connection) -> SimulatorChoice | None:
+    """Return the choice of the simulator that a connection is for; None for no connection."""
+    owners = [one.name for one in SIMULATORS.values() if {*connection} & one.access.keys()]
+    return SimulatorChoice(owners[0], access=connection) if owners else None

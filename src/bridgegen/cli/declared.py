@@ -1,0 +1,53 @@
+"""Options of the command line that are made of the declarations in `bridgegen.options`."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from inspect import signature
+from typing import Annotated, Any
+
+import typer
+
+from bridgegen.cli.expansion import expand
+from bridgegen.options import Option, PipelineOptions, SearchOptions, options_of
+
+
+def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of the class that its parameter ``options`` is annotated with."""
+    kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
+    declared = {one.name: one for one in options_of(kind) if one.form.kind is not None}
+
+    def fold(values: dict[str, Any]) -> PipelineOptions:
+        given = {name: value for name, value in values.items() if value is not None}
+        return kind(**{n: declared[n].form.read(v, declared[n].spelling) for n, v in given.items()})
+
+    made = {name: (_annotation(one), _default(one)) for name, one in declared.items()}
+    return expand(command, "options", made, fold)
+
+
+def declaration(name: str, *, shown: str | None = None) -> Any:
+    """Return what typer is told of an option of a search, for a command that takes it alone.
+
+    Args:
+        name: of the field of `SearchOptions`.
+        shown: the command's default in words, where it is not the search's.
+    """
+    (one,) = (one for one in options_of(SearchOptions) if one.name == name)
+    return _declaration(one if shown is None else replace(one, shown=shown))
+
+
+def _annotation(one: Option) -> Any:
+    kind = one.form.kind
+    return Annotated[kind if kind is bool else kind | None, _declaration(one)]
+
+
+def _declaration(one: Option) -> Any:
+    spelling = one.spelling
+    if one.form.kind is bool:
+        spelling = f"{spelling}/--no-{spelling.removeprefix('--')}"
+    text = f"{one.help} {one.hint}".rstrip()
+    return typer.Option(spelling, help=text, show_default=one.shown or True)
+
+
+def _default(one: Option) -> Any:
+    """Return the default that the parser knows; None where only the options' class does."""
+    return one.default if isinstance(one.default, bool | int | float | str) else None

@@ -1,0 +1,260 @@
+"""The options of a run, each declared once; a stage takes the part that it needs.
+
+To add one: a field here, and its use. `option` says what a declaration holds.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Self
+
+from bridgegen.options.forms import (
+    FIXED,
+    FLAG,
+    NAMES,
+    NUMBER,
+    PATH,
+    SETTINGS,
+    SIMULATOR,
+    TERMS,
+    TEXT,
+    WHOLE,
+)
+from bridgegen.options.option import option, options_of
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
+
+MAX_BUDGET = 10**7
+MAX_SEED = 2**32 - 1
+MAX_KEEP = 1000
+
+_CAUSES = option(
+    FLAG,
+    "Find the cause of each critical scenario: it is simulated again with one stage ideal.",
+    before=False,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PipelineOptions:
+    """The options of how a scenario is evaluated."""
+
+    ego: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
+            "file.py:Class (or a compiled driver's function), file.fmu.",
+            shown="the scenario's choice",
+        ),
+    )
+    ideal: Sequence[str] = field(
+        default=(),
+        metadata=option(
+            NAMES,
+            "Stages of the driver that work without fault: perception, prediction, control.",
+            hint="Separated by commas.",
+            shown="none",
+            before=(),
+        ),
+    )
+    time_limit: float | None = field(
+        default=None,
+        metadata=option(
+            NUMBER,
+            "Seconds that one call of a driver of your own may take; a compiled one, one scenario.",
+            shown="10",
+        ),
+    )
+    metrics: Sequence[str] = field(
+        default=(),
+        metadata=option(
+            NAMES,
+            "Metrics to record besides the objective's and the paper's, see 'bridgegen list "
+            "metrics'.",
+            hint="Separated by commas.",
+            before=(),
+        ),
+    )
+    causes: bool = field(default=False, metadata=_CAUSES)
+    cause: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Count only critical scenarios of this cause: perception, planning, control or "
+            "unavoidable.",
+            shown="any",
+            before=None,
+        ),
+    )
+
+    def __post_init__(self) -> None:
+        for one in options_of(type(self)):
+            object.__setattr__(self, one.name, one.form.keep(getattr(self, one.name)))
+
+    @classmethod
+    def of(cls, options: "PipelineOptions", **changes: Any) -> Self:
+        """Return the fields of other options that this class has too, some of them changed.
+
+        Args:
+            options: whose class is a base of this one, or derived from it.
+            changes: fields, by name; those that ``options`` lacks among them.
+        """
+        shared = {one.name for one in fields(options)} & {one.name for one in fields(cls)}
+        return cls(**{name: getattr(options, name) for name in shared} | changes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommonOptions(PipelineOptions):
+    """The options that a search and a comparison of searches have in common."""
+
+    distribution: Path | str | None = field(
+        default=None,
+        metadata=option(
+            PATH,
+            "File with the ParameterValueDistribution of an OpenSCENARIO file's parameters.",
+            before=None,
+        ),
+    )
+    axes: Sequence[str] | None = field(
+        default=None,
+        metadata=option(
+            NAMES,
+            "Axes to search, e.g. static,participants,weather.",
+            hint="Separated by commas.",
+            shown="the scenario's",
+        ),
+    )
+    fixed: Mapping[str, float | str] = field(
+        default_factory=dict,
+        metadata=option(
+            FIXED,
+            "Parameters to hold at a value, by name.",
+            spelling="--fix",
+            hint="NAME=VALUE, e.g. --fix fog_density=80; a category by name; may be repeated.",
+        ),
+    )
+    road_map: Path | str | None = field(
+        default=None,
+        metadata=option(
+            PATH,
+            "Map to search on: .xodr, or the .owl that it was imported as.",
+            spelling="--map",
+            shown="the scenario's roads",
+        ),
+    )
+    junction: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT, "Id of the map's junction, where several have as many legs as the scenario's."
+        ),
+    )
+    objective: Mapping[str, float | None] | None = field(
+        default=None,
+        metadata=option(
+            TERMS,
+            "What to optimise: harm, paper, or metrics with their weights (without, for entropy "
+            "weights).",
+            hint="E.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy.",
+            shown="the scenario's",
+        ),
+    )
+    weights: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Weights of the metrics: fixed, or entropy (of a random sample).",
+            shown="the scenario's",
+            before=None,
+        ),
+    )
+    scale: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Scale of the metrics: raw, or standardised (by a random sample).",
+            shown="the scenario's",
+            before=None,
+        ),
+    )
+    objectives: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Number of objectives: one, the metrics' weighted sum; or many, one for each metric.",
+            shown="what the algorithm is made for",
+            before=None,
+        ),
+    )
+    count: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Conflicts that count as harm: ego, those that the ego is responsible for or could "
+            "have prevented; or any.",
+            shown="ego",
+            before=None,
+        ),
+    )
+    adversary: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Participant that an adversary drives instead of the scenario's events.",
+            shown="none; with ppo-adversary the first vehicle",
+            before=None,
+        ),
+    )
+    others: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Driver of all other participants: attentive, or scripted (they heed nobody).",
+            shown="what the scenario says",
+            before="scripted",
+        ),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchOptions(CommonOptions):
+    """All options of a run that its result depends on: those that it records."""
+
+    algorithm: str = field(
+        default="pso", metadata=option(TEXT, "Search algorithm, see 'bridgegen list algorithms'.")
+    )
+    settings: Mapping[str, Value] = field(
+        default_factory=dict,
+        metadata=option(
+            SETTINGS,
+            "Settings of the algorithm, where they are not to be its defaults.",
+            spelling="--set",
+            hint="NAME=VALUE; may be repeated.",
+        ),
+    )
+    budget: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "Number of evaluations, exactly.",
+            shown="1000, or a distribution's test runs",
+            limits=(1, MAX_BUDGET),
+        ),
+    )
+    seed: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "Seed of all random numbers: the same seed gives the same result.",
+            shown="0, or a distribution's",
+            limits=(0, MAX_SEED),
+        ),
+    )
+    keep: int = field(
+        default=10,
+        metadata=option(WHOLE, "Number of critical scenarios to export.", limits=(0, MAX_KEEP)),
+    )
+    simulator: SimulatorChoice = field(
+        default=EMBEDDED,
+        metadata=option(SIMULATOR, "Simulator that runs the scenarios.", before=EMBEDDED),
+    )
+    causes: bool = field(default=True, metadata=_CAUSES)

@@ -1,0 +1,118 @@
+"""Settings that runs recorded: each form is read, and is written as it was."""
+
+import copy
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from bridgegen.campaign.settings import DEFAULTS_BEFORE_FIELD, Settings
+from bridgegen.errors import StorageError
+from bridgegen.simulation.choice import EMBEDDED
+
+PLACE = Path("runs/s3")
+RECORDED = {
+    "scenario": "crossroads-s3", "distribution": None, "fingerprint": "2be684d9",
+    "algorithm": "pso", "algorithm_settings": {"population": 20, "w": 0.8, "mutate_best": True},
+    "budget": 60, "seed": 3, "ego": "reference", "ideal": ["perception", "prediction"],
+    "time_limit": None, "axes": ["participants", "weather"], "fixed": {"fog_density": 80.0},
+    "map": "/maps/town.xodr", "map_digest": "ab12", "junction": "965", "keep": 2, "causes": True,
+    "cause": "planning", "adversary": "bv", "others": "attentive", "simulator": "esmini",
+    "simulator_settings": {"steps": 4},
+    "objective": {
+        "names": ["d_min", "ttc"], "weights": [0.5, 1.0], "scale": "raw", "objectives": "one",
+        "thresholds": {"n_collision_above": 0.0, "d_min_below": 2.0, "v_d_at_least": 1.0},
+        "low": [], "span": [], "rule": "thresholds", "count": "ego",
+    },
+    "chosen": {
+        "objective": {"d_min": 0.5, "ttc": None}, "weights": "entropy", "scale": "raw",
+        "objectives": "one", "count": "any", "metrics": ["pet"],
+    },
+}  # fmt: skip
+"""As a run of the version before `SearchOptions` recorded its settings."""
+
+
+def record(**changes):
+    return copy.deepcopy(RECORDED) | changes
+
+
+def test_a_record_is_read_and_written_as_it_was():
+    settings = Settings.from_dict(RECORDED, PLACE)
+    assert settings.to_dict() == RECORDED
+    assert (settings.budget, settings.settings["w"], settings.road_map) == (
+        60,
+        0.8,
+        "/maps/town.xodr",
+    )
+    assert settings.objective == {"d_min": 0.5, "ttc": None}
+    assert settings.optimised["weights"] == [0.5, 1.0]
+    assert (settings.simulator.name, settings.simulator.settings) == ("esmini", {"steps": 4})
+
+
+def test_what_a_run_of_the_first_version_did_not_record_is_what_it_was_made_with():
+    old = record(chosen={"objective": None})
+    later = ("distribution", "ideal", "causes", "cause", "adversary", "others", "simulator",
+             "simulator_settings")  # fmt: skip
+    for name in later:
+        del old[name]
+    settings = Settings.from_dict(old, PLACE)
+    assert (settings.others, settings.causes, settings.ideal) == ("scripted", False, ())
+    assert settings.simulator == EMBEDDED
+    assert (settings.weights, settings.count, settings.metrics) == (None, None, ())
+    assert {*DEFAULTS_BEFORE_FIELD} - {"weights", "scale", "objectives", "count", "metrics"} == {
+        *later
+    } - {"simulator_settings"}
+
+
+def test_its_command_has_every_option():
+    words = shlex.split(Settings.from_dict(RECORDED, PLACE).command(Path("again")))
+    text = " ".join(words)
+    assert text.startswith("bridgegen search crossroads-s3 --algorithm pso --set population=20 ")
+    for said in (
+        "--set mutate_best=true", "--budget 60", "--seed 3", "--ego reference",
+        "--ideal perception,prediction", "--axes participants,weather", "--fix fog_density=80.0",
+        "--map /maps/town.xodr", "--junction 965", "--keep 2", "--cause planning",
+        "--adversary bv", "--others attentive", "--simulator esmini", "--simulator-set steps=4",
+        "--objective d_min=0.5,ttc", "--weights entropy", "--scale raw", "--objectives one",
+        "--count any", "--metrics pet",
+    ):  # fmt: skip
+        assert f" {said} " in text, said
+    assert "--causes" not in text  # the default
+    assert "--time-limit" not in text
+    assert words[-2:] == ["--out", "again"]
+    file = Settings.from_dict(record(ego="storyboard", causes=False, cause=None), PLACE)
+    assert "--ego" not in file.command(PLACE)
+    assert "--no-causes" in file.command(PLACE)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"budget": None}, "budget: "),
+        ({"budget": 0}, "1 <= budget <= 10000000 must hold, got 0"),
+        ({"seed": 1.0}, "seed: "),
+        ({"ideal": "perception"}, "ideal: "),
+        ({"fixed": {"fog_density": float("nan")}}, "fixed.fog_density: "),
+        ({"algorithm_settings": []}, "algorithm_settings: "),
+        ({"map": 5}, "map"),
+        ({"chosen": []}, "chosen: must be an object"),
+        ({"chosen": {"objective": None, "count": 3}}, "count: "),
+        ({"chosen": {"objective": None, "keep": 3}}, "unknown or missing: chosen.keep"),
+        ({"road_map": "/other.xodr"}, "unknown or missing: 'road_map'"),
+        ({"weights": "entropy"}, "unknown or missing: 'weights'"),
+        ({"later": 1}, "unknown or missing: later"),
+        ({"scenario": "a\0b"}, "a text holds NUL, or more than 4096 characters"),
+        ({"ego": "x" * 5000}, "a text holds NUL, or more than 4096 characters"),
+        ({"simulator": "esmini3"}, "unknown simulator 'esmini3'"),
+    ],
+)  # fmt: skip
+def test_what_is_no_record_is_refused(changes, message):
+    with pytest.raises(StorageError, match=f"^runs/s3: .*{re.escape(message)}"):
+        Settings.from_dict(record(**changes), PLACE)
+
+
+@pytest.mark.parametrize("name", ["budget", "time_limit", "chosen", "objective", "map_digest"])
+def test_what_every_run_recorded_must_be_there(name):
+    with pytest.raises(StorageError):
+        Settings.from_dict({key: one for key, one in RECORDED.items() if key != name}, PLACE)

@@ -1,0 +1,121 @@
+"""An option of a run is declared once; keywords, command lines and texts follow from it."""
+
+import inspect
+import shlex
+import sys
+from dataclasses import fields, replace
+
+import pytest
+
+import bridgegen as bg
+from bridgegen.cli import comparisons, main, runs
+from bridgegen.errors import InputError
+from bridgegen.options import CommonOptions, PipelineOptions, SearchOptions, options_of
+from bridgegen.options.forms import read_names, read_numbers, read_settings, read_terms
+from bridgegen.simulation.choice import SimulatorChoice
+
+DECLARED = {one.name: one for one in options_of(SearchOptions)}
+
+
+def line(options):
+    return [
+        word for one in options_of(type(options)) for word in one.words(getattr(options, one.name))
+    ]
+
+
+@pytest.mark.parametrize("kind", [PipelineOptions, CommonOptions, SearchOptions])
+def test_every_field_is_an_option_and_says_what_it_means(kind):
+    assert {one.name for one in options_of(kind)} == {one.name for one in fields(kind)}
+    for one in options_of(kind):
+        assert one.help.endswith("."), one.name
+        assert one.spelling.startswith("--"), one.name
+
+
+def test_keywords_are_those_of_the_options():
+    search = inspect.signature(bg.run_search).parameters
+    assert {one.name for one in fields(SearchOptions)} < {*search}
+    assert next(iter(search)) == "scenario"
+    assert search["causes"].default is True
+    compare = inspect.signature(bg.compare).parameters
+    assert {one.name for one in fields(CommonOptions)} < {*compare}
+    assert "keep" not in compare
+    assert compare["causes"].default is False
+    for function, parameters in ((bg.run_search, search), (bg.compare, compare)):
+        described = inspect.getdoc(function).partition("Args:")[2].partition("Returns:")[0]
+        assert [text.split(":")[0].strip() for text in described.strip().splitlines()] == [
+            *parameters
+        ]
+
+
+def test_a_keyword_that_there_is_not_is_refused():
+    with pytest.raises(TypeError, match="bugdet"):
+        bg.run_search("crossroads-s4", bugdet=10)
+
+
+def test_the_command_line_has_them_all():
+    search = inspect.signature(runs.search).parameters
+    assert {*DECLARED} - {*search} == set()
+    compare = inspect.signature(comparisons.compare).parameters
+    assert {one.name for one in options_of(CommonOptions)} - {*compare} == set()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        SearchOptions(),
+        SearchOptions(
+            algorithm="random", budget=7, seed=3, keep=0, settings={"w": 0.5, "on": True, "as": "x"}
+        ),
+        SearchOptions(ego="my driver.py:It's", ideal=["control", "perception"], time_limit=2.5),
+        SearchOptions(axes=["static", "weather"], fixed={"fog_density": 1e-3}, causes=False),
+        SearchOptions(objective={"d_min": 0.25, "ttc": 1.0}, scale="standardised", metrics=["pet"]),
+        SearchOptions(objective={"d_min": None, "ttc": None}, weights="entropy", cause="planning"),
+        SearchOptions(objectives="many", road_map="town.xodr", junction="965", adversary="bv"),
+        SearchOptions(others="scripted", count="any", distribution="d.xosc"),
+        SearchOptions(simulator=SimulatorChoice("esmini", {"steps": 4})),
+    ],
+)
+def test_options_are_what_their_command_line_says(options, monkeypatch):
+    found = {}
+
+    def keep(scenario, *, out, workers, watch, **given):
+        found.update(given)
+        raise InputError("not today")
+
+    monkeypatch.setattr("bridgegen.campaign.run_search", keep)
+    words = shlex.split(shlex.join(["bridgegen", "search", "crossroads-s4", *line(options)]))
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit):
+        main()
+    paths = {name: found[name] and str(found[name]) for name in ("road_map", "distribution")}
+    assert SearchOptions(**found | paths) == options
+
+
+def test_options_keep_what_they_are_given_as_values():
+    names, numbers = ["perception"], {"fog_density": 80.0}
+    options = SearchOptions(ideal=names, fixed=numbers)
+    names.append("control")
+    numbers["rain"] = 1.0
+    assert (options.ideal, options.fixed) == (("perception",), {"fog_density": 80.0})
+
+
+def test_a_part_of_the_options_and_back():
+    options = SearchOptions(ego="reference", causes=True, budget=5)
+    part = PipelineOptions.of(options, ego=None)
+    assert part == PipelineOptions(causes=True)
+    assert SearchOptions.of(part, budget=5) == replace(options, ego=None)
+
+
+def test_texts_of_the_command_line():
+    assert read_names(" a, b,") == ["a", "b"]
+    assert read_names(None) == []
+    assert read_settings(["a=1", "b=true", "c=x", "d=[1]"], "--set") == {
+        "a": 1, "b": True, "c": "x", "d": "[1]"
+    }  # fmt: skip
+    assert read_terms("d_min=0.5,ttc", "--objective") == {"d_min": 0.5, "ttc": None}
+    with pytest.raises(InputError) as refused:
+        read_numbers(["a", "b=x", "c=1"], "--fix")
+    assert refused.value.problems == (
+        "--fix must read NAME=NUMBER, got 'a'",
+        "--fix must read NAME=NUMBER, got 'b=x'",
+    )
