@@ -1,5 +1,6 @@
 """A plan's command line is the plan; and what its runs are made with."""
 
+import json
 import shlex
 import sys
 
@@ -87,6 +88,14 @@ def test_a_mistake_that_made_no_run_binds_nobody(tmp_path):
     folder = made.folder(made.cells[0])
     folder.mkdir()
     (folder / "run.sqlite").touch()
+    begin(made)
+    with pytest.raises(StorageError, match='others was null, is "attentive"'):
+        begin(plan(out=out, ego="reference", others="attentive"))
+    without = json.loads((out / "compare.json").read_text("utf-8"))
+    del without["others"]  # as comparisons were recorded that could not choose them
+    (out / "compare.json").write_text(json.dumps(without), "utf-8")
+    with pytest.raises(StorageError, match='others was null, is "attentive"'):
+        begin(plan(out=out, ego="reference", others="attentive"))
     begin(made)
     (out / "compare.json").write_text("[]", "utf-8")
     with pytest.raises(StorageError, match="the file is damaged"):

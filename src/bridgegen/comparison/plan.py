@@ -147,8 +147,7 @@ class Plan:
         for name, settings in self.algorithms.items():
             known = {key: one.default for key, one in toolkit.get(name).settings.items()}
             same[f"settings of {name}"] = {**known, **settings}
-        plain: dict[str, Any] = json.loads(json.dumps(same))
-        return plain
+        return _plain(same)
 
 
 def make_plan(
@@ -231,15 +230,23 @@ def begin(plan: Plan) -> None:
     if not any(plan.out.glob(f"{RUNS}/*/{RUN_FILE}")):
         before = None  # no run has been made: there is nothing to fit to
     before = before or {}
-    differ = [name for name in mine if name in before and before[name] != mine[name]]
+    # An option that did not exist then had its default.
+    made_with = {**_plain(asdict(CommonOptions())), **before} if before else {}
+    differ = [name for name in mine if name in made_with and made_with[name] != mine[name]]
     if differ:
-        told = ", ".join(_difference(name, before[name], mine[name]) for name in differ)
+        told = ", ".join(_difference(name, made_with[name], mine[name]) for name in differ)
         raise StorageError(
             f"{plan.out}: holds a comparison that was made otherwise, and runs of both cannot be "
             f"compared: {told}; choose another --out"
         )
     text = json.dumps({**before, **mine}, indent=1)
     write_whole(file, [text.encode()])
+
+
+def _plain(value: Any) -> dict[str, Any]:
+    """Return an object as JSON has it."""
+    plain: dict[str, Any] = json.loads(json.dumps(value))
+    return plain
 
 
 def _difference(name: str, before: Any, now: Any) -> str:
