@@ -41,7 +41,7 @@ _TABLE_I = (
 
 _BEYOND = (pet, drac, btn, thw, tet, tit, rss)
 
-_OURS = {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
+_OURS: dict[str, Metric] = {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
 
 ADDED = PlugIns("metric", "bridgegen.metrics")
 
