@@ -58,6 +58,28 @@ def test_the_cache_lies_in_the_user_s_cache_folder(tmp_path):
     assert folder(HOME=str(tmp_path)).is_relative_to(tmp_path / ".cache" / "bridgegen")
 
 
+SOURCES = """
+from bridgegen import kernel_cache
+print(*sorted(one.name for one in kernel_cache._sources()))
+"""
+
+
+def test_a_constant_that_kernels_take_from_elsewhere_counts(tmp_path):
+    """Numba bakes it into the code: with another value, the code is another."""
+    shutil.copytree(Path(bridgegen.__file__).parent, tmp_path / "bridgegen")
+    environment = {"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)}
+    named = result(begin(SOURCES, **environment)).split()
+    assert {"_rollout_kernels.py", "_codes.py", "kinds.py", "detections.py"} <= set(named)
+    before = folder(**environment)
+    detections = tmp_path / "bridgegen" / "ego" / "detections.py"
+    detections.write_text(detections.read_text("utf-8") + "\nANOTHER = 1.0\n", "utf-8")
+    after = folder(**environment)
+    assert after != before
+    elsewhere = tmp_path / "bridgegen" / "cli" / "app.py"
+    elsewhere.write_text(elsewhere.read_text("utf-8") + "\n", "utf-8")
+    assert folder(**environment) == after
+
+
 def test_the_user_may_say_where(tmp_path):
     assert folder(NUMBA_CACHE_DIR=str(tmp_path / "mine")).is_relative_to(tmp_path / "mine")
 

@@ -2,15 +2,17 @@
 
 Numba keys its cache by the file of the compiled function alone, so a change in a kernel that it
 calls from another file would go unnoticed. Here the cache folder's name is a digest of the source
-of every private module beside a kernel, all that kernels read: change one, and all are compiled
-again. Nothing else of the folder's path depends on where the package is installed: each new virtual
-environment, clone and CI job of the same source finds what an earlier one compiled.
+of every private module beside a kernel, and of the modules that those take constants from: change
+one, and all are compiled again. Nothing else of the folder's path depends on where the package is
+installed: each new virtual environment, clone and CI job of the same source finds what an earlier
+one compiled.
 
 The cache holds pickles and machine code, so only a folder of this user's own is read.
 """
 
 import hashlib
 import os
+import re
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
@@ -27,6 +29,9 @@ from numba.core.compiler_lock import global_compiler_lock
 
 PACKAGE = Path(__file__).parent
 
+IMPORTED = re.compile(r"^ *from bridgegen\.([\w.]+) import", re.MULTILINE)
+"""A module of ours that another one imports from."""
+
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path:
@@ -38,8 +43,7 @@ def cache_folder() -> Path:
     """
     versions = (numba.__version__, llvmlite.__version__, np.__version__)
     digest = hashlib.sha256(" ".join(versions).encode())
-    homes = {kernels.parent for kernels in PACKAGE.rglob("_*_kernels.py")}
-    for source in sorted(one for home in homes for one in home.glob("_[!_]*.py")):
+    for source in sorted(_sources()):
         digest.update(source.read_bytes())
     name = f"kernels-{digest.hexdigest()[:16]}"
     chosen = os.environ.get("NUMBA_CACHE_DIR")
@@ -53,6 +57,20 @@ def cache_folder() -> Path:
     if _is_writable(shared) and _is_ours(shared) and _is_writable(shared / name):
         return shared / name
     return _for_this_process()
+
+
+def _sources() -> set[Path]:
+    """Return the files of the kernels, and of all modules that they take constants from."""
+    homes = {kernels.parent for kernels in PACKAGE.rglob("_*_kernels.py")}
+    found = {one for home in homes for one in home.glob("_[!_]*.py")}
+    new = list(found)
+    while new:
+        for module in IMPORTED.findall(new.pop().read_text(encoding="utf-8")):
+            source = PACKAGE.joinpath(*module.split(".")).with_suffix(".py")
+            if source.is_file() and source not in found:
+                found.add(source)
+                new.append(source)
+    return found
 
 
 def is_compiled() -> bool:

@@ -1,13 +1,15 @@
 """What installed packages add to BridgeGen, by entry points: algorithms, metrics, simulators."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterator, MutableMapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from bridgegen.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+Kind = TypeVar("Kind")
 
 
 @dataclass(frozen=True)
@@ -68,3 +70,51 @@ class PlugIns:
             if all(point.value != other.value for other in found.setdefault(point.name, [])):
                 found[point.name].append(point)
         return found
+
+
+class Registry(MutableMapping[str, Kind]):
+    """Ours by name, then those of installed packages, which are imported when they are asked for.
+
+    Where both have a name, it is ours.
+
+    Args:
+        ours: by name.
+        added: where packages add theirs.
+        check: makes one of what a package offers, given with its name.
+    """
+
+    def __init__(
+        self, ours: dict[str, Kind], added: PlugIns, check: Callable[[Any, str], Kind]
+    ) -> None:
+        self._ours, self._added, self._check = ours, added, check
+        self._loaded: dict[str, Kind] = {}
+
+    def __getitem__(self, name: str) -> Kind:
+        """Return one by name.
+
+        Raises:
+            KeyError: there is none.
+            InputError: a package's that cannot be loaded, or is not what it should be.
+        """
+        if name in self._ours:
+            return self._ours[name]
+        if name not in self._loaded:
+            if name not in self._added.names(self._ours):
+                raise KeyError(name)
+            self._loaded[name] = self._check(self._added.load(name, self._ours), name)
+        return self._loaded[name]
+
+    def __setitem__(self, name: str, one: Kind) -> None:
+        self._ours[name] = one
+
+    def __delitem__(self, name: str) -> None:
+        del self._ours[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._ours or name in self._added.names(self._ours)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._added.names(self._ours))
+
+    def __len__(self) -> int:
+        return len(self._added.names(self._ours))

@@ -9,7 +9,7 @@ import pytest
 from bridgegen import metrics
 from bridgegen.conflict import quantities
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.metrics import Metric, registry
+from bridgegen.metrics import Metric
 from bridgegen.simulation.rollout import Rollout
 
 
@@ -32,7 +32,7 @@ ALL_NAN = made("all_nan", lambda rollout: np.full(rollout.shape[0], np.nan))
 def installed(monkeypatch):
     """Pretend that a package declares these entry points."""
     sys.modules.setdefault(__name__, sys.modules[__name__])
-    monkeypatch.setattr(metrics.METRICS, "_known", dict(registry._OURS))
+    monkeypatch.setattr(metrics.METRICS, "_loaded", {})
 
     def declare(**points: str) -> None:
         found = EntryPoints(

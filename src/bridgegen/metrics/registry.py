@@ -3,7 +3,7 @@
 Or a package's: an entry point of the group ``bridgegen.metrics``.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +31,7 @@ from bridgegen.metrics import (
     v_d,
 )
 from bridgegen.metrics.metric import Metric
-from bridgegen.plugins import PlugIns
+from bridgegen.plugins import PlugIns, Registry
 from bridgegen.simulation.rollout import Rollout
 
 _TABLE_I = (
@@ -46,36 +46,12 @@ _OURS: dict[str, Metric] = {module.METRIC.name: module.METRIC for module in (*_T
 ADDED = PlugIns("metric", "bridgegen.metrics")
 
 
-class _Metrics(Mapping[str, Metric]):
-    """Ours, and those of installed packages, which are imported when they are asked for."""
-
-    def __init__(self) -> None:
-        self._known = dict(_OURS)
-
-    def __getitem__(self, name: str) -> Metric:
-        if name not in self._known:
-            if name not in ADDED.names(_OURS):
-                raise KeyError(name)
-            self._known[name] = _added(name)
-        return self._known[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._known or name in ADDED.names(_OURS)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(ADDED.names(_OURS))
-
-    def __len__(self) -> int:
-        return len(ADDED.names(_OURS))
-
-
-def _added(name: str) -> Metric:
+def _checked(found: object, name: str) -> Metric:
     """Return a package's metric, whose results are checked.
 
     Raises:
-        InputError: it cannot be loaded, or is no metric of that name.
+        InputError: it is no metric of that name.
     """
-    found = ADDED.load(name, _OURS)
     if not isinstance(found, Metric):
         raise InputError(
             f"{ADDED.place(name)} must be a bridgegen.metrics.Metric, got {type(found).__name__}"
@@ -108,7 +84,7 @@ def _added(name: str) -> Metric:
     return replace(found, compute=compute)
 
 
-METRICS: Mapping[str, Metric] = _Metrics()
+METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 """In the order of Table I, then ours beyond it, then those of installed packages."""
 
 TABLE_I = tuple(module.METRIC.name for module in _TABLE_I)

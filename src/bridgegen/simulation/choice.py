@@ -1,10 +1,11 @@
 """Which simulator runs a scenario, and how; what is asked for on the command line."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.plugins import PlugIns, Registry
 from bridgegen.simulation.carla.settings import MEANINGS as CARLA_SETTINGS
 from bridgegen.simulation.carla.settings import OPTIONS as CARLA_OPTIONS
 from bridgegen.simulation.carla.settings import Access as CarlaAccess
@@ -80,7 +81,7 @@ def _carla(
     return CarlaSimulator(embedded, storyboard, settings=chosen, access=where)
 
 
-SIMULATORS: Mapping[str, Kind] = {
+_OURS = {
     one.name: one
     for one in (
         Kind(
@@ -105,6 +106,30 @@ SIMULATORS: Mapping[str, Kind] = {
         ),
     )
 }
+
+ADDED = PlugIns("simulator", "bridgegen.simulators")
+
+
+def _checked(found: object, name: str) -> Kind:
+    """Return a package's simulator.
+
+    Raises:
+        InputError: it is no `Kind` of that name.
+    """
+    if not isinstance(found, Kind):
+        raise InputError(
+            f"{ADDED.place(name)} must be a bridgegen.simulation.choice.Kind, got "
+            f"{type(found).__name__}"
+        )
+    if found.name != name:
+        raise InputError(
+            f"{ADDED.place(name)} calls itself '{found.name}'; the two names must agree"
+        )
+    return found
+
+
+SIMULATORS: MutableMapping[str, Kind] = Registry(_OURS, ADDED, _checked)
+"""Ours, then those of installed packages."""
 
 
 @dataclass(frozen=True)

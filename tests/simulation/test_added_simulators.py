@@ -1,0 +1,73 @@
+"""Simulators that installed packages add."""
+
+import sys
+from importlib.metadata import EntryPoint, EntryPoints
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.simulation import choice
+from bridgegen.simulation.choice import Kind, SimulatorChoice
+
+OURS = Kind(
+    "twin",
+    "The embedded one again, under another name.",
+    lambda embedded, storyboard, settings, access: embedded,
+    settings={"delay": "how long it waits [s]"},
+)
+
+
+@pytest.fixture
+def installed(monkeypatch):
+    """Pretend that a package declares these entry points."""
+    sys.modules.setdefault(__name__, sys.modules[__name__])
+    monkeypatch.setattr(choice.SIMULATORS, "_loaded", {})
+
+    def declare(**points: str) -> None:
+        found = EntryPoints(
+            EntryPoint(name, f"{__name__}:{value}", "bridgegen.simulators")
+            for name, value in points.items()
+        )
+
+        def entry_points(**which: str) -> EntryPoints:
+            return found.select(**which)
+
+        monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
+
+    return declare
+
+
+def test_a_search_runs_in_a_package_s_simulator(installed, tmp_path):
+    installed(twin="OURS")
+    there, here = (
+        bg.run_search(
+            "crossroads-s4", algorithm="random", budget=20, ego="route-follower", deliver=False,
+            out=tmp_path / name, simulator=SimulatorChoice(name), causes=False,
+        ).frame()
+        for name in ("twin", "embedded")
+    )  # fmt: skip
+    np.testing.assert_array_equal(there["d_min"], here["d_min"])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("gone", "Nothing", "cannot be loaded: AttributeError"),
+        ("not_one", "test_a_package_that_is_wrong_is_named", "must be a .*Kind, got function"),
+        ("other", "OURS", "calls itself 'twin'"),
+    ],
+)
+def test_a_package_that_is_wrong_is_named(installed, name, value, message):
+    installed(**{name: value})
+    with pytest.raises(InputError, match=f"simulator '{name}'.*{message}"):
+        SimulatorChoice(name)
+
+
+def test_settings_and_names_are_checked(installed):
+    installed(twin="OURS")
+    with pytest.raises(UnknownNameError, match="did you mean 'delay'"):
+        SimulatorChoice("twin", {"dilay": 1.0})
+    with pytest.raises(UnknownNameError, match="did you mean 'twin'"):
+        SimulatorChoice("twim")
