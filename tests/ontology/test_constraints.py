@@ -362,6 +362,36 @@ def test_individuals_of_random_rows_keep_all_rules(name):
         assert check(individuals, scenario) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "law", "rules"),
+    [
+        ("crossroads-s2", "speed and path", {"bend-of-junction"}),
+        ("crossroads-s3", "speed and path", {"bend-of-junction"}),
+        ("roundabout-entry", "speed and path", {"bend-of-ring"}),
+        ("cyclist-right-turn", "constrain participants)", {"speed-limit"}),
+        ("jam-tail-in-fog", "restricts roads", {"closed-by-fog_density", "closed-by-precipitation"}),
+    ],
+)
+def test_decoder_and_sparql_draw_the_line_between_layers_at_the_same_place(name, law, rules):
+    """The rules between layers are written for both; a value just within breaks neither."""
+    scenario = load(name)
+    space = scenario.space(axes=list(Axis))
+    found = set()
+    for row in space.decode(np.random.default_rng(5).random((2, space.n_var))):
+        values = dict(space.values(row))
+        for bound in scenario.bounds:
+            if law not in bound.source:
+                continue
+            most = float(bound.hi.evaluate(values))
+            for factor in (0.999, 1.001):
+                changed = values | {bound.target: factor * most}
+                judged = check(build(scenario, changed, driver="reference"), scenario)
+                broken = {r.key for r in conduct_rules() for one in judged if r.why in one.message}
+                assert bool(broken & rules) == (factor > 1.0), (bound.target, most, judged)
+                found |= broken & rules
+    assert found == rules
+
+
 @pytest.mark.parametrize("name", names())
 def test_properties_belong_to_what_has_them(name):
     """Else a reasoner takes the individual for something that it is not."""
