@@ -64,6 +64,19 @@ print(*sorted(one.name for one in kernel_cache._sources()))
 """
 
 
+FULL = """
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+"""
+
+
+def test_a_full_disk_costs_the_cache_only(tmp_path):
+    """A limit on file sizes stands for the full disk."""
+    (tmp_path / "mine.py").write_text(MINE)
+    assert result(begin(FULL + COMPILES, tmp_path, HOME=str(tmp_path))) == "1"
+
+
 def test_a_constant_that_kernels_take_from_elsewhere_counts(tmp_path):
     """Numba bakes it into the code: with another value, the code is another."""
     shutil.copytree(Path(bridgegen.__file__).parent, tmp_path / "bridgegen")

@@ -145,6 +145,11 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
             found = self._load(signature, context)
         return found
 
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Keep the compiled code of a signature, if it can be written: else the next run compiles."""
+        with suppress(OSError):
+            super().save_overload(signature, data)
+
     def _load(self, signature: Any, context: Any) -> Any:
         try:
             return super().load_overload(signature, context)

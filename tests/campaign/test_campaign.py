@@ -39,7 +39,7 @@ def same(a, b) -> bool:
 
 def variants():
     yield pytest.param({"scenario": "crossroads-s4"}, id="s4")
-    yield pytest.param({"scenario": "crossroads-s1", "ego": "reference"}, id="reference")
+    yield pytest.param({"scenario": "crossroads-s2", "ego": "reference"}, id="reference")
     yield pytest.param({"scenario": "crossroads-s3", "algorithm": "random"}, id="random")
     yield pytest.param(
         {"scenario": "crossroads-s2", "axes": ["static", "participants", "weather"]}, id="static"

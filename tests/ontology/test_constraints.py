@@ -369,7 +369,11 @@ def test_individuals_of_random_rows_keep_all_rules(name):
         ("crossroads-s3", "speed and path", {"bend-of-junction"}),
         ("roundabout-entry", "speed and path", {"bend-of-ring"}),
         ("cyclist-right-turn", "constrain participants)", {"speed-limit"}),
-        ("jam-tail-in-fog", "restricts roads", {"closed-by-fog_density", "closed-by-precipitation"}),
+        (
+            "jam-tail-in-fog",
+            "restricts roads",
+            {"closed-by-fog_density", "closed-by-precipitation"},
+        ),
     ],
 )
 def test_decoder_and_sparql_draw_the_line_between_layers_at_the_same_place(name, law, rules):

@@ -92,7 +92,8 @@ class Settings(SearchOptions):
                 raise InputError(*problems)
         except ValidationError as error:
             first = error.errors(include_input=False, include_url=False)[0]
-            where = ".".join([RECORDED_AS.get(name, name), *map(str, first["loc"])])
+            inside = [str(one) for one in first["loc"] if one not in ("float", "str")]
+            where = ".".join([RECORDED_AS.get(name, name), *inside])
             what = f"{where}: {first['msg']}"
             raise StorageError(f"{place}: the run's settings are damaged: {what}") from None
         except (InputError, ValueError) as error:
