@@ -63,10 +63,10 @@ class Burner:
         return np.repeat(X[:, :1], 11, axis=1)
 
 
-def seconds(crew: Workers, burner: Burner, X: Float) -> float:
+def seconds(pool: Workers, burner: Burner, X: Float) -> float:
     """Return what a batch takes [s]."""
     start = time.perf_counter()
-    crew.map(burner, "burn", X)
+    pool.map(burner, Burner.burn, X)
     return time.perf_counter() - start
 
 
@@ -80,11 +80,11 @@ def speedup(pairs: int = 7) -> tuple[float, float, float]:
     return float(np.median(ratios)), min(ratios), max(ratios)
 
 
-def overhead(crew: Workers, chunks: int = 200) -> float:
+def overhead(pool: Workers, chunks: int = 200) -> float:
     """Return what a chunk takes that has nothing to do [s], one after the other."""
     X, burner = np.zeros((1, 10)), Burner(0.0, 1)
-    seconds(crew, burner, X)
-    return min(sum(seconds(crew, burner, X) for _ in range(chunks)) / chunks for _ in range(3))
+    seconds(pool, burner, X)
+    return min(sum(seconds(pool, burner, X) for _ in range(chunks)) / chunks for _ in range(3))
 
 
 @contextmanager
@@ -113,11 +113,11 @@ def together(campaigns: int, batches: int = 5) -> tuple[float, float]:
     ready = threading.Barrier(campaigns + 1)
 
     def campaign() -> None:
-        with open_workers("ray") as crew:
-            seconds(crew, Burner(0.0), X)
+        with open_workers("ray") as pool:
+            seconds(pool, Burner(0.0), X)
             ready.wait()
             for _ in range(batches):
-                seconds(crew, burner, X)
+                seconds(pool, burner, X)
             ends.append(time.perf_counter())
 
     threads = [threading.Thread(target=campaign) for _ in range(campaigns)]
@@ -145,9 +145,9 @@ def workers() -> list[tuple[str, str, str]]:
     if importlib.util.find_spec("ray") is None:
         return [*told, ("a Ray cluster", "no Ray", "≤ 10 ms a chunk")]
     with cluster():
-        with open_workers("ray") as crew:
+        with open_workers("ray") as pool:
             told.append(
-                ("a chunk that does nothing, Ray, ms", f"{1e3 * overhead(crew):.2f}", "≤ 10")
+                ("a chunk that does nothing, Ray, ms", f"{1e3 * overhead(pool):.2f}", "≤ 10")
             )
         alone, _ = together(1)
         ten, first = together(10)

@@ -1,13 +1,13 @@
-"""The job in one file: rows of X → scenarios → rollouts → metrics → objectives → causes.
+"""The evaluation in one file: rows of X → scenarios → rollouts → metrics → objectives → causes.
 
 Read this first. `Pipeline.evaluate_rows` is the whole path of a batch, one line per stage;
 everything else here prepares it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self, TypeVar, TypeVarTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,10 +37,13 @@ from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
 
 FAR_ROWS = 8
-"""Rows that a worker is given at a time whose simulator only its machine has."""
+"""Rows per chunk if only the workers' machines have the simulator."""
 
 SAMPLE = 400
-"""Random scenarios from which weights and scales are taken, where an objective needs them."""
+"""Random scenarios that set an objective's weights and scales where it needs a sample."""
+
+Result = TypeVar("Result")
+Args = TypeVarTuple("Args")
 
 
 class Pipeline:
@@ -52,11 +55,11 @@ class Pipeline:
         driver: the ego's driver.
         source: makes its concrete scenarios.
         objective: set by ``choose_objective``.
-        metrics: the names of all metrics that are recorded: what was asked for and what the
+        metrics: the names of all metrics that are recorded: those requested, and those that the
             objective and the thresholds need.
-        simulator: holds the scenario's storyboard. The embedded one, where another is asked for and
-            only the workers' machines have it.
-        cause: the only one that makes a scenario count as critical, if one was asked for.
+        simulator: runs the scenario's storyboard; the embedded one if only the workers' machines
+            have the chosen one.
+        cause: the only one that makes a scenario count as critical, if one was requested.
         seeks_causes: whether ``evaluate`` finds causes.
     """
 
@@ -79,16 +82,17 @@ class Pipeline:
             scenario: the logical scenario.
             space: its search space.
             options: how its rows are evaluated; the defaults by default.
-            road_map: the map that it takes place on; its own road network by default.
+            road_map: the map to use; the scenario's own road network by default.
             recorded: the names of all metrics to record, CLASSIFYING and the objective's among
                 them; what ``metrics_of`` says by default.
-            simulator: which one runs the scenarios.
-            workers: who evaluates; threads by default, one for each core. No result depends on it.
+            simulator: runs the scenarios.
+            workers: evaluate the rows; threads by default, one per core. Results do not depend on
+                them.
 
         Raises:
             UnknownNameError: no such driver or metric.
             InputError: a metric, or harm by the cause, does not exist with this driver; or the
-                simulator is not where it should be.
+                simulator is unavailable.
         """
         self.scenario = scenario
         self.space = space
@@ -110,7 +114,7 @@ class Pipeline:
         near = EMBEDDED if self._is_far else simulator
         self.simulator: Simulator[Any] = near.simulator(nominal.storyboard, scenario.name, driver)
         self.driver = self.simulator.embedded.program.driver
-        if driver is None and self.driver != egos.STORYBOARD:  # the file's choice is written, too
+        if driver is None and self.driver != egos.STORYBOARD:  # write the file's choice, too
             self.source = _source(scenario, self.driver, road_map, space)
         if self.cause is not None:
             require(self.cause, self.driver)
@@ -126,7 +130,7 @@ class Pipeline:
 
     @cached_property
     def recipe(self) -> Recipe:
-        """Makes this pipeline in a worker, but for the objective, which is given with the rows."""
+        """Builds this pipeline in a worker, without the objective, which is sent with the rows."""
         ego = self._options.ego
         carried = CarriedDriver.of(ego) if ego else None
         options = replace(self._options, ego=None)
@@ -134,32 +138,32 @@ class Pipeline:
 
     @property
     def rows_at_once(self) -> int:
-        """How many rows a worker had best be given; see `Simulator`."""
+        """The number of rows of a chunk that is fastest; see `Simulator`."""
         return FAR_ROWS if self._is_far else self.simulator.rows_at_once
 
     @property
     def runs_at_once(self) -> int:
-        """How many threads had best work on rows; see `Simulator`."""
+        """The number of threads that is fastest; see `Simulator`."""
         return self.simulator.runs_at_once
 
     @property
     def device(self) -> str:
-        """What a worker needs one of; see `bridgegen.simulation.choice.Kind`."""
+        """The device that each worker needs; see `bridgegen.simulation.choice.Kind`."""
         return self._simulated_by.device
 
     def arena(self) -> Arena:
-        """Return where an agent drives the adversary's participant in closed loop.
+        """Return the arena in which an agent drives the adversary's participant in closed loop.
 
         Raises:
-            InputError: there is no adversary, or the ego's driver cannot be asked instant by
-                instant; or another simulator than the embedded one is to run it.
+            InputError: there is no adversary, the ego's driver cannot be called step by step, or
+                the simulator is not the embedded one.
         """
         if not isinstance(self.source, AdversarySource):
-            raise InputError(f"{self.scenario.place}: no adversary drives anybody")
+            raise InputError(f"{self.scenario.place}: no participant is driven by an adversary")
         if self._is_far or self.simulator is not self.simulator.embedded:
             raise InputError(
                 f"{self.scenario.place}: an agent drives in closed loop in the embedded simulator "
-                "alone; search there, and confirm elsewhere what it finds"
+                "only; search there, and confirm its results in another simulator"
             )
         return Arena(self.source, self.simulator.embedded, self.space)
 
@@ -170,13 +174,13 @@ class Pipeline:
         objectives: Objectives = "one",
         seed: int = 0,
     ) -> Objective:
-        """Set the objective: the given one, or the scenario's, sampled where it says so.
+        """Set the objective: the given one, or the scenario's, with a random sample if needed.
 
         Args:
             objective: as an earlier run recorded it.
             objectives: "one", the terms' weighted sum, or "many", one for each term.
-            seed: of the random sample that entropy weights and scales are taken from. Its
-                scenarios are not part of the search and not charged to its budget.
+            seed: of the random sample that sets entropy weights and scales. Its scenarios are not
+                part of the search and do not count towards its budget.
         """
         if objective is None:
             spec = self.scenario.objective
@@ -184,9 +188,9 @@ class Pipeline:
             if needs_sample(spec.weights, spec.scale, objectives):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
-                parts = self._share_out("measure_rows", self.space.decode(U))
+                parts = self._map(type(self).measure_rows, self.space.decode(U))
                 lost = np.full((1, len(self.metrics)), np.nan)
-                rows = [lost if isinstance(one.came, Lost) else one.came for one in parts]
+                rows = [lost if isinstance(one.result, Lost) else one.result for one in parts]
                 sample = (np.concatenate(rows), self.metrics)
             objective = Objective.build(
                 [(term.metric, term.weight) for term in spec.terms],
@@ -202,15 +206,15 @@ class Pipeline:
         return objective
 
     def warm_up(self) -> None:
-        """Roll out the nominal row once, so that the kernels are compiled before time counts.
+        """Roll out the nominal row once, so that the kernels are compiled before time is measured.
 
-        In this thread, if it is here that rows are simulated: Ctrl-C ends a compilation at once.
+        In this thread if rows are simulated on this machine: Ctrl-C ends a compilation at once.
         """
         nominal = self.space.row({})[np.newaxis]
         if self._workers.are_here:
             self.measure_rows(nominal)
         else:
-            self._share_out("measure_rows", nominal)
+            self._map(type(self).measure_rows, nominal)
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
@@ -218,13 +222,16 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
         """
-        parts = self._share_out("evaluate_rows", X, self.objective)
+        parts = self._map(type(self).evaluate_rows, X, self.objective)
         return Evaluation.join(
-            [self._lost(one) if isinstance(one.came, Lost) else one.came for one in parts]
+            [
+                self._lost(one.rows, one.result) if isinstance(one.result, Lost) else one.result
+                for one in parts
+            ]
         )
 
     def evaluate_rows(self, X: Float, objective: Objective) -> Evaluation:
-        """Evaluate N rows at once, in this thread; ``evaluate`` has it done by many."""
+        """Evaluate N rows at once, in this thread; ``evaluate`` shares them among workers."""
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
         metrics = quantities.evaluate(rollout, self.metrics)
@@ -245,12 +252,12 @@ class Pipeline:
 
     @property
     def tries(self) -> bool:
-        """Whether ``try_all`` can be asked: rows are simulated by the embedded simulator."""
+        """Whether ``try_all`` is available: rows are simulated by the embedded simulator."""
         return self._simulated_by == EMBEDDED
 
     @cached_property
     def fixes(self) -> tuple[Counterfactual, ...]:
-        """The changes that ``try_all`` knows by number: those by which causes are sought."""
+        """The changes that ``try_all`` takes by number: the counterfactuals of causes."""
         return counterfactuals(self.driver)
 
     @property
@@ -260,34 +267,37 @@ class Pipeline:
         return dict(zip(program.names, (NAMES[k] for k in program.kinds), strict=True))
 
     def try_all(self, X: Float, fix: Int | None = None, noise: Float | None = None) -> Trials:
-        """Drive N rows once more, each as is or with one thing put right; see `Trials`.
+        """Simulate N rows again, each unchanged or with one stage idealised; see `Trials`.
 
         Args:
             X: ``(N, len(space.names))`` feasible rows.
-            fix: ``(N,)`` number of each row's change in ``fixes``; −1 as is, which is the default.
-            noise: ``(N, len(space.names))`` rows whose random numbers these rows get, so that a
-                row and its neighbours differ in nothing else; their own by default.
+            fix: ``(N,)`` number of each row's change in ``fixes``; −1, the default, for unchanged.
+            noise: ``(N, len(space.names))`` rows whose random numbers these rows use, so that a
+                row and its neighbours differ only in X; their own by default.
         """
         numbers = np.full(len(X), -1) if fix is None else fix
         keys = X if noise is None else noise
         rows = np.concatenate([X, keys, numbers[:, np.newaxis].astype(np.float64)], axis=1)
-        given = (self.objective.harm, self.objective.count)
         if not len(rows):
             return Trials.none(0)
         order = np.arange(len(rows))
-        if self._roads is not None:  # a worker had best have rows of one driver
+        if self._roads is not None:  # chunks with one driver are faster
             order = np.argsort(numbers, kind="stable")
-        parts = self._share_out("try_rows", rows[order], *given)
-        came = [Trials.none(one.rows) if isinstance(one.came, Lost) else one.came for one in parts]
-        return Trials.join(came).take(np.argsort(order))
+        parts = self._map(
+            type(self).try_rows, rows[order], self.objective.harm, self.objective.count
+        )
+        trials = [
+            Trials.none(one.rows) if isinstance(one.result, Lost) else one.result for one in parts
+        ]
+        return Trials.join(trials).take(np.argsort(order))
 
     def try_rows(self, rows: Float, harm: str, count: Count) -> Trials:
-        """Drive N rows at once, in this thread; ``try_all`` has it done by many.
+        """Simulate N rows at once, in this thread; ``try_all`` shares them among workers.
 
         Args:
-            rows: ``(N, 2 n + 1)``: X, the rows whose random numbers they get, number of the fix.
-            harm: the quantity that counts.
-            count: whose conflicts do.
+            rows: ``(N, 2 n + 1)``: X, the rows whose random numbers they use, number of the fix.
+            harm: the quantity that is measured.
+            count: the conflicts that count.
         """
         n = len(self.space.names)
         X, keys, numbers = rows[:, :n], rows[:, n : 2 * n], rows[:, -1].astype(np.int64)
@@ -319,7 +329,7 @@ class Pipeline:
     def facts(self, x: Float) -> dict[str, float]:
         """Return the parameters of one row that its scenario depends on, by name.
 
-        Without an adversary's decisions: what came of them is the scenario's.
+        Without an adversary's decisions, which the scenario contains as a course.
         """
         unused = {*self.source.unused_names, *self.space.decisions}
         return {name: one for name, one in self.space.values(x).items() if name not in unused}
@@ -329,7 +339,7 @@ class Pipeline:
 
         Args:
             x: ``(len(space.names),)``.
-            road_file: what its OpenDRIVE file will be called; a map's own name by default.
+            road_file: the name of its OpenDRIVE file; the map's own name by default.
         """
         return self.source.concrete(self.space.values(x), road_file)
 
@@ -338,28 +348,28 @@ class Pipeline:
         if not self._is_far:
             return self._run(*self._roads_of(X), X)
         parts, start = [], 0
-        for part in self._share_out("rollout", X):
-            rows, came = np.arange(start, start := start + part.rows), part.came
-            if isinstance(came, Lost):
+        for part in self._map(type(self).rollout, X):
+            rows, rollout = np.arange(start, start := start + part.rows), part.result
+            if isinstance(rollout, Lost):
                 lost = self._run(*self._roads_of(X[rows]), X[rows])
                 status = np.full(part.rows, WORKER_ENDED, np.int8)
-                came = replace(lost, status=status, messages={0: came.reason})
-            parts.append((rows, came))
+                rollout = replace(lost, status=status, messages={0: rollout.reason})
+            parts.append((rows, rollout))
         return joined(parts)
 
     def rollouts(self, X: Float) -> list[Rollout | Lost]:
-        """Have N rows rolled out by many; return what came of them, a part of the rows in each."""
-        return [one.came for one in self._share_out("rollout", X)]
+        """Roll out N rows in the workers; return the rollouts of consecutive parts of them."""
+        return [one.result for one in self._map(type(self).rollout, X)]
 
     def replay(
         self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
     ) -> Replay:
-        """Roll out N rows as ``evaluate`` does, and find out what went on besides.
+        """Roll out N rows as ``evaluate`` does, with the egos' plans and the weather.
 
         Args:
             X: ``(N, len(space.names))`` float64.
-            plans: whether to find out what the egos meant to do, which takes many times as long;
-                only the embedded simulator can.
+            plans: whether to compute the egos' planned paths, which takes many times as long; only
+                the embedded simulator can.
             noise: ``(N,)`` keys of the rows' random numbers, in the embedded simulator; their own
                 by default.
         """
@@ -389,25 +399,27 @@ class Pipeline:
         """Return the metrics of N rows, ``(N, M)``, in this thread."""
         return quantities.evaluate(self.rollout(X), self.metrics)
 
-    def _share_out(self, work: str, X: Float, *given: Any) -> list[Part]:
-        """Have the workers do this pipeline's work on rows; return what came of them, in order."""
+    def _map(
+        self, work: Callable[[Self, Float, *Args], Result], X: Float, *args: *Args
+    ) -> list[Part[Result]]:
+        """Have the workers call a method of this pipeline for rows; see `Workers.map`."""
         try:
-            return self._workers.map(self, work, X, *given)
+            return self._workers.map(self, work, X, *args)
         except KeyboardInterrupt:
             self.simulator.stop()
             raise
 
-    def _lost(self, part: Part) -> Evaluation:
-        """Return what a row came to that nobody could evaluate."""
-        metrics = np.full((part.rows, len(self.metrics)), np.nan)
+    def _lost(self, rows: int, lost: Lost) -> Evaluation:
+        """Return the evaluation of rows that ended their workers."""
+        metrics = np.full((rows, len(self.metrics)), np.nan)
         F, critical = self.objective.F(metrics, self.metrics)
-        status = np.full(part.rows, WORKER_ENDED, np.int8)
-        cause = np.full(part.rows, Cause.NONE, np.int8) if self.seeks_causes else None
-        findings = Findings.none(part.rows)
-        return Evaluation(metrics, F, critical, status, findings, {0: part.came.reason}, cause)
+        status = np.full(rows, WORKER_ENDED, np.int8)
+        cause = np.full(rows, Cause.NONE, np.int8) if self.seeks_causes else None
+        findings = Findings.none(rows)
+        return Evaluation(metrics, F, critical, status, findings, {0: lost.reason}, cause)
 
     def _roads_of(self, X: Float) -> tuple[Any, Int]:
-        """Return the compiled road networks of some rows, and which row has which."""
+        """Return the compiled road networks of rows, and each row's network, ``(N,)``."""
         if self._roads is not None:
             return self._roads, np.zeros(len(X), dtype=np.int64)
         source, names = self.source, self._road_names
@@ -426,7 +438,7 @@ class Pipeline:
 
 
 def _remade(ego: CarriedDriver | None, options: PipelineOptions, **made_with: Any) -> Pipeline:
-    """Return a pipeline for a worker, which is one thread; its kernels are compiled by then."""
+    """Return a pipeline for a worker, in one thread, with its kernels compiled."""
     options = replace(options, ego=ego.here() if ego else None)
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
@@ -456,7 +468,7 @@ def _source(
 
 
 def _refuse_fixed(scenario: SearchedScenario, space: SearchSpace, fixed: Mapping[str, str]) -> None:
-    """Refuse a search of parameters that must be the same in every row."""
+    """Reject a search of parameters that must be the same in every row."""
     moving = {*space.variables}
     moving |= {one.name for one in scenario.derived if one.names & moving}
     if problems := [
@@ -476,7 +488,7 @@ def metrics_of(
 ) -> tuple[str, ...]:
     """Return the quantities that a search records.
 
-    The metrics that `bridgegen.metrics.to_record` says, then what the conflict analysis measures.
+    The metrics of `bridgegen.metrics.to_record`, then the quantities of the conflict analysis.
 
     Raises:
         UnknownNameError: no such metric.

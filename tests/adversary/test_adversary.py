@@ -188,5 +188,5 @@ def test_decisions_that_are_not_searched_are_named():
     with pytest.raises(InputError, match="needs all of its decisions, got no bv_"):
         made.arena()
     plain = load("crossroads-s4")
-    with pytest.raises(InputError, match="no adversary drives anybody"):
+    with pytest.raises(InputError, match="no participant is driven by an adversary"):
         Pipeline(plain, plain.space()).arena()

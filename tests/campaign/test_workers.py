@@ -41,19 +41,19 @@ def undisturbed(tmp_path_factory):
 def test_processes_find_what_threads_find_whoever_is_killed(
     undisturbed, tmp_path, count, same_rows
 ):
-    crew, killed = Processes(count), []
+    pool, killed = Processes(count), []
 
     def kill(progress) -> None:
         if progress.evaluations in (40, 120):
-            os.kill(crew.pids[-1], signal.SIGKILL)
-            killed.append(crew.pids[-1])
+            os.kill(pool.pids[-1], signal.SIGKILL)
+            killed.append(pool.pids[-1])
 
-    run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=crew, watch=Watch(batch=kill))
-    crew.close()
+    run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=pool, watch=Watch(batch=kill))
+    pool.close()
     assert len(set(killed)) == 2
     assert same_rows(run.folder, undisturbed.folder)
     assert run.settings == undisturbed.settings
-    assert not crew.pids
+    assert not pool.pids
 
 
 def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
@@ -63,12 +63,12 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     scenario = load("crossroads-s4")
     space = scenario.space()
     X = space.decode(np.random.default_rng(0).random((4, space.n_var)))
-    crew = Processes(2)
-    pipeline = Poisoned(scenario, space, PipelineOptions(causes=True), workers=crew)
+    pool = Processes(2)
+    pipeline = Poisoned(scenario, space, PipelineOptions(causes=True), workers=pool)
     pipeline.choose_objective()
     pipeline.poison = X[3]
     found = pipeline.evaluate(X)
-    crew.close()
+    pool.close()
     assert found.status.tolist() == [0, 0, 0, WORKER_ENDED]
     assert found.messages == {3: "by SIGSEGV"}
     assert np.isnan(found.metrics[3]).all()

@@ -115,7 +115,7 @@ def cluster(nodes) -> Iterator[Cluster]:
 
 
 def joined(parts) -> np.ndarray:
-    return np.concatenate([part.came for part in parts])
+    return np.concatenate([part.result for part in parts])
 
 
 def actors() -> list[int]:
@@ -123,7 +123,7 @@ def actors() -> list[int]:
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
-            if b"ray::_Actor" in path.read_bytes():
+            if b"ray::_RemoteActor" in path.read_bytes():
                 found.append(int(path.parent.name))
         except (FileNotFoundError, ProcessLookupError):
             continue
@@ -141,22 +141,24 @@ def test_from_outside_of_the_cluster(nodes, doubles, monkeypatch):
     """By Ray's own client, as from a machine that is no node of it."""
     monkeypatch.setenv("BRIDGEGEN_IDLE_SECONDS", "1")
     with open_workers(f"ray://127.0.0.1:{CLIENT_PORT}") as workers:
-        assert (joined(workers.map(doubles.Doubler(), "double", X)) == 2.0 * X).all()
+        assert (joined(workers.map(doubles.Doubler(), doubles.Doubler.double, X)) == 2.0 * X).all()
 
 
 def test_actors_that_nobody_needs_make_room(nodes, doubles, monkeypatch):
     monkeypatch.setenv("BRIDGEGEN_IDLE_SECONDS", "1")
     with open_workers("ray") as workers:
-        workers.map(doubles.Doubler(), "double", X)
+        workers.map(doubles.Doubler(), doubles.Doubler.double, X)
         assert 1 <= len(actors()) <= 2
     wait_for(lambda: not actors())
 
 
 def test_rows_come_back_in_order_from_both_nodes(cluster, doubles):
     doubler = doubles.Doubler()
-    assert (joined(cluster.map(doubler, "double", X)) == 2.0 * X).all()
+    assert (joined(cluster.map(doubler, doubles.Doubler.double, X)) == 2.0 * X).all()
     assert cluster.count == 2
-    pids = {part.came for part in cluster.map(doubler, "who", np.arange(400.0))}
+    pids = {
+        part.result for part in cluster.map(doubler, doubles.Doubler.process_id, np.arange(400.0))
+    }
     assert pids <= set(actors())
 
 
@@ -167,7 +169,7 @@ def test_campaigns_share_the_same_actors(nodes, doubles):
     def campaign(k: int) -> None:
         with open_workers("ray") as workers:
             for _ in range(3):
-                parts = workers.map(doubles.Doubler(), "double", X + k)
+                parts = workers.map(doubles.Doubler(), doubles.Doubler.double, X + k)
             done.append((joined(parts) == 2.0 * (X + k)).all())
 
     threads = [threading.Thread(target=campaign, args=(k,)) for k in range(10)]
@@ -182,19 +184,21 @@ def test_campaigns_share_the_same_actors(nodes, doubles):
 def test_a_killed_worker_costs_nothing_and_rows_that_kill_are_lost_alone(
     cluster, doubles, tmp_path
 ):
-    parts = cluster.map(doubles.Doubler(), "double_once_killed", X, tmp_path)
+    parts = cluster.map(doubles.Doubler(), doubles.Doubler.double_once_killed, X, tmp_path)
     assert (joined(parts) == 2.0 * X).all()
     few = X[5:9]
-    parts = cluster.map(doubles.Doubler(2), "double_but", few, (6.0,))
-    found = [x for part in parts for x in ([None] if isinstance(part.came, Lost) else part.came)]
+    parts = cluster.map(doubles.Doubler(2), doubles.Doubler.double_but, few, (6.0,))
+    found = [
+        x for part in parts for x in ([None] if isinstance(part.result, Lost) else part.result)
+    ]
     assert found == [None if x == 6.0 else 2.0 * x for x in few]
 
 
 def test_what_is_raised_arrives_as_it_was(cluster, doubles):
     with pytest.raises(UnknownNameError, match="unknown number 'seven'; known: one, two"):
-        cluster.map(doubles.Doubler(), "refuse", X)
-    with pytest.raises(ZeroDivisionError, match="by nobody"):
-        cluster.map(doubles.Doubler(), "fail", X)
+        cluster.map(doubles.Doubler(), doubles.Doubler.refuse, X)
+    with pytest.raises(ZeroDivisionError, match="by design"):
+        cluster.map(doubles.Doubler(), doubles.Doubler.fail, X)
 
 
 SEARCH = {
@@ -286,4 +290,4 @@ def test_no_cluster_there(doubles, monkeypatch):
         open_workers("ray") as workers,
         pytest.raises(WorkersError, match=r"cannot be reached|is lost"),
     ):
-        workers.map(doubles.Doubler(), "double", X)
+        workers.map(doubles.Doubler(), doubles.Doubler.double, X)

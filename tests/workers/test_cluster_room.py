@@ -25,25 +25,25 @@ class Shrunken:
     kills: bool
 
     def __init__(self, said: "queue.SimpleQueue[Any]", *_: Any) -> None:
-        self.said, self.places = said, dict[int, int]()
+        self.said, self.slots = said, dict[int, int]()
 
-    def ask(self, name: str, *given: Any) -> None:
-        match name, given:
-            case "join", _:
+    def ask(self, *request: Any) -> None:
+        match [getattr(one, "__name__", one) for one in request]:
+            case [None, _]:  # an address and a device
                 self.say("joined", *self.joins)
-            case "hire", (number, place):
-                self.places[number] = place
-                if place in self.has_room:
-                    self.say(number, ("begun", cluster.version("bridgegen")))
-            case "prepare", (number, _):
+            case ["start_worker", number, slot]:
+                self.slots[number] = slot
+                if slot in self.has_room:
+                    self.say(number, ("started", cluster.version("bridgegen")))
+            case ["prepare", number, _]:
                 self.say(number, ("answer", None))
-            case "greet", (number,):
-                self.say(number, ("begun", cluster.version("bridgegen")))
-            case "work", (number, _, _, rows, _):
+            case ["ping", number]:
+                self.say(number, ("started", cluster.version("bridgegen")))
+            case ["run", number, _, _, rows, _]:
                 if Shrunken.kills:  # the node, with it one of two actors; the other one moves
                     Shrunken.kills = False
-                    Shrunken.has_room = {1 - self.places[number]}
-                    self.say(number, ("died", "its node is gone"))
+                    Shrunken.has_room = {1 - self.slots[number]}
+                    self.say(number, ("died", "its node ended"))
                     self.say("joined", 1, 2)
                 else:
                     self.say(number, ("answer", 2.0 * rows))
@@ -81,11 +81,11 @@ def shrunken(monkeypatch):
 
 def test_the_actor_that_has_room_works_whichever_it_is(shrunken, doubles):
     Shrunken.joins, Shrunken.has_room, Shrunken.kills = (2, 2), {0, 1}, True
-    (part,) = shrunken.map(doubles.Doubler(), "double", X)
-    assert (part.came == 2.0 * X).all()
+    (part,) = shrunken.map(doubles.Doubler(), doubles.Doubler.double, X)
+    assert (part.result == 2.0 * X).all()
 
 
 def test_a_campaign_that_joins_later_finds_it_too(shrunken, doubles):
     Shrunken.joins, Shrunken.has_room, Shrunken.kills = (1, 2), {1}, False
-    (part,) = shrunken.map(doubles.Doubler(), "double", X)
-    assert (part.came == 2.0 * X).all()
+    (part,) = shrunken.map(doubles.Doubler(), doubles.Doubler.double, X)
+    assert (part.result == 2.0 * X).all()

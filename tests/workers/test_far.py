@@ -26,15 +26,14 @@ class Elsewhere:
     def __init__(self) -> None:
         self.made = None
 
-    def map(self, portable, work, X, *given):
+    def map(self, portable, work, X, *args):
         choice.SIMULATORS["there"].access["here"] = "yes"  # we are on that machine now
         if self.made is None:
             self.made = portable.recipe.make()
-        method = getattr(self.made, work)
         parts = []
         for a, b in cut(len(X), self.count, portable.rows_at_once):
             gone = self.lost is not None and a <= self.lost < b
-            parts.append(Part(b - a, Lost("by test") if gone else method(X[a:b], *given)))
+            parts.append(Part(b - a, Lost("by test") if gone else work(self.made, X[a:b], *args)))
         del choice.SIMULATORS["there"].access["here"]
         return parts
 
@@ -60,8 +59,8 @@ def test_only_workers_have_it(there):
     X = space.decode(np.random.default_rng(0).random((3, space.n_var)))
     with pytest.raises(InputError, match="no such simulator"):
         Pipeline(scenario, space, simulator=there)
-    crew = Elsewhere()
-    pipeline = Pipeline(scenario, space, simulator=there, workers=crew)
+    pool = Elsewhere()
+    pipeline = Pipeline(scenario, space, simulator=there, workers=pool)
     assert (pipeline.device, pipeline.rows_at_once) == ("GPU", FAR_ROWS)
     pipeline.warm_up()
     pipeline.choose_objective()
@@ -71,11 +70,11 @@ def test_only_workers_have_it(there):
     assert pipeline.replay(X, plans=True).intentions is None
     motion, expected = pipeline.rollout(X), plain.rollout(X)
     assert motion.x.tobytes() == expected.x.tobytes()
-    crew.lost, crew.count = 1, 3
+    pool.lost, pool.count = 1, 3
     motion = pipeline.rollout(X)
     assert motion.status.tolist() == [0, WORKER_ENDED, 0]
     assert motion.messages == {1: "by test"}
-    with pytest.raises(InputError, match="no adversary drives anybody"):
+    with pytest.raises(InputError, match="no participant is driven by an adversary"):
         pipeline.arena()
 
 

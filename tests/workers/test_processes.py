@@ -24,7 +24,7 @@ def doubles(doubles_can_be_imported):
 
 
 @pytest.fixture
-def crew() -> Iterator[Processes]:
+def pool() -> Iterator[Processes]:
     with open_workers(2) as workers:
         assert isinstance(workers, Processes)
         yield workers
@@ -34,67 +34,71 @@ X = np.arange(20.0)
 
 
 def joined(parts: list[Part]) -> np.ndarray:
-    return np.concatenate([part.came for part in parts])
+    return np.concatenate([part.result for part in parts])
 
 
-def test_rows_come_back_in_order_from_several_processes(crew, doubles):
+def test_rows_come_back_in_order_from_several_processes(pool, doubles):
     doubler = doubles.Doubler()
-    assert (joined(crew.map(doubler, "double", X)) == 2.0 * X).all()
-    pids = {part.came for part in crew.map(doubler, "who", X)}
+    assert (joined(pool.map(doubler, doubles.Doubler.double, X)) == 2.0 * X).all()
+    pids = {part.result for part in pool.map(doubler, doubles.Doubler.process_id, X)}
     assert 1 <= len(pids) <= 2
     assert os.getpid() not in pids
-    again = {part.came for part in crew.map(doubler, "who", X)}
+    again = {part.result for part in pool.map(doubler, doubles.Doubler.process_id, X)}
     assert len(pids | again) <= 2  # they stay
-    assert [part.rows for part in crew.map(doubler, "double", X[:0])] == [0]
+    assert [part.rows for part in pool.map(doubler, doubles.Doubler.double, X[:0])] == [0]
 
 
-def test_a_killed_process_costs_nothing(crew, doubles, tmp_path):
-    parts = crew.map(doubles.Doubler(), "double_once_killed", X, tmp_path)
+def test_a_killed_process_costs_nothing(pool, doubles, tmp_path):
+    parts = pool.map(doubles.Doubler(), doubles.Doubler.double_once_killed, X, tmp_path)
     assert (joined(parts) == 2.0 * X).all()
     assert (tmp_path / "was here").exists()
 
 
-def test_rows_that_kill_are_lost_alone(crew, doubles):
-    parts = crew.map(doubles.Doubler(), "double_but", X, (6.0, 17.0))
-    found = [x for part in parts for x in ([None] if isinstance(part.came, Lost) else part.came)]
+def test_rows_that_kill_are_lost_alone(pool, doubles):
+    parts = pool.map(doubles.Doubler(), doubles.Doubler.double_but, X, (6.0, 17.0))
+    found = [
+        x for part in parts for x in ([None] if isinstance(part.result, Lost) else part.result)
+    ]
     assert found == [None if x in (6.0, 17.0) else 2.0 * x for x in X]
-    lost = [part for part in parts if isinstance(part.came, Lost)]
-    assert [(one.rows, one.came.reason) for one in lost] == [(1, "by SIGSEGV")] * 2
+    lost = [part for part in parts if isinstance(part.result, Lost)]
+    assert [(one.rows, one.result.reason) for one in lost] == [(1, "by SIGSEGV")] * 2
 
 
-def test_what_is_raised_arrives_as_it_was(crew, doubles):
+def test_what_is_raised_arrives_as_it_was(pool, doubles):
     with pytest.raises(UnknownNameError, match="unknown number 'seven'; known: one, two") as error:
-        crew.map(doubles.Doubler(), "refuse", X)
+        pool.map(doubles.Doubler(), doubles.Doubler.refuse, X)
     assert error.value.problems == ("unknown number 'seven'; known: one, two",)
-    with pytest.raises(ZeroDivisionError, match="by nobody") as mistake:
-        crew.map(doubles.Doubler(), "fail", X)
+    with pytest.raises(ZeroDivisionError, match="by design") as mistake:
+        pool.map(doubles.Doubler(), doubles.Doubler.fail, X)
     assert "worker_doubles.py" in mistake.value.__notes__[0]  # where it was
-    assert (joined(crew.map(doubles.Doubler(), "double", X)) == 2.0 * X).all()
+    assert (joined(pool.map(doubles.Doubler(), doubles.Doubler.double, X)) == 2.0 * X).all()
 
 
-def test_what_cannot_be_made_is_no_endless_loop(crew, doubles):
+def test_what_cannot_be_made_is_no_endless_loop(pool, doubles):
     with pytest.raises(WorkersError, match="ended before they were ready: with exit status 9"):
-        crew.map(doubles.Unmakeable(), "double", X)
+        pool.map(doubles.Unmakeable(), doubles.Unmakeable.double, X)
 
 
 @pytest.mark.parametrize(
     ("work", "reason"),
     [("fork_and_die", "with exit status 4"), ("fork_and_exit", "with exit status 5")],
 )
-def test_one_that_dies_after_a_fork_is_told(crew, doubles, work, reason):
-    parts = crew.map(doubles.Doubler(), work, X[:1])
-    assert [part.came for part in parts] == [Lost(reason)]
+def test_one_that_dies_after_a_fork_is_told(pool, doubles, work, reason):
+    parts = pool.map(doubles.Doubler(), getattr(doubles.Doubler, work), X[:1])
+    assert [part.result for part in parts] == [Lost(reason)]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells whose a daemon was")
-def test_what_they_start_ends_with_them(crew, doubles, tmp_path):
-    assert (joined(crew.map(doubles.Doubler(), "start_daemon", X, tmp_path)) == X).all()
+def test_what_they_start_ends_with_them(pool, doubles, tmp_path):
+    assert (
+        joined(pool.map(doubles.Doubler(), doubles.Doubler.start_daemon, X, tmp_path)) == X
+    ).all()
     end = time.monotonic() + 60.0
     while not (pids := [int(path.name) for path in tmp_path.iterdir()]):
         assert time.monotonic() < end
         time.sleep(0.01)
     assert Path(f"/proc/{pids[0]}").exists()
-    crew.close()
+    pool.close()
     pids = [int(path.name) for path in tmp_path.iterdir()]
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
 
@@ -106,10 +110,10 @@ def test_ctrl_c_ends_them_at_once(doubles, tmp_path):
             time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGINT)
 
-    crew, thread = Processes(2), threading.Thread(target=interrupt)
+    pool, thread = Processes(2), threading.Thread(target=interrupt)
     thread.start()
     with pytest.raises(KeyboardInterrupt):
-        crew.map(doubles.Doubler(), "slowly", X, tmp_path)
+        pool.map(doubles.Doubler(), doubles.Doubler.slowly, X, tmp_path)
     thread.join()
     pids = [int(path.name) for path in tmp_path.iterdir()]
     assert len(pids) == 2

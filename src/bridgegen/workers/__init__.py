@@ -1,9 +1,9 @@
-"""Who works on a batch: threads of this process, processes of this machine, a Ray cluster.
+"""Workers evaluate a batch: threads of this process, processes of this machine, a Ray cluster.
 
-``Workers`` is what all of them do; ``open_workers`` makes those that a user asks for. They are
-given a `Recipe`, plain data from which a worker makes what works (a pipeline with its compiled
-plan, or its connection to a simulator), and rows. What comes of a row depends on that row alone,
-so no result depends on who did it, on how many there are, or on who died.
+`Workers` is their protocol; ``open_workers`` makes the workers that a user asks for. Each worker
+gets a `Recipe`, plain data from which it builds what evaluates rows (a pipeline with its compiled
+plan, or its connection to a simulator), and rows. The result of a row depends on that row alone, so
+no result depends on the kind of workers, on their number or on which of them crashed.
 """
 
 from bridgegen.workers.carried import CarriedDriver

@@ -1,30 +1,30 @@
-"""In a process of its own (`bridgegen.workers.process`): calls functions, as it is told to."""
+"""The program of a worker process (`bridgegen.workers.process`): it calls functions on request."""
 
 import pickle
 import queue
 
 from bridgegen.child import Say, connect, leave
-from bridgegen.workers.bench import portable
+from bridgegen.workers.pipeline_cache import picklable
 
 
 def main() -> None:
-    """Call what is asked for, until nobody asks."""
+    """Answer requests until the parent process ends."""
     requests, say = connect()
     try:
         _answer(requests, say)
-    except BaseException as error:  # sys.exit, say
+    except BaseException as error:  # sys.exit, for example
         leave(error)
 
 
 def _answer(requests: "queue.SimpleQueue[bytes]", say: Say) -> None:
-    say("begun")
+    say("started")
     while True:
         request = requests.get()
         try:
-            # Here, not where they are taken: what cannot be unpickled is told like any error.
+            # Unpickled here, so that a failure to unpickle is reported like any other error.
             function, arguments, tells = pickle.loads(request)
-            came = function(*arguments, *([say] if tells else []))
+            result = function(*arguments, *([say] if tells else []))
         except Exception as error:
-            say("raised", portable(error))
+            say("raised", picklable(error))
         else:
-            say("answer", came)
+            say("answer", result)

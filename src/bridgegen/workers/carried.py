@@ -1,4 +1,4 @@
-"""A driver of the user's own, carried to where a worker is."""
+"""A user's driver with the contents of its file, sent to workers."""
 
 import hashlib
 import os
@@ -13,14 +13,14 @@ from bridgegen.errors import InputError
 
 @dataclass(frozen=True)
 class CarriedDriver:
-    """What names a driver, and its file.
+    """The name of a driver, and the contents of its file.
 
-    One that lies in a package is not carried: the package has to be installed where workers are;
-    and so has whatever a file imports.
+    A driver in a package is not sent: the package must be installed on the workers' machines, and
+    so must the modules that a driver's file imports.
 
     Attributes:
-        name: as ``--ego`` has it.
-        data: the file's bytes; None of a driver without one.
+        name: the value of ``--ego``.
+        data: the file's bytes; None if the driver has no file.
     """
 
     name: str
@@ -28,7 +28,7 @@ class CarriedDriver:
 
     @classmethod
     def of(cls, name: str) -> Self:
-        """Return a driver with its file, if it has one.
+        """Return a driver with the contents of its file, if it has one.
 
         Raises:
             InputError: the file cannot be read.
@@ -40,7 +40,7 @@ class CarriedDriver:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 
     def here(self) -> str:
-        """Return what names it on this machine: the same if its file lies here, else a copy."""
+        """Return its name here: unchanged if the same file exists, else that of a copy."""
         path = _file(self.name)
         if path is None or self.data is None or _holds(path, self.data):
             return self.name
@@ -56,7 +56,7 @@ class CarriedDriver:
 
 
 def _file(name: str) -> Path | None:
-    """Return the file that a driver is in, if it is named by one."""
+    """Return the file that a driver's name contains, or None."""
     if not is_spec(name):
         return None
     where = name if name.endswith(".fmu") else name.rpartition(":")[0]

@@ -1,4 +1,4 @@
-"""Which workers a user asks for."""
+"""Makes the workers that a user asks for."""
 
 import re
 from collections.abc import Iterator
@@ -9,22 +9,22 @@ from bridgegen.workers.threads import Threads
 from bridgegen.workers.workers import Workers
 
 MOST = 1024
-"""Processes of one machine: more is a slip of the finger."""
+"""Maximum number of processes on one machine; a larger number is a typing error."""
 
 RAY = "ray"
 
 Choice = int | str | Workers | None
-"""A number of processes; ``"ray"`` or ``"ray://HOST:PORT"``; somebody's own; nothing: threads."""
+"""A number of processes; ``"ray"`` or ``"ray://HOST:PORT"``; open workers; None for threads."""
 
 
 def read_choice(given: int | str | None) -> int | str | None:
-    """Return what a user says, checked.
+    """Check and return a choice of workers.
 
     Args:
-        given: how many processes, in digits if it is a text; or "ray", or "ray://HOST:PORT".
+        given: a number of processes, as an integer or in digits; or "ray", or "ray://HOST:PORT".
 
     Raises:
-        InputError: it is neither a number in range, nor one of Ray's.
+        InputError: it is neither a number in range nor an address of Ray.
     """
     if given is None:
         return None
@@ -41,7 +41,7 @@ def read_choice(given: int | str | None) -> int | str | None:
 
 @contextmanager
 def open_workers(choice: Choice) -> Iterator[Workers]:
-    """Have workers; in the end they are let go, but for those that the caller brought.
+    """Open workers and close them at the end; workers that the caller passes stay open.
 
     Raises:
         InputError: see `read_choice`.

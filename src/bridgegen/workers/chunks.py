@@ -1,18 +1,18 @@
-"""How a batch of rows is cut."""
+"""Splits a batch of rows into chunks."""
 
 from collections.abc import Iterator
 
 
 def cut(n: int, workers: int, at_once: int) -> Iterator[tuple[int, int]]:
-    """Yield the bounds of chunks that cover rows 0 … n − 1 in their order; of none, one chunk.
+    """Yield the bounds of chunks that cover rows 0 … n − 1 in order; one empty chunk if n = 0.
 
-    All are alike, but for a row, and their number is a multiple of the workers' where there are
-    rows enough: so nobody is left to work alone on the last ones.
+    Their sizes differ by one row at most. If there are enough rows, their number is a multiple of
+    the number of workers, so that no worker evaluates the last rows alone.
 
     Args:
-        n: rows, ≥ 0.
-        workers: that are to have something to do each, ≥ 1.
-        at_once: rows that a chunk has at most, ≥ 1.
+        n: number of rows, ≥ 0.
+        workers: number of workers that need a chunk each, ≥ 1.
+        at_once: maximum number of rows of a chunk, ≥ 1.
     """
     rounds = -(-n // (workers * at_once))
     pieces = max(1, min(n, rounds * workers))

@@ -1,4 +1,4 @@
-"""A process that calls functions for us, seen from here."""
+"""A process that calls functions on request; this is the side of its parent."""
 
 import queue
 from collections.abc import Callable
@@ -8,20 +8,20 @@ from typing import IO, Any
 from bridgegen.child import Child
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Environment of a process that leaves the other cores to the other processes."""
+"""Environment of a process whose libraries use one thread."""
 
 Said = queue.SimpleQueue[tuple["Process", tuple[Any, ...]]]
-"""What processes say: ("begun",), ("answer", what came), ("raised", the exception), ("died",), and
-whatever else a function says that is given a way to."""
+"""Messages of processes: ("started",), ("answer", result), ("raised", exception), ("died",) when
+the process has ended, and the messages of functions that are called with ``tells``."""
 
 
 class Process:
-    """A process, one for one thread; it ends with this one, however this one ends.
+    """A process with one thread; it ends when this process ends, for whatever reason.
 
     Args:
-        said: takes what it says.
-        module: whose ``main`` it runs.
-        errors: takes what it writes to its standard error; ours does by default.
+        said: receives its messages.
+        module: the module whose ``main`` it runs.
+        errors: receives its standard error; this process's standard error by default.
     """
 
     def __init__(
@@ -36,24 +36,24 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """Its process number."""
         return self._child.pid
 
     def call(self, function: Callable[..., Any], *arguments: Any, tells: bool = False) -> None:
-        """Have a function called; what it returns or raises will be said.
+        """Call a function in the process; its result or exception arrives as a message.
 
         Args:
             function: importable by its name.
-            arguments: of it.
-            tells: whether it takes, as its last argument, a function that says something here.
+            arguments: its arguments.
+            tells: whether its last parameter is a function that sends messages to this process.
         """
         self.ask(function, arguments, tells)
 
     def ask(self, *request: Any) -> None:
-        """Send a request, as the module's ``main`` understands it."""
-        with suppress(OSError):  # it has died: the last that it says tells
+        """Send a request to the module's ``main``."""
+        with suppress(OSError):  # it has ended: its last message reports that
             self._child.send(request)
 
     def end(self) -> int:
-        """End the process and those that it has begun, at once; return its exit status."""
+        """End the process and its descendants at once; return its exit status."""
         return self._child.end()

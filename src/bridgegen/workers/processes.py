@@ -1,18 +1,19 @@
-"""Processes of this machine, each one thread: what is killed or crashes costs nothing but time."""
+"""Processes of this machine, each one thread; one that crashes or is killed costs time only."""
 
 import queue
 import signal
 from typing import Any
 
 from bridgegen.arrays import Float
-from bridgegen.workers.bench import Bench
-from bridgegen.workers.crew import Crew
+from bridgegen.workers.pipeline_cache import PipelineCache
+from bridgegen.workers.pool import WorkerPool
 from bridgegen.workers.process import Process, Said
 from bridgegen.workers.recipe import Recipe
+from bridgegen.workers.workers import Work
 
 
-class Processes(Crew[Process]):
-    """`Workers` in processes of this machine; begun when there is something to do.
+class Processes(WorkerPool[Process]):
+    """`Workers` in processes of this machine; started when there are rows to evaluate.
 
     Args:
         count: how many, ≥ 1.
@@ -32,30 +33,30 @@ class Processes(Crew[Process]):
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """The numbers of those that have been begun."""
-        return tuple(one.pid for one in self._posts)
+        """The process numbers of the workers that have been started."""
+        return tuple(one.pid for one in self._workers)
 
-    def _hire(self) -> Process:
+    def _start_worker(self) -> Process:
         return Process(self._said)
 
-    def _greet(self, hand: Process) -> None:
-        hand.call(_be_there)
+    def _ping(self, worker: Process) -> None:
+        worker.call(_pong)
 
-    def _prepare(self, hand: Process, recipe: Recipe) -> None:
-        hand.call(_prepare, recipe)
+    def _prepare(self, worker: Process, recipe: Recipe) -> None:
+        worker.call(_prepare, recipe)
 
-    def _work(self, hand: Process, key: str, work: str, X: Float, given: tuple[Any, ...]) -> None:
-        hand.call(_work, key, work, X, given)
+    def _run(self, worker: Process, key: str, work: Work, X: Float, args: tuple[Any, ...]) -> None:
+        worker.call(_run, key, work, X, args)
 
-    def _hear(self) -> tuple[Process, tuple[Any, ...]]:
+    def _receive(self) -> tuple[Process, tuple[Any, ...]]:
         return self._said.get()
 
-    def _dismiss(self, hand: Process) -> str:
-        return ending(hand.end())
+    def _release(self, worker: Process) -> str:
+        return ending(worker.end())
 
 
 def ending(status: int) -> str:
-    """Return how a process ended, by its exit status; negative is a signal's number."""
+    """Return how a process ended, by its exit status; a negative one is a signal's number."""
     if status >= 0:
         return f"with exit status {status}"
     try:
@@ -64,18 +65,18 @@ def ending(status: int) -> str:
         return f"by signal {-status}"
 
 
-# --- In the other process -------------------------------------------------------------------------
+# --- In the worker --------------------------------------------------------------------------------
 
-_bench = Bench()
+_cache = PipelineCache()
 
 
-def _be_there() -> None:
-    """Answer."""
+def _pong() -> None:
+    """Answer a ping."""
 
 
 def _prepare(recipe: Recipe) -> None:
-    _bench.prepare(recipe)
+    _cache.prepare(recipe)
 
 
-def _work(key: str, work: str, X: Float, given: tuple[Any, ...]) -> Any:
-    return _bench.work(key, work, X, given)
+def _run(key: str, work: Work, X: Float, args: tuple[Any, ...]) -> Any:
+    return _cache.run(key, work, X, args)

@@ -1,4 +1,4 @@
-"""Plain data from which a worker makes what it works with: no file need be where it is."""
+"""Plain data from which a worker builds its pipeline; no file has to exist on its machine."""
 
 import hashlib
 import io
@@ -14,8 +14,8 @@ class Recipe:
     """A call, pickled, with its arguments.
 
     Attributes:
-        data: it.
-        key: a digest of it: two recipes of one key make the same.
+        data: the pickled call.
+        key: a digest of it; recipes with the same key build the same.
     """
 
     data: bytes
@@ -27,8 +27,8 @@ class Recipe:
 
         Args:
             make: importable by its name.
-            arguments: of it; all that is needed must be in them, files by their bytes.
-            more: by name.
+            arguments: its positional arguments, complete: files are passed by their bytes.
+            more: its keyword arguments.
         """
         file = io.BytesIO()
         _Pickler(file, protocol=5).dump((make, arguments, more))
@@ -36,10 +36,10 @@ class Recipe:
         return cls(data, hashlib.blake2b(data, digest_size=16).hexdigest())
 
     def make(self) -> Any:
-        """Call it.
+        """Call the function and return its result.
 
         Raises:
-            Exception: whatever it raises; ModuleNotFoundError if it is not to be found here.
+            Exception: raised by the function; ModuleNotFoundError if it is not installed here.
         """
         function, arguments, more = pickle.loads(self.data)
         return function(*arguments, **more)
@@ -47,7 +47,7 @@ class Recipe:
 
 class _Pickler(pickle.Pickler):
     def reducer_override(self, obj: Any) -> Any:
-        if isinstance(obj, MappingProxyType):  # a mapping that may not be changed, nothing more
+        if isinstance(obj, MappingProxyType):  # which pickle does not support
             return _read_only, (dict(obj),)
         return NotImplemented
 

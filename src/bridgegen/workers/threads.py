@@ -1,16 +1,16 @@
-"""Threads of this process: for what runs without the GIL."""
+"""Threads of this process, for work that runs without the GIL."""
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 from bridgegen.arrays import Float
 from bridgegen.workers.chunks import cut
-from bridgegen.workers.workers import Part, Portable
+from bridgegen.workers.workers import Args, Evaluator, Part, Result
 
 
 class Threads:
-    """`Workers` that share what they work with; one that dies takes this process with it.
+    """`Workers` that share one evaluator; a crash of one ends this process.
 
     Args:
         count: how many; one for each core by default.
@@ -27,13 +27,18 @@ class Threads:
         """See `Workers`."""
         return self._count
 
-    def map(self, portable: Portable, work: str, X: Float, *given: Any) -> list[Part]:
+    def map(
+        self,
+        portable: Evaluator,
+        work: Callable[[Evaluator, Float, *Args], Result],
+        X: Float,
+        *args: *Args,
+    ) -> list[Part[Result]]:
         """See `Workers`."""
-        method = getattr(portable, work)
 
-        def one(bounds: tuple[int, int]) -> Part:
+        def one(bounds: tuple[int, int]) -> Part[Result]:
             start, stop = bounds
-            return Part(stop - start, method(X[start:stop], *given))
+            return Part(stop - start, work(portable, X[start:stop], *args))
 
         each = min(self._count, portable.runs_at_once)
         return list(self._pool.map(one, cut(len(X), each, portable.rows_at_once)))

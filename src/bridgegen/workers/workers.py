@@ -1,35 +1,45 @@
-"""What everybody who works on a batch does."""
+"""The protocol of workers, and of what they evaluate rows with."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar, TypeVarTuple
 
 from bridgegen.arrays import Float
 from bridgegen.workers.recipe import Recipe
 
 
 class Portable(Protocol):
-    """What works on rows, here and, made again, elsewhere; a row's result depends on that row."""
+    """Evaluates rows, here and, rebuilt, in a worker; a row's result depends on that row alone."""
 
     @property
     def rows_at_once(self) -> int:
-        """How many rows it had best be given, ≥ 1."""
+        """The number of rows of a chunk that is evaluated fastest, ≥ 1."""
 
     @property
     def runs_at_once(self) -> int:
-        """In how many threads it had best work, where they share it, ≥ 1."""
+        """The number of threads that use one instance best, ≥ 1."""
 
     @property
     def device(self) -> str:
-        """What a worker needs one of, as Ray calls it: "CPU", or "GPU"."""
+        """The device that each worker needs, as Ray names it: "CPU" or "GPU"."""
 
     @property
     def recipe(self) -> Recipe:
-        """Makes it again."""
+        """Builds it in a worker."""
+
+
+Result = TypeVar("Result")
+Evaluator = TypeVar("Evaluator", bound=Portable)
+Args = TypeVarTuple("Args")
+
+Work = Callable[..., Any]
+"""A function of a `Portable`, of rows and of further arguments, importable by its name: usually a
+method of its class, unbound."""
 
 
 @dataclass(frozen=True)
 class Lost:
-    """A row that nobody could work on: it took two workers with it.
+    """A row without a result: two workers crashed while they evaluated it.
 
     Attributes:
         reason: how the second one ended.
@@ -39,46 +49,53 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Part:
-    """What came of some rows that follow each other.
+class Part(Generic[Result]):
+    """The result of consecutive rows.
 
     Attributes:
-        rows: how many they are, ≥ 0.
-        came: what the work on them returned; or `Lost`, which is one row at most.
+        rows: how many rows, ≥ 0.
+        result: what the work returned; or `Lost`, of one row at most.
     """
 
     rows: int
-    came: Any
+    result: Result | Lost
 
 
 class Workers(Protocol):
-    """Threads, processes or a cluster: they share a batch of rows among them."""
+    """Threads, processes or a cluster that share the rows of a batch."""
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of workers."""
 
     @property
     def are_here(self) -> bool:
-        """Whether they are on this machine."""
+        """Whether they run on this machine."""
 
-    def map(self, portable: Portable, work: str, X: Float, *given: Any) -> list[Part]:
-        """Have rows worked on.
+    def map(
+        self,
+        portable: Evaluator,
+        work: Callable[[Evaluator, Float, *Args], Result],
+        X: Float,
+        *args: *Args,
+    ) -> list[Part[Result]]:
+        """Evaluate rows.
 
         Args:
-            portable: what works; it is made again where the worker is.
-            work: the name of its method: rows ``(n, …)`` and ``given`` → what comes of them.
-            X: ``(N, …)`` float64, the rows; none of them is worked on, too, once.
-            given: to every call, besides.
+            portable: evaluates the rows; each worker builds it from its recipe.
+            work: called as ``work(portable, rows, *args)`` with rows ``(n, …)``, once per chunk. A
+                function that workers can import by its name, e.g. ``type(portable).evaluate``.
+            X: ``(N, …)`` float64, the rows; if N = 0, the work is called once.
+            args: further arguments of each call.
 
         Returns:
-            What came of all rows, in their order.
+            The results of all rows, in order.
 
         Raises:
-            Exception: whatever the work raised.
-            WorkersError: there are no workers, or they are lost.
-            KeyboardInterrupt: Ctrl-C; nobody works any more.
+            Exception: raised by the work.
+            WorkersError: no workers are available, or the connection to them is lost.
+            KeyboardInterrupt: Ctrl-C; all workers have stopped.
         """
 
     def close(self) -> None:
-        """Let them go: what they have begun ends with them."""
+        """Release the workers; the processes that they started end with them."""

@@ -1,4 +1,4 @@
-"""What workers work with in tests: imported by them by its name."""
+"""Evaluators for tests, which workers import by name."""
 
 import os
 import signal
@@ -33,7 +33,7 @@ class Doubler:
         return 2.0 * X
 
     def double_once_killed(self, X: np.ndarray, folder: Path) -> np.ndarray:
-        """Who is first at a row of 7 is gone."""
+        """End the first process that evaluates a row of 7."""
         if 7.0 in X:
             try:
                 (folder / "was here").touch(exist_ok=False)
@@ -51,10 +51,10 @@ class Doubler:
         raise UnknownNameError("number", "seven", ["one", "two"])
 
     def fail(self, X: np.ndarray) -> np.ndarray:
-        raise ZeroDivisionError("by nobody")
+        raise ZeroDivisionError("by design")
 
     def start_daemon(self, X: np.ndarray, folder: Path) -> np.ndarray:
-        """Leave a process behind that is nobody's child and has a session of its own."""
+        """Start an orphaned process in a session of its own."""
         if os.fork() == 0:
             os.setsid()
             if os.fork() == 0:
@@ -74,12 +74,12 @@ class Doubler:
             time.sleep(300.0)
         raise SystemExit(5)
 
-    def who(self, X: np.ndarray) -> int:
+    def process_id(self, X: np.ndarray) -> int:
         return os.getpid()
 
 
 class Unmakeable(Doubler):
-    """Takes with it whoever makes it."""
+    """Ends the process that builds it."""
 
     @property
     def recipe(self) -> Recipe:

@@ -1,4 +1,4 @@
-"""An actor's own side, without Ray: what it answers, and when it leaves."""
+"""An actor without Ray: what it answers, and when it ends."""
 
 import threading
 import time
@@ -8,9 +8,9 @@ import pytest
 
 from bridgegen.errors import InputError
 from bridgegen.workers import open_workers
-from bridgegen.workers.bench import KEPT, Bench, Unprepared
+from bridgegen.workers.pipeline_cache import CAPACITY, NotPrepared, PipelineCache
+from bridgegen.workers.ray_actor import RayActor
 from bridgegen.workers.recipe import Recipe
-from bridgegen.workers.station import Station
 
 
 class Sleeper:
@@ -22,18 +22,18 @@ class Sleeper:
         return len(X)
 
 
-def test_it_leaves_once_nobody_asks_and_not_before():
+def test_it_ends_when_it_has_been_idle_and_not_before():
     left = threading.Event()
-    station = Station(left.set, idle_seconds=0.3)
+    actor = RayActor(left.set, idle_seconds=0.3)
     recipe = Recipe.of(Sleeper, 1.0)
-    assert station.prepare(lambda: recipe, recipe.key) == ("answer", None)
-    assert station.work(recipe.key, "sleep", np.zeros(3), ()) == ("answer", 3)
+    assert actor.prepare(lambda: recipe, recipe.key) == ("answer", None)
+    assert actor.run(recipe.key, Sleeper.sleep, np.zeros(3), ()) == ("answer", 3)
     assert not left.is_set()  # it was busy for longer
     assert left.wait(10.0)
 
 
 def test_a_recipe_is_fetched_once():
-    station, fetched = Station(lambda: None), []
+    actor, fetched = RayActor(lambda: None), []
     recipe = Recipe.of(Sleeper)
 
     def fetch() -> Recipe:
@@ -41,25 +41,25 @@ def test_a_recipe_is_fetched_once():
         return recipe
 
     for _ in range(3):
-        station.prepare(fetch, recipe.key)
+        actor.prepare(fetch, recipe.key)
     assert fetched == [1]
 
 
 def test_what_is_raised_is_answered():
-    kind, error = Station(lambda: None).work("unknown", "sleep", np.zeros(1), ())
+    kind, error = RayActor(lambda: None).run("unknown", Sleeper.sleep, np.zeros(1), ())
     assert kind == "raised"
-    assert isinstance(error, Unprepared)
+    assert isinstance(error, NotPrepared)
 
 
 def test_the_latest_used_are_kept():
-    bench = Bench()
-    recipes = [Recipe.of(Sleeper, float(k) / 1e6) for k in range(KEPT + 1)]
+    cache = PipelineCache()
+    recipes = [Recipe.of(Sleeper, float(k) / 1e6) for k in range(CAPACITY + 1)]
     for one in recipes[:-1]:
-        bench.prepare(one)
-    bench.work(recipes[0].key, "sleep", np.zeros(1), ())
-    bench.prepare(recipes[-1])
-    assert bench.holds(recipes[0].key)
-    assert not bench.holds(recipes[1].key)
+        cache.prepare(one)
+    cache.run(recipes[0].key, Sleeper.sleep, np.zeros(1), ())
+    cache.prepare(recipes[-1])
+    assert recipes[0].key in cache
+    assert recipes[1].key not in cache
 
 
 def test_without_ray_the_extra_is_named(monkeypatch):
