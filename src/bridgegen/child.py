@@ -1,7 +1,7 @@
-"""A process that we begin, and what we exchange with it: pickled messages, through its pipes.
+"""A child process and its messages: pickled, through its standard input and output.
 
-Not forked, so that it inherits no threads and no compiled code's state. It ends with this process,
-however this one ends, and all processes that it has started end with it: see
+It is not forked, so that it inherits neither threads nor the state of compiled code. It ends when
+this process ends, for whatever reason, and its descendants end with it: see
 `bridgegen.supervisor`.
 """
 
@@ -21,26 +21,26 @@ from pathlib import Path
 from typing import IO, Any, NoReturn
 
 Say = Callable[..., None]
-"""Says something to who began this process; may be called by any thread."""
+"""Sends a message to the parent process; may be called by any thread."""
 
 SUPERVISOR = Path(__file__).with_name("supervisor.py")
 
 END_SECONDS = 10.0
-"""So long is the end of a process awaited that has been asked to end; then it is killed."""
+"""A process that has been asked to end is killed after so long [s]."""
 
 DRAIN_SECONDS = 2.0
-"""Of a process's pipe and the process itself, one ends so long after the other at most."""
+"""Maximum time between the end of a process and the end of its pipe [s]."""
 
 
 class Child:
-    """A process, seen from here, with those that it starts; Ctrl-C is not theirs.
+    """A child process with its descendants; they do not receive Ctrl-C.
 
     Args:
-        program: what Python is to run, e.g. ``-m`` and a module of ours that calls `connect`.
-        take: is given each message of its, a tuple, in a thread; the last is ``("died",)``, when
-            the process has ended.
-        environment: of it, besides ours.
-        errors: takes what it writes to its standard error; ours does by default.
+        program: arguments of Python, e.g. ``-m`` and a module that calls `connect`.
+        take: is called with each message, a tuple, in a thread; the last message is ``("died",)``,
+            when the process has ended.
+        environment: variables that are added to this process's environment.
+        errors: receives its standard error; this process's standard error by default.
     """
 
     def __init__(
@@ -64,11 +64,11 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """The number of the process that supervises it."""
+        """The process number of its supervisor."""
         return self._process.pid
 
     def send(self, message: Any) -> None:
-        """Send what can be pickled.
+        """Send a message that can be pickled.
 
         Raises:
             OSError: it has ended.
@@ -77,13 +77,13 @@ class Child:
         _write(self._process.stdin, pickle.dumps(message, protocol=5))
 
     def kill(self) -> None:
-        """End it, from any thread; whoever waits for its messages gets the last."""
+        """End it, from any thread; its last message is still delivered."""
         _terminate(self._process)
 
     def end(self) -> int:
-        """End it, if it is running, at once; so does this object's end. Return its exit status.
+        """End it at once, as does this object's deletion; return its exit status.
 
-        It is negative for a signal; that of SIGKILL, too, of a process that cannot be ended.
+        A signal's status is its negative number; −SIGKILL also if the process cannot be ended.
         """
         self._end()
         status = self._process.returncode
@@ -91,19 +91,19 @@ class Child:
 
 
 def _terminate(process: subprocess.Popen[bytes]) -> None:
-    """Ask the supervisor to kill the process and what it has started."""
+    """Ask the supervisor to kill the process and its descendants."""
     with suppress(OSError):
         process.terminate()
 
 
 def _end(process: subprocess.Popen[bytes], ended: threading.Event, read: threading.Event) -> None:
     _terminate(process)
-    if not ended.wait(END_SECONDS):  # the supervisor has been stopped, say
+    if not ended.wait(END_SECONDS):  # the supervisor has been stopped, for example
         with suppress(OSError):
             os.killpg(process.pid, signal.SIGKILL)
         ended.wait(END_SECONDS)
     if not read.wait(DRAIN_SECONDS):
-        return  # somebody else holds its pipes: closing them here might wait for ever
+        return  # another process holds its pipes: closing them here might block
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             with suppress(OSError):
@@ -116,7 +116,7 @@ def _wait(
     ended: threading.Event,
     read: threading.Event,
 ) -> None:
-    """Wait for the end of the process itself: a process that it started may hold its pipe."""
+    """Wait for the end of the process itself: a descendant may hold its pipe open."""
     process.wait()
     ended.set()
     read.wait(DRAIN_SECONDS)
@@ -129,7 +129,7 @@ def _forward(
     ended: threading.Event,
     read: threading.Event,
 ) -> None:
-    """Pass on its messages; end it if it says what is no message, or closes its pipe."""
+    """Forward its messages; end it if it sends an invalid message or closes its pipe."""
     assert process.stdout is not None
     with suppress(Exception):
         while True:
@@ -146,31 +146,31 @@ def _write(pipe: IO[bytes], data: bytes) -> None:
 
 
 def _read(pipe: IO[bytes]) -> bytes:
-    """Return the next message; both ends are ours, and the other process is trusted."""
+    """Return the next message; the process at the other end is trusted."""
     head = pipe.read(8)
     if len(head) < 8:
         raise EOFError
     return pipe.read(struct.unpack("<q", head)[0])
 
 
-# --- In the other process -------------------------------------------------------------------------
+# --- In the child process -------------------------------------------------------------------------
 
 
 def connect(
-    spoken: int = 2, at_end: Callable[[], None] = lambda: None
+    stdout: int = 2, at_end: Callable[[], None] = lambda: None
 ) -> tuple["queue.SimpleQueue[bytes]", Say]:
-    """Return what is asked for, as it comes, pickled, and how to answer.
+    """Return the queue of pickled requests, and the function that sends messages.
 
     Args:
-        spoken: where what is printed goes, a file's number: the other output by default.
-        at_end: is called when nobody is there any more; then this process ends, whatever it is at.
+        stdout: file descriptor that receives printed output; standard error by default.
+        at_end: is called when the parent process has ended; then this process ends at once.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the job itself ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     lock = threading.Lock()
     nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nothing, 0)  # what is read must not be our messages,
-    os.dup2(spoken, 1)  # and what is printed must not get between them
+    os.dup2(nothing, 0)  # code here must not read requests,
+    os.dup2(stdout, 1)  # and must not print between messages
     pipes = questions.fileno(), answers.fileno()
 
     def release_pipes() -> None:
@@ -190,9 +190,9 @@ def connect(
 
 
 def leave(error: BaseException) -> NoReturn:
-    """End this process as Python would for an exception that nobody caught, but at once.
+    """End this process as Python does after an uncaught exception, but at once.
 
-    Python would first wait for threads and processes that the driver has started.
+    Python would first wait for the threads and processes that this process has started.
     """
     status: Any = 1
     if isinstance(error, SystemExit):

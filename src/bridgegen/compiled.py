@@ -1,4 +1,4 @@
-"""The one decorator for compiled code, and what compiled code can do that Numba has no word for."""
+"""The decorators for compiled code, and intrinsics that Numba lacks."""
 
 import ctypes
 import gc
@@ -16,8 +16,8 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from bridgegen.kernel_cache import KernelCache, compiling
 
 
-class _Unhurried(event.Listener):  # type: ignore[misc]
-    """Collects garbage less often while Numba compiles: its millions of small objects all stay."""
+class _RelaxGarbageCollection(event.Listener):  # type: ignore[misc]
+    """Collects garbage less often during a compilation, which keeps its millions of objects."""
 
     depth, usual = 0, (0, 0, 0)
 
@@ -33,7 +33,7 @@ class _Unhurried(event.Listener):  # type: ignore[misc]
             gc.set_threshold(*self.usual)
 
 
-event.register("numba:compile", _Unhurried())  # always under Numba's own lock
+event.register("numba:compile", _RelaxGarbageCollection())  # always under Numba's own lock
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

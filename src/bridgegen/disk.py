@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and pages that replace none but their own kind."""
+"""Files that are written atomically, and pages that replace only pages of the same kind."""
 
 import glob
 import os
@@ -10,18 +10,17 @@ from typing import IO
 from bridgegen.errors import InputError, StorageError
 
 _HEAD = 1000
-"""Bytes of a page in which it says who made it."""
+"""Bytes of a page within which its generator is named."""
 
 
 def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
-    """Write a file beside its place, then put it there: nobody ever reads half of it.
+    """Write a file atomically: a temporary file beside it, then a rename.
 
-    What processes that were killed left of the same file is removed. A device or a pipe is written
-    to, and never replaced.
+    Temporary files of killed processes are removed. A device or a pipe is written to directly.
 
     Args:
-        path: where to; a file that exists is replaced.
-        chunks: what it holds.
+        path: of the file; an existing file is replaced.
+        chunks: its content.
 
     Raises:
         StorageError: it cannot be written (no such folder, read-only, disk full).
@@ -40,20 +39,20 @@ def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
     except OSError as error:
         raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
     finally:
-        with suppress(OSError):  # it is there no more, or the first error has been raised already
+        with suppress(OSError):  # already renamed, or an error is being raised
             part.unlink()
 
 
 def read_inside(folder: Path, name: str) -> bytes:
-    """Return a file of a folder that somebody else may have made.
+    """Return the content of a file in an untrusted folder.
 
     Args:
         folder: of a run.
-        name: of the file, relative to it.
+        name: of the file, relative to the folder.
 
     Raises:
-        FileNotFoundError: there is none.
-        StorageError: it cannot be read, is no file, or is a link to a place outside the folder.
+        FileNotFoundError: it does not exist.
+        StorageError: it cannot be read, is not a file, or is a link to a place outside the folder.
     """
     path = folder / name
     try:
@@ -70,9 +69,9 @@ def read_inside(folder: Path, name: str) -> bytes:
 
 
 def _remove_left_over(path: Path) -> None:
-    """Remove the parts of a file whose processes have ended: none of this machine's, none locked.
+    """Remove temporary files of processes that have ended.
 
-    The lock tells of processes on other machines, where the file system has such locks.
+    A lock marks those of processes on other machines, if the file system has locks.
     """
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         pid = part.name.split(".")[-2]
@@ -84,14 +83,14 @@ def _remove_left_over(path: Path) -> None:
 
 
 def _runs(pid: int) -> bool:
-    """Say whether there is such a process on this machine, as far as can be told."""
+    """Return whether a process runs on this machine; True if that is unknown."""
     if os.name != "posix":
         return True
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # somebody else's; or no process's number
+    except (OSError, OverflowError):  # another user's; or not a process number
         return True
     return True
 
@@ -102,22 +101,22 @@ def _lock(file: IO[bytes]) -> bool:
         import fcntl
 
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (ImportError, OSError):  # not on this system, nor on this file system; or it is taken
+    except (ImportError, OSError):  # not supported, or locked by another process
         return False
     return True
 
 
 def refuse_other(page: Path, generator: str, what: str) -> None:
-    """Refuse a page's name that is no page's, or is taken by anything but an earlier one.
+    """Reject a page's path that is not .html, or at which another kind of file exists.
 
     Args:
-        page: where it is to be.
-        generator: what an earlier one names as its generator.
-        what: what it is, for messages ("picture").
+        page: path of the new page.
+        generator: the generator that an earlier page of this kind names.
+        what: the kind, for messages ("picture").
 
     Raises:
         InputError: its name does not end in .html.
-        StorageError: something else is there, or nobody can tell.
+        StorageError: another file exists there, or the file cannot be read.
     """
     if page.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{page}: the {what} is a page, its name must end in .html")
@@ -130,4 +129,4 @@ def refuse_other(page: Path, generator: str, what: str) -> None:
     except OSError as error:
         raise StorageError(f"{page}: cannot be written: {error.strerror}") from None
     if not ours:
-        raise StorageError(f"{page}: exists already, is no {what}, and is not overwritten")
+        raise StorageError(f"{page}: exists already, is not a {what}, and is not overwritten")

@@ -1,18 +1,18 @@
 """The exceptions that BridgeGen raises, one small tree.
 
     BridgeGenError
-     ├── InputError               what the user gave breaks a rule; exit status 2
-     │    ├── UnknownNameError    no such scenario, algorithm, metric …; suggests the nearest
+     ├── InputError               the user's input breaks a rule; exit status 2
+     │    ├── UnknownNameError    no such scenario, algorithm, metric …; suggests the closest
      │    ├── FileFormatError     a file that is missing, unreadable, malformed, hostile, too big
      │    ├── ScenarioError       a logical scenario (YAML) that breaks a rule
-     │    ├── OntologyError       individuals that lack what a scenario needs, or contradict it
-     │    └── UnsupportedError    valid, but outside what this version can do
+     │    ├── OntologyError       individuals that are incomplete for a scenario, or contradict it
+     │    └── UnsupportedError    valid, but not supported by this version
      ├── StorageError             a run folder that exists, is read-only, is full, is not a run
-     ├── WorkersError             workers cannot be had, or are lost; the run can be gone on with
-     └── Interrupted              Ctrl-C; what is done is kept, and the run can be gone on with
+     ├── WorkersError             workers are unavailable or lost; the run can be resumed
+     └── Interrupted              Ctrl-C; the results so far are kept, and the run can be resumed
 
-Every message states the rule, the value with its unit and the place; ``problems`` holds all that
-were found at once.
+Every message states the rule, the value with its unit and the place; ``problems`` holds all
+problems that were found.
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ from typing import Any
 
 
 class BridgeGenError(Exception):
-    """Base of everything that BridgeGen raises on purpose.
+    """Base class of the exceptions that BridgeGen raises.
 
     Args:
         problems: one sentence each; all that were found, not only the first.
@@ -33,27 +33,27 @@ class BridgeGenError(Exception):
         self.problems = problems
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (type(self), self.problems), self.__dict__
+        return _rebuild, (type(self), self.problems), self.__dict__
 
 
-def _again(kind: type[BridgeGenError], problems: tuple[str, ...]) -> BridgeGenError:
-    """Return an error that was pickled, whatever its own arguments were: a worker raised it."""
+def _rebuild(kind: type[BridgeGenError], problems: tuple[str, ...]) -> BridgeGenError:
+    """Rebuild a pickled error of a worker, whatever the arguments of its class are."""
     error = kind.__new__(kind)
     BridgeGenError.__init__(error, *problems)
     return error
 
 
 class InputError(BridgeGenError):
-    """What the user gave breaks a rule."""
+    """The user's input breaks a rule."""
 
 
 class UnknownNameError(InputError):
     """A name that is not in a registry.
 
     Args:
-        kind: what was looked up, for the message ("scenario", "metric").
-        name: what the user gave.
-        known: the names there are.
+        kind: of the name, for the message ("scenario", "metric").
+        name: the user's input.
+        known: the registered names.
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
@@ -72,7 +72,7 @@ class ScenarioError(InputError):
 
 
 class OntologyError(InputError):
-    """Individuals that lack what a scenario needs, or contradict it."""
+    """Individuals that are incomplete for a scenario, or contradict it."""
 
 
 class UnsupportedError(InputError):
@@ -84,18 +84,18 @@ class StorageError(BridgeGenError):
 
 
 class WorkersError(BridgeGenError):
-    """Workers cannot be had, or are lost."""
+    """Workers are unavailable or lost."""
 
 
 class Interrupted(BridgeGenError):
     """Ctrl-C ended a search, or a comparison.
 
     Args:
-        folder: the run's; holds what was done.
-        evaluations: how many that is.
-        budget: how many it was to be.
-        what: they are, if not evaluations.
-        command: that goes on, if not ``bridgegen resume``.
+        folder: of the run; holds the results so far.
+        evaluations: number of results.
+        budget: number of results that were planned.
+        what: the unit of both numbers, if not evaluations.
+        command: resumes the work, if not ``bridgegen resume``.
     """
 
     def __init__(
@@ -109,6 +109,6 @@ class Interrupted(BridgeGenError):
     ) -> None:
         super().__init__(
             f"stopped after {evaluations} of {budget} {what}; "
-            f"go on with '{command or f'bridgegen resume {folder}'}'"
+            f"resume with '{command or f'bridgegen resume {folder}'}'"
         )
         self.folder, self.evaluations, self.budget = folder, evaluations, budget

@@ -1,7 +1,7 @@
-"""Work in a process of its own, so that what it does cannot end the job.
+"""Calls into a process of its own, so that a crash cannot end this process.
 
-What is called there may raise, take too long, or take its process down with it: that costs the call
-and nothing else. The process is ended then, and another one is begun for the next.
+A call may raise, take too long or crash its process: only that call fails. After a timeout or a
+crash, the next call needs a new process.
 """
 
 import pickle
@@ -13,14 +13,14 @@ from typing import Any
 from bridgegen.child import Child, Say, connect, leave
 
 Answer = Callable[..., Any]
-"""Answers a request, in the other process."""
+"""Answers a request, in the isolated process."""
 
 
 class CallError(Exception):
     """A call was not answered.
 
     Attributes:
-        kind: "raised", "timed out", "died", or a word of whoever answers.
+        kind: "raised", "timed out", "died", or a word that the answering function chooses.
     """
 
     def __init__(self, kind: str, message: str) -> None:
@@ -32,9 +32,9 @@ class IsolatedProcess:
     """A process that answers calls, one at a time.
 
     Args:
-        module: of ours; run as a program, it calls ``main``.
-        arguments: of that program.
-        error: what is raised where a call is not answered.
+        module: is run as a program.
+        arguments: of the program.
+        error: is raised if a call is not answered.
     """
 
     def __init__(
@@ -49,17 +49,17 @@ class IsolatedProcess:
 
     @property
     def runs(self) -> bool:
-        """Whether it has been started, and not ended since."""
+        """Whether it has been started and not closed since."""
         return self._child is not None
 
     def start(self, seconds: float) -> Any:
-        """Begin the process; return its greeting.
+        """Start the process; return its first answer.
 
         Args:
-            seconds: that this may take.
+            seconds: time limit [s].
 
         Raises:
-            CallError: it cannot be begun.
+            CallError: it cannot be started.
         """
         self._answers = queue.SimpleQueue()
         self._child = Child(self._program, self._answers.put)
@@ -73,27 +73,28 @@ class IsolatedProcess:
         """Return the answer to a request; the process must run.
 
         Args:
-            request: what can be pickled.
-            seconds: that it may take.
-            progress: what changes while it gets on; the limit is for each change.
+            request: objects that can be pickled.
+            seconds: time limit [s].
+            progress: returns a counter that grows while the process works; each change restarts
+                the time limit.
 
         Raises:
-            CallError: it was not answered; unless it "raised", or as `Answer` says, the process
-                has ended.
+            CallError: it was not answered. The process has ended, unless the kind is "raised" or a
+                word of the answering function.
         """
         assert self._child is not None
-        with suppress(OSError):  # it has ended: the last that it says tells how
+        with suppress(OSError):  # it has ended: its last message reports that
             self._child.send(request)
         return self._answer(seconds, progress)
 
     def kill(self) -> None:
-        """End the process from another thread: who waits for it gets a `CallError`."""
+        """End the process from another thread: a waiting ``ask`` raises `CallError`."""
         child = self._child
         if child is not None:
             child.kill()
 
     def close(self) -> None:
-        """End the process, if it is running; so does this object's end."""
+        """End the process, as does this object's deletion."""
         if self._child is not None:
             self._child.end()
         self._child = None
@@ -118,52 +119,52 @@ class IsolatedProcess:
         raise self._error(kind, rest[0])
 
 
-# --- In the other process -------------------------------------------------------------------------
+# --- In the isolated process ----------------------------------------------------------------------
 
 
 def serve(
     make: Callable[[], tuple[Any, Answer]],
-    told: Callable[[Exception], str] = str,
-    spoken: int = 2,
+    describe: Callable[[Exception], str] = str,
+    stdout: int = 2,
     at_end: Callable[[], None] = lambda: None,
 ) -> None:
-    """Answer requests until nobody is there to make any.
+    """Answer requests until the parent process ends.
 
     Args:
-        make: returns the greeting, and what answers requests.
-        told: says an exception in one line.
-        spoken: where what is printed goes, a file's number: the other output by default.
-        at_end: is called when nobody is there any more.
+        make: returns the first answer, and the function that answers requests.
+        describe: returns an exception in one line.
+        stdout: file descriptor that receives printed output; standard error by default.
+        at_end: is called when the parent process has ended.
     """
-    requests, say = connect(spoken, at_end)
+    requests, say = connect(stdout, at_end)
     try:
-        _serve(make, told, requests, say)
-    except BaseException as error:  # sys.exit, say
+        _serve(make, describe, requests, say)
+    except BaseException as error:  # sys.exit, for example
         leave(error)
 
 
 def _serve(
     make: Callable[[], tuple[Any, Answer]],
-    told: Callable[[Exception], str],
+    describe: Callable[[Exception], str],
     requests: "queue.SimpleQueue[bytes]",
     say: Say,
 ) -> None:
     try:
-        greeting, answer = make()
+        first, answer = make()
     except Exception as error:
-        say(*_failure(error, told))
+        say(*_failure(error, describe))
         return
-    say("answer", greeting)
+    say("answer", first)
     while True:
         request = requests.get()
         try:
             message: tuple[str, Any] = ("answer", answer(*pickle.loads(request)))
         except Exception as error:
-            message = _failure(error, told)
+            message = _failure(error, describe)
         say(*message)
 
 
-def _failure(error: Exception, told: Callable[[Exception], str]) -> tuple[str, str]:
+def _failure(error: Exception, describe: Callable[[Exception], str]) -> tuple[str, str]:
     if isinstance(error, CallError):
         return error.kind, str(error)
-    return "raised", told(error)
+    return "raised", describe(error)

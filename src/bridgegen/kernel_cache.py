@@ -1,13 +1,13 @@
-"""Where compiled kernels are kept between runs, and by whom they may be read.
+"""The cache of compiled kernels on disk.
 
-Numba keys its cache by the file of the compiled function alone, so a change in a kernel that it
-calls from another file would go unnoticed. Here the cache folder's name is a digest of the source
-of every private module beside a kernel, and of the modules that those take constants from: change
-one, and all are compiled again. Nothing else of the folder's path depends on where the package is
-installed: each new virtual environment, clone and CI job of the same source finds what an earlier
-one compiled.
+Numba's cache key is the file of the compiled function only, so it misses a change in a kernel that
+the function calls from another file. Here the name of the cache folder is a digest of the source of
+all private modules beside kernels and of the modules that those take constants from: after a change
+in one of them, all kernels are compiled again. Nothing else of the path depends on the
+installation: each new virtual environment, clone and CI job of the same source reuses the compiled
+code.
 
-The cache holds pickles and machine code, so only a folder of this user's own is read.
+The cache holds pickles and machine code, so only a folder that this user owns is read.
 """
 
 import hashlib
@@ -35,11 +35,11 @@ IMPORTED = re.compile(r"^ *from bridgegen\.([\w.]+) import", re.MULTILINE)
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path:
-    """The folder that holds the compiled code of exactly this source, made if need be.
+    """Return the folder of the compiled code of exactly this source; it is created if needed.
 
-    ``NUMBA_CACHE_DIR`` says where; otherwise it is the user's cache, or, where that cannot be
-    written or belongs to somebody else, a folder of the user's own among the temporary ones. Where
-    that belongs to somebody else, too, a new one serves this process alone.
+    It is in ``NUMBA_CACHE_DIR`` if that is set; else in the user's cache folder; else, if that is
+    not writable or belongs to another user, in a temporary folder of this user; else it is a new
+    temporary folder for this process only.
     """
     versions = (numba.__version__, llvmlite.__version__, np.__version__)
     digest = hashlib.sha256(" ".join(versions).encode())
@@ -51,10 +51,10 @@ def cache_folder() -> Path:
         folder = Path(chosen) / name
         return folder if _is_writable(folder) else _for_this_process()
     home = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "bridgegen"
-    if _is_writable(home / name) and _is_ours(home / name):
+    if _is_writable(home / name) and _is_owned(home / name):
         return home / name
     shared = Path(tempfile.gettempdir()) / f"bridgegen-{_user()}"
-    if _is_writable(shared) and _is_ours(shared) and _is_writable(shared / name):
+    if _is_writable(shared) and _is_owned(shared) and _is_writable(shared / name):
         return shared / name
     return _for_this_process()
 
@@ -74,7 +74,7 @@ def _sources() -> set[Path]:
 
 
 def is_compiled() -> bool:
-    """Whether an earlier run has left compiled kernels, so that this one starts at once."""
+    """Return whether compiled kernels of an earlier run exist, so that this run starts at once."""
     return any(cache_folder().rglob("*.nbi"))
 
 
@@ -95,10 +95,10 @@ def _is_writable(folder: Path) -> bool:
         return False
 
 
-def _is_ours(folder: Path) -> bool:
-    """Whether nobody but this user can have written what lies in a folder."""
+def _is_owned(folder: Path) -> bool:
+    """Return whether only this user can have written the files of a folder."""
     if not hasattr(os, "getuid"):
-        return True  # on this system, temporary folders are each user's own
+        return True  # on this system, each user has a temporary folder
     found = folder.lstat()
     others = stat.S_IWGRP | stat.S_IWOTH
     return (
@@ -107,7 +107,7 @@ def _is_ours(folder: Path) -> bool:
 
 
 class _Locator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
-    """Keeps a function's code in a folder named by its place in this package."""
+    """Stores a function's code in a folder named after its subpackage."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         self._py_file, self._lineno = file, function.__code__.co_firstlineno
@@ -122,7 +122,7 @@ class _Locator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_Locator | None":
-        # Not the parent's, who asks for ``numba.config.CACHE_DIR``.
+        # Skips the parent's, which requires ``numba.config.CACHE_DIR``.
         found: _Locator | None = super(caching.UserProvidedCacheLocator, cls).from_function(
             function, file
         )
@@ -134,43 +134,45 @@ class _Format(caching.CompileResultCacheImpl):  # type: ignore[misc]
 
 
 class KernelCache(caching.FunctionCache):  # type: ignore[misc]
-    """A function's compiled code on disk; of processes that lack it, one compiles at a time."""
+    """A function's compiled code on disk; processes that lack it compile one after the other."""
 
     _impl_class = _Format
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the compiled code of a signature, or None; what is damaged is left out."""
+        """Return the compiled code of a signature, or None; damaged files are ignored."""
         found = self._load(signature, context)
-        if found is None and _Turn.take():  # somebody else may have compiled it meanwhile
+        if (
+            found is None and _CompileLock.acquire()
+        ):  # another process may have compiled it meanwhile
             found = self._load(signature, context)
         return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep the compiled code of a signature, if it can be written: else the next run compiles."""
+        """Keep the compiled code of a signature if it can be written."""
         with suppress(OSError):
             super().save_overload(signature, data)
 
     def _load(self, signature: Any, context: Any) -> Any:
         try:
             return super().load_overload(signature, context)
-        except Exception:  # a file that is cut off, of zeros, of another machine
+        except Exception:  # a file that is truncated, zeroed or of another machine
             with suppress(OSError):
                 self.flush()
             return None
 
 
-class _Turn:
-    """This process's turn to compile; always under Numba's own lock."""
+class _CompileLock:
+    """A lock among processes for compilation; always used under Numba's own lock."""
 
     depth = 0
     file: IO[str] | None = None
 
     @classmethod
-    def take(cls) -> bool:
-        """Wait until no other process compiles; return whether this one had to ask."""
+    def acquire(cls) -> bool:
+        """Wait until no other process compiles; return whether the lock was acquired now."""
         try:
             import fcntl
-        except ImportError:  # not on this system: each compiles for itself
+        except ImportError:  # not on this system: each process compiles for itself
             return False
         if cls.file is not None:
             return False
@@ -182,8 +184,8 @@ class _Turn:
         return True
 
     @classmethod
-    def give_back(cls) -> None:
-        """Let others compile."""
+    def release(cls) -> None:
+        """Release the lock."""
         if cls.file is not None:
             cls.file.close()
             cls.file = None
@@ -191,12 +193,12 @@ class _Turn:
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Around whatever loads or compiles a kernel: ends this process's turn with the outermost."""
+    """Enclose code that loads or compiles kernels; the outermost one releases the lock."""
     with global_compiler_lock:
-        _Turn.depth += 1
+        _CompileLock.depth += 1
         try:
             yield
         finally:
-            _Turn.depth -= 1
-            if not _Turn.depth:
-                _Turn.give_back()
+            _CompileLock.depth -= 1
+            if not _CompileLock.depth:
+                _CompileLock.release()

@@ -1,4 +1,4 @@
-"""Records of a run that are kept as JSON, and read again as untrusted."""
+"""Records of a run as JSON files, which are untrusted when they are read."""
 
 import json
 import math
@@ -14,15 +14,15 @@ from bridgegen.errors import FileFormatError, InputError, StorageError
 Model = TypeVar("Model", bound=BaseModel)
 
 MOST_BYTES = 2**26
-"""The largest record that is read; BridgeGen's own stay far below it."""
+"""Maximum size of a record; BridgeGen writes far smaller ones."""
 
 
 def parse_json(text: str | bytes) -> Any:
-    """Return the value of a JSON text that BridgeGen may have written.
+    """Return the value of a JSON text, under the rules of BridgeGen's records.
 
     Raises:
-        ValueError: it is not JSON; or it holds a number that is not finite or a whole number of
-            more than 64 bits, a lone surrogate, or is nested too deeply.
+        ValueError: it is not JSON, contains a number that is not finite, an integer of more than
+            64 bits or a lone surrogate, or is nested too deeply.
     """
     try:
         value = json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
@@ -67,21 +67,21 @@ def _whole(text: str) -> int:
 def read_model(
     path: Path, model: type[Model], not_ours: Callable[[Path, str], FileFormatError]
 ) -> Model | None:
-    """Return a record; None where there is no file.
+    """Return a record; None if the file does not exist.
 
     Args:
         path: of the file.
-        model: what it holds.
-        not_ours: makes the error of a file that holds something else, from the path and why.
+        model: its schema.
+        not_ours: returns the error for another kind of file, from the path and a reason.
 
     Raises:
-        FileFormatError: it holds something else.
+        FileFormatError: its content does not fit the schema.
         StorageError: it cannot be read.
     """
     try:
         data = read_bytes(path)
         record = model.model_validate_json(data, strict=True)
-        parse_json(data)  # the rules that a model does not state, on every value
+        parse_json(data)  # rules that the schema does not contain, for every value
         return record
     except FileNotFoundError:
         return None

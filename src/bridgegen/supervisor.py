@@ -1,14 +1,14 @@
-"""Between this process and a child of it: starts the child, and ends all that the child started.
+"""A supervisor process: starts a program, and ends all descendants of it.
 
-Run as a program by `bridgegen.child`: ``python supervisor.py PROGRAM ARGUMENT…``. The program gets
-the standard streams as they are. When it ends, when this process is sent SIGTERM, or when nobody
-holds the other end of the standard input any more, every process that descends from the program is
-killed; then this process ends as the program did, with its exit status or by its signal.
+`bridgegen.child` runs it: ``python supervisor.py PROGRAM ARGUMENT…``. The program inherits the
+standard streams. When the program ends, when the supervisor receives SIGTERM, or when the other end
+of the standard input is closed, all descendants of the program are killed; then the supervisor ends
+as the program did, with its exit status or by its signal.
 
-On Linux a process that has left its parent (a daemon, or one whose parent ended) is found, too:
-it becomes a child of this process. Elsewhere the program's process group is killed.
+On Linux, orphans (daemons, or processes whose parent ended) are killed, too: they become children
+of the supervisor. On other systems the program's process group is killed.
 
-It is single-threaded and imports nothing of ours, so it starts in a few milliseconds and may fork.
+It is single-threaded and imports only the standard library: it starts in a few ms and may fork.
 """
 
 import ctypes
@@ -21,10 +21,10 @@ import time
 from contextlib import suppress
 
 HANG_UP_SECONDS = 2.0
-"""So long may the program take to end by itself when its standard input ends: it may tidy up."""
+"""Time for the program to end by itself after its standard input ends [s]."""
 
 KILL_SECONDS = 5.0
-"""So long the end of killed processes is awaited: one may be stuck in the kernel."""
+"""Maximum wait for killed processes to end [s]: one may be stuck in the kernel."""
 
 _POLL = 0.01
 _PR_SET_PDEATHSIG = 1
@@ -35,7 +35,7 @@ def main() -> None:
     """Run the program of the command line, and end as it ends."""
     status = supervise(sys.argv[1:])
     if status < 0:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # the program has left one, if any
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # the program has written one, if any
         if -status != signal.SIGKILL:
             signal.signal(-status, signal.SIG_DFL)
         os.kill(os.getpid(), -status)
@@ -52,19 +52,19 @@ def supervise(program: list[str]) -> int:
     for end in (woken, wakes):
         os.set_blocking(end, False)
     signal.set_wakeup_fd(wakes, warn_on_full_buffer=False)
-    asked: list[int] = []
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the job itself ends us
-    signal.signal(signal.SIGTERM, lambda number, frame: asked.append(number))
+    terminations: list[int] = []
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    signal.signal(signal.SIGTERM, lambda number, frame: terminations.append(number))
     signal.signal(signal.SIGCHLD, lambda number, frame: None)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     child = _start(program)
-    os.dup2(2, 1)  # the program alone holds the way to answer
+    os.dup2(2, 1)  # only the program holds the output pipe
     poll = select.poll()
-    poll.register(0, 0)  # reports a hang-up only: what is sent is the program's
+    poll.register(0, 0)  # hang-ups only: the program reads the data
     poll.register(woken, select.POLLIN)
     status: int | None = None
     deadline: float | None = None
-    while status is None and not asked:
+    while status is None and not terminations:
         left = None if deadline is None else 1000.0 * max(deadline - time.monotonic(), 0.0)
         ready = [number for number, _ in poll.poll(left)]
         if woken in ready:
@@ -104,7 +104,7 @@ def _reap(child: int) -> int | None:
     """Collect the processes that have ended; return the status of the program if it is among them.
 
     Raises:
-        ChildProcessError: there are none left, running or ended; the program's end is known.
+        ChildProcessError: no child is left; the program's status is known.
     """
     found = None
     while True:
@@ -132,7 +132,7 @@ def _end_all(child: int, status: int | None) -> int:
 
 
 def _descendants() -> list[int]:
-    """Return the processes that descend from this one; none where there is no /proc."""
+    """Return the descendants of this process; none on systems without /proc."""
     parents: dict[int, list[int]] = {}
     try:
         numbers = [int(name) for name in os.listdir("/proc") if name.isdecimal()]
@@ -146,7 +146,7 @@ def _descendants() -> list[int]:
             continue
         parents.setdefault(int(fields[1]), []).append(number)
     found = parents.get(os.getpid(), [])
-    for number in found:  # grows as it is gone through
+    for number in found:  # grows during the iteration
         found += parents.get(number, [])
     return found
 

@@ -207,7 +207,9 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(folder, double):
     with pytest.raises(Interrupted) as stop:
         confirm(folder, elsewhere(), rows=9, progress=lambda done, *_: seen.append(done))
     assert "stopped after 3 of 9 scenarios" in str(stop.value)
-    assert f"go on with 'bridgegen confirm {folder} --simulator double --rows 9'" in str(stop.value)
+    assert f"resume with 'bridgegen confirm {folder} --simulator double --rows 9'" in str(
+        stop.value
+    )
     assert (seen, len(record_of(folder)["scenarios"])) == ([1, 2, 3], 3)
     double.ran, double.disturb = 100, lambda rollout: rollout
     found = confirm(folder, elsewhere(), rows=9)
@@ -279,7 +281,7 @@ def test_ctrl_c_ends_with_the_status_for_it(folder, double, cli):
     double.disturb = disturb
     code, out, err = cli("confirm", folder, "--simulator", "double")
     assert (code, out) == (130, "")
-    assert "stopped after 0 of 4 scenarios; go on with 'bridgegen confirm" in err
+    assert "stopped after 0 of 4 scenarios; resume with 'bridgegen confirm" in err
 
 
 def test_every_mistake_is_one_clear_error(folder, double, cli, tmp_path):

@@ -186,7 +186,7 @@ def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path):
     small = {**GRID, "seeds": 1}
     with pytest.raises(Interrupted) as caught:
         bg.compare("crossroads-s4", **small, workers=1, out=out, watch=Watch(batch=stop))
-    assert "stopped after 1 of 2 runs; go on with 'bridgegen compare" in str(caught.value)
+    assert "stopped after 1 of 2 runs; resume with 'bridgegen compare" in str(caught.value)
     assert f"--seeds 1 --budget 120 --out {out}'" in str(caught.value)
     assert finished(out) == 1
     assert len(rows_of(out / "runs" / "crossroads-s4-pso-0")) == 80

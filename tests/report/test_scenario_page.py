@@ -114,7 +114,7 @@ def test_where_it_goes(tmp_path, monkeypatch):
     assert show_scenario(str(own)) == folder / "own.html"
     assert show_scenario(str(own)) == folder / "own.html"  # an earlier picture is replaced
     (tmp_path / "notes.html").write_text("mine")
-    with pytest.raises(StorageError, match="is no picture, and is not overwritten"):
+    with pytest.raises(StorageError, match="is not a picture, and is not overwritten"):
         show_scenario("cut-in", tmp_path / "notes.html")
     with pytest.raises(InputError, match=r"must end in \.html"):
         show_scenario("cut-in", tmp_path / "page.pdf")

@@ -56,7 +56,7 @@ def test_an_earlier_picture_is_replaced_and_nothing_else_is(owl):
     show_file(owl)
     assert page.read_bytes() != before
     page.write_text("my notes")
-    with pytest.raises(StorageError, match="is no picture, and is not overwritten"):
+    with pytest.raises(StorageError, match="is not a picture, and is not overwritten"):
         show_file(owl)
     assert page.read_text() == "my notes"
 

@@ -200,7 +200,7 @@ def test_interrupted_and_gone_on_with_it_is_the_same(
     with pytest.raises(Interrupted) as caught:
         bg.reproduce(**tiny, workers=1, watch=Watch(batch=stop))
     told = str(caught.value)
-    stopped, _, command = told.partition("; go on with ")
+    stopped, _, command = told.partition("; resume with ")
     assert re.fullmatch(rf"stopped after 1\d of {COUNT} runs", stopped)
     assert not Path("reproduction/index.html").exists()
     with Store.open("reproduction/with-perception/runs/crossroads-s3-pso-0") as store:

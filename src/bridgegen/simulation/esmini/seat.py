@@ -269,7 +269,7 @@ def main(start: Callable[[str, str], tuple[str, Answer]] = answering) -> None:
     import os
 
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    serve(partial(start, *sys.argv[1:3]), spoken=nowhere, at_end=clear)
+    serve(partial(start, *sys.argv[1:3]), stdout=nowhere, at_end=clear)
 
 
 if __name__ == "__main__":
