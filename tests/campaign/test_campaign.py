@@ -470,7 +470,7 @@ def test_a_folder_that_is_deleted_in_mid_run_is_said_to_be(tmp_path, when):
         bg.run_search("crossroads-s4", budget=200, keep=1, ego="route-follower", causes=False,
                       out=folder, watch=Watch(batch=on_batch, stage=on_stage))  # fmt: skip
     assert str(stop.value) == (
-        f"{folder}: run.sqlite was deleted or moved while the run was going on; if it was deleted, "
+        f"{folder}: run.sqlite was deleted or moved during the run; if it was deleted, "
         "its evaluations are lost"
     )
     if when == "batch":

@@ -253,7 +253,7 @@ def test_refusals(run, catalogue, tmp_path):
 
     refuse(InputError, "unknown flavour 'recrded'; did you mean 'recorded'", source, "recrded")
     refuse(StorageError, "there is no such folder", tmp_path / "nothing", "1.3")
-    refuse(StorageError, "holds no run", tmp_path, "1.3")
+    refuse(StorageError, "contains no run", tmp_path, "1.3")
     refuse(FileFormatError, "cannot be read", tmp_path / "no.xosc", "1.3")
     refuse(InputError, "0009", run.folder, "1.3", scenarios=["0009"])
     refuse(InputError, "chosen of a run", source, "1.3", scenarios=["0001"])

@@ -14,7 +14,7 @@ from bridgegen.campaign.validate import validate_file
 from bridgegen.openx.openscenario.read import read
 from bridgegen.report.show import show_scenario
 from bridgegen.store import Store
-from bridgegen.verdict.of_run import Gate
+from bridgegen.verdict.of_run import PassFailCriteria
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/braking-manner.yaml"
 NAMES = ("gentle", "firm", "emergency")
@@ -56,7 +56,7 @@ def test_exported_files_name_the_value_and_are_valid(run):
 
 
 def test_the_verdict_names_the_values(searched, tmp_path):
-    Gate.read(["critical > 0"], tmp_path / "junit.xml").judge(searched)
+    PassFailCriteria.read(["critical > 0"], tmp_path / "junit.xml").judge(searched)
     text = (tmp_path / "junit.xml").read_text("utf-8")
     assert re.search(f"manner = ({'|'.join(NAMES)})\n", text)
     assert re.search(r"wind_from = [0-9.]+ deg\n", text)

@@ -77,8 +77,8 @@ def test_the_sentences_are_for_people():
     assert rest == [
         "Differences, median (largest): d_min 0.250 (2.000) m, v_d 0.000 (1.000) m/s, first "
         "contact 0.500 (0.500) s.",
-        "In 2 of 3 somebody is more than 0.5 m elsewhere at some time, first at 2.00 s (median).",
-        "Contacts: 1 in both, 1 here alone, 0 there alone.",
+        "In 2 of 3 an entity deviates by more than 0.5 m, first at 2.00 s (median).",
+        "Contacts: 1 in both, 1 only here, 0 only there.",
     ]
 
 
@@ -91,4 +91,4 @@ def test_where_nothing_ran_nothing_is_claimed():
 
 def test_where_all_is_the_same_that_is_said():
     (*_, last) = sentences("x", [scenario(1, outcome(), outcome())])
-    assert last == "Nobody ever is more than 0.5 m elsewhere."
+    assert last == "No entity deviates by more than 0.5 m."

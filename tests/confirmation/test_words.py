@@ -76,8 +76,8 @@ def of_harm(harm, conflict="", kind="", responsible=""):
         ),
         (
             of_harm(0.0, "contact", "ego standing", "none"),
-            "A contact with bv (ego standing) there, for which nobody is responsible: harm is "
-            "0.00 there, 0.62 here, below 0.3.",
+            "A contact with bv (ego standing) there, for which no participant is responsible: harm "
+            "is 0.00 there, 0.62 here, below 0.3.",
         ),
     ],
 )
@@ -99,8 +99,8 @@ def test_the_first_who_parts_is_told_with_what_came_before():
     order = [
         "The light s1 is green there and red here from 1.00 s on.",
         "bv_changes_lanes began 0.15 s later there, at 2.65 s.",
-        "bv parts first: at 3.20 s it is 0.52 m apart there, behind, and 0.40 m/s slower; on its "
-        "way since 2.60 s.",
+        "bv diverges first: at 3.20 s it is 0.52 m away there, behind, and 0.40 m/s slower; "
+        "deviating since 2.60 s.",
         "Then ego at 4.10 s.",
     ]
     assert " ".join(order) in text
@@ -125,10 +125,10 @@ def test_events_are_told(event, words):
 @pytest.mark.parametrize(
     ("turn", "words"),
     [
-        (None, "slower; on its way"),
-        (0.1, "slower; on its way"),
-        (np.pi / 2, "slower, going 90° to the left of its way here; on its way"),
-        (-0.5, "slower, going 29° to the right of its way here; on its way"),
+        (None, "slower; deviating"),
+        (0.1, "slower; deviating"),
+        (np.pi / 2, "slower, moving 90° to the left of its direction here; deviating"),
+        (-0.5, "slower, moving 29° to the right of its direction here; deviating"),
     ],
 )
 def test_another_way_is_told(turn, words):
@@ -139,7 +139,7 @@ def test_another_way_is_told(turn, words):
 def test_who_was_off_before_is_told():
     parts = Parting("ego", 6.1, 0.52, -0.52, 0.0, -0.5, None, 5.15)
     text = said(came_to(False, 3.0, 0.0), partings=(parts,), offsets=(Offset("bv", 0.091),))
-    assert text.endswith("on its way since 5.15 s. By then bv was 0.09 m off.")
+    assert text.endswith("deviating since 5.15 s. By then bv deviated by 0.09 m.")
 
 
 def test_what_else_differs_is_told():
@@ -153,11 +153,11 @@ def test_what_else_differs_is_told():
     )
     for part in (
         "The first contact is with van there, with bv here.",
-        "cone is not there.",
-        "walker is there alone.",
+        "cone does not exist there.",
+        "walker exists only there.",
         "bv is a box of 4.50 m × 1.80 m, centre 1.20 m ahead, there; 4.00 m × 2.00 m, 1.00 m here.",
-        "No event and no light differs before anybody parts.",
-        "bv parts first: at 1.00 s it is there alone.",
+        "No event and no light differs before the first divergence.",
+        "bv diverges first: at 1.00 s it is present only there.",
     ):
         assert part in text
 
@@ -170,7 +170,7 @@ def test_contacts_are_told_where_only_one_has_them():
 
 
 def test_where_nobody_parts_that_is_said():
-    assert said(came_to(True, 1.0, 5.0)) == "Nobody ever is more than 0.5 m from where it is here."
+    assert said(came_to(True, 1.0, 5.0)) == "No entity deviates by more than 0.5 m."
 
 
 CLOSEST = Approach(4.0, "bv", 1.0)
@@ -193,10 +193,11 @@ def test_a_miss_is_explained_by_what_differs_before_the_closest_approach():
         "d_min is 2.10 m there, 1.00 m here: narrowly, 0.10 m above the threshold. "
         "The closest approach here is to bv, 1.00 m, at 4.00 s. "
         "bv_sets_off began 0.15 s later there, at 2.65 s. "
-        "bv diverges first, from 2.70 s on: at 4.00 s it is 0.31 m off, mainly longitudinally "
+        "bv diverges first, from 2.70 s on: at 4.00 s it deviates by 0.31 m, mainly longitudinally "
         "(0.30 m behind, 0.05 m to the left), and 0.40 m/s slower. "
-        "ego diverges from 3.10 s on: at 3.50 s it is 0.10 m off, mainly laterally "
-        "(0.10 m to the right, 0.01 m ahead), and as fast, going 11° to the left of its way here."
+        "ego diverges from 3.10 s on: at 3.50 s it deviates by 0.10 m, mainly laterally "
+        "(0.10 m to the right, 0.01 m ahead), and as fast, moving 11° to the left of its direction "
+        "here."
     )
 
 
@@ -204,7 +205,7 @@ def test_a_miss_names_nothing_that_comes_after_the_closest_approach():
     text = said(came_to(False, 2.1, 5.0), closest=CLOSEST, partings=(LATER,))
     assert text.endswith(
         "The closest approach here is to bv, 1.00 m, at 4.00 s. "
-        "Until then nobody is more than 0.05 m from where it is here."
+        "Until then no entity deviates by more than 0.05 m."
     )
 
 
@@ -218,7 +219,8 @@ def test_a_missed_contact_is_explained_by_what_differs_before_it():
     )
     assert text.endswith(
         "No contact there; here with bv at 3.00 s. "
-        "cone is not there. bv diverges first, from 1.00 s on: at 1.05 s it is here alone."
+        "cone does not exist there. bv diverges first, from 1.00 s on: at 1.05 s it is present only "
+        "here."
     )
 
 
@@ -228,10 +230,10 @@ def test_where_both_have_contacts_the_first_one_here_is_told():
         here=came_to(True, 0.0, 5.0, Contact(3.0, "bv")),
         closest=Approach(3.0, "bv", 0.0),
     )
-    assert "The first contact here is with bv at 3.00 s. Until then nobody" in text
+    assert "The first contact here is with bv at 3.00 s. Until then no entity" in text
 
 
 def test_what_is_critical_there_is_told_as_ever():
     text = said(came_to(True, 1.0, 5.0), closest=CLOSEST, partings=(LATER,))
-    assert "bv parts first" in text
+    assert "bv diverges first" in text
     assert "closest approach" not in text

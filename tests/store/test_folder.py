@@ -65,14 +65,16 @@ def test_a_run_is_never_overwritten(tmp_path):
     with create(tmp_path / "run") as store:
         append(store)
     before = (tmp_path / "run" / "run.sqlite").read_bytes()
-    with pytest.raises(StorageError, match=r"holds a run already.*bridgegen resume .*/run.*--out"):
+    with pytest.raises(
+        StorageError, match=r"contains a run already.*bridgegen resume .*/run.*--out"
+    ):
         create(tmp_path / "run")
     assert (tmp_path / "run" / "run.sqlite").read_bytes() == before
 
 
 def test_nor_is_anything_else(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(StorageError, match=r"is not empty and holds no run.*--out"):
+    with pytest.raises(StorageError, match=r"is not empty and contains no run.*--out"):
         create(tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
     with pytest.raises(StorageError, match="File exists"):
@@ -102,7 +104,7 @@ def test_killed_while_it_is_made(tmp_path):
     with pytest.raises(AssertionError):
         child(code, tmp_path / "run")
     assert (tmp_path / "run" / "run.sqlite.new").exists()
-    with pytest.raises(StorageError, match="holds no run"):
+    with pytest.raises(StorageError, match="contains no run"):
         Store.open(tmp_path / "run")
     create(tmp_path / "run").close()
     assert len(Store.open(tmp_path / "run")) == 0
@@ -114,9 +116,9 @@ def test_killed_while_it_is_made(tmp_path):
 def test_not_a_run(tmp_path):
     with pytest.raises(StorageError, match="there is no such folder"):
         Store.open(tmp_path / "nowhere")
-    with pytest.raises(StorageError, match=r"holds no run \(run.sqlite is missing\)"):
+    with pytest.raises(StorageError, match=r"contains no run \(run.sqlite is missing\)"):
         Store.open(tmp_path)
-    with pytest.raises(StorageError, match=r"holds no run \(run.sqlite is missing\)"):
+    with pytest.raises(StorageError, match=r"contains no run \(run.sqlite is missing\)"):
         Store.open(tmp_path, write=True)
     assert list(tmp_path.iterdir()) == []
 
@@ -260,7 +262,7 @@ def check_full(folder, said, cause):
     n, message = int(said.split()[0]), said.split(maxsplit=1)[1]
     assert n > 0
     assert cause in message
-    assert f"{n} evaluations are kept; go on with: bridgegen resume {folder}" in message
+    assert f"{n} evaluations are kept; resume with: bridgegen resume {folder}" in message
     with Store.open(folder, write=True) as store:  # there is room again
         assert len(store) == n
         assert store.read().batch[-1] == n // 40 - 1

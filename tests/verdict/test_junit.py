@@ -87,9 +87,9 @@ def test_another_file_is_never_overwritten(tmp_path):
     assert check(path.read_bytes())[0].get("name") == "two"
     (tmp_path / "other.xml").write_text("<project/>")
     for wrong, message in (
-        (tmp_path / "other.xml", "is no JUnit XML, and is not overwritten"),
+        (tmp_path / "other.xml", "is not JUnit XML, and is not overwritten"),
         (tmp_path, "cannot be written"),
-        (tmp_path / "other.xml" / "j.xml", "is no folder that can be written"),
+        (tmp_path / "other.xml" / "j.xml", "is not a writable folder"),
     ):
         with pytest.raises(StorageError, match=message):
             refuse_junit(wrong)

@@ -10,7 +10,7 @@ import bridgegen as bg
 from bridgegen.cause import CAUSES
 from bridgegen.errors import InputError
 from bridgegen.store.summary import Summary
-from bridgegen.verdict.of_run import FIGURES, Gate, figures_of
+from bridgegen.verdict.of_run import FIGURES, PassFailCriteria, figures_of
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_search_and_resume_end_with_the_verdict(cli, tmp_path):
 
 
 def test_the_xml_tells_what_a_person_needs(run, tmp_path):
-    Gate.read(["r_critic > 0.01"], tmp_path / "j.xml").judge(run)
+    PassFailCriteria.read(["r_critic > 0.01"], tmp_path / "j.xml").judge(run)
     root = ElementTree.parse(tmp_path / "j.xml").getroot()
     criteria, *scenarios = root
     facts = {one.get("name"): one.get("value") for one in criteria.iter("property")}
@@ -76,10 +76,10 @@ def test_the_xml_tells_what_a_person_needs(run, tmp_path):
 def test_only_who_is_to_blame_fails(run, tmp_path):
     causes = [json.loads(p.with_suffix(".json").read_text("utf-8"))["cause"] for p in run.scenarios]
     for cause in {*causes}:
-        Gate.read([f"{cause} > 0"], tmp_path / "j.xml").judge(run)
+        PassFailCriteria.read([f"{cause} > 0"], tmp_path / "j.xml").judge(run)
         root = ElementTree.parse(tmp_path / "j.xml").getroot()
         assert len([*root.iter("failure")]) == 1 + causes.count(cause)
-    Gate.read(["evaluations < 1000"], tmp_path / "j.xml").judge(run)
+    PassFailCriteria.read(["evaluations < 1000"], tmp_path / "j.xml").judge(run)
     assert ElementTree.parse(tmp_path / "j.xml").getroot().get("failures") == "1"
 
 
@@ -95,7 +95,7 @@ def test_what_nobody_knows_is_no_pass(tmp_path):
         "crossroads-s4", ego=f"{driver}:Broken", budget=3, algorithm="random", causes=False,
         out=tmp_path / "run",
     )  # fmt: skip
-    outcomes = Gate.read(["critical > 0", "failed > 3"], tmp_path / "j.xml").judge(run)
+    outcomes = PassFailCriteria.read(["critical > 0", "failed > 3"], tmp_path / "j.xml").judge(run)
     assert [one.verdict for one in outcomes] == ["unknown", "unknown", "passed"]
     root = ElementTree.parse(tmp_path / "j.xml").getroot()
     assert root.get("errors") == "2"
@@ -112,13 +112,13 @@ def test_mistakes_are_found_before_anything_runs(cli, tmp_path, run):
     refused(*search, "--fail-if", "r_critic", message="--fail-if must read")
     refused(*search, "--fail-if", "d_min<2", message="unknown figure of --fail-if 'd_min'")
     refused(*search, "--no-causes", "--fail-if", "planning > 0", message="causes must be sought")
-    refused(*search, "--junit", __file__, message="is no JUnit XML")
+    refused(*search, "--junit", __file__, message="is not JUnit XML")
     assert not (tmp_path / "run").exists()
     file = run.scenarios[0]
     refused("simulate", file, "--fail-if", "r_critic > 0", message="unknown figure")
     refused("simulate", file, "--fail-if", "map < 0.5", message="needs detections")
     with pytest.raises(InputError, match="causes must be sought"):
-        Gate.read(["control == 0"], None, causes=False)
+        PassFailCriteria.read(["control == 0"], None, causes=False)
 
 
 def test_simulate_ends_with_the_verdict(cli, tmp_path, run):

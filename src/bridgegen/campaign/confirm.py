@@ -21,7 +21,7 @@ from bridgegen.confirmation.record import (
     write_record,
 )
 from bridgegen.confirmation.schema import Record, Scenario
-from bridgegen.confirmation.summary import Summary, summarise
+from bridgegen.confirmation.summary import ConfirmationSummary, summarise
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
@@ -61,7 +61,7 @@ class RunConfirmation:
     files: tuple[Path, ...]
 
     @property
-    def summary(self) -> Summary:
+    def summary(self) -> ConfirmationSummary:
         """Of the scenarios that were asked for."""
         return summarise(self.scenarios)
 

@@ -1,5 +1,5 @@
-"""Is what one simulator found so in another one? Rollouts compared, put in words, and recorded.
+"""Cross-simulator validation: rollouts of two simulators are compared, explained and recorded.
 
-``compare.py`` finds where two rollouts of one scenario part; ``words.py`` says it; ``record.py``
-keeps it in a run's folder; ``summary.py`` is what it comes to.
+``compare.py`` finds where two rollouts of one scenario diverge; ``words.py`` explains it in
+sentences; ``record.py`` stores it in the run's folder; ``summary.py`` has its key figures.
 """

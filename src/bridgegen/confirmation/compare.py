@@ -1,7 +1,7 @@
-"""Two rollouts of one scenario, by two simulators: where they part, and what differed by then.
+"""Compares two rollouts of one scenario by two simulators: where they diverge, and what differs.
 
-The one is *here*, the other *there*; every difference is there − here. Where they record at
-different time steps, the states of the finer one are interpolated at the coarser one's instants.
+One is *here*, the other *there*; every difference is there − here. If their time steps differ, the
+states of the finer one are interpolated at the instants of the coarser one.
 """
 
 import math
@@ -31,17 +31,17 @@ from bridgegen.metrics.d_min import first_closest
 from bridgegen.simulation.rollout import Rollout
 
 SAME_BOX = 1e-3
-"""Boxes that differ by less are the same [m]."""
+"""Boxes that differ by less are equal [m]."""
 
 STANDS = 1e-3
-"""Who moves less in a step has no direction [m]."""
+"""An entity that moves less in a step has no direction of travel [m]."""
 
 _EPSILON = 1e-6  # of times [s]: they are multiples of a step
 
 
 @dataclass(frozen=True)
 class _States:
-    """One entity's, at the K instants that are compared."""
+    """The states of one entity at the K compared instants, ``(K,)`` each."""
 
     x: Float
     y: Float
@@ -66,12 +66,12 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0, partner: str 
     """Compare row i of one rollout with row j of another.
 
     Args:
-        here: what is compared with.
-        there: what is compared; the egos are the first entities, the others are the same if they
-            have the same name.
-        i: of ``here``, not failed.
-        j: of ``there``, not failed.
-        partner: whose closest approach to the ego counts; that of whoever comes closest by default.
+        here: the reference.
+        there: the other rollout; the egos are the first entities, other entities are matched by
+            their names.
+        i: a row of ``here`` that has not failed.
+        j: a row of ``there`` that has not failed.
+        partner: the entity whose closest approach to the ego is reported; the closest by default.
     """
     times = _instants(here, there, i, j)
     step = max(here.time_step, there.time_step)
@@ -100,13 +100,13 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0, partner: str 
 
 
 def tracks(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> tuple[Track, ...]:
-    """Return where everybody was there who was ever off by more than TRACE, from then on.
+    """Return the tracks there of the entities that deviate by more than TRACE, from then on.
 
     Args:
-        here: as of ``compare``, and so are those that follow.
-        there: likewise.
-        i: likewise.
-        j: likewise.
+        here: see ``compare``, as for the following.
+        there: see ``compare``.
+        i: see ``compare``.
+        j: see ``compare``.
     """
     n = min(int(here.n_steps[i]), int((_end(there, j) + _EPSILON) / here.time_step) + 1)
     times = np.arange(n, dtype=np.float64) * here.time_step
@@ -122,7 +122,7 @@ def tracks(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> tuple[Track
 
 
 def _instants(here: Rollout, there: Rollout, i: int, j: int) -> Float:
-    """Return the instants that both have [s], at the coarser one's steps."""
+    """Return the instants of both rollouts [s], at the coarser time step."""
     coarse, row = (there, j) if there.time_step > here.time_step else (here, i)
     end = min(_end(here, i), _end(there, j))
     n = min(int(coarse.n_steps[row]), int((end + _EPSILON) / coarse.time_step) + 1)
@@ -135,13 +135,13 @@ def _end(rollout: Rollout, row: int) -> float:
 
 
 def _shared(here: Rollout, there: Rollout) -> list[tuple[int, int]]:
-    """Return the numbers, here and there, of who is in both; the egos may differ in name."""
+    """Return the numbers, here and there, of shared entities; the egos' names may differ."""
     others = _paired(here.names[1:], there.names[1:])
     return [(0, 0), *((e + 1, f + 1) for e, f in others)]
 
 
 def _paired(ours: Sequence[str], theirs: Sequence[str]) -> list[tuple[int, int]]:
-    """Return the places of equal names; of several equal ones the first is the first there."""
+    """Return the positions of equal names; duplicates are matched in order."""
     places: dict[str, list[int]] = {}
     for f, name in enumerate(theirs):
         places.setdefault(name, []).append(f)
@@ -149,7 +149,7 @@ def _paired(ours: Sequence[str], theirs: Sequence[str]) -> list[tuple[int, int]]
 
 
 def _states(rollout: Rollout, row: int, entity: int, times: Float) -> _States:
-    """Return an entity's states at instants that the rollout has, or lie between two of its."""
+    """Return an entity's states at given instants, interpolated between those of the rollout."""
     at = times / rollout.time_step
     before = np.minimum(np.floor(at + _EPSILON).astype(np.int64), int(rollout.n_steps[row]) - 1)
     rest = np.where(at - before > _EPSILON, at - before, 0.0)
@@ -180,7 +180,7 @@ def _apart(a: _States, b: _States) -> Bool:
 
 
 def _lasting(differs: Bool) -> Bool:
-    """Return where something differs that already did an instant before."""
+    """Return where something differs at an instant and at the one before."""
     lasting: Bool = differs.copy()
     lasting[0] = False
     lasting[1:] &= differs[:-1]
@@ -193,7 +193,7 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
     if not off.size:
         return None
     k = int(off[0])
-    trace = np.flatnonzero(~((gap > TRACE) | alone)[: k + 1])  # where it was not off yet
+    trace = np.flatnonzero(~((gap > TRACE) | alone)[: k + 1])  # where it did not deviate yet
     since = float(times[trace[-1] + 1 if trace.size else 0])
     off_by = _off_by(a, b, k)
     return Parting(
@@ -212,7 +212,7 @@ def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | Non
 def _diverged(
     pairs: Sequence[tuple[str, _States, _States]], times: Float, closest: Approach
 ) -> tuple[Divergence, ...]:
-    """Return who is off by more than TRACE up to the closest approach, the first one first."""
+    """Return the entities that deviate by more than TRACE up to the closest approach, in order."""
     n = int(np.searchsorted(times, closest.time + _EPSILON))
     found = []
     for name, a, b in pairs:
@@ -256,7 +256,7 @@ def _off_by(a: _States, b: _States, k: int) -> _OffBy:
 def _offsets(
     pairs: Sequence[tuple[str, _States, _States]], times: Float, first: Parting
 ) -> tuple[Offset, ...]:
-    """Return who else was off when the first one parted, who was off most first."""
+    """Return the deviations of other entities when the first one diverged, largest first."""
     k = int(np.searchsorted(times, first.time - _EPSILON))
     gaps = [(name, float(_gap(a, b)[k])) for name, a, b in pairs if name != first.entity]
     off = [Offset(name, gap) for name, gap in gaps if gap > SLIGHT]
@@ -264,7 +264,7 @@ def _offsets(
 
 
 def _turn(a: _States, b: _States, k: int) -> float | None:
-    """Return the angle between two directions of travel at an instant; None where one stands."""
+    """Return the angle between two directions of travel at an instant; None if one stands."""
     if k == 0 or not (a.present[k - 1] and b.present[k - 1]):
         return None
     (ax, ay), (bx, by) = ((float(s.x[k] - s.x[k - 1]), float(s.y[k] - s.y[k - 1])) for s in (a, b))
@@ -274,7 +274,7 @@ def _turn(a: _States, b: _States, k: int) -> float | None:
 
 
 def first_contact(rollout: Rollout, row: int) -> Contact | None:
-    """Return the ego's first contact in a row that has not failed; None if there is none."""
+    """Return the ego's first contact in a row that has not failed, or None."""
     distance = rollout.distance[row, :, : rollout.n_steps[row]]
     instants = np.flatnonzero((distance <= 0.0).any(axis=0))
     if not instants.size:
@@ -289,16 +289,16 @@ def closest_approach(rollout: Rollout, row: int, partner: str = "") -> Approach 
     Args:
         rollout: with the ego first.
         row: of it.
-        partner: to whom; to whoever comes closest, if it takes no part.
+        partner: the other entity; the closest one if it does not take part.
     """
     distance = rollout.distance[row, :, : rollout.n_steps[row]]
-    who = rollout.names.index(partner) if partner in rollout.names[1:] else None
-    distance = distance if who is None else distance[who : who + 1]
+    other = rollout.names.index(partner) if partner in rollout.names[1:] else None
+    distance = distance if other is None else distance[other : other + 1]
     least = distance.min(axis=0)
     if not np.isfinite(least).any():
         return None
     k = first_closest(least)
-    e = int(distance[:, k].argmin()) if who is None else who
+    e = int(distance[:, k].argmin()) if other is None else other
     return Approach(k * rollout.time_step, rollout.names[e], float(least[k]))
 
 
@@ -309,7 +309,7 @@ def _events(here: Rollout, there: Rollout, i: int, j: int, step: float) -> tuple
         a, b = _began(here, i, u), _began(there, j, w)
         if a is not None and b is not None:
             differs = abs(b - a) > step + _EPSILON
-        else:  # what began in one after the other had ended says nothing of the other
+        else:  # an event after the end of the other rollout is no difference
             begun = [one for one in (a, b) if one is not None]
             differs = any(one < end - step - _EPSILON for one in begun)
         if differs:

@@ -7,18 +7,17 @@ from pydantic import ConfigDict
 from bridgegen.arrays import Float
 
 PARTED = 0.5
-"""States have parted where a reference point is farther than this from the other one [m]."""
+"""An entity diverges if its reference points are farther apart than this [m]."""
 
 TRACE = 0.05
-"""What is off by more than this [m] is on its way to part."""
-
+"""A larger deviation [m] is the beginning of a divergence."""
 
 SLIGHT = 0.01
-"""What is off by more than this [m] may change what a driver decides."""
+"""A larger deviation [m] may change a driver's decision."""
 
 
 class _Checked:
-    """What is read from a file holds nothing else, and only numbers that are finite."""
+    """Has no further fields and only finite numbers, also when it is read from a file."""
 
     __pydantic_config__ = ConfigDict(allow_inf_nan=False, extra="forbid", strict=True)
 
@@ -29,7 +28,7 @@ class Contact(_Checked):
 
     Attributes:
         time: [s].
-        entity: with whom.
+        entity: the other one.
     """
 
     time: float
@@ -38,20 +37,20 @@ class Contact(_Checked):
 
 @dataclass(frozen=True)
 class Parting(_Checked):
-    """When an entity is where it is not in the other rollout.
+    """The divergence of an entity: its positions differ by more than PARTED.
 
     Attributes:
-        entity: who.
-        time: the first instant at which it has parted [s].
-        gap: how far the reference points are apart then [m]; None where it is in one alone.
-        along: how far ahead it is there, in its own direction here [m]; None likewise, and so all
-            that follow.
-        across: how far left it is there [m].
-        speed: how much faster it is there [m/s].
-        turn: how far to the left of its direction of travel here it moves there [rad], in −π..π;
-            None too where it does not move.
-        since: the first instant from which on it was off by more than TRACE without a pause [s].
-        only: "here" or "there", if it is in one of them alone, for more than a step.
+        entity: its name.
+        time: the first instant of the divergence [s].
+        gap: distance of the reference points at that instant [m]; None if the entity is present in
+            one rollout only, as for the next four.
+        along: difference there − here along its heading here [m], positive ahead.
+        across: likewise across its heading here [m], positive to the left.
+        speed: likewise of its speed [m/s].
+        turn: angle from its direction of travel here to that there [rad], in −π..π, positive to the
+            left; None also if it does not move.
+        since: the instant from which it deviates by more than TRACE without interruption [s].
+        only: "here" or "there", if it is present in one rollout only, for more than a step.
     """
 
     entity: str
@@ -67,7 +66,7 @@ class Parting(_Checked):
 
 @dataclass(frozen=True)
 class Approach(_Checked):
-    """The closest approach of the ego to another entity; the first contact, if there is one.
+    """The closest approach of the ego to another entity; the first contact if there is one.
 
     Attributes:
         time: [s].
@@ -82,19 +81,18 @@ class Approach(_Checked):
 
 @dataclass(frozen=True)
 class Divergence(_Checked):
-    """How far an entity is from where it is in the other rollout, up to the closest approach.
+    """The largest deviation of an entity up to the closest approach.
 
     Attributes:
-        entity: who.
-        since: the first instant at which it is off by more than TRACE [s].
-        time: the instant, up to the closest approach, at which it is off most [s].
-        gap: how far the reference points are apart then [m]; None where it is in one alone.
-        along: how far ahead it is there, in its own direction here [m]; None likewise, and so all
-            that follow.
-        across: how far left it is there [m].
-        speed: how much faster it is there [m/s].
-        turn: see `Parting`.
-        only: likewise.
+        entity: its name.
+        since: the first instant at which it deviates by more than TRACE [s].
+        time: the instant of the largest deviation up to the closest approach [s].
+        gap: see `Parting`, as for the following.
+        along: [m].
+        across: [m].
+        speed: [m/s].
+        turn: [rad].
+        only: "here", "there" or None.
     """
 
     entity: str
@@ -110,11 +108,11 @@ class Divergence(_Checked):
 
 @dataclass(frozen=True)
 class Offset(_Checked):
-    """Who else was a little off when the first one parted, and may have led to it.
+    """A small deviation of another entity when the first one diverged: a possible cause.
 
     Attributes:
-        entity: who.
-        gap: how far the reference points were apart [m].
+        entity: its name.
+        gap: distance of the reference points [m].
     """
 
     entity: str
@@ -123,11 +121,11 @@ class Offset(_Checked):
 
 @dataclass(frozen=True)
 class EventTimes(_Checked):
-    """An event that began at different times, by more than a step.
+    """An event whose start times differ by more than a step.
 
     Attributes:
-        name: of it.
-        here: when it began [s]; None if it never did.
+        name: of the event.
+        here: its start [s]; None if it did not start.
         there: likewise.
     """
 
@@ -137,17 +135,17 @@ class EventTimes(_Checked):
 
     @property
     def first(self) -> float:
-        """When it first began, here or there [s]."""
+        """Its earlier start [s]."""
         return min(one for one in (self.here, self.there) if one is not None)
 
 
 @dataclass(frozen=True)
 class LightTimes(_Checked):
-    """A traffic light that shows something else, for more than a step.
+    """A traffic light whose states differ for more than a step.
 
     Attributes:
         name: its id.
-        time: from when on [s].
+        time: start of the difference [s].
         here: its state, see `Rollout.lights`.
         there: likewise.
     """
@@ -160,11 +158,11 @@ class LightTimes(_Checked):
 
 @dataclass(frozen=True)
 class BoxSizes(_Checked):
-    """An entity that has another box.
+    """An entity whose bounding boxes differ.
 
     Attributes:
-        entity: who.
-        here: length, width, and how far the centre is ahead of the reference point [m].
+        entity: its name.
+        here: length, width, and distance of the centre ahead of the reference point [m].
         there: likewise.
     """
 
@@ -175,21 +173,21 @@ class BoxSizes(_Checked):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two rollouts of one scenario, side by side.
+    """The comparison of two rollouts of one scenario.
 
     Attributes:
         step: the coarser of the two time steps [s].
         ends: when each of them ends [s].
-        contacts: the ego's first contact in each; None where there is none.
-        partings: everybody's who parts, the first one first.
-        offsets: of the others when the first one parted, if they were off by more than SLIGHT.
-        events: those that began at different times, the earliest first.
-        lights: those that differ, the earliest first.
+        contacts: the ego's first contact in each, or None.
+        partings: of all entities that diverge, in order of time.
+        offsets: of other entities when the first one diverged, if larger than SLIGHT.
+        events: those with different start times, in order of time.
+        lights: those that differ, in order of time.
         boxes: those that differ.
-        only_here: entities that are unknown there.
-        only_there: entities that are unknown here.
-        closest: the closest approach here; None where the ego is alone.
-        diverged: who was off by more than TRACE up to then, the first one first.
+        only_here: entities that do not exist there.
+        only_there: entities that do not exist here.
+        closest: the closest approach here; None if the ego is alone.
+        diverged: entities that deviate by more than TRACE up to that instant, in order of time.
     """
 
     step: float
@@ -208,12 +206,12 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Track:
-    """Where somebody was there, at here's instants.
+    """The track of an entity there, at the instants of here.
 
     Attributes:
-        entity: who.
+        entity: its name.
         first: the instant of the first value.
-        x: ``(n,)`` float64 [m], of the reference point; NaN where it is not there.
+        x: ``(n,)`` float64 [m], of the reference point; NaN where it is absent.
         y: likewise.
         h: ``(n,)`` float64 [rad], heading.
     """

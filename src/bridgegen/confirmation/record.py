@@ -1,4 +1,4 @@
-"""A confirmation in a run's folder, as JSON: for machines, and to be gone on with."""
+"""The record of a confirmation in a run's folder: JSON, from which it can be resumed."""
 
 from collections.abc import Iterable
 from hashlib import sha256
@@ -19,7 +19,7 @@ def file_name(simulator: str) -> str:
 
 
 def digest_of(x: Float, metrics: Float) -> str:
-    """Return what tells an evaluation from every other: of its parameters and its metrics."""
+    """Return the digest of an evaluation's parameters and metrics, which identifies it."""
     digest = sha256()
     for array in (x, metrics):
         digest.update(array.astype("<f8").tobytes())
@@ -27,7 +27,7 @@ def digest_of(x: Float, metrics: Float) -> str:
 
 
 def write_record(folder: Path, record: Record) -> Path:
-    """Write a record into a run's folder, whole; return its path.
+    """Write a record into a run's folder atomically; return its path.
 
     Raises:
         StorageError: it cannot be written.
@@ -38,10 +38,10 @@ def write_record(folder: Path, record: Record) -> Path:
 
 
 def read_record(path: Path) -> Record | None:
-    """Return what `write_record` wrote; None where there is no file.
+    """Return a record of `write_record`; None if the file does not exist.
 
     Raises:
-        FileFormatError: it is something else.
+        FileFormatError: the file is not such a record.
         StorageError: it cannot be read.
     """
     record = read_model(path, Record, _not_ours)
@@ -61,12 +61,12 @@ def read_records(folder: Path, X: Numbers, metrics: Numbers) -> tuple[Record, ..
     """Return the records of all simulators in a run's folder, by their names.
 
     Args:
-        folder: the run's.
+        folder: of the run.
         X: ``(N, n)`` of the run.
         metrics: ``(N, M)`` of the run.
 
     Raises:
-        FileFormatError: one is something else, or of another run.
+        FileFormatError: a file is not such a record, or belongs to another run.
         StorageError: one cannot be read.
     """
     records = []
@@ -79,16 +79,16 @@ def read_records(folder: Path, X: Numbers, metrics: Numbers) -> tuple[Record, ..
 
 
 def check_rows(path: Path, scenarios: Iterable[Scenario], X: Numbers, metrics: Numbers) -> None:
-    """Refuse a record that is not of these evaluations.
+    """Check that a record belongs to these evaluations.
 
     Args:
         path: of the record, for the message.
-        scenarios: that it has.
-        X: as of ``read_records``.
-        metrics: likewise.
+        scenarios: of the record.
+        X: see ``read_records``.
+        metrics: see ``read_records``.
 
     Raises:
-        FileFormatError: it is another run's.
+        FileFormatError: it belongs to another run.
     """
     for one in scenarios:
         k = one.evaluation

@@ -1,4 +1,4 @@
-"""What a confirmation's record holds; it is written from these models, and checked by them."""
+"""The schema of a confirmation's record, which is written and checked with these models."""
 
 import math
 from typing import Annotated
@@ -26,7 +26,7 @@ from bridgegen.objective import Rule
 from bridgegen.odd.thresholds import Thresholds
 
 SCALE = {"x": 100, "y": 100, "h": 1000}
-"""Units to 1 m or rad of what a track has as whole numbers."""
+"""Integer units of a track per 1 m or rad."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Whole = Annotated[int, Field(ge=0, le=10**8)]
@@ -38,21 +38,21 @@ class _Model(BaseModel):
 
 
 class Outcome(_Model):
-    """What a scenario came to in one simulator.
+    """The outcome of a scenario in one simulator.
 
     Attributes:
-        critical: by the run's own rule, whatever its cause.
-        d_min: [m]; None is infinite, nobody else is there.
+        critical: by the run's rule, whatever its cause.
+        d_min: [m]; None is infinite: the ego is alone.
         v_d: [m/s].
         n_collision: [count].
         F: objectives, minimised.
-        contact: the ego's first one, if there is one.
-        ends: when [s]; None where the rollouts were not compared.
+        contact: the ego's first contact, or None.
+        ends: end of the rollout [s]; None if the rollouts were not compared.
         harm: in [0, 1], of the conflicts that the run counts; None in records of earlier versions.
         severity: probability of a MAIS3+ injury; likewise.
-        conflict: "contact", "near miss", "collision course", or "" where there is none.
+        conflict: "contact", "near miss", "collision course", or "" if there is none.
         conflict_type: label of its type.
-        responsible: who is responsible for it.
+        responsible: the responsible participant.
         partner: the other participant.
     """
 
@@ -75,7 +75,7 @@ class Change(_Model):
     """There minus here.
 
     Attributes:
-        d_min: [m]; None where one of them is infinite.
+        d_min: [m]; None if one of them is infinite.
         v_d: [m/s].
         F: objectives.
         contact: of the time of the first contact [s]; None unless both have one.
@@ -102,12 +102,12 @@ class Change(_Model):
 
 
 class Course(_Model):
-    """Where somebody was there who was off: whole numbers, see SCALE, at here's instants.
+    """The track there of an entity that deviates: integers, see SCALE, at the instants of here.
 
     Attributes:
-        entity: who.
+        entity: its name.
         first: the instant of the first value.
-        x: of the reference point; None where it is not there.
+        x: of the reference point; None where the entity is absent.
         y: likewise.
         h: heading.
     """
@@ -157,17 +157,17 @@ class Scenario(_Model):
 
     Attributes:
         evaluation: its row in the store, from 0.
-        name: of its files, if it was handed over.
+        name: of its files, if it was exported.
         row: digest of that row, see `record.digest_of`.
-        here: what it came to in the run.
-        there: what it came to in the other simulator; None if that failed.
+        here: the outcome in the run.
+        there: the outcome in the other simulator; None if that failed.
         failure: why it failed.
-        change: of the figures; None if it failed, and so all that follow.
+        change: of the figures; None if it failed.
         differences: of the rollouts.
-        tracks: where those were there who were off; of the first scenarios only.
-        explanation: the same in words.
-        robustness: share of its neighbours that are harmful here, as the run's triage has it; None
-            where they were not tested.
+        tracks: of the entities that deviate; of the first scenarios only.
+        explanation: the differences in words.
+        robustness: share of its neighbours that are harmful here, from the run's triage; None
+            if they were not tested.
     """
 
     evaluation: Whole
@@ -184,7 +184,7 @@ class Scenario(_Model):
 
     @property
     def knife_edge(self) -> bool:
-        """Whether fewer than half of its neighbours are harmful: a miss is no surprise."""
+        """Whether fewer than half of its neighbours are harmful, so that a miss is likely."""
         return self.robustness is not None and self.robustness < 0.5
 
     @model_validator(mode="after")
@@ -205,11 +205,11 @@ class Record(_Model):
     Attributes:
         simulator: its name.
         label: the same with its version.
-        settings: of it, that were chosen.
+        settings: of the simulator.
         reference: the run's own simulator.
         run: the run's folder.
         scenario: the logical scenario.
-        ego: who drives.
+        ego: the driver.
         thresholds: when a scenario is critical by the rule "thresholds".
         rule: what makes a scenario critical, "harm" or "thresholds".
         count: whose conflicts are harm, "ego" or "any".
@@ -238,7 +238,7 @@ class Record(_Model):
 
 
 def number(value: float) -> float | None:
-    """Return a number as JSON has it; None for what is not finite."""
+    """Return a number for JSON; None if it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 

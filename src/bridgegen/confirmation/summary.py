@@ -1,4 +1,4 @@
-"""What a confirmation comes to."""
+"""The key figures of a confirmation."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from bridgegen.regions.evidence import wilson
 
 @dataclass(frozen=True)
 class Spread:
-    """How large something is over several scenarios, whatever its sign.
+    """The absolute value of a quantity over several scenarios.
 
     Attributes:
-        n: scenarios that have it.
-        median: over these; None of none.
+        n: scenarios that have the quantity.
+        median: over these; None if there are none.
         max: likewise.
     """
 
@@ -25,29 +25,29 @@ class Spread:
 
     @classmethod
     def of(cls, values: Iterable[float | None]) -> "Spread":
-        """Return that of some numbers; those that do not exist are left out."""
+        """Return the spread of numbers; None is skipped."""
         there = [abs(one) for one in values if one is not None]
         return cls(len(there), median(there) if there else None, max(there, default=None))
 
 
 @dataclass(frozen=True)
-class Summary:
-    """What a confirmation comes to.
+class ConfirmationSummary:
+    """The key figures of a confirmation.
 
     Attributes:
-        scenarios: that were run again, or were to be.
-        confirmed: that are critical there, too.
-        not_run: that failed there; they say nothing.
-        contacts: those with a contact in both, here alone, there alone.
+        scenarios: how many were requested.
+        confirmed: how many are critical there, too.
+        not_run: how many failed there; they are not judged.
+        contacts: how many have a contact in both, only here, only there.
         robust: of those that ran and whose neighbours were tested, how many are robust, and how
             many of these are confirmed.
-        knife_edge: likewise of the others, harmful in fewer than half of their neighbours.
-        harm: differences of harm, of those that ran; of none in records of earlier versions.
-        d_min: differences of d_min [m], of those that ran.
-        v_d: of v_d [m/s].
-        F: of the objective, where there is one.
-        contact: of the time of the first contact [s], of those with one in both.
-        parted: when the first entity parted [s], of those where one did.
+        knife_edge: likewise of those that are harmful in fewer than half of their neighbours.
+        harm: differences of harm; empty in records of earlier versions.
+        d_min: differences of d_min [m].
+        v_d: differences of v_d [m/s].
+        F: differences of the objective, if there is only one.
+        contact: differences of the time of the first contact [s], if both have one.
+        parted: time of the first divergence [s], if there is one.
     """
 
     scenarios: int
@@ -65,44 +65,44 @@ class Summary:
 
     @property
     def ran(self) -> int:
-        """Scenarios that ran there."""
+        """The number of scenarios that ran there."""
         return self.scenarios - self.not_run
 
     @property
     def lost(self) -> int:
-        """Scenarios that ran there and are not critical."""
+        """The number of scenarios that ran there and are not critical."""
         return self.ran - self.confirmed
 
     @property
     def share(self) -> float | None:
-        """Confirmed of those that ran; None of none."""
+        """Confirmed scenarios / scenarios that ran; None if none ran."""
         return self.confirmed / self.ran if self.ran else None
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's, with 95 %: of the share, were the scenarios independent draws."""
+        """Wilson's 95 % interval of the share, valid for independent draws."""
         return wilson(self.confirmed, self.ran)
 
 
-def summarise(scenarios: Iterable[Scenario]) -> Summary:
-    """Return what some scenarios come to."""
+def summarise(scenarios: Iterable[Scenario]) -> ConfirmationSummary:
+    """Return the key figures of scenarios."""
     every = list(scenarios)
     ran = [
         (one.here, one.there, one.change, one.differences)
         for one in every
         if one.there and one.change and one.differences
     ]
-    touches = [(here.contact is not None, there.contact is not None) for here, there, *_ in ran]
+    contacts = [(here.contact is not None, there.contact is not None) for here, there, *_ in ran]
     change = [one for _, _, one, _ in ran]
     partings = [found.partings for *_, found in ran]
-    return Summary(
+    return ConfirmationSummary(
         scenarios=len(every),
         confirmed=sum(there.critical for _, there, *_ in ran),
         not_run=len(every) - len(ran),
         contacts=(
-            touches.count((True, True)),
-            touches.count((True, False)),
-            touches.count((False, True)),
+            contacts.count((True, True)),
+            contacts.count((True, False)),
+            contacts.count((False, True)),
         ),
         robust=_of_tested(every, knife_edge=False),
         knife_edge=_of_tested(every, knife_edge=True),
@@ -125,8 +125,8 @@ def _of_tested(every: Iterable[Scenario], *, knife_edge: bool) -> tuple[int, int
     return len(ran), sum(map(bool, ran))
 
 
-def to_json(summary: Summary) -> dict[str, Any]:
-    """Return a summary as JSON's types."""
+def to_json(summary: ConfirmationSummary) -> dict[str, Any]:
+    """Return a summary in JSON types."""
     low, high = summary.interval
     both, here, there = summary.contacts
     spreads = {

@@ -1,22 +1,22 @@
-"""What a confirmation comes to, in sentences."""
+"""The result of a confirmation in sentences."""
 
 from collections.abc import Sequence
 
 from bridgegen.confirmation.differences import PARTED
 from bridgegen.confirmation.schema import Scenario
-from bridgegen.confirmation.summary import Spread, Summary, summarise
+from bridgegen.confirmation.summary import ConfirmationSummary, Spread, summarise
 
 NAMED = 10
-"""Scenarios that are named at most."""
+"""Maximum number of scenarios that are named."""
 
 
 def name_of(one: Scenario) -> str:
-    """Return what people call a scenario: as its files, or by its evaluation, counted from 1."""
+    """Return the name of a scenario: that of its files, or its evaluation, counted from 1."""
     return one.name or f"evaluation {one.evaluation + 1}"
 
 
 def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
-    """Return what a confirmation comes to: how many are confirmed, then by how much they differ.
+    """Return how many scenarios are confirmed, then by how much they differ.
 
     Args:
         label: the other simulator.
@@ -40,23 +40,23 @@ def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
     return [f"{line}.", *_robust(s), *_differences(s)]
 
 
-def _robust(s: Summary) -> list[str]:
+def _robust(s: ConfirmationSummary) -> list[str]:
     """Return how many robust and how many knife-edge scenarios are confirmed."""
-    told = [
+    parts = [
         f"{confirmed} of {ran} {kind}"
         for (ran, confirmed), kind in ((s.robust, "robust"), (s.knife_edge, "knife-edge"))
         if ran
     ]
-    if not told:
+    if not parts:
         return []
     return [
-        f"Confirmed: {', '.join(told)}. Knife-edge is what is harmful in fewer than half of its "
-        "neighbours."
+        f"Confirmed: {', '.join(parts)}. A knife-edge scenario is harmful in fewer than half of "
+        "its neighbours."
     ]
 
 
-def _differences(s: Summary) -> list[str]:
-    told = filter(
+def _differences(s: ConfirmationSummary) -> list[str]:
+    parts = filter(
         None,
         [
             _spread("harm", s.harm, ""),
@@ -65,17 +65,17 @@ def _differences(s: Summary) -> list[str]:
             _spread("first contact", s.contact, "s"),
         ],
     )
-    lines = [f"Differences, median (largest): {', '.join(told)}."]
+    lines = [f"Differences, median (largest): {', '.join(parts)}."]
     if s.parted.median is None:
-        lines.append(f"Nobody ever is more than {PARTED:g} m elsewhere.")
+        lines.append(f"No entity deviates by more than {PARTED:g} m.")
     else:
         lines.append(
-            f"In {s.parted.n} of {s.ran} somebody is more than {PARTED:g} m elsewhere at some "
-            f"time, first at {s.parted.median:.2f} s (median)."
+            f"In {s.parted.n} of {s.ran} an entity deviates by more than {PARTED:g} m, first at "
+            f"{s.parted.median:.2f} s (median)."
         )
     both, here, there = s.contacts
     if here or there:
-        lines.append(f"Contacts: {both} in both, {here} here alone, {there} there alone.")
+        lines.append(f"Contacts: {both} in both, {here} only here, {there} only there.")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Where and why two rollouts part, in sentences."""
+"""Where and why two rollouts diverge, in sentences."""
 
 import math
 
@@ -18,17 +18,17 @@ from bridgegen.objective import Rule
 from bridgegen.odd.thresholds import Thresholds
 
 NARROW = (0.25, 0.25)
-"""A scenario that misses a threshold by no more than this, on d_min [m] or v_d [m/s], misses it
+"""A scenario that misses a threshold of d_min [m] or v_d [m/s] by at most this much misses it
 narrowly."""
 
 NARROW_HARM = 0.02
-"""Likewise on harm."""
+"""Likewise for harm."""
 
 TURNED = math.radians(10.0)
-"""Who moves in a direction that differs by more takes another way."""
+"""A larger difference of the direction of travel is reported."""
 
 MOST_OFF = 3
-"""Of those who were a little off, so many are named."""
+"""Maximum number of entities with small deviations that are named."""
 
 LIGHTS = ("off", "red", "red and yellow", "yellow", "green")
 
@@ -40,27 +40,27 @@ def explanation(
     limits: Thresholds,
     rule: Rule = "thresholds",
 ) -> str:
-    """Return what is known of why a scenario is, or is not, critical there.
+    """Explain why a scenario is, or is not, critical there.
 
-    Why it is not is explained by what differs up to the closest approach here: had nothing differed
-    by then, it would be as close there. What differs later is not named.
+    If it is not, the explanation is what differs up to the closest approach here: without these
+    differences it would be as close there. Later differences are not named.
 
     Args:
-        here: what it came to here.
-        there: what it came to there.
+        here: the outcome here.
+        there: the outcome there.
         found: how the rollouts differ.
         limits: when a scenario is critical by the rule "thresholds".
         rule: what makes a scenario critical.
     """
-    said = []
+    verdict = []
     if not there.critical:
-        said = [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
-    told = _contacts(here, there)
+        verdict = [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
+    contacts = _contacts(here, there)
     if there.critical or found.closest is None:
-        return " ".join([*said, *told, *_story(found)])
-    if there.contact or found.closest.distance > 0.0:  # else it is told already
-        told.append(_closest(found.closest))
-    return " ".join([*said, *told, *_until(found, found.closest.time)])
+        return " ".join([*verdict, *contacts, *_story(found)])
+    if there.contact or found.closest.distance > 0.0:  # else it is in the sentence on contacts
+        contacts.append(_closest(found.closest))
+    return " ".join([*verdict, *contacts, *_until(found, found.closest.time)])
 
 
 def _less_harm(here: Outcome, there: Outcome) -> str:
@@ -75,7 +75,9 @@ def _less_harm(here: Outcome, there: Outcome) -> str:
     elif there.conflict == "collision course":
         what = f"Only a {conflict} there"
     else:
-        who = {"other": there.partner, "none": "nobody"}.get(there.responsible, there.responsible)
+        who = {"other": there.partner, "none": "no participant"}.get(
+            there.responsible, there.responsible
+        )
         what = f"A {conflict} there, for which {who} is responsible"
     if there.harm is None or here.harm is None:
         return f"{what}."
@@ -87,7 +89,7 @@ def _less_harm(here: Outcome, there: Outcome) -> str:
 
 
 def _miss(here: Outcome, there: Outcome, limits: Thresholds) -> str:
-    """Return by how much a scenario is not critical."""
+    """Return by how much a scenario misses a threshold."""
     if there.d_min is None:
         return "The ego is alone there."
     far = there.d_min - limits.d_min_below
@@ -108,7 +110,7 @@ def _miss(here: Outcome, there: Outcome, limits: Thresholds) -> str:
 
 
 def _length(value: float) -> str:
-    """Return a number with two decimals, or with as many as show it."""
+    """Return a number with two decimals, or with one digit if it is smaller."""
     return f"{value:.2f}" if value >= 0.005 else f"{value:.1g}"
 
 
@@ -135,20 +137,20 @@ def _closest(one: Approach) -> str:
 
 
 def _until(found: Differences, time: float) -> list[str]:
-    """Return what differed up to the closest approach, in the order in which it did."""
-    said = _always(found)
+    """Return the differences up to the closest approach, in order of time."""
+    sentences = _always(found)
     if not found.diverged:
-        said.append(f"Until then nobody is more than {TRACE:g} m from where it is here.")
+        sentences.append(f"Until then no entity deviates by more than {TRACE:g} m.")
     before = [(one.since, 1, _divergence(one, first=not k)) for k, one in enumerate(found.diverged)]
     before += [(one.first, 0, _event(one)) for one in found.events if one.first <= time]
     before += [(one.time, 0, _light(one)) for one in found.lights if one.time <= time]
-    return [*said, *(text for *_, text in sorted(before, key=lambda one: one[:2]))]
+    return [*sentences, *(text for *_, text in sorted(before, key=lambda one: one[:2]))]
 
 
 def _divergence(one: Divergence, *, first: bool) -> str:
-    said = f"{one.entity} diverges{' first,' if first else ''} from {one.since:.2f} s on: "
+    sentences = f"{one.entity} diverges{' first,' if first else ''} from {one.since:.2f} s on: "
     if one.only is not None:
-        return f"{said}at {one.time:.2f} s it is {one.only} alone."
+        return f"{sentences}at {one.time:.2f} s it is present only {one.only}."
     assert one.gap is not None
     assert one.along is not None
     assert one.across is not None
@@ -162,40 +164,40 @@ def _divergence(one: Divergence, *, first: bool) -> str:
     shown = (largest, *([other] if other[0] >= 0.005 else []))
     where = ", ".join(f"{by:.2f} m {side}" for by, side in shown)
     return (
-        f"{said}at {one.time:.2f} s it is {one.gap:.2f} m off, mainly "
+        f"{sentences}at {one.time:.2f} s it deviates by {one.gap:.2f} m, mainly "
         f"{'longitudinally' if ahead else 'laterally'} ({where}), and {_pace(one.speed)}"
-        f"{_way(one.turn)}."
+        f"{_direction(one.turn)}."
     )
 
 
 def _always(found: Differences) -> list[str]:
-    """Return what differs from the start on."""
-    said = [f"{name} is not there." for name in found.only_here]
-    said += [f"{name} is there alone." for name in found.only_there]
-    return said + [_box(one) for one in found.boxes]
+    """Return the differences from the start."""
+    sentences = [f"{name} does not exist there." for name in found.only_here]
+    sentences += [f"{name} exists only there." for name in found.only_there]
+    return sentences + [_box(one) for one in found.boxes]
 
 
 def _story(found: Differences) -> list[str]:
-    """Return what differed, in the order in which it did, up to the first who parted."""
-    said = _always(found)
+    """Return the differences up to the first divergence, in order of time."""
+    sentences = _always(found)
     if not found.partings:
-        return [*said, f"Nobody ever is more than {PARTED:g} m from where it is here."]
+        return [*sentences, f"No entity deviates by more than {PARTED:g} m."]
     first = found.partings[0]
     before: list[tuple[float, str]] = []
     before += [(one.first, _event(one)) for one in found.events if one.first <= first.time]
     before += [(one.time, _light(one)) for one in found.lights if one.time <= first.time]
-    said += [text for _, text in sorted(before)]
+    sentences += [text for _, text in sorted(before)]
     if not before:
-        said.append("No event and no light differs before anybody parts.")
-    said.append(_parting(first))
+        sentences.append("No event and no light differs before the first divergence.")
+    sentences.append(_parting(first))
     together = {one.entity for one in found.partings[1:] if one.time <= first.time}
     if off := [one for one in found.offsets if one.entity not in together][:MOST_OFF]:
-        others = [f"{one.entity} was {one.gap:.2f} m off" for one in off]
-        said.append(f"By then {', '.join(others)}.")
+        others = [f"{one.entity} deviated by {one.gap:.2f} m" for one in off]
+        sentences.append(f"By then {', '.join(others)}.")
     if first.entity != found.partings[-1].entity:
         later = [f"{one.entity} at {one.time:.2f} s" for one in found.partings[1:]]
-        said.append(f"Then {', '.join(later)}.")
-    return said
+        sentences.append(f"Then {', '.join(later)}.")
+    return sentences
 
 
 def _box(one: BoxSizes) -> str:
@@ -228,7 +230,7 @@ def _light(one: LightTimes) -> str:
 
 def _parting(one: Parting) -> str:
     if one.only is not None:
-        return f"{one.entity} parts first: at {one.time:.2f} s it is {one.only} alone."
+        return f"{one.entity} diverges first: at {one.time:.2f} s it is present only {one.only}."
     assert one.gap is not None
     assert one.along is not None
     assert one.across is not None
@@ -237,21 +239,21 @@ def _parting(one: Parting) -> str:
     sides = ("ahead", "behind") if along else ("to the left", "to the right")
     where = sides[(one.along if along else one.across) < 0.0]
     return (
-        f"{one.entity} parts first: at {one.time:.2f} s it is {one.gap:.2f} m apart there, "
-        f"{where}, and {_pace(one.speed)}{_way(one.turn)}; on its way since {one.since:.2f} s."
+        f"{one.entity} diverges first: at {one.time:.2f} s it is {one.gap:.2f} m away there, "
+        f"{where}, and {_pace(one.speed)}{_direction(one.turn)}; deviating since {one.since:.2f} s."
     )
 
 
 def _pace(speed: float) -> str:
-    """Return how much faster somebody is there, in words."""
+    """Return the difference of an entity's speed in words."""
     if abs(speed) < 0.05:
         return "as fast"
     return f"{abs(speed):.2f} m/s {'faster' if speed > 0.0 else 'slower'}"
 
 
-def _way(turn: float | None) -> str:
-    """Return in which other direction somebody moves there, if it does."""
+def _direction(turn: float | None) -> str:
+    """Return the difference of an entity's direction of travel in words, if it is large."""
     if turn is None or abs(turn) <= TURNED:
         return ""
     side = "left" if turn > 0.0 else "right"
-    return f", going {math.degrees(abs(turn)):.0f}° to the {side} of its way here"
+    return f", moving {math.degrees(abs(turn)):.0f}° to the {side} of its direction here"

@@ -1,6 +1,6 @@
-"""Critical regions of a search space: rules that hold, for they were tried on fresh scenarios.
+"""Critical regions of a search space: rules that are verified with fresh scenarios.
 
-`find_regions` finds and verifies them; `words` says them, `owl` states them as ontology classes.
+`find_regions` finds and verifies them; `words` puts them in sentences, `owl` in ontology classes.
 """
 
 from bridgegen.regions.box import Box

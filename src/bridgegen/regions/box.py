@@ -1,4 +1,4 @@
-"""Boxes of the search space with edges that people can read."""
+"""Boxes of the search space with rounded edges."""
 
 import math
 from collections.abc import Sequence
@@ -10,13 +10,13 @@ from bridgegen.arrays import Bool, Float
 from bridgegen.odd.space import SearchSpace
 from bridgegen.search.tree import Leaf
 
-# An edge moves by 1/20 of its box at most, and by 1/60 of its parameter's range.
+# Rounding moves an edge by at most 1/20 of its box and 1/60 of its parameter's range.
 _STEPS_IN_BOX, _STEPS_IN_RANGE = 10, 30
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A range of each searched parameter, in its own unit; all edges count as inside.
+    """A range of each searched parameter, in the parameter's unit; edges are inclusive.
 
     Attributes:
         low: ``(n_var,)`` float64.
@@ -32,7 +32,7 @@ class Box:
         return inside
 
     def narrows(self, outer: "Box") -> Bool:
-        """Return which parameters it leaves less than another box does, ``(n_var,)`` bool."""
+        """Return which ranges are narrower than another box's, ``(n_var,)`` bool."""
         less: Bool = (self.low > outer.low) | (self.high < outer.high)
         return less
 
@@ -46,12 +46,12 @@ def whole(space: SearchSpace) -> Box:
 
 
 def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
-    """Return a leaf with edges of few digits: what is printed is what is checked.
+    """Return a leaf with rounded edges, so that the printed rule is exactly the verified one.
 
     Args:
         leaf: of a tree over the searched parameters.
-        space: of these.
-        outer: edges of this box stay as they are, and none goes beyond.
+        space: of these parameters.
+        outer: edges of this box are not rounded, and no edge exceeds them.
     """
     low, high = leaf.low.copy(), leaf.high.copy()
     for k, name in enumerate(space.variables):
@@ -61,7 +61,7 @@ def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
             continue
         step = min((high[k] - low[k]) / _STEPS_IN_BOX, (one.high - one.low) / _STEPS_IN_RANGE)
         if not step > 0.0:
-            continue  # one value is all that it may be
+            continue  # the range is a single value
         digits = -math.floor(math.log10(step))
         if low[k] > outer.low[k]:
             low[k] = max(round(float(low[k]), digits) + 0.0, outer.low[k])  # no −0.0
@@ -71,7 +71,7 @@ def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
 
 
 def joined(leaves: Sequence[Leaf]) -> list[Leaf]:
-    """Return leaves with those made one that lie side by side and make up a box together."""
+    """Merge adjacent leaves whose union is a box."""
     kept = list(leaves)
     first = 0
     while first < len(kept):
@@ -80,14 +80,14 @@ def joined(leaves: Sequence[Leaf]) -> list[Leaf]:
             if both is not None:
                 kept[first] = both
                 del kept[second]
-                first = -1  # the larger box may have neighbours among the earlier ones
+                first = -1  # the larger box may have earlier neighbours
                 break
         first += 1
     return kept
 
 
 def _together(one: Leaf, other: Leaf) -> Leaf | None:
-    """Return two leaves as one, if they differ in one column and touch there."""
+    """Return the union of two leaves if they differ in one column and are adjacent there."""
     (columns,) = np.nonzero((one.low != other.low) | (one.high != other.high))
     if len(columns) != 1:
         return None

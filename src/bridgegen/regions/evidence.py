@@ -1,4 +1,4 @@
-"""How many of some scenarios are critical, and how sure that makes one of the share."""
+"""The share of critical scenarios, with its confidence interval."""
 
 import math
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ Z_95 = 1.959963984540054
 def clopper_pearson(
     successes: int, trials: int, confidence: float = CONFIDENCE
 ) -> tuple[float, float]:
-    """Return an interval that holds a probability with at least this confidence.
+    """Return an interval that contains a probability with at least this confidence.
 
-    It is exact: whatever the probability, independent trials give an interval without it with a
-    probability of at most 1 − confidence, half of that on either side.
+    It is exact: for independent trials and any probability, the interval misses it with a
+    probability of at most 1 − confidence, at most half of that on either side.
     Source: C. Clopper and E. Pearson, Biometrika 26 (1934).
 
     Args:
         successes: 0 .. trials.
-        trials: none gives (0, 1).
+        trials: 0 gives (0, 1).
         confidence: in (0, 1).
     """
     from scipy.special import betaincinv
@@ -33,13 +33,13 @@ def clopper_pearson(
 
 
 def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Return where a probability is, with about 95 % confidence; quick, and near the exact one.
+    """Return an interval that contains a probability with about 95 % confidence; fast.
 
     Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), doi:10.1080/01621459.1927.10502953.
 
     Args:
         successes: 0 .. trials.
-        trials: none gives (0, 1).
+        trials: 0 gives (0, 1).
     """
     if not trials:
         return 0.0, 1.0
@@ -53,12 +53,12 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What some scenarios came to.
+    """The results of a set of scenarios.
 
     Attributes:
         rows: scenarios whose simulation succeeded.
         critical: critical ones among them.
-        failed: scenarios besides whose simulation failed; they say nothing.
+        failed: scenarios whose simulation failed, not part of ``rows``.
     """
 
     rows: int
@@ -67,14 +67,14 @@ class Evidence:
 
     @property
     def share(self) -> float | None:
-        """Critical scenarios of all that succeeded; None of none."""
+        """Critical / successful scenarios; None if none succeeded."""
         return self.critical / self.rows if self.rows else None
 
     @cached_property
     def interval(self) -> tuple[float, float]:
-        """Where the share of all such scenarios is, with 95 % confidence: Clopper-Pearson's.
+        """The Clopper-Pearson 95 % confidence interval of the share.
 
-        That holds for independent random scenarios. A search chooses its own: its interval says
-        how much its number of rows can tell, not how large the share is.
+        It is valid for independent random scenarios. A search chooses its scenarios, so its
+        interval reflects the number of rows only.
         """
         return clopper_pearson(self.critical, self.rows)

@@ -1,10 +1,9 @@
-"""Finding regions in which scenarios are critical, and trying them on fresh scenarios.
+"""Finds regions in which scenarios are critical, and verifies them with fresh scenarios.
 
-A decision tree over all evaluations of a run names boxes in which most rows are critical. But a
-search chose these rows, so their share is no measure of the box. Random rows of the box, drawn as
-random search would meet them and simulated anew, are: a box counts as a critical region only if
-these say so. One that does not is narrowed: another tree, over its fresh rows and some of the
-run's, names boxes inside it, and these are tried on fresh rows of their own.
+A decision tree over all evaluations of a run proposes boxes in which most rows are critical. The
+search chose these rows, so their share is biased. Therefore each box is verified with fresh random
+rows, drawn from it as random search draws them. A box that fails is narrowed: another tree, over
+its fresh rows and some of the run's, proposes boxes inside it, which get fresh rows of their own.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,13 +25,13 @@ SAMPLES, MAX_SAMPLES = 300, 100_000
 AT_LEAST = 0.5
 MOST_CONDITIONS = 4
 MIN_ROWS = 20
-"""Rows that a leaf has at least: a rule from fewer of the run's rows seldom held (decisions.md)."""
+"""Minimum number of rows of a leaf: rules from fewer rows seldom hold (decisions.md)."""
 
-_STREAM = 5  # keeps these random numbers apart from others of the same seed
+_STREAM = 5  # a random stream of its own under the seed
 
 
 class Result(Protocol):
-    """What fresh rows came to; `bridgegen.evaluation.Evaluation` is one."""
+    """The results of fresh rows; `bridgegen.evaluation.Evaluation` is one."""
 
     @property
     def critical(self) -> Bool:
@@ -45,16 +44,16 @@ class Result(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A box that the tree calls critical, and what is known of it.
+    """A box that the tree proposes, with its evidence.
 
     Attributes:
         box: of the searched parameters.
-        search: the run's rows in it. The search chose them: their share is biased.
-        fresh: random rows of it, drawn and simulated for this alone: what counts.
-        space_share: of all random rows of the search space, those that lie in it.
-        confirmed: whether the fresh rows' share is at least what was asked for, with 95 %
+        search: the run's rows in it; their share is biased, since the search chose them.
+        fresh: random rows of the box that verify it.
+        space_share: the share of all random rows of the search space that lie in it.
+        confirmed: whether the fresh rows' share is at least the required one, with 95 %
             confidence.
-        narrowed: whether it is not, and boxes inside it were tried instead.
+        narrowed: whether it is not confirmed, and boxes inside it were verified instead.
     """
 
     box: Box
@@ -67,15 +66,15 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What was found in a run.
+    """The regions of a run.
 
     Attributes:
-        regions: confirmed ones first; of each kind those first that hold most critical scenarios.
-        rows: the run's evaluations, failed ones left out.
+        regions: confirmed ones first, then by the share of critical scenarios that they contain.
+        rows: the run's evaluations without failed ones.
         critical: critical ones among them.
-        critical_held: critical ones of the run that lie in a confirmed region.
-        space_share: of all random rows of the search space, those in a confirmed region.
-        simulations: fresh rows that were simulated.
+        critical_held: critical ones of the run in a confirmed region.
+        space_share: the share of all random rows of the search space in a confirmed region.
+        simulations: number of simulated fresh rows.
     """
 
     regions: tuple[Region, ...]
@@ -87,7 +86,7 @@ class Found:
 
     @property
     def confirmed(self) -> tuple[Region, ...]:
-        """The regions that hold."""
+        """The confirmed regions."""
         return tuple(one for one in self.regions if one.confirmed)
 
 
@@ -104,17 +103,17 @@ def find_regions(
 ) -> Found:
     """Find the regions of a search space in which most scenarios are critical.
 
-    One seed gives one result, however many threads evaluate.
+    The result depends on the seed, not on the number of threads.
 
     Args:
-        space: what was searched.
+        space: the search space.
         evaluate: simulates rows.
         X: ``(N, len(space.names))`` float64, the rows of a run whose simulation succeeded.
         critical: ``(N,)`` bool.
         samples: fresh rows for each region.
         at_least: the share of critical rows that makes a region critical.
         seed: of the fresh rows, and of the tree.
-        progress: told how many fresh rows are simulated, and how many will be as far as is known.
+        progress: called with the number of simulated fresh rows and the expected total.
 
     Raises:
         InputError: samples or at_least out of range; no parameter was searched; no critical row.
@@ -143,27 +142,27 @@ class _Search:
         self._samples, self._at_least, self._seed = samples, at_least, seed
         self._progress = progress or (lambda done, total: None)
         self._outer = whole(space)
-        self._tried: list[Region] = []
+        self._verified: list[Region] = []
         self._held = np.zeros(len(X), np.bool_)
         self._space_share = 0.0
         self._simulations = 0
 
     def run(self) -> Found:
-        """Try the boxes of the run's tree, then those inside what does not hold."""
+        """Verify the boxes of the run's tree, then boxes inside those that are not confirmed."""
         leaves = fit_leaves(
             self._X, self._critical, low=self._outer.low, high=self._outer.high,
             min_rows=MIN_ROWS, seed=self._seed, max_depth=MOST_CONDITIONS,
         )  # fmt: skip
         inner: list[Box] = []
         for box in (boxes := self._readable(leaves, self._outer)):
-            region, fresh, fresh_critical = self._try(box, len(boxes))
+            region, fresh, fresh_critical = self._verify(box, len(boxes))
             found = [] if region.confirmed else self._inside(box, fresh, fresh_critical)
             inner += found
             self._keep(replace(region, narrowed=bool(found)), fresh)
         for box in inner:
-            region, fresh, _ = self._try(box, len(boxes) + len(inner))
+            region, fresh, _ = self._verify(box, len(boxes) + len(inner))
             self._keep(region, fresh)
-        order = sorted(self._tried, key=_by_weight)
+        order = sorted(self._verified, key=_by_weight)
         return Found(
             tuple(order),
             rows=len(self._X),
@@ -174,16 +173,16 @@ class _Search:
         )
 
     def _readable(self, leaves: Sequence[Leaf], outer: Box) -> list[Box]:
-        """Return the boxes of those leaves that look critical."""
+        """Return the boxes of leaves with a sufficient share of critical rows."""
         promising = [leaf for leaf in leaves if leaf.critical and leaf.share >= self._at_least]
         return [readable(leaf, self._space, outer) for leaf in joined(promising)]
 
-    def _try(self, box: Box, planned: int) -> tuple[Region, Float, Bool]:
-        """Simulate fresh rows of a box; return what is known of it, the rows, which are critical.
+    def _verify(self, box: Box, planned: int) -> tuple[Region, Float, Bool]:
+        """Simulate fresh rows of a box; return its region, the rows, and which are critical.
 
-        The rows are ``(n, n_var)``, without those whose simulation failed.
+        The rows are ``(n, n_var)``, without failed ones.
         """
-        random = np.random.Generator(np.random.PCG64([self._seed, _STREAM, len(self._tried)]))
+        random = np.random.Generator(np.random.PCG64([self._seed, _STREAM, len(self._verified)]))
         drawn = draw_within(self._space, box.low, box.high, self._samples, random)
         result = self._evaluate(drawn.X)
         self._simulations += len(drawn.X)
@@ -202,21 +201,21 @@ class _Search:
         return region, drawn.X[ok][:, self._columns], fresh_critical
 
     def _keep(self, region: Region, fresh: Float) -> None:
-        """Take a region down; what it adds to the space that is confirmed, its fresh rows say."""
+        """Record a region; its fresh rows estimate how much it adds to the confirmed space."""
         if region.confirmed:
             new = np.ones(len(fresh), np.bool_)
-            for other in self._tried:
+            for other in self._verified:
                 if other.confirmed:
                     new &= ~other.box.holds(fresh)
             self._space_share += region.space_share * float(new.mean())
             self._held |= region.box.holds(self._X)
-        self._tried.append(region)
+        self._verified.append(region)
 
     def _inside(self, box: Box, fresh: Float, fresh_critical: Bool) -> list[Box]:
-        """Return boxes inside one that does not hold which look critical.
+        """Return promising boxes inside a box that is not confirmed.
 
-        The fresh rows are what is told truly of the box. Some of the run's, half as many at most,
-        keep the tree from cutting off where the search found most.
+        The fresh rows are unbiased. Some rows of the run, at most half as many, keep the tree from
+        cutting off the part in which the search found most critical rows.
         """
         mine = np.flatnonzero(box.holds(self._X))
         few = min(len(mine), len(fresh) // 2)
@@ -241,15 +240,15 @@ class _Search:
 
 
 def _by_weight(region: Region) -> tuple[bool, float]:
-    """Put confirmed regions first, and those that hold more of the critical scenarios."""
+    """Sort key: confirmed regions first, then those that contain more critical scenarios."""
     return not region.confirmed, -region.space_share * (region.fresh.share or 0.0)
 
 
 def check(space: SearchSpace, critical: Bool, samples: int, at_least: float) -> None:
-    """Refuse what no regions can be found for; see `find_regions`.
+    """Check the arguments of `find_regions`.
 
     Raises:
-        InputError: all that is wrong.
+        InputError: all problems.
     """
     problems = []
     if not 1 <= samples <= MAX_SAMPLES:
@@ -257,7 +256,7 @@ def check(space: SearchSpace, critical: Bool, samples: int, at_least: float) -> 
     if not 0.0 < at_least < 1.0:
         problems.append(f"0 < at_least < 1 must hold, got {at_least:g}")
     if not problems and space.n_var == 0:
-        problems.append(f"{space.name}: nothing is searched, so it has no regions")
+        problems.append(f"{space.name}: no parameter is searched, so it has no regions")
     if not problems and not critical.any():
         problems.append(
             f"{space.name}: none of {len(critical)} evaluations is critical, so there is "

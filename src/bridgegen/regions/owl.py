@@ -1,4 +1,4 @@
-"""Regions as classes of the ontology: a reasoner tells of a scenario which region it lies in.
+"""Regions as classes of the ontology: a reasoner infers which regions contain a scenario.
 
 A class is equivalent to a conjunction, in Manchester syntax:
 
@@ -6,10 +6,10 @@ A class is equivalent to a conjunction, in Manchester syntax:
       and (has_event some (has_what some ((has_parameter some (has_name value "bv_speed"))
            and (has_target_speed some xsd:double[>= 1.2, <= 2.0]))))
 
-that is: from the scenario, this way, something is found that is bound to the parameter of that name
-and has a value in that range. The way is the one by which a handed-over scenario's own individuals
-lead there. (A shorter one, back from the parameter by the inverse of ``has_parameter``, takes
-HermiT ten times as long and more.)
+that is: this property path leads from the scenario to an individual that is bound to the parameter
+of that name and has a value in that range. The path is that of an exported scenario's individuals.
+(A shorter path, from the parameter by the inverse of ``has_parameter``, takes HermiT more than ten
+times as long.)
 """
 
 import hashlib
@@ -67,11 +67,11 @@ _ANNOTATIONS = {
 
 @dataclass(frozen=True)
 class Carrier:
-    """Where a scenario's individuals have the value of a parameter.
+    """The place of a parameter's value among a scenario's individuals.
 
     Attributes:
-        path: the object properties that lead there from the scenario.
-        property: the data property that has the value.
+        path: the object properties from the scenario to the individual.
+        property: the data property with the value.
         datatype: of that property.
     """
 
@@ -83,12 +83,12 @@ class Carrier:
 def carriers(
     individuals: Individuals, values: Mapping[str, float], parameters: Mapping[str, Parameter]
 ) -> dict[str, Carrier]:
-    """Return where the value of each parameter is found.
+    """Return the carrier of each parameter's value.
 
     Args:
-        individuals: of any one row.
-        values: of that row, by name; generic, so that no two parameters agree by accident.
-        parameters: what may vary, by name.
+        individuals: of one row.
+        values: of that row, by name; generic, so that no two parameters are equal by chance.
+        parameters: the parameters that vary, by name.
     """
     paths = _paths(individuals)
     found = {}
@@ -112,7 +112,7 @@ def _has(
     name: str,
     values: Mapping[str, float],
 ) -> bool:
-    """Say whether an individual has the value of a parameter."""
+    """Return whether an individual has the value of a parameter."""
     if name not in values:
         return False
     kind = parameters[name].kind if name in parameters else FLOAT
@@ -122,7 +122,7 @@ def _has(
 
 
 def _paths(individuals: Individuals) -> dict[Subject, tuple[str, ...]]:
-    """Return a shortest way from the scenario to each individual, nearest first."""
+    """Return a shortest path from the scenario to each individual, nearest first."""
     links: dict[Subject, list[tuple[str, Subject]]] = {}
     for quad in individuals.quads:
         name = local_name(quad.predicate)
@@ -145,7 +145,7 @@ def _paths(individuals: Individuals) -> dict[Subject, tuple[str, ...]]:
 
 
 def statable(region: Region, space: SearchSpace, carried: Mapping[str, Carrier]) -> bool:
-    """Say whether the ontology carries every parameter that a region's rule names."""
+    """Return whether the ontology contains every parameter that a region's rule names."""
     named = region.box.narrows(whole(space))
     return all(name in carried for name, one in zip(space.variables, named, strict=True) if one)
 
@@ -161,17 +161,17 @@ def classes(
     """Return the statements that define a class for each region.
 
     Args:
-        regions: those to state by their number; `statable` each.
-        space: what was searched.
-        carried: what carries its parameters.
-        driver: the ego's, for whom the regions are critical.
-        origin: what they were found in, in words.
+        regions: by number; each is `statable`.
+        space: the search space.
+        carried: the carriers of its parameters.
+        driver: the ego's driver.
+        origin: the source of the regions, in words.
     """
     writer = _Writer(space, carried)
     digest = hashlib.sha256(repr([space.name, driver]).encode())
     for one in regions.values():
         digest.update(one.box.low.tobytes() + one.box.high.tobytes())
-    # Regions of two runs may be loaded together: each run's have a name of their own.
+    # Regions of several runs may be loaded together, so the names contain the run's digest.
     name = quote(space.name, safe="")
     header = ox.NamedNode(f"{REGIONS}/{name}/{digest.hexdigest()[:12]}")
     writer.put(header, TYPE, OWL_ONTOLOGY)
@@ -204,7 +204,7 @@ class _Writer:
         predicate: ox.NamedNode,
         value: ox.NamedNode | ox.BlankNode | ox.Literal,
     ) -> None:
-        """State something."""
+        """Add a statement."""
         self.quads.append(ox.Quad(node, predicate, value))
 
     def _anonymous(self) -> ox.BlankNode:
@@ -212,7 +212,7 @@ class _Writer:
         return ox.BlankNode(f"part{self._count}")  # a random name would differ each time
 
     def region(self, node: ox.NamedNode, number: int, region: Region, driver: str) -> None:
-        """Define the class of a region, and say what is known of it."""
+        """Define the class of a region, annotated with its evidence."""
         name = self._space.name
         self.put(node, TYPE, _CLASS)
         self.put(node, LABEL, ox.Literal(f"critical region {number} of {name}"))
@@ -266,7 +266,7 @@ class _Writer:
         return node
 
     def _range(self, datatype: ox.NamedNode, low: float | None, high: float | None) -> ox.BlankNode:
-        """Return the values of a datatype between two ends, both included."""
+        """Return the values of a datatype between two inclusive bounds."""
         facets = []
         for facet, end in (("minInclusive", low), ("maxInclusive", high)):
             if end is not None:
@@ -281,7 +281,7 @@ class _Writer:
         return node
 
     def _one_of(self, names: Sequence[str]) -> ox.BlankNode:
-        """Return the data range of some texts."""
+        """Return the data range of a list of texts."""
         node = self._anonymous()
         self.put(node, TYPE, ox.NamedNode(RDFS + "Datatype"))
         self.put(node, ox.NamedNode(OWL + "oneOf"), self._list([ox.Literal(one) for one in names]))

@@ -1,4 +1,4 @@
-"""What was found, as JSON: for machines, and to be drawn."""
+"""The regions of a run as JSON."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,14 +13,14 @@ from bridgegen.regions.find import Found, Region
 from bridgegen.regions.words import rule, sentence
 
 JSON_FILE = "regions.json"
-"""Its name in a run's folder."""
+"""The file name in a run's folder."""
 
 
 def read_record(path: Path) -> Mapping[str, Any] | None:
-    """Return what `to_json` gave for a run, as it was written; None where there is no file.
+    """Return the record of `to_json` in a file; None if the file does not exist.
 
     Raises:
-        FileFormatError: it cannot be read, or is something else.
+        FileFormatError: it cannot be read, or is not such a record.
     """
     try:
         record = parse_json(read_bytes(path))
@@ -32,14 +32,14 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
         return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FileFormatError(
-            f"{path}: must be what 'bridgegen regions' writes, and {_said(error)}; "
+            f"{path}: must be what 'bridgegen regions' writes, and {_reason(error)}; "
             "run that again, or delete the file"
         ) from None
     return record  # type: ignore[no-any-return]
 
 
 def _check(one: Mapping[str, Any]) -> None:
-    """Raise a KeyError, TypeError or ValueError where a region lacks what a page needs."""
+    """Raise a KeyError, TypeError or ValueError if a region lacks data that a page needs."""
     _whole(one["number"])
     _of(bool, one["confirmed"])
     _of(str, one["rule"], one["sentence"], *_of(list, one["named"])[0])
@@ -64,24 +64,24 @@ def _whole(*values: Any) -> None:
 
 
 def _number(*values: Any) -> None:
-    """Refuse what is no number; `parse_json` has refused what is not finite."""
+    """Check that values are numbers; `parse_json` has checked that they are finite."""
     _of(float, *(float(value) if type(value) is int else value for value in values))
 
 
-def _said(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     return f"lacks {error}" if isinstance(error, KeyError) else f"is not: {error}"
 
 
 def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:
-    """Return everything as JSON's types.
+    """Return the regions in JSON types.
 
-    ``box`` has the lowest and the highest value of every searched parameter, both inside; ``named``
-    are those that the rule names.
+    ``box`` has the inclusive bounds of every searched parameter; ``named`` lists the parameters
+    that the rule names.
 
     Args:
         found: the regions.
-        space: what was searched.
-        driver: the ego's.
+        space: the search space.
+        driver: the ego's driver.
     """
     outer = whole(space)
     return {

@@ -1,4 +1,4 @@
-"""Boxes as people say them."""
+"""Boxes in words."""
 
 from bridgegen.odd.space import SearchSpace
 from bridgegen.regions.box import Box, whole
@@ -9,9 +9,9 @@ _UNITLESS = ("1", "count", "?")
 
 
 def conditions(box: Box, space: SearchSpace) -> list[str]:
-    """Return what a row must keep to lie in a box, one condition per parameter.
+    """Return the conditions of a box, one per parameter.
 
-    The numbers are the box's own, to the last bit.
+    The numbers are those of the box, to the last bit.
     """
     outer = whole(space)
     found = []
@@ -32,13 +32,13 @@ def rule(box: Box, space: SearchSpace) -> str:
 
 
 def sentence(box: Box, space: SearchSpace, driver: str, fresh: Evidence) -> str:
-    """Return what is known of a box, in one sentence.
+    """Return the evidence for a box in one sentence.
 
     Args:
         box: a region.
-        space: what is searched.
-        driver: the ego's.
-        fresh: what random scenarios in the box came to.
+        space: the search space.
+        driver: the ego's driver.
+        fresh: the results of random scenarios in the box.
     """
     text = rule(box, space)
     where = "Anywhere in its space" if text == ANYWHERE else f"Where {text}"
@@ -52,7 +52,7 @@ def sentence(box: Box, space: SearchSpace, driver: str, fresh: Evidence) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in whole per cent, or as it takes to tell it from none and from all."""
+    """Return a share in per cent, with enough digits to differ from 0 % and 100 %."""
     if 0.0 < share < 0.0995:
         return f"{100.0 * share:.2g} %"
     if 0.995 <= share < 1.0:
@@ -61,7 +61,7 @@ def percent(share: float) -> str:
 
 
 def number(value: float) -> str:
-    """Return the shortest text that is read as the same float64."""
+    """Return the shortest text that is parsed as the same float64."""
     return repr(value).removesuffix(".0")
 
 

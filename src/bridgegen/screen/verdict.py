@@ -1,4 +1,4 @@
-"""What a job's criteria came to, on stderr: standard output may be JSON."""
+"""Outcomes of criteria on standard error: standard output may be JSON."""
 
 import sys
 from collections.abc import Sequence
@@ -14,5 +14,5 @@ def print_outcomes(outcomes: "Sequence[Outcome]") -> bool:
     """Print each outcome; return whether all passed."""
     for one in outcomes:
         word = _WORDS[one.verdict]
-        print(f"bridgegen: {word}: {one.test} ({one.said})", file=sys.stderr)
+        print(f"bridgegen: {word}: {one.test} ({one.details})", file=sys.stderr)
     return all(one.verdict == "passed" for one in outcomes)

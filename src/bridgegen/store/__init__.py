@@ -1,6 +1,6 @@
-"""A run's results, append-only, in one SQLite file that anybody can query.
+"""A run's results, append-only, in one SQLite file that any SQLite client can query.
 
-``Store.create`` starts a run's folder, ``Store.open`` reads it or goes on with it.
+``Store.create`` creates a run's folder, ``Store.open`` reads it or resumes it.
 """
 
 from bridgegen.store.checkpoint import Checkpoint

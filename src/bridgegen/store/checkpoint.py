@@ -1,4 +1,4 @@
-"""The state of a search, beside its evaluations: the newest only."""
+"""The latest state of a search, stored with its evaluations."""
 
 import sqlite3
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ TABLE = (
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What a search was after it had been told some evaluations.
+    """The state of a search after a number of evaluations.
 
     Attributes:
-        evaluations: how many, the first of the run.
-        idle: how many batches in a row had brought none.
-        state: the algorithm's own account of itself.
+        evaluations: how many, from the start of the run.
+        idle: how many consecutive batches before it were empty.
+        state: the serialised state of the algorithm.
     """
 
     evaluations: int
@@ -28,7 +28,7 @@ class Checkpoint:
 
 
 def write_checkpoint(connection: sqlite3.Connection, checkpoint: Checkpoint) -> None:
-    """Put a checkpoint in the place of the one before; within a transaction."""
+    """Replace the checkpoint; within a transaction."""
     connection.execute(f"CREATE TABLE IF NOT EXISTS {TABLE}")
     connection.execute(
         "INSERT OR REPLACE INTO checkpoint VALUES (0, ?, ?, ?, ?)",
@@ -37,10 +37,10 @@ def write_checkpoint(connection: sqlite3.Connection, checkpoint: Checkpoint) -> 
 
 
 def read_checkpoint(connection: sqlite3.Connection) -> Checkpoint | None:
-    """Return the checkpoint; None of a run that has none.
+    """Return the checkpoint; None if the run has none.
 
     Raises:
-        InputError: it is not what was written.
+        InputError: it is damaged.
     """
     there = connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'checkpoint'")
     if not there.fetchone()[0]:
@@ -58,6 +58,6 @@ def read_checkpoint(connection: sqlite3.Connection) -> Checkpoint | None:
 
 
 def _digest(checkpoint: Checkpoint) -> bytes:
-    """Return what tells a damaged state; SQLite has no checksums."""
+    """Return a checksum of the state; SQLite has none."""
     key = f"{checkpoint.evaluations} {checkpoint.idle}".encode()
     return blake2b(checkpoint.state, digest_size=16, key=key).digest()

@@ -23,15 +23,15 @@ DIGESTED = 4096
 
 
 class Evaluated(Protocol):
-    """What an evaluation of n rows hands over; any object with these arrays will do.
+    """The evaluation of n rows: any object with these arrays.
 
-    It may have others: ``cause``, ``(n,)`` integers, a `Cause` each, and ``findings``, the
-    `Findings` of n rows; where it has none, or None, none are recorded.
+    Optional attributes: ``cause``, ``(n,)`` integers, a `Cause` each, and ``findings``, the
+    `Findings` of n rows; they are not recorded if they are missing or None.
     """
 
     @property
     def metrics(self) -> Float:
-        """``(n, M)`` float64, NaN or ±inf where the metric says so."""
+        """``(n, M)`` float64, NaN or ±inf where the metric defines them."""
 
     @property
     def F(self) -> Float:
@@ -47,7 +47,7 @@ class Evaluated(Protocol):
 
     @property
     def messages(self) -> Mapping[int, str]:
-        """By row, what else there is to say of its failure."""
+        """Details of failures, by row."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Rows:
         F: ``(n, n_obj)`` float64.
         status: ``(n,)`` int64, 0 is success.
         critical: ``(n,)`` bool.
-        cause: ``(n,)`` int8, a `Cause` each; NONE, too, of a run that did not seek causes.
-        findings: the decisive conflict of each row; empty, too, of a run that recorded none.
+        cause: ``(n,)`` int8, a `Cause` each; NONE in a run that did not determine causes.
+        findings: the decisive conflict of each row; empty in a run that recorded none.
     """
 
     id: Int
@@ -85,12 +85,12 @@ class Rows:
 
     @property
     def messages(self) -> Mapping[int, str]:
-        """Nothing: what was recorded is in `Store.failures`."""
+        """Empty: the recorded messages are in `Store.failures`."""
         return {}
 
     @classmethod
     def join(cls, parts: Sequence["Rows"]) -> "Rows":
-        """Return the rows of several parts, at least one, in their order."""
+        """Concatenate the rows of several parts, at least one."""
         if len(parts) == 1:
             return parts[0]
         names = [one.name for one in fields(cls) if one.name != "findings"]
@@ -100,9 +100,9 @@ class Rows:
         )
 
     def digest(self) -> str:
-        """Return SHA-256 of all that was evaluated and came of it, times left out.
+        """Return the SHA-256 of inputs and results, without times.
 
-        One seed gives one digest.
+        It depends on the seed only.
         """
         return digest_of(self)
 
@@ -116,17 +116,17 @@ class Rows:
 
 @dataclass(frozen=True)
 class Columns:
-    """The columns of the table, named once, when the run is created.
+    """The columns of the table, named when the run is created.
 
-    SQL takes no notice of case and has our own columns beside the user's, so a name that is
-    taken gets a suffix: a parameter "status" is in the column "status_parameter".
+    SQL ignores case, and the table has columns besides the user's, so a name that is in use gets a
+    suffix: a parameter "status" is in the column "status_parameter".
 
     Attributes:
         n_var: searched parameters.
         X: the column of each parameter.
         metrics: the column of each metric.
         F: the column of each objective: f0, f1 …
-        last: those that come last, see ``LAST_OF_SCHEMA``.
+        last: the last columns, see ``LAST_OF_SCHEMA``.
     """
 
     n_var: int
@@ -153,7 +153,7 @@ class Columns:
         problems = []
         for kind, given in (("parameter", parameters), ("metric", metrics)):
             for name in dict.fromkeys(given):
-                # SQL ends at NUL; a lone surrogate is no character.
+                # SQL ends at NUL; a lone surrogate is not a character.
                 if not name.strip() or "\0" in name or any("\ud800" <= c <= "\udfff" for c in name):
                     problems.append(f"a {kind}'s name must be a non-empty text, got {name!r}")
                 if given.count(name) > 1:
@@ -172,7 +172,7 @@ class Columns:
         return (*FIRST, *self.X, *self.metrics, *self.F, *self.last)
 
     def create_sql(self) -> str:
-        """Return the statement that makes the table."""
+        """Return the statement that creates the table."""
         kinds = {"id": "INTEGER PRIMARY KEY", "batch": "INTEGER NOT NULL", "u": "BLOB NOT NULL"}
         kinds |= {"status": "INTEGER NOT NULL", "critical": "INTEGER NOT NULL"}
         kinds |= dict.fromkeys(self.last[2:], "TEXT")
@@ -208,16 +208,16 @@ class Columns:
         for name, array in (("status", status), ("critical", critical), ("cause", cause)):
             if array.shape != (n,):
                 raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
-        said = getattr(result, "findings", None) or Findings.none(n)
-        if len(said) != n:
-            raise ValueError(f"findings must be those of {n} rows, got {len(said)}")
+        findings = getattr(result, "findings", None) or Findings.none(n)
+        if len(findings) != n:
+            raise ValueError(f"findings must be those of {n} rows, got {len(findings)}")
         parts = zip(
             blobs,
             numbers.tolist(),
             status.astype(np.int64).tolist(),
             critical.astype(np.int64).tolist(),
             [Cause(one).label or None for one in cause.tolist()],
-            *([one or None for one in texts.tolist()] for texts in said.columns().values()),
+            *([one or None for one in texts.tolist()] for texts in findings.columns().values()),
             strict=True,
         )
         width = len(self.last)
@@ -227,7 +227,7 @@ class Columns:
         ]
 
     def unpack(self, rows: Sequence[tuple[Any, ...]]) -> Rows:
-        """Return what SQL read as arrays.
+        """Convert rows that SQL has read to arrays.
 
         Raises:
             ValueError, TypeError, InputError: values that this table cannot hold.

@@ -1,4 +1,4 @@
-"""The file of a run: how it comes into being, and what must be in it."""
+"""The file of a run: its creation, and the checks of its content."""
 
 import json
 import os
@@ -26,7 +26,7 @@ KEYS = ("schema", "version", "settings", "parameters", "metrics", "n_var", "n_ob
 
 
 def refuse_other_names(folder: Path) -> None:
-    """Refuse a folder whose path no settings, page or ontology could name.
+    """Reject a folder whose path cannot be written in settings, pages or ontologies.
 
     Raises:
         StorageError: its path is not valid UTF-8.
@@ -41,42 +41,42 @@ def refuse_other_names(folder: Path) -> None:
 
 
 def require_there(folder: Path) -> None:
-    """Refuse to go on with a run whose file is no longer in its folder.
+    """Check that the file of a run is still in its folder.
 
     Raises:
-        StorageError: it was deleted, or moved.
+        StorageError: it was deleted or moved.
     """
     if not (folder / FILE).is_file():
         raise StorageError(
-            f"{folder}: {FILE} was deleted or moved while the run was going on; if it was deleted, "
+            f"{folder}: {FILE} was deleted or moved during the run; if it was deleted, "
             "its evaluations are lost"
         )
 
 
 def refuse_used(folder: Path) -> None:
-    """Let a run begin only where nothing can be overwritten.
+    """Check that a new run in a folder would not overwrite anything.
 
     Raises:
-        StorageError: the folder holds a run, or anything else that no run left behind; or its path
-            is not valid UTF-8.
+        StorageError: the folder contains a run, or files that are not left over from one; or its
+            path is not valid UTF-8.
     """
     refuse_other_names(folder)
     ours = {LOCK, DRAFT, f"{DRAFT}-journal"}
     with storage_errors(folder, "read"):
         if (folder / FILE).exists():
             raise StorageError(
-                f"{folder}: holds a run already, which is never overwritten; "
-                f"go on with it: bridgegen resume {folder}, or choose another --out"
+                f"{folder}: contains a run already, which is never overwritten; "
+                f"resume it: bridgegen resume {folder}, or choose another --out"
             )
         if folder.is_dir() and any(path.name not in ours for path in folder.iterdir()):
             raise StorageError(
-                f"{folder}: is not empty and holds no run, so it is left alone; "
+                f"{folder}: is not empty and contains no run, so it is not used; "
                 "choose another --out"
             )
 
 
 def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
-    """Make the run's file: whole or not at all, whenever the process is killed."""
+    """Create the run's file atomically."""
     keys = [key for key in (*KEYS, "labels") if key in run]
     values = [(key, json.dumps(run[key], allow_nan=False)) for key in keys]
     draft = folder / DRAFT
@@ -105,7 +105,7 @@ def columns_of(run: Mapping[str, Any]) -> Columns:
 
 
 def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
-    """Return what :func:`write_run` was given, ``finished`` besides where the run has ended.
+    """Return the values of :func:`write_run`, and ``finished`` if the run has ended.
 
     Raises:
         StorageError: not a run, damaged, or of another schema.
@@ -113,8 +113,8 @@ def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
     try:
         with storage_errors(path, "read"):
             if missing := {*NEEDED} - tables_of(connection):
-                told = ", ".join(sorted(missing))
-                raise StorageError(f"{path}: is not a run: its tables are missing ({told})")
+                names = ", ".join(sorted(missing))
+                raise StorageError(f"{path}: is not a run: its tables are missing ({names})")
             stored = connection.execute("SELECT key, value FROM run").fetchall()
             found = connection.execute("PRAGMA table_xinfo(evaluations)").fetchall()
         run = {key: _value(key, text) for key, text in stored}
@@ -138,7 +138,7 @@ def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
 
 
 def _value(key: str, text: str) -> Any:
-    """Return a value that a run's file has as JSON.
+    """Return a value that is stored as JSON.
 
     Raises:
         InputError: it is not JSON of finite numbers.
@@ -150,10 +150,10 @@ def _value(key: str, text: str) -> Any:
 
 
 def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
-    """Refuse values of the wrong type, and counts that do not fit the table of evaluations.
+    """Check the types of the values, and that the counts fit the table of evaluations.
 
     Raises:
-        InputError: the first that is wrong.
+        InputError: the first mistake.
     """
     kinds = {
         "version": str,
@@ -188,10 +188,10 @@ def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
 
 
 def _check_rows(connection: sqlite3.Connection, n_var: int, n_columns: int) -> None:
-    """Refuse numbers of evaluations that the file has no room for: arrays are made for as many.
+    """Check that the file has room for its evaluations: their number sizes arrays.
 
     Raises:
-        InputError: they are negative, or too many for the size of the file.
+        InputError: a number is negative, or too large for the size of the file.
     """
     last, first = (
         connection.execute(f"SELECT {end}(id) FROM evaluations").fetchone()[0]

@@ -1,7 +1,7 @@
-"""The tables of a run's file: what they must be before a row of them is read.
+"""Checks of the tables of a run's file before any row is read.
 
-The file may be anybody's. SQLite runs what a schema says (views, triggers, generated columns,
-defaults), so a file whose schema is not the one that the store writes is refused.
+The file is untrusted. SQLite executes parts of a schema (views, triggers, generated columns,
+defaults), so a file with another schema than the store writes is rejected.
 """
 
 import re
@@ -19,20 +19,20 @@ _FIXED = {"run": RUN, "failures": FAILURES, "checkpoint": checkpoint.TABLE}
 _OWN = (*_FIXED, "evaluations")
 
 _HARMLESS = ("CREATE TABLE ", "CREATE INDEX ", "CREATE UNIQUE INDEX ", "CREATE VIEW ")
-"""How an entry of a schema may begin, as SQLite writes them; views of other names are not read."""
+"""Permitted beginnings of schema entries; views of other names are never read."""
 
 
 def tables_of(connection: sqlite3.Connection) -> set[str]:
-    """Return the names of all tables, once those of a run are known to be plain ones.
+    """Return the names of all tables, after a check that those of a run are plain tables.
 
     Raises:
-        InputError: a trigger, a virtual table, or a view in the place of a table.
+        InputError: a trigger, a virtual table, or a view instead of a table.
     """
     found = connection.execute("SELECT name, sql FROM sqlite_master").fetchall()
     for name, sql in found:
         if sql is not None and not str(sql).startswith(_HARMLESS):
-            raise InputError(f"it holds '{str(sql)[:40]}', which no run does")
-        # SQLite goes by the statement, not by the name or the kind beside it.
+            raise InputError(f"it contains '{str(sql)[:40]}', which no run does")
+        # SQLite uses the statement, not the name or the kind beside it.
         if str(name).lower() in _OWN and not re.match(
             rf'CREATE TABLE ("?){re.escape(str(name).lower())}\1\s*\(', str(sql), re.IGNORECASE
         ):
@@ -44,17 +44,17 @@ def tables_of(connection: sqlite3.Connection) -> set[str]:
 
 
 def check_columns(connection: sqlite3.Connection, table: str, sql: str) -> None:
-    """Refuse a table whose columns are not those that a statement would make.
+    """Check that a table has the columns that a statement creates.
 
     Names, types, constraints, default values and whether they are computed must be the same.
 
     Args:
         connection: to the file.
         table: its name.
-        sql: the statement that the store makes it by.
+        sql: the statement that creates it.
 
     Raises:
-        InputError: they are not.
+        InputError: its columns differ.
     """
     with closing(sqlite3.connect(":memory:")) as model:
         model.execute(sql)

@@ -1,4 +1,4 @@
-"""SQLite as the store needs it: connections, a lock that dies with its process, clear errors."""
+"""SQLite for the store: connections, a lock that ends with its process, clear errors."""
 
 import os
 import sqlite3
@@ -24,12 +24,12 @@ CAUSES = {
 
 @contextmanager
 def storage_errors(path: Path, doing: str, kept: str = "") -> Iterator[None]:
-    """Turn what SQLite and the system raise into one StorageError with the cause.
+    """Convert errors of SQLite and of the system to a StorageError with the cause.
 
     Args:
         path: the file, for the message.
-        doing: what is being done to it ("written").
-        kept: what is safe all the same, a sentence.
+        doing: the operation, as a participle ("written").
+        kept: what is not lost, a sentence.
     """
     try:
         yield
@@ -55,13 +55,13 @@ def connect(path: Path, *, write: bool) -> sqlite3.Connection:
     """
     mode = "rw"
     if not write and not os.access(path.parent, os.W_OK):
-        # SQLite reads a WAL database only where it may make a -shm file, unless it is told that
-        # nobody writes. Nobody does where there is no log.
+        # SQLite reads a WAL database only where it can create a -shm file, unless the URI says that
+        # the file is immutable. It is if there is no log.
         mode = "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
     uri = f"file:{quote(str(path.absolute()))}?mode={mode}"
     connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=10.0)
     try:
-        # The file may be anybody's: its schema calls no function that has side effects, and every
+        # The file is untrusted: its schema must not call functions with side effects, and every
         # page is checked before it is used.
         connection.execute("PRAGMA trusted_schema = OFF")
         connection.execute("PRAGMA cell_size_check = ON")
@@ -86,11 +86,11 @@ _FORBIDDEN = {
 def _authorize(
     action: int, _first: str | None, _second: str | None, _base: str | None, inside: str | None
 ) -> int:
-    """Refuse what no statement of the store needs: a file's own views, triggers and recursion.
+    """Deny what no statement of the store needs: views, triggers and recursion of the file.
 
     Args:
-        action: what is about to be done.
-        inside: the view or trigger that asks for it, if one does.
+        action: the requested operation.
+        inside: the view or trigger that requests it, or None.
     """
     refused = inside is not None or action in _FORBIDDEN
     return sqlite3.SQLITE_DENY if refused else sqlite3.SQLITE_OK
@@ -98,7 +98,7 @@ def _authorize(
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing, an interrupt from the keyboard included."""
+    """Commit everything or nothing, also after Ctrl-C."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -114,11 +114,11 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 class Lock:
     """At most one writer per run, in this process or any other.
 
-    An empty SQLite database held in an exclusive transaction: SQLite's own file locks work on
-    every system, within one process too, and end when the process does, however it ends.
+    It is an exclusive transaction on an empty SQLite database: SQLite's file locks work on every
+    system and within one process, and end when the process ends, for whatever reason.
 
     Raises:
-        StorageError: another writer holds it, or the folder cannot be written.
+        StorageError: another process holds it, or the folder is not writable.
     """
 
     def __init__(self, path: Path) -> None:
@@ -138,5 +138,5 @@ class Lock:
         self._connection = connection
 
     def release(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         self._connection.close()

@@ -1,4 +1,4 @@
-"""One run's store: a folder with ``run.sqlite``, one transaction a batch."""
+"""The store of a run: a folder with ``run.sqlite``, one transaction per batch."""
 
 import json
 import sqlite3
@@ -42,25 +42,25 @@ MARKS = 900
 
 
 class Store:
-    """A run's settings and its evaluations, in the order of recording; nothing is ever changed.
+    """A run's settings and its evaluations, in the order of recording; append-only.
 
     Table ``evaluations``: id, batch, seconds, u (the unit-cube row, float64 little endian), one
     column per parameter, metric and objective (f0, f1 …), status, critical, cause, and those of
     `Findings`. NaN is NULL, and so is the cause of what is not critical. SQLite keeps no sign of
     zero: −0.0 comes back as 0.0; every other float64 comes back bit for bit.
-    Table ``run``: key and value (JSON); what the algorithm learnt is under "notes".
-    Table ``failures``, where there is something to say: id, message.
-    Table ``checkpoint``, where the algorithm can be saved: its state after its newest batch.
+    Table ``run``: key and value (JSON); the algorithm's notes are under "notes".
+    Table ``failures``, if there are messages: id, message.
+    Table ``checkpoint``, if the algorithm can be saved: its state after its latest batch.
 
-    Made by :meth:`create` or :meth:`open`; a context manager.
+    Created by :meth:`create` or :meth:`open`; a context manager.
 
     Attributes:
         folder: the run's folder.
-        settings: what the run was made with, as given to ``create``.
+        settings: of the run, as passed to ``create``.
         parameters: names of X's columns.
         metrics: names of the metrics.
-        columns: how the table names them.
-        labels: how the values of parameters are read that are no plain numbers, by name
+        columns: their names in the table.
+        labels: how to read the values of parameters that are not plain numbers, by name
             (`bridgegen.odd.kinds.Kind.labels`).
     """
 
@@ -91,19 +91,19 @@ class Store:
         n_obj: int,
         labels: Mapping[str, Any] | None = None,
     ) -> Self:
-        """Start a run in a new or empty folder, and hold it for writing.
+        """Create a run in a new or empty folder, and open it for writing.
 
         Args:
-            folder: made with its parents if need be.
-            settings: all that it takes to go on with the run; JSON values, no NaN.
+            folder: created with its parents if needed.
+            settings: everything that resuming the run needs; JSON values, no NaN.
             parameters: names of X's columns.
             metrics: names of the metrics.
             n_var: searched parameters, the width of U.
             n_obj: objectives.
-            labels: how the values of parameters are read that are no plain numbers, by name.
+            labels: how to read the values of parameters that are not plain numbers, by name.
 
         Raises:
-            StorageError: the folder holds a run or anything else, or cannot be written.
+            StorageError: the folder contains a run or other files, or is not writable.
             InputError: a name that cannot be a column.
         """
         folder = Path(folder)
@@ -124,7 +124,7 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
         lock = Lock(folder / LOCK)
         try:
-            refuse_used(folder)  # again, now that nobody else can be making one here
+            refuse_used(folder)  # again, now that no other process can create one
             with storage_errors(folder, "written", "nothing was written"):
                 write_run(folder, columns, run)
             return cls._connected(folder, lock)
@@ -138,7 +138,7 @@ class Store:
 
         Args:
             folder: the run's folder.
-            write: go on with it; no other process may be writing it.
+            write: resume it; no other process may be writing it.
 
         Raises:
             StorageError: not a run, damaged, of another schema, locked, or not readable.
@@ -147,7 +147,7 @@ class Store:
         refuse_other_names(folder)
         with storage_errors(folder, "read"):
             if not (folder / FILE).is_file():
-                what = "holds no run" if folder.is_dir() else "there is no such folder"
+                what = "contains no run" if folder.is_dir() else "there is no such folder"
                 raise StorageError(f"{folder}: {what} ({FILE} is missing)")
         lock = Lock(folder / LOCK) if write else None
         try:
@@ -177,10 +177,10 @@ class Store:
             raise
 
     def close(self) -> None:
-        """Close the files and let others write."""
+        """Close the files and release the lock."""
         if self._lock:
-            # One plain file, readable from read-only media. Refused while somebody reads, or where
-            # the disk is full; the log then stays beside the file, and is as good.
+            # One plain file, readable from read-only media. This fails while another process reads,
+            # or if the disk is full; then the log stays beside the file, which is as good.
             with suppress(sqlite3.Error):
                 self._connection.execute("PRAGMA busy_timeout = 0")
                 self._connection.execute("PRAGMA journal_mode = DELETE")
@@ -201,12 +201,12 @@ class Store:
         self.close()
 
     def append(self, U: Float, X: Float, result: Evaluated, seconds: float) -> None:
-        """Record one batch, whole or not at all.
+        """Record one batch atomically.
 
         Args:
             U: ``(n, n_var)`` float64, unit-cube rows.
-            X: ``(n, len(parameters))`` float64, what they decode to.
-            result: metrics, F, critical, status and perhaps cause of the n rows.
+            X: ``(n, len(parameters))`` float64, the decoded rows.
+            result: the results of the n rows.
             seconds: [s] since the start of the run.
 
         Raises:
@@ -214,20 +214,20 @@ class Store:
             ValueError: an array has the wrong shape.
         """
         start, batch = len(self), self.n_batches
-        kept = f"{start} evaluations are kept; go on with: bridgegen resume {self.folder}"
+        kept = f"{start} evaluations are kept; resume with: bridgegen resume {self.folder}"
         rows = self.columns.pack(start, batch, seconds, U, X, result)
         with self._writing(kept):
             if self._finished is not None:
                 self._connection.execute("DELETE FROM run WHERE key = 'finished'")
             self._connection.executemany(self.columns.insert_sql(), rows)
             if result.messages:
-                said = [(start + row, text) for row, text in sorted(result.messages.items())]
+                messages = [(start + row, text) for row, text in sorted(result.messages.items())]
                 self._connection.execute(f"CREATE TABLE IF NOT EXISTS {FAILURES}")
-                self._connection.executemany("INSERT INTO failures VALUES (?, ?)", said)
+                self._connection.executemany("INSERT INTO failures VALUES (?, ?)", messages)
         self._finished = None
 
     def finish(self, reason: str) -> None:
-        """Mark the run as finished, and why; another ``append`` takes the mark away.
+        """Mark the run as finished, with the reason; ``append`` removes the mark.
 
         Raises:
             StorageError: the disk is full or fails; every evaluation is kept.
@@ -240,14 +240,14 @@ class Store:
 
     @property
     def notes(self) -> dict[str, Any]:
-        """What the algorithm wants kept with the run; nothing by default."""
+        """The algorithm's notes on the run; empty by default."""
         return self._notes
 
     def keep_notes(self, notes: Mapping[str, Any]) -> None:
-        """Record what the algorithm wants kept with the run, in place of what was there.
+        """Replace the algorithm's notes on the run.
 
         Raises:
-            InputError: it is not JSON, or holds NaN or inf.
+            InputError: they are not JSON, or contain NaN or inf.
             StorageError: the disk is full or fails; every evaluation is kept.
         """
         try:
@@ -259,7 +259,7 @@ class Store:
         self._notes = json.loads(text)
 
     def save(self, checkpoint: Checkpoint) -> None:
-        """Keep the state of the search, in the place of the one before.
+        """Replace the saved state of the search.
 
         Raises:
             StorageError: the disk is full or fails; every evaluation is kept.
@@ -268,7 +268,7 @@ class Store:
             write_checkpoint(self._connection, checkpoint)
 
     def checkpoint(self) -> Checkpoint | None:
-        """Return the state of the search that was saved last; None if none was.
+        """Return the saved state of the search, or None.
 
         Raises:
             StorageError: it is damaged.
@@ -286,20 +286,20 @@ class Store:
     def _writing(self, kept: str) -> Iterator[None]:
         if self._lock is None:
             raise StorageError(f"{self.folder}: this run was opened for reading only")
-        self.require_there()  # SQLite would go on writing to what nobody can open again
+        self.require_there()  # SQLite would write to a deleted file
         with storage_errors(self.folder / FILE, "written", kept), transaction(self._connection):
             yield
 
     def require_there(self) -> None:
-        """Make sure that what was recorded is still where it was recorded.
+        """Check that the run's file still exists.
 
         Raises:
-            StorageError: the run's file was deleted, or moved.
+            StorageError: the run's file was deleted or moved.
         """
         require_there(self.folder)
 
     def failures(self) -> dict[int, str]:
-        """Return what is said of failed evaluations besides their status, by id.
+        """Return the messages of failed evaluations, by id.
 
         Raises:
             StorageError: the database is damaged.
@@ -315,21 +315,21 @@ class Store:
 
     @property
     def finished(self) -> str | None:
-        """Why the run ended, or None while it has not."""
+        """Why the run ended, or None if it has not."""
         return self._finished
 
     @property
     def n_obj(self) -> int:
-        """Objectives."""
+        """The number of objectives."""
         return len(self.columns.F)
 
     def __len__(self) -> int:
-        """Evaluations recorded."""
+        """The number of recorded evaluations."""
         return self._number("SELECT coalesce(max(id) + 1, 0) FROM evaluations")
 
     @property
     def n_batches(self) -> int:
-        """Transactions recorded."""
+        """The number of recorded batches."""
         last = "(SELECT max(id) FROM evaluations)"
         return self._number(
             f"SELECT coalesce((SELECT batch + 1 FROM evaluations WHERE id = {last}), 0)"
@@ -337,7 +337,7 @@ class Store:
 
     @property
     def seconds(self) -> float:
-        """[s] from the start of the run to the last batch recorded; 0 for none."""
+        """Time from the start of the run to the last recorded batch [s]; 0 if there is none."""
         with self._reading():
             row = self._connection.execute(
                 "SELECT seconds FROM evaluations ORDER BY id DESC LIMIT 1"
@@ -438,7 +438,7 @@ class Store:
     def rows(self, start: int = 0, stop: int | None = None, chunk: int = CHUNK) -> Iterator[Rows]:
         """Yield the evaluations with ``start <= id < stop``, ``chunk`` at a time.
 
-        Memory stays bounded however long the run, and the run may grow meanwhile.
+        Memory is bounded for any length of the run, and the run may grow meanwhile.
         """
         stop = len(self) if stop is None else min(stop, len(self))
         for at in range(start, stop, chunk):
@@ -459,13 +459,13 @@ class Store:
             at = slice(int(rows.id[0]), int(rows.id[-1]) + 1)
             for name in ("batch", "seconds", "status", "critical"):
                 data[name][at] = getattr(rows, name)
-            said: dict[str, Any] = {
+            labels: dict[str, Any] = {
                 name: [text or None for text in one.tolist()]
                 for name, one in rows.findings.columns().items()
             }
-            said["cause"] = [Cause(one).label or None for one in rows.cause.tolist()]
+            labels["cause"] = [Cause(one).label or None for one in rows.cause.tolist()]
             for name in texts:
-                data[name][at] = said[name]
+                data[name][at] = labels[name]
             for part, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
                                  (columns.F, rows.F)):  # fmt: skip
                 for name, column in zip(part, values.T, strict=True):

@@ -1,4 +1,4 @@
-"""A run in figures."""
+"""The key figures of a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from bridgegen.cause import CAUSES
 
 @dataclass(frozen=True)
 class Summary:
-    """A run in figures; NaN where there is nothing to tell yet.
+    """The key figures of a run; NaN if there is no evaluation yet.
 
     Attributes:
         evaluations: how many, failed ones included.
@@ -25,9 +25,9 @@ class Summary:
         d_min_median: [m].
         v_d_best: largest v_d [m/s].
         v_d_median: [m/s].
-        seconds: of search, all sessions together.
-        causes: how many scenarios each cause has, in the order in which causes are sought, those
-            that do not count as critical included; empty where none was sought or found.
+        seconds: duration of the search, of all sessions together [s].
+        causes: the number of scenarios of each cause, in the order in which causes are tested,
+            including those that do not count as critical; empty if none was determined.
     """
 
     evaluations: int

@@ -1,4 +1,4 @@
-"""What a run says of the whole space: how near to harm it came, and how large harm can be."""
+"""Bounds of a run for the whole space: its least margins, and the harmful share."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from bridgegen.regions.words import percent
 from bridgegen.triage.record import Bound, Drawn, Estimate, Least
 
 UNBIASED = ("random", "sobol")
-"""The algorithms whose rows are drawn without regard to results."""
+"""The algorithms whose rows do not depend on results."""
 
 MARGINS = ("harm", "course_ttc", "course_braking")
 
@@ -31,12 +31,12 @@ _MARGIN = {
 
 
 def estimate(drawn: Drawn, harmful: int, rows: int) -> Estimate:
-    """Return a share of the space from rows that no algorithm chose, with its exact interval.
+    """Estimate a share of the space from independent rows, with its exact interval.
 
     Args:
-        drawn: where the rows come from; "" where there are none.
-        harmful: of the rows.
-        rows: that have a result.
+        drawn: the source of the rows; "" if there are none.
+        harmful: number of harmful rows.
+        rows: number of rows with a result.
 
     Source: C. Clopper and E. Pearson, Biometrika 26 (1934); 95 %, two-sided.
     """
@@ -50,10 +50,10 @@ def estimate(drawn: Drawn, harmful: int, rows: int) -> Estimate:
 def least_margins(
     metrics: Numbers, names: Sequence[str], harm: Float, ids: Int, fit: Bool
 ) -> tuple[Least, ...]:
-    """Return the rows that come nearest to harm, one for each of ``MARGINS`` that is recorded.
+    """Return the rows with the least margin to harm, one for each recorded one of ``MARGINS``.
 
-    Time to collision and deceleration count in rows with a collision course that counts as harm;
-    who else collides with the ego without its fault is no margin of the ego's.
+    Time to collision and deceleration count only in rows with a collision course that counts as
+    harm: conflicts without the ego's fault are not its margins.
 
     Args:
         metrics: ``(N, M)``.
@@ -73,7 +73,7 @@ def least_margins(
 def _least(name: str, column: Float, counts: Bool, ids: Int) -> Least:
     quantity = QUANTITIES[name]
     worth = np.where(counts & np.isfinite(column), quantity.sign * column, -np.inf)
-    k = int(np.lexsort((ids, -worth))[0]) if len(worth) else 0  # of equals the earliest
+    k = int(np.lexsort((ids, -worth))[0]) if len(worth) else 0  # the earliest of equal ones
     known = len(worth) > 0 and bool(np.isfinite(worth[k]))
     return Least(
         quantity=name, unit=quantity.unit, value=float(column[k]) if known else None,
@@ -92,7 +92,7 @@ def bound(
     modes: int,
     ego: str,
 ) -> Bound:
-    """Return what is known of the space, in figures and in words."""
+    """Return the bound of the space, in figures and in words."""
     if evaluations == failed:
         text = f"No evaluation has a result, so nothing is known of {ego}."
     elif harmful:
@@ -125,12 +125,12 @@ def _of_the_space(space: Estimate) -> str:
 
 def _margin(least: Sequence[Least]) -> str:
     of = {one.quantity: one for one in least}
-    said = []
+    parts = []
     for name, words in _MARGIN.items():
         one = of.get(name)
         if one is not None and one.value is not None and one.evaluation is not None:
-            said.append(f"{words.format(one.value)} (evaluation {one.evaluation + 1})")
-    return "least margin " + ", ".join(said) if said else "no margin is known"
+            parts.append(f"{words.format(one.value)} (evaluation {one.evaluation + 1})")
+    return "least margin " + ", ".join(parts) if parts else "no margin is known"
 
 
 def _percent(share: float) -> str:

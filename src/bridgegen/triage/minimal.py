@@ -1,14 +1,14 @@
-"""The simplest form of a finding: all parameters as near to nominal as the harm allows.
+"""Minimal scenarios: all parameters as close to nominal as the failure mode permits.
 
-Each searched parameter of a harmful row has a ladder of values from where it is to nominal, in
-steps of 2.5 % of its range. A parameter may jump down its ladder by the whole of what is left, a
-half, a quarter, an eighth, or one step, where the scenario then still fails in the same mode; all
-parameters of all modes are tried in one batch, then what they allow together. Where none may
-jump any more, the parameters that are not nominal move back by as few steps as make the scenario
-robust. Where no such move does, all begins anew, by the whole or a half alone, and each jump must
-leave half of the neighbours harmful. What is needed of each parameter is then found by moving that
-one alone. All scenarios have the random numbers of the row that it began with: what is needed is
-needed of the parameters.
+Each searched parameter of a harmful row has a ladder of values from its own to nominal, in steps of
+2.5 % of its range. A parameter may jump down its ladder by all remaining steps, a half, a quarter,
+an eighth, or one step, if the scenario then still fails in the same mode; the single jumps of all
+parameters of all modes are tried in one batch, then combinations of the permitted ones. When no
+jump is left, the parameters that are not nominal move back by the fewest steps that make the
+scenario robust. If no such move does, the descent starts again with jumps by all steps or a half,
+each of which must leave half of the neighbours harmful. The limit of each parameter is then found
+by moving it alone. All scenarios use the random numbers of the original row, so that the limits are
+limits of parameters only.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,14 +30,14 @@ BACK = (0, 1, 2, 4, 8)
 """Steps by which the parameters that are not nominal move back to make the scenario robust."""
 
 SHARES, MOST_ROUNDS = (1, 2, 4, 8, 10_000_000), 40
-"""Jumps: by the whole of what is left of a ladder, a half, …, one step; and how often."""
+"""Jumps: by all remaining steps of a ladder, a half, …, one step; maximum number of rounds."""
 
 ROBUST_SHARES, MOST_ROBUST_ROUNDS = (1, 2), 6
-"""The same where each jump must leave the scenario robust."""
+"""The same if each jump must leave the scenario robust."""
 
-_AHEAD = 6  # steps that are tried at a time to find what is needed of a parameter
+_AHEAD = 6  # steps tried at a time to find the limit of a parameter
 Holds = Callable[[Sequence["Ladder"], Sequence[Key], Sequence[Int]], list[Bool]]
-"""Of the ladders and keys of modes and rungs ``(n, n_var)`` of each: where harm persists."""
+"""From ladders and keys of modes and rungs ``(n, n_var)`` of each: where harm persists."""
 
 _UNITLESS = ("1", "count", "?")
 
@@ -87,7 +87,7 @@ class Minimiser:
         self._bases: Float = np.empty((0, len(pipeline.space.names)))
 
     def find(self, X: Float, ways: Sequence[Key], names: Sequence[str]) -> list[Minimal | None]:
-        """Return the minimal scenario of each mode; None where its row fails otherwise.
+        """Return the minimal scenario of each mode; None if its row now fails in another mode.
 
         Args:
             X: ``(K, len(space.names))``, a row of each mode.
@@ -105,7 +105,7 @@ class Minimiser:
         start = [np.zeros((int(m in frail), space.n_var), dtype=np.int64) for m in range(len(X))]
         robust = self._holds_robustly(ladders, ways, start)
         frail = [m for m in frail if robust[m][0]]
-        for m in frail:  # again, by jumps that keep it robust: they cost more, so they are fewer
+        for m in frail:  # again, with jumps that keep it robust: they cost more, so they are fewer
             here[m] = start[m][0]
         self._descend(
             ladders, ways, here, frail, ROBUST_SHARES, MOST_ROBUST_ROUNDS, self._holds_robustly
@@ -123,16 +123,16 @@ class Minimiser:
         rounds: int,
         holds: Holds,
     ) -> None:
-        """Move the modes' parameters towards nominal until none may jump any more.
+        """Move the modes' parameters towards nominal until no jump is left.
 
         Args:
             ladders: of all modes.
-            ways: likewise.
+            ways: keys of all modes.
             here: the rung of each parameter of each mode; changed.
             modes: those to move.
-            shares: a parameter may jump by one of these parts of what is left of its ladder.
-            rounds: at most.
-            holds: tells where the harm persists.
+            shares: a parameter may jump by the remaining steps divided by one of these.
+            rounds: maximum number.
+            holds: returns where the harm persists.
         """
         active = list(modes)
         for _ in range(rounds):
@@ -153,7 +153,7 @@ class Minimiser:
                 best: dict[int, int] = {}
                 for (i, size), fine in zip(jumps[m], alone[m].tolist(), strict=True):
                     if fine:
-                        best.setdefault(i, size)  # the largest comes first
+                        best.setdefault(i, size)  # jumps are sorted, the largest first
                 if best:
                     reach = ladders[m].step / ranges(self._space)
                     order = sorted(best, key=lambda i: (-best[i] * reach[i], i))
@@ -171,7 +171,7 @@ class Minimiser:
     def _move_back(
         self, ladders: Sequence[Ladder], ways: Sequence[Key], here: list[Int], modes: Sequence[int]
     ) -> list[int]:
-        """Move the parameters that are not nominal back until it is robust; return where not."""
+        """Move parameters that are not nominal back until a mode is robust; return the others."""
         tried: list[Int] = [np.empty((0, self._space.n_var), np.int64) for _ in ladders]
         for m in modes:
             bound = here[m] < ladders[m].rungs
@@ -266,23 +266,25 @@ class Minimiser:
     def _holds(
         self, ladders: Sequence[Ladder], ways: Sequence[Key], tried: Sequence[Int]
     ) -> list[Bool]:
-        """Return, per mode, at which of some rungs ``(n, n_var)`` it still comes to its harm."""
+        """Return, per mode, at which rungs ``(n, n_var)`` its harm persists."""
         parts = [self._rows(ladder, at) for ladder, at in zip(ladders, tried, strict=True)]
         noise = np.repeat(self._bases, [len(part) for part in parts], axis=0)
-        came = self._pipeline.try_all(np.concatenate(parts), noise=noise)
-        keys = keys_of(came.findings, self._pipeline.kinds, came.place.tolist(), [""] * len(came))
+        trials = self._pipeline.try_all(np.concatenate(parts), noise=noise)
+        keys = keys_of(
+            trials.findings, self._pipeline.kinds, trials.place.tolist(), [""] * len(trials)
+        )
         fine, start = [], 0
         for part, way in zip(parts, ways, strict=True):
             stop = start + len(part)
             same = np.array([key == way for key in keys[start:stop]], dtype=np.bool_)
-            fine.append(came.harmful[start:stop] & same)
+            fine.append(trials.harmful[start:stop] & same)
             start = stop
         return fine
 
     def _holds_robustly(
         self, ladders: Sequence[Ladder], ways: Sequence[Key], tried: Sequence[Int]
     ) -> list[Bool]:
-        """Return where it comes to its harm, and half of the neighbours do."""
+        """Return where the harm persists in the row and in half of its neighbours."""
         fine = self._holds(ladders, ways, tried)
         asked = [(m, int(k)) for m, each in enumerate(fine) for k in np.flatnonzero(each)]
         shares = self._robustness([(m, tried[m][k]) for m, k in asked], ladders)
@@ -300,9 +302,9 @@ class Minimiser:
         space = self._space
         rows = [around(space, x, self._seed, 0, NEIGHBOURS, RADIUS)[0] for x in bases]
         noise = np.repeat(self._bases[[m for m, _ in asked]], NEIGHBOURS, axis=0)
-        came: Trials = self._pipeline.try_all(np.concatenate(rows), noise=noise)
-        ok = came.ok.reshape(-1, NEIGHBOURS).sum(axis=1)
-        hits = came.harmful.reshape(-1, NEIGHBOURS).sum(axis=1)
+        trials: Trials = self._pipeline.try_all(np.concatenate(rows), noise=noise)
+        ok = trials.ok.reshape(-1, NEIGHBOURS).sum(axis=1)
+        hits = trials.harmful.reshape(-1, NEIGHBOURS).sum(axis=1)
         return [(int(h) / max(int(n), 1), int(h), int(n)) for h, n in zip(hits, ok, strict=True)]
 
 

@@ -89,7 +89,7 @@ def keys_of(
 
 
 def by_harm(harm: Float, U: Float) -> Int:
-    """Return the rows, the worst first; equal ones by their parameters, wherever they stand."""
+    """Return the rows, the worst first; equal ones in the order of their parameters."""
     order: Int = np.lexsort((*U.T[::-1], -harm))
     return order
 
@@ -118,7 +118,7 @@ def group(keys: Sequence[Key], harm: Float, U: Float) -> list[Group]:
 
 
 def rekeyed(groups: Sequence[Group], keys: Sequence[Key], harm: Float, U: Float) -> list[Group]:
-    """Return groups under other keys; those whose keys and parts are then the same are one.
+    """Return groups under other keys; groups with equal keys and parts are merged.
 
     Args:
         groups: disjoint.
@@ -139,7 +139,7 @@ def rekeyed(groups: Sequence[Group], keys: Sequence[Key], harm: Float, U: Float)
 def clusters(U: Float) -> Int:
     """Return the cluster of each row, ``(n,)`` from 0 on, that of the first row first.
 
-    Rows are in one cluster where a chain of short distances joins them (single linkage).
+    Rows are in one cluster if a chain of short distances joins them (single linkage).
 
     Args:
         U: ``(n, n_var)``, the worst first.
@@ -186,7 +186,7 @@ _RESPONSIBLE = {
     "ego": "ego responsible",
     "shared": "both responsible",
     "other": "other responsible, preventable by the ego",
-    "none": "nobody responsible, preventable by the ego",
+    "none": "no participant responsible, preventable by the ego",
     "": "responsibility unknown",
 }
 
@@ -205,15 +205,15 @@ def title(key: Key, count: str = "ego") -> str:
     text = (contact if key.conflict == "contact" else near).format(partner)
     if key.place:
         text += f" {key.place}"
-    said = {rule.label: words for rule, (words, _) in RULES.items()}.get(key.rule, key.rule)
-    who = _RESPONSIBLE.get(key.responsible, key.responsible)
+    reason = {rule.label: words for rule, (words, _) in RULES.items()}.get(key.rule, key.rule)
+    responsible = _RESPONSIBLE.get(key.responsible, key.responsible)
     if count == "any":
-        who = who.removesuffix(", preventable by the ego")
-    return f"{text} ({who}: {said})" if said else f"{text} ({who})"
+        responsible = responsible.removesuffix(", preventable by the ego")
+    return f"{text} ({responsible}: {reason})" if reason else f"{text} ({responsible})"
 
 
 def where(U: Float, others: Float, names: Sequence[str]) -> tuple[int, float, float] | None:
-    """Return the parameter that tells a cluster from the others best, and its range in it.
+    """Return the parameter that best separates a cluster from the others, and its range.
 
     Args:
         U: ``(n, n_var)`` of the cluster, in any units.
@@ -221,7 +221,7 @@ def where(U: Float, others: Float, names: Sequence[str]) -> tuple[int, float, fl
         names: of the columns.
 
     Returns:
-        Its column, least and largest value; None where there is nothing to compare.
+        Its column, least and largest value; None if there is nothing to compare.
     """
     if not len(others) or not len(names):
         return None

@@ -1,22 +1,22 @@
-"""Rows near a row: values moved by little, or towards nominal, and kept feasible."""
+"""Feasible rows near a row: values moved slightly, or towards nominal."""
 
 import numpy as np
 
 from bridgegen.arrays import Float, as_float
 from bridgegen.odd.space import SearchSpace
 
-_STREAM = 17  # keeps these random numbers apart from others of the same seed
+_STREAM = 17  # a random stream of its own under the seed
 
 
 def nearest(space: SearchSpace, V: Float) -> Float:
-    """Return the rows of X whose searched parameters are as near to wanted values as is feasible.
+    """Return the feasible rows of X whose searched parameters are nearest to wanted values.
 
     The parameters are taken in the decoder's order, each moved into the interval that the earlier
     ones leave to it, as its kind does it: whole numbers are rounded, angles go round. Feasible
     values are kept to the last bit.
 
     Args:
-        space: what is searched.
+        space: the search space.
         V: ``(N, n_var)`` wanted values of the searched parameters.
 
     Returns:
@@ -40,7 +40,7 @@ def nearest(space: SearchSpace, V: Float) -> Float:
                 value = np.minimum(np.maximum(space.defaults[name], lo), hi)
         table[name] = value
         X[:, space.index(name)] = value
-    return X + 0.0  # no −0.0: what is simulated is what would be recorded
+    return X + 0.0  # no −0.0: simulated rows equal recorded rows
 
 
 def searched(space: SearchSpace, X: Float) -> Float:
@@ -61,10 +61,10 @@ def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius:
     move only where that is half of one or more, categories never.
 
     Args:
-        space: what is searched.
+        space: the search space.
         x: ``(len(space.names),)``, feasible.
         seed: of the run.
-        number: of the row: other rows move otherwise.
+        number: of the row, for the random numbers.
         n: neighbours.
         radius: a share of each parameter's range.
 

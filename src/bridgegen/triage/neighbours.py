@@ -1,10 +1,10 @@
-"""The neighbours of a row: is its harm robust, and which fix removes it beyond what chance does?
+"""The neighbours of a row: is its harm robust, and which fix removes it significantly?
 
 Each searched parameter of a neighbour lies within ±2.5 % of its range around the row's. All
-neighbours of a row, with and without a fix, get the random numbers of that row: the noise of the
-driver's sensors follows from a key, a hash of parameter values, and the row's own values are
-hashed for all of them (`bridgegen.ego.noise`). So a neighbour differs from the row by its
-parameters alone, and a fix changes nothing but what it puts right.
+neighbours of a row, with and without a fix, use the random numbers of that row: the noise of the
+driver's sensors follows from a key, a hash of parameter values, and the row's values are hashed for
+all of them (`bridgegen.ego.noise`). So a neighbour differs from the row only in its parameters, and
+a fix changes only the stage that it idealises.
 """
 
 from collections.abc import Sequence
@@ -21,17 +21,17 @@ from bridgegen.triage.statistics import paired_drop
 
 NEIGHBOURS = 32
 RADIUS = 0.025
-"""By which each searched parameter moves at most, a share of its range."""
+"""Maximum move of each searched parameter, a share of its range."""
 
 ROBUST = 0.5
-"""The share of harmful neighbours below which a finding is on a knife's edge."""
+"""A finding with a lower share of harmful neighbours is knife-edge."""
 
 PLACEBO = "random move"
 _AS_IS, _MOVED = -1, -2
 
 
 AsIs = dict[int, tuple[Bool, Bool]]
-"""By evaluation: which of its neighbours are harmful as they are, and which have a result."""
+"""By evaluation: which unchanged neighbours are harmful, and which have a result."""
 
 
 def neighbourhoods(
@@ -44,25 +44,25 @@ def neighbourhoods(
     sampled: bool = False,
     as_is: AsIs | None = None,
 ) -> list[Neighbourhood]:
-    """Drive the neighbours of rows, all in one batch; a row's result depends on that row alone.
+    """Simulate the neighbours of rows in one batch; a row's result depends on that row alone.
 
     Args:
         pipeline: the run's, one that ``tries``.
         X: ``(K, len(space.names))``, the rows.
         evaluations: ``(K,)`` their ids in the store.
         seed: of the run.
-        fixes: whether to drive them with every fix and the placebo, too.
+        fixes: whether to simulate them with every fix and the placebo, too.
         sampled: whether the rows were drawn at random.
-        as_is: what is known of neighbours as they are; what is found is added.
+        as_is: known results of unchanged neighbours; new ones are added.
     """
     known: AsIs = {} if as_is is None else as_is
     ids = evaluations.tolist()
     new = np.array([k for k, one in enumerate(ids) if one not in known], dtype=np.int64)
-    harmful, ok = _drive(pipeline, X[new], evaluations[new], seed, [_AS_IS])
+    harmful, ok = _simulate(pipeline, X[new], evaluations[new], seed, [_AS_IS])
     known |= {ids[k]: (harmful[j, :, 0], ok[j, :, 0]) for j, k in enumerate(new.tolist())}
     tried = pipeline.fixes if fixes else ()
     variants = [_MOVED, *range(len(tried))] if tried else []
-    harmful, ok = _drive(pipeline, X, evaluations, seed, variants)
+    harmful, ok = _simulate(pipeline, X, evaluations, seed, variants)
     return [
         _neighbourhood(
             one,
@@ -74,7 +74,7 @@ def neighbourhoods(
     ]  # fmt: skip
 
 
-def _drive(
+def _simulate(
     pipeline: Pipeline, X: Float, evaluations: Int, seed: int, variants: Sequence[int]
 ) -> tuple[Bool, Bool]:
     """Return which neighbours are harmful, and have a result, ``(K, NEIGHBOURS, variants)``."""
@@ -87,19 +87,19 @@ def _drive(
             for x, i in zip(X, evaluations.tolist(), strict=True)
         ]
     )  # (K, 2, NEIGHBOURS, n)
-    # Neighbour by neighbour, so that those of one road network are driven by one worker.
+    # Neighbour by neighbour, so that those of one road network are simulated by one worker.
     rows = np.stack([near[:, int(one == _MOVED)] for one in variants], axis=2)
     noise = np.broadcast_to(X[:, np.newaxis, np.newaxis], rows.shape)
     fix = np.broadcast_to(np.maximum(variants, _AS_IS), shape)
     n = len(space.names)
-    came = pipeline.try_all(rows.reshape(-1, n), fix.reshape(-1), noise.reshape(-1, n))
-    return came.harmful.reshape(shape), came.ok.reshape(shape)
+    trials = pipeline.try_all(rows.reshape(-1, n), fix.reshape(-1), noise.reshape(-1, n))
+    return trials.harmful.reshape(shape), trials.ok.reshape(shape)
 
 
 def _neighbourhood(
     evaluation: int, harmful: Bool, ok: Bool, fixes: Sequence[Counterfactual], sampled: bool
 ) -> Neighbourhood:
-    """Return what neighbours came to; ``harmful`` and ``ok`` are ``(NEIGHBOURS, variants)``."""
+    """Summarise neighbours; ``harmful`` and ``ok`` are ``(NEIGHBOURS, variants)``."""
     rows, hits = int(ok[:, 0].sum()), int(harmful[:, 0].sum())
     low, high = wilson(hits, rows)
     placebo, treatments = None, []
@@ -124,7 +124,7 @@ def treatment(name: str, cause: str, harmful: Bool, ok: Bool) -> Treatment:
     Args:
         name: of the change.
         cause: that it stands for.
-        harmful: ``(n, 2)`` bool, as is and with the change.
+        harmful: ``(n, 2)`` bool, unchanged and with the change.
         ok: ``(n, 2)`` bool, which have a result; only neighbours with both count.
     """
     known = ok.all(axis=1)

@@ -45,7 +45,7 @@ class Estimate(_Model):
     """A share of the search space, estimated from rows that no algorithm chose.
 
     Attributes:
-        drawn: where the rows come from.
+        drawn: the source of the rows.
         rows: that have a result.
         harmful: of them.
         share: harmful / rows; None where there are no rows.
@@ -69,8 +69,8 @@ class Treatment(_Model):
             placebo.
         cause: that the change stands for; "" for the placebo.
         rows: neighbours that have a result with and without the change.
-        gone: neighbours that are harmful as is and harmless with the change.
-        new: neighbours that are harmless as is and harmful with the change.
+        gone: neighbours that are harmful unchanged and harmless with the change.
+        new: neighbours that are harmless unchanged and harmful with the change.
         drop: (gone - new) / rows.
         low: lower end of its 95 % interval (Newcombe 1998, paired proportions, method 10).
         high: its upper end.
@@ -96,12 +96,12 @@ class Treatment(_Model):
 
 
 class Neighbourhood(_Model):
-    """What the neighbours of one row came to.
+    """The results of the neighbours of one row.
 
     Attributes:
         evaluation: the row's id in the store.
         rows: neighbours that have a result.
-        harmful: of them, driven as is.
+        harmful: of them, unchanged.
         robustness: harmful / rows; None where no neighbour has a result.
         low: lower end of its 95 % interval (Wilson).
         high: its upper end.
@@ -253,7 +253,7 @@ class Mode(_Model):
 
 
 class Least(_Model):
-    """The row that comes nearest to harm in one quantity.
+    """The row with the least margin to harm in one quantity.
 
     Attributes:
         quantity: "harm", "course_ttc" or "course_braking".
@@ -269,7 +269,7 @@ class Least(_Model):
 
 
 class Bound(_Model):
-    """What a run says of the space as a whole, whether or not it found a failure.
+    """The bounds of a run for the whole space, with or without failures.
 
     Attributes:
         evaluations: of the run.
@@ -299,11 +299,11 @@ class Triage(_Model):
         ego: label of its driver.
         count: whose conflicts count as harm, "ego" or "any".
         results: digest of the evaluations that it was made from, `Rows.digest`.
-        seed: of the run; all chance comes from it.
+        seed: of the run, from which all random numbers follow.
         neighbours: of each row that was tested; 0 where none were (see ``untested``).
         radius: by which each searched parameter moves at most, a share of its range.
         sampled: rows that were drawn from those not exported.
-        bound: what is known of the space.
+        bound: of the space.
         modes: the failure modes, at most ``MOST_MODES``.
         unrecorded_modes: further modes.
         neighbourhoods: of the exported rows, in their order, then of the others.
@@ -338,7 +338,7 @@ class Triage(_Model):
         return self
 
     def neighbourhood(self, evaluation: int) -> Neighbourhood | None:
-        """Return what the neighbours of an evaluation came to, if they were tested."""
+        """Return the results of an evaluation's neighbours, if they were tested."""
         found = (one for one in self.neighbourhoods if one.evaluation == evaluation)
         return next(found, None)
 
@@ -349,7 +349,7 @@ class Triage(_Model):
 
 
 def write_record(folder: Path, triage: Triage) -> Path:
-    """Write the record into a run's folder, whole; return its path.
+    """Write the record into a run's folder atomically; return its path.
 
     Raises:
         StorageError: it cannot be written.
@@ -360,14 +360,14 @@ def write_record(folder: Path, triage: Triage) -> Path:
 
 
 def read_record(path: Path, results: str | None = None) -> Triage | None:
-    """Return what `write_record` wrote; None where there is no file.
+    """Return a record of `write_record`; None if the file does not exist.
 
     Args:
         path: of the record.
         results: digest of the run's evaluations, `Rows.digest`, if it is known.
 
     Raises:
-        FileFormatError: it is something else, or another run's.
+        FileFormatError: it is not such a record, or belongs to another run.
         StorageError: it cannot be read.
     """
     record = read_model(path, Triage, _not_ours)

@@ -30,20 +30,20 @@ from bridgegen.triage.record import (
 )
 
 SAMPLED = 8
-"""Harmful rows besides the exported ones whose neighbours are driven, drawn at random."""
+"""Number of random harmful rows, besides the exported ones, whose neighbours are tested."""
 
 PER_MODE = 3
-"""Rows of a mode, the worst that differ, among which one that is robust is looked for."""
+"""Number of distinct worst rows of a mode among which a robust one is sought."""
 
 FRESH = 256
-"""Random rows from which shares of the space are estimated, where an algorithm chose the run's."""
+"""Number of random rows that estimate shares of the space if an algorithm chose the run's."""
 
 MOST_PLACED = 4096
-"""Harmful rows, the worst, that are driven again to see where on the route they fail; a further
-one counts as failing where the nearest of these does that agrees in all else."""
+"""Number of worst harmful rows that are simulated again to find their place on the route. Other
+rows get the place of the nearest of these with an otherwise equal key."""
 
 MOST_TESTED, MOST_MINIMAL = 20, 10
-"""Modes whose cause is tested, and for which a minimal scenario is sought."""
+"""Maximum number of modes with a tested cause, and with a minimal scenario."""
 
 _SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
 
@@ -84,15 +84,15 @@ class Evaluations(Protocol):
         """Of N rows."""
 
     def digest(self) -> str:
-        """Return what tells them from others."""
+        """Return a digest that identifies them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Triaged:
-    """What the triage of a run gives.
+    """The result of the triage of a run.
 
     Attributes:
-        record: all that is known, but for the names of files.
+        record: the findings, without names of files.
         exports: positions of the rows to export, best first.
     """
 
@@ -103,14 +103,14 @@ class Triaged:
 def triage(
     pipeline: Pipeline, rows: Evaluations, *, algorithm: str, seed: int, keep: int
 ) -> Triaged:
-    """Group a run's harmful rows into failure modes, and find out how sure each finding is.
+    """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
-    One seed gives one result, to the last bit, whoever simulates.
+    The result depends on the seed only, to the last bit.
 
     Args:
-        pipeline: the run's.
-        rows: all of it.
-        algorithm: that chose them; only rows of "random" and "sobol" tell shares of the space.
+        pipeline: of the run.
+        rows: all evaluations.
+        algorithm: of the run; only rows of "random" and "sobol" estimate shares of the space.
         seed: of the run.
         keep: how many scenarios to export.
     """
@@ -122,13 +122,13 @@ def harmful_rows(
 ) -> tuple[Bool, Float]:
     """Return which rows are a failure of the ego, ``(N,)``, and the harm of each, ``(N,)``.
 
-    Whatever the objective: a row is harmful with a harm of at least 0.3, a result, and traffic
-    that could happen. No row is where the run did not record its harm.
+    Independently of the objective, a row is harmful if it has a result, plausible traffic and a
+    harm of at least 0.3. Without recorded harm no row is harmful.
 
     Args:
         metrics: ``(N, M)``.
         names: of the M columns.
-        harm: the quantity that counts, "harm" or "harm_any".
+        harm: the quantity, "harm" or "harm_any".
         status: ``(N,)``, 0 is success.
         findings: of N rows.
     """
@@ -140,7 +140,7 @@ def harmful_rows(
 
 
 class _Triage:
-    """One call of `triage`; positions count among all rows unless they are said to be others."""
+    """One call of `triage`; positions are those among all rows unless stated otherwise."""
 
     def __init__(
         self, pipeline: Pipeline, rows: Evaluations, algorithm: str, seed: int, keep: int
@@ -160,7 +160,7 @@ class _Triage:
         self._unrecorded = 0
 
     def run(self) -> Triaged:
-        """Go through the stages."""
+        """Run the stages."""
         rows, tries = self._rows, self._pipeline.tries
         U, harm = self._U, self._harm[self._at]
         place = self._places(U) if tries else [""] * len(self._at)
@@ -186,7 +186,7 @@ class _Triage:
         record = self._record(groups, shown, exports, tested, sample, minimal)
         return Triaged(record, tuple(self._at[exports].tolist()))
 
-    # Stages; positions count among the harmful rows.
+    # Stages; positions are those among the harmful rows.
 
     def _places(self, U: Float) -> list[str]:
         """Return where on its route each harmful row fails."""
@@ -210,11 +210,11 @@ class _Triage:
         return place.tolist()
 
     def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
-        """Drive neighbours of the worst rows as they are; return the row that shows each mode."""
+        """Simulate neighbours of the worst rows; return the row that represents each mode."""
         worst = [distinct(U, one.rows, PER_MODE) for one in groups]
         every = by_harm(harm, U)
         several = distinct(U, every, max(2 * self._keep, 1))
-        self._drive(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
+        self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
         return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
 
     def _choose(self, shown: Sequence[int], U: Float, harm: Float) -> list[int]:
@@ -226,10 +226,10 @@ class _Triage:
         known = [i for i in every.tolist() if i in self._found and critical[i]]
         known.sort(key=lambda i: self._rank(i, harm))
         more = distinct(U, np.array(known, dtype=np.int64), self._keep, first)
-        if len(first) + len(more) < self._keep:  # those whose robustness is not known
+        if len(first) + len(more) < self._keep:  # rows of unknown robustness
             kept = [*first, *more]
             more += distinct(U, every[critical[every]], self._keep, kept)
-            self._drive(
+            self._simulate(
                 [i for i in more if self._pipeline.tries and i not in self._found], fixes=False
             )
         both = [*first, *more]
@@ -244,31 +244,31 @@ class _Triage:
         return rest[np.sort(drawn)].tolist()  # type: ignore[no-any-return]
 
     def _test(self, at: Sequence[int], *, sampled: bool) -> None:
-        """Drive neighbours with every fix, if causes are sought."""
+        """Simulate neighbours with every fix, if causes are determined."""
         if self._pipeline.seeks_causes:
-            self._drive(at, fixes=True, sampled=sampled)
+            self._simulate(at, fixes=True, sampled=sampled)
         else:
-            self._drive([i for i in at if i not in self._found], fixes=False, sampled=sampled)
+            self._simulate([i for i in at if i not in self._found], fixes=False, sampled=sampled)
 
-    def _drive(self, at: Any, *, fixes: bool, sampled: bool = False) -> None:
+    def _simulate(self, at: Any, *, fixes: bool, sampled: bool = False) -> None:
         rows = self._at[np.array(list(at), dtype=np.int64)]
-        came = neighbourhoods(
+        results = neighbourhoods(
             self._pipeline, self._rows.X[rows], self._rows.id[rows], self._seed,
             fixes=fixes, sampled=sampled, as_is=self._as_is,
         )  # fmt: skip
-        self._found |= dict(zip(at, came, strict=True))
+        self._found |= dict(zip(at, results, strict=True))
 
     def _is_knife_edge(self, i: int) -> bool:
         return i in self._found and self._found[i].knife_edge
 
     def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
-        """Return what orders findings: robust ones first, then the worst."""
+        """Return the sort key of findings: robust ones first, then the worst."""
         return self._is_knife_edge(i), -float(harm[i]), *self._U[i].tolist()
 
     def _by_tested_cause(
         self, groups: Sequence[Group], shown: Sequence[int], U: Float, harm: Float
     ) -> tuple[list[Group], list[int]]:
-        """Give modes the cause that neighbours tell; those that then agree in all are one."""
+        """Give modes the tested cause; modes that are then equal are merged."""
         keys = []
         for one, i in zip(groups, shown, strict=True):
             cause = self._found[i].cause if i in self._found else ""
@@ -283,9 +283,9 @@ class _Triage:
         return joined, [min(some, key=lambda i: self._rank(i, harm)) for some in of_each]
 
     def _minimal(self, groups: Sequence[Group], shown: Sequence[int]) -> list[Minimal | None]:
-        """Return the minimal scenarios of the first modes; one of those that differ in cause alone.
+        """Return the minimal scenarios of the first modes; one for modes that differ only in cause.
 
-        None is sought where an adversary decides: its decisions have no nominal values of use.
+        With an adversary there are none: its decisions have no useful nominal values.
         """
         found: list[Minimal | None] = [None] * len(groups)
         first: dict[Any, int] = {}
@@ -295,8 +295,8 @@ class _Triage:
         if at:
             X = self._rows.X[self._at[np.array([shown[k] for k in at], dtype=np.int64)]]
             ways, names = [groups[k].key.way for k in at], [f"minimal-{k + 1:02d}" for k in at]
-            came = Minimiser(self._pipeline, self._seed).find(X, ways, names)
-            for k, minimal in zip(at, came, strict=True):
+            results = Minimiser(self._pipeline, self._seed).find(X, ways, names)
+            for k, minimal in zip(at, results, strict=True):
                 found[k] = minimal
         return found
 
@@ -312,17 +312,17 @@ class _Triage:
             return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups]
         random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
         U = random.random((FRESH, self._space.n_var))
-        came = self._pipeline.try_all(self._space.decode(U) + 0.0)
-        keys = keys_of(came.findings, self._pipeline.kinds, came.place.tolist(), [""] * FRESH)
+        results = self._pipeline.try_all(self._space.decode(U) + 0.0)
+        keys = keys_of(results.findings, self._pipeline.kinds, results.place.tolist(), [""] * FRESH)
         held = [0] * len(groups)
         own = self._U
-        for i in np.flatnonzero(came.harmful).tolist():
+        for i in np.flatnonzero(results.harmful).tolist():
             same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
-            if same:  # several where they differ in cause: the one with the nearest row
+            if same:  # of several that differ in cause, the one with the nearest row
                 gaps = [float(((own[groups[k].rows] - U[i]) ** 2).sum(axis=1).min()) for k in same]
                 held[same[int(np.argmin(gaps))]] += 1
-        n = int(came.ok.sum())
-        return estimate("fresh", int(came.harmful.sum()), n), [
+        n = int(results.ok.sum())
+        return estimate("fresh", int(results.harmful.sum()), n), [
             estimate("fresh", k, n) for k in held
         ]
 
@@ -363,7 +363,7 @@ class _Triage:
         known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
         untested = ""
         if not pipeline.tries:
-            untested = "neighbours are driven in the embedded simulator alone"
+            untested = "neighbours are simulated in the embedded simulator only"
         return Triage(
             scenario=pipeline.scenario.name, ego=pipeline.driver.label,
             count=pipeline.objective.count, results=rows.digest(), seed=self._seed,
@@ -388,7 +388,7 @@ class _Triage:
         return float(np.nan_to_num(column, nan=0.0).max())
 
     def _title(self, one: Group, groups: Sequence[Group]) -> str:
-        """Return a mode in words; a cluster also by the parameter that parts it from the others."""
+        """Return a mode in words; a cluster also with the parameter that separates it."""
         text = title(one.key, self._pipeline.objective.count)
         others = [g.rows for g in groups if g is not one and g.key == one.key]
         if not one.part or not others:

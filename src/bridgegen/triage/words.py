@@ -5,7 +5,7 @@ from bridgegen.triage.record import Mode, Triage
 
 
 def headline(found: Triage) -> str:
-    """Return in how many ways the driver fails, or how near it came, and what of the space."""
+    """Return the number of failure modes, or the least margin, and the share of the space."""
     return found.bound.sentence
 
 
@@ -50,6 +50,6 @@ def cause_in_words(mode: Mode, found: Triage) -> str:
 
 
 def _drop(share: float) -> str:
-    """Return by how much a share drops, in points of per cent: −50 where half of it is gone."""
+    """Return the change of a share in percentage points: −50 for a drop by one half."""
     points = round(-100.0 * share)
     return f"{'−' if points < 0 else '+' if points > 0 else '±'}{abs(points)}"

@@ -1,1 +1,1 @@
-"""Does a job fail? Criteria held against what a run, or a scenario file, came to."""
+"""Pass/fail criteria for the results of a run, a confirmation or a scenario file."""

@@ -1,9 +1,9 @@
-"""What makes a job fail: comparisons of figures with numbers, read, and held against a result.
+"""Fail criteria: comparisons of figures with numbers, applied to a result.
 
     r_critic > 0.1
     d_min < 2 and v_d >= 1
 
-A figure that is NaN cannot be judged. That is no pass: where nothing was measured, nothing is safe.
+A figure that is NaN cannot be judged, and that is not a pass.
 """
 
 import operator
@@ -35,7 +35,7 @@ Verdict = Literal["passed", "failed", "unknown"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """A figure beside a number.
+    """A comparison of a figure with a number.
 
     Attributes:
         figure: its name.
@@ -48,33 +48,33 @@ class Comparison:
     number: float
 
     def holds(self, value: float) -> bool:
-        """Say whether a value, not NaN, compares so."""
+        """Return whether it holds for a value that is not NaN."""
         return _OPERATORS[self.sign](value, self.number)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a test of a result came to.
+    """The outcome of one test of a result.
 
     Attributes:
-        test: what must be, in words.
-        verdict: "unknown" where a figure that decides it is NaN.
-        said: the figures, in words.
-        figures: the names of those that it looks at.
+        test: the requirement, in words.
+        verdict: "unknown" if a decisive figure is NaN.
+        details: the values of the figures, in words.
+        figures: the names of the figures that it uses.
     """
 
     test: str
     verdict: Verdict
-    said: str
+    details: str
     figures: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """When a job fails: if all of its comparisons hold.
+    """A fail criterion: it is met if all of its comparisons hold.
 
     Attributes:
-        text: as the user wrote it, spaces evened out.
+        text: the user's text with single spaces.
         comparisons: at least one.
     """
 
@@ -83,21 +83,21 @@ class Criterion:
 
     @property
     def figures(self) -> tuple[str, ...]:
-        """The names of what is compared."""
+        """The names of the figures that it compares."""
         return tuple(dict.fromkeys(one.figure for one in self.comparisons))
 
     def judge(self, values: Mapping[str, float]) -> Outcome:
-        """Hold it against the figures of a result; NaN is a figure that nobody knows."""
+        """Apply it to the figures of a result; NaN is an unknown figure."""
         known = [one for one in self.comparisons if not isnan(values[one.figure])]
         verdict: Verdict = "failed" if len(known) == len(self.comparisons) else "unknown"
         if any(not one.holds(values[one.figure]) for one in known):
             verdict = "passed"
-        said = ", ".join(f"{name} {_told(values[name])}" for name in self.figures)
-        return Outcome(f"not {self.text}", verdict, said, self.figures)
+        details = ", ".join(f"{name} {_value_text(values[name])}" for name in self.figures)
+        return Outcome(f"not {self.text}", verdict, details, self.figures)
 
 
-def _told(value: float) -> str:
-    return "cannot be told" if isnan(value) else f"= {value:.6g}" if isfinite(value) else "= inf"
+def _value_text(value: float) -> str:
+    return "= n/a (NaN)" if isnan(value) else f"= {value:.6g}" if isfinite(value) else "= inf"
 
 
 def read_criteria(texts: Iterable[str], known: Collection[str]) -> tuple[Criterion, ...]:
@@ -105,10 +105,10 @@ def read_criteria(texts: Iterable[str], known: Collection[str]) -> tuple[Criteri
 
     Args:
         texts: ``FIGURE < NUMBER`` (or <=, >, >=, ==, !=), several joined by ``and``.
-        known: the figures that there are.
+        known: the names of all figures.
 
     Raises:
-        InputError: a text that is no criterion, or a figure that is unknown; all of them at once.
+        InputError: a text is not a criterion, or a figure is unknown; all problems at once.
     """
     found, problems = [], list[str]()
     for text in texts:

@@ -1,7 +1,7 @@
-"""Results as JUnit XML, which Jenkins, GitLab and their like show as tests.
+"""Results as JUnit XML, which Jenkins, GitLab and other CI systems show as tests.
 
-Elements and attributes are those of Jenkins' schema (xunit-plugin, junit-10.xsd), which knows
-properties of a suite, and none of a case: so a scenario with its metrics is a suite of its own.
+Elements and attributes follow Jenkins' schema (xunit-plugin, junit-10.xsd), in which suites have
+properties and cases have not: so each scenario with its metrics is a suite.
 """
 
 import os
@@ -26,7 +26,7 @@ _PROBLEMS: Mapping[str, Problem | None] = {
     "unknown": "error",
 }
 _HEAD = 1000
-"""Bytes of a file within which JUnit XML says what it is."""
+"""Bytes of a file within which JUnit XML has its first element."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Case:
     """One test.
 
     Attributes:
-        group: of tests, dots apart; Jenkins shows it as package and class.
-        name: the same from run to run.
-        problem: "failure", "error" (it could not be told), or None if it passed.
-        message: what it came to, in one line.
-        text: whatever else helps.
+        group: of tests, separated by dots; Jenkins shows it as package and class.
+        name: the same in each run.
+        problem: "failure", "error" (it could not be judged), or None if it passed.
+        message: the result in one line.
+        text: further details.
     """
 
     group: str
@@ -55,8 +55,8 @@ class Suite:
     Attributes:
         name: of the suite.
         cases: its tests.
-        properties: facts by name, in their order.
-        seconds: that it took [s], if that is known.
+        properties: values by name, in order.
+        seconds: duration [s], if known.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Suite:
 def case_of(group: str, outcome: Outcome) -> Case:
     """Return an outcome as a test."""
     kind = _PROBLEMS[outcome.verdict]
-    return Case(group, outcome.test, kind, outcome.said)
+    return Case(group, outcome.test, kind, outcome.details)
 
 
 def junit_xml(suites: Iterable[Suite]) -> bytes:
@@ -113,14 +113,14 @@ def _legal(text: str) -> str:
 
 
 def refuse_junit(path: Path) -> None:
-    """Refuse a place where no JUnit XML can be written, or where something else is.
+    """Reject a path that is not writable, or at which another kind of file exists.
 
     Raises:
-        StorageError: no folder can be made there, or a file is there that is no JUnit XML.
+        StorageError: its folder cannot be created, or a file exists that is not JUnit XML.
     """
     folder = next(one for one in path.absolute().parents if one.exists())
     if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise StorageError(f"{path}: cannot be written: {folder} is no folder that can be written")
+        raise StorageError(f"{path}: cannot be written: {folder} is not a writable folder")
     try:
         with path.open("rb") as file:
             ours = b"<testsuite" in file.read(_HEAD)
@@ -129,11 +129,11 @@ def refuse_junit(path: Path) -> None:
     except OSError as error:
         raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
     if not ours:
-        raise StorageError(f"{path}: exists already, is no JUnit XML, and is not overwritten")
+        raise StorageError(f"{path}: exists already, is not JUnit XML, and is not overwritten")
 
 
 def write_junit(path: Path, suites: Iterable[Suite]) -> None:
-    """Write suites as JUnit XML, into a new folder if need be; an earlier one is replaced.
+    """Write suites as JUnit XML; create its folder if needed, replace an earlier JUnit XML.
 
     Raises:
         StorageError: see ``refuse_junit``; or the disk is full.

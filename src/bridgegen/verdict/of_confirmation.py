@@ -1,8 +1,9 @@
-"""Is enough of what a run found so elsewhere? Criteria held against a confirmation."""
+"""Pass/fail criteria for a confirmation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from bridgegen.campaign.confirm import RunConfirmation
 from bridgegen.confirmation.schema import Scenario
@@ -10,55 +11,55 @@ from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
 
 FIGURES = {
-    "confirmed": "those that are critical there, too / those that ran there",
-    "lost": "those that ran there and are not critical",
-    "not_run": "those that failed there",
-    "scenarios": "all that were asked for",
+    "confirmed": "scenarios that are critical there, too / scenarios that ran there",
+    "lost": "scenarios that ran there and are not critical",
+    "not_run": "scenarios that failed there",
+    "scenarios": "scenarios that were requested",
     "harm_change": "the largest difference of harm",
     "d_min_change": "the largest difference of d_min [m]",
     "v_d_change": "the largest difference of v_d [m/s]",
     "contact_change": "the largest difference of the time of the first contact [s]",
 }
-"""What ``--fail-if`` can name of a confirmation."""
+"""The figures of a confirmation that ``--fail-if`` accepts."""
 
 _OF_THE_LOST = ("confirmed", "lost")
-"""Scenarios that are not confirmed are to blame for these; for ``not_run`` those that failed."""
+"""Scenarios that are not confirmed fail these; those that failed there fail ``not_run``."""
 
 
 @dataclass(frozen=True)
-class ConfirmationGate:
-    """What a confirmation must keep, read and checked before it begins.
+class ConfirmationCriteria:
+    """The criteria for a confirmation, checked before it starts.
 
     Attributes:
-        criteria: each fails it if it holds.
-        junit: where the JUnit XML goes, if it is wanted.
+        criteria: each fails the confirmation if it holds.
+        junit: path of the JUnit XML, or None.
     """
 
     criteria: tuple[Criterion, ...]
     junit: Path | None
 
     @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None) -> "ConfirmationGate":
+    def read(cls, texts: Sequence[str], junit: Path | None) -> Self:
         """Read the criteria.
 
         Args:
-            texts: as `read_criteria` has them, of FIGURES.
+            texts: see `read_criteria`; their figures are FIGURES.
             junit: a new file, or an earlier JUnit XML.
 
         Raises:
-            InputError: no criterion, or an unknown figure.
-            StorageError: no JUnit XML can be written there.
+            InputError: a text is not a criterion, or a figure is unknown.
+            StorageError: the JUnit XML cannot be written.
         """
-        gate = cls(read_criteria(texts, FIGURES), junit)
+        criteria = cls(read_criteria(texts, FIGURES), junit)
         if junit is not None:
             refuse_junit(junit)
-        return gate
+        return criteria
 
     def judge(self, found: RunConfirmation) -> tuple[Outcome, ...]:
-        """Hold the criteria against a confirmation, and write the JUnit XML if it is wanted.
+        """Apply the criteria to a confirmation, and write the JUnit XML if requested.
 
-        Nothing is judged where nothing is asked for. Otherwise the first outcome is whether
-        anything ran: where nothing did, nothing is proved.
+        Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
+        whether any scenario ran.
         """
         if not self.criteria and self.junit is None:
             return ()
@@ -75,10 +76,14 @@ class ConfirmationGate:
         return outcomes
 
 
+ConfirmationGate = ConfirmationCriteria
+"""The name by which the command line imports it."""
+
+
 def figures_of(found: RunConfirmation) -> dict[str, float]:
-    """Return FIGURES of a confirmation; NaN is what nobody knows."""
+    """Return FIGURES of a confirmation; NaN is an unknown figure."""
     s, nan = found.summary, float("nan")
-    unknown = nan if not s.ran else 0.0  # where all ran and none has it, nothing changed
+    unknown = nan if not s.ran else 0.0  # if all ran and none has it, nothing changed
     return {
         "confirmed": nan if s.share is None else s.share,
         "lost": s.lost if s.ran else nan,
@@ -92,7 +97,7 @@ def figures_of(found: RunConfirmation) -> dict[str, float]:
 
 
 def _suites(found: RunConfirmation, outcomes: Sequence[Outcome]) -> list[Suite]:
-    """Return the criteria as one suite, and each scenario as a test in another one."""
+    """Return the criteria as one suite, and each scenario as a test of another suite."""
     record = found.record
     name = Path(record.scenario).stem
     group = f"bridgegen.{name}.{record.simulator}"
@@ -112,11 +117,11 @@ def _suites(found: RunConfirmation, outcomes: Sequence[Outcome]) -> list[Suite]:
 
 
 def _case(one: Scenario, group: str, broken: set[str]) -> Case:
-    """Return a scenario as a test, failed if it is to blame for a criterion."""
+    """Return a scenario as a test, failed if it contributes to a failed criterion."""
     name = f"critical {one.name or f'evaluation {one.evaluation + 1}'}"
     if one.there is None:
-        blamed = "not_run" in broken
-        return Case(group, name, "failure" if blamed else None, "not run", one.failure)
-    blamed = not one.there.critical and any(figure in broken for figure in _OF_THE_LOST)
+        contributes = "not_run" in broken
+        return Case(group, name, "failure" if contributes else None, "not run", one.failure)
+    contributes = not one.there.critical and any(figure in broken for figure in _OF_THE_LOST)
     message = "confirmed" if one.there.critical else "not confirmed"
-    return Case(group, name, "failure" if blamed else None, message, one.explanation)
+    return Case(group, name, "failure" if contributes else None, message, one.explanation)

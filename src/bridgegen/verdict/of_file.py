@@ -1,8 +1,9 @@
-"""Is what one scenario file came to good enough? Criteria held against its metrics."""
+"""Pass/fail criteria for the metrics of one scenario file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.simulate import FileResult
@@ -11,44 +12,44 @@ from bridgegen.verdict.junit import Suite, case_of, refuse_junit, write_junit
 
 
 @dataclass(frozen=True)
-class FileGate:
-    """What a scenario file must keep, read and checked before it is simulated.
+class FileCriteria:
+    """The criteria for a scenario file, checked before the simulation.
 
     Attributes:
         criteria: each fails the file if it holds.
-        junit: where the JUnit XML goes, if it is wanted.
+        junit: path of the JUnit XML, or None.
     """
 
     criteria: tuple[Criterion, ...]
     junit: Path | None
 
     @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None) -> "FileGate":
+    def read(cls, texts: Sequence[str], junit: Path | None) -> Self:
         """Read the criteria.
 
         Args:
-            texts: as `read_criteria` has them, of metrics.
+            texts: see `read_criteria`; their figures are metrics.
             junit: a new file, or an earlier JUnit XML.
 
         Raises:
-            InputError: no criterion, or an unknown metric.
-            StorageError: no JUnit XML can be written there.
+            InputError: a text is not a criterion, or a metric is unknown.
+            StorageError: the JUnit XML cannot be written.
         """
-        gate = cls(read_criteria(texts, QUANTITIES), junit)
+        criteria = cls(read_criteria(texts, QUANTITIES), junit)
         if junit is not None:
             refuse_junit(junit)
-        return gate
+        return criteria
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """Those that must be measured."""
+        """The metrics that must be measured."""
         return tuple(dict.fromkeys(name for one in self.criteria for name in one.figures))
 
     def judge(self, file: Path, result: FileResult) -> tuple[Outcome, ...]:
-        """Hold the criteria against a result, and write the JUnit XML if it is wanted.
+        """Apply the criteria to a result, and write the JUnit XML if requested.
 
-        Nothing is judged where nothing is asked for. Otherwise the first outcome is the
-        simulation's own: one that failed proves nothing.
+        Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
+        whether the simulation succeeded.
         """
         if not self.criteria and self.junit is None:
             return ()
@@ -70,3 +71,7 @@ class FileGate:
             cases = [case_of(group, one) for one in outcomes]
             write_junit(self.junit, [Suite(file.name, cases, facts)])
         return outcomes
+
+
+FileGate = FileCriteria
+"""The name by which the command line imports it."""

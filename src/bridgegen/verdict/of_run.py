@@ -1,11 +1,12 @@
-"""Is a run good enough? Criteria held against its figures, as JUnit XML and as an exit status.
+"""Pass/fail criteria for a run, reported as JUnit XML and as an exit status.
 
-A test fails in the XML exactly where the command says so by its exit status.
+The XML contains a failed test if and only if the exit status is a failure.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from bridgegen.campaign.handover import Facts, ParameterValue, Quantity, read_facts
 from bridgegen.campaign.run import Run
@@ -31,60 +32,61 @@ FIGURES = {
     "r_critic": "critical evaluations / all evaluations",
     "critical": "critical evaluations",
     "evaluations": "evaluations, failed ones included",
-    "failed": "evaluations that have no result",
+    "failed": "evaluations without a result",
     "first": "evaluations until the first critical one; infinite if there is none",
     "fiftieth": "evaluations until the 50th critical one; infinite if there is none",
     "d_min_best": "the smallest d_min [m]",
     "d_min_median": "the median of d_min [m]",
     "v_d_best": "the largest v_d [m/s]",
     "v_d_median": "the median of v_d [m/s]",
-    "seconds": "of search, compilation not included [s]",
+    "seconds": "duration of the search without compilation [s]",
     **_CAUSES,
     **_TRIAGE,
 }
-"""What ``--fail-if`` can name of a run."""
+"""The figures of a run that ``--fail-if`` accepts."""
 
 _OF_THE_RUN = ("evaluations", "failed", "seconds", "harmful.upper")
-"""No single critical scenario is to blame for these."""
+"""Figures to which no single critical scenario contributes."""
 
 
 @dataclass(frozen=True)
-class Gate:
-    """What a run must keep, read and checked before it begins.
+class PassFailCriteria:
+    """The criteria for a run, checked before it starts.
 
     Attributes:
         criteria: each fails the run if it holds.
-        junit: where the JUnit XML goes, if it is wanted.
+        junit: path of the JUnit XML, or None.
     """
 
     criteria: tuple[Criterion, ...]
     junit: Path | None
 
     @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None, *, causes: bool = True) -> "Gate":
+    def read(cls, texts: Sequence[str], junit: Path | None, *, causes: bool = True) -> Self:
         """Read the criteria.
 
         Args:
-            texts: as `read_criteria` has them, of FIGURES.
+            texts: see `read_criteria`; their figures are FIGURES.
             junit: a new file, or an earlier JUnit XML.
-            causes: whether the run seeks causes.
+            causes: whether the run determines causes.
 
         Raises:
-            InputError: no criterion; an unknown figure; or a cause, and none is sought.
-            StorageError: no JUnit XML can be written there.
+            InputError: a text is not a criterion; a figure is unknown, or is a cause although the
+                run determines none.
+            StorageError: the JUnit XML cannot be written.
         """
-        gate = cls(read_criteria(texts, FIGURES), junit)
-        if not causes and (named := sorted(gate.figures & _CAUSES.keys())):
+        criteria = cls(read_criteria(texts, FIGURES), junit)
+        if not causes and (named := sorted(criteria.figures & _CAUSES.keys())):
             raise InputError(
-                f"--fail-if names {', '.join(named)}: causes must be sought, and here they are not"
+                f"--fail-if names {', '.join(named)}, but this run does not determine causes"
             )
         if junit is not None:
             refuse_junit(junit)
-        return gate
+        return criteria
 
     @classmethod
-    def of_run(cls, texts: Sequence[str], junit: Path | None, folder: Path) -> "Gate":
-        """Read the criteria for a run that has begun; see ``read``."""
+    def of_run(cls, texts: Sequence[str], junit: Path | None, folder: Path) -> Self:
+        """Read the criteria for an existing run; see ``read``."""
         if not texts and junit is None:
             return cls((), None)
         with Store.open(folder) as store:
@@ -93,14 +95,14 @@ class Gate:
 
     @property
     def figures(self) -> set[str]:
-        """All that are named."""
+        """The names of all figures in the criteria."""
         return {name for one in self.criteria for name in one.figures}
 
     def judge(self, run: Run) -> tuple[Outcome, ...]:
-        """Hold the criteria against a run, and write the JUnit XML if it is wanted.
+        """Apply the criteria to a run, and write the JUnit XML if requested.
 
-        Nothing is judged where nothing is asked for. Otherwise the first outcome is the search's
-        own: a run of which every evaluation failed proves nothing.
+        Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
+        whether the search has results.
         """
         if not self.criteria and self.junit is None:
             return ()
@@ -111,8 +113,12 @@ class Gate:
         return outcomes
 
 
+Gate = PassFailCriteria
+"""The name by which the command line imports it."""
+
+
 def figures_of(run: Run) -> dict[str, float]:
-    """Return FIGURES of a run; NaN is what nobody knows, of its results if there are none."""
+    """Return FIGURES of a run; NaN is an unknown figure."""
     s, nan = run.summary, float("nan")
     sought = run.settings.causes and run.settings.ego != STORYBOARD.name
     figures: dict[str, float] = {
@@ -133,7 +139,7 @@ def figures_of(run: Run) -> dict[str, float]:
 
 
 def _of_triage(run: Run) -> dict[str, float]:
-    """Return the figures of a run's triage; NaN where there is none, or nothing was estimated."""
+    """Return the figures of a run's triage; NaN if there is none, or no estimate."""
     found, nan = run.triage, float("nan")
     if found is None:
         return dict.fromkeys(_TRIAGE, nan)
@@ -148,16 +154,16 @@ def _of_triage(run: Run) -> dict[str, float]:
 
 def _searched(run: Run) -> Outcome:
     s = run.summary
-    said = f"{s.evaluations} evaluations, {s.critical} critical, {s.failed} failed"
+    details = f"{s.evaluations} evaluations, {s.critical} critical, {s.failed} failed"
     if reasons := run.failures.most_common(3):
-        said += "; " + "; ".join(f"{count} x {reason}" for reason, count in reasons)
+        details += "; " + "; ".join(f"{count} x {reason}" for reason, count in reasons)
     return Outcome(
-        "the search has results", "unknown" if s.failed == s.evaluations else "passed", said
+        "the search has results", "unknown" if s.failed == s.evaluations else "passed", details
     )
 
 
 def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
-    """Return the criteria as one suite, and each handed-over scenario as one of its own."""
+    """Return the criteria as one suite, and each exported scenario as a suite."""
     settings = run.settings
     name = Path(settings.scenario).stem
     group = f"bridgegen.{name}.{settings.ego.replace('.', '_')}"
@@ -180,47 +186,47 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
 
 
 def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
-    """Return a handed-over scenario as a test, failed if it is to blame for a criterion."""
+    """Return an exported scenario as a test, failed if it contributes to a failed criterion."""
     facts = read_facts(path.with_suffix(".json"))
     if missing := {"d_min", "v_d", "n_collision"} - facts.metrics.keys():
         raise StorageError(
-            f"{path.with_suffix('.json')}: is not what was handed over: it has no "
+            f"{path.with_suffix('.json')}: is not what was exported: it has no "
             f"{', '.join(sorted(missing))}"
         )
-    blamed = [one.test for one in broken if _is_to_blame(facts, one.figures)]
-    values = {key: _told(one) for key, one in facts.metrics.items()}
+    failed = [one.test for one in broken if _contributes(facts, one.figures)]
+    values = {key: _text_of(one) for key, one in facts.metrics.items()}
     cause = f", cause: {facts.cause}" if facts.cause else ""
     what = "collision" if facts.metrics["n_collision"].value else "near miss"
     message = f"{what}: d_min {values['d_min']} at v_d {values['v_d']}{cause}"
     files = sorted(path.parent.glob(f"{path.stem}.*"))
     text = "\n".join(
         [
-            *(f"against: {one}" for one in blamed),
+            *(f"against: {one}" for one in failed),
             f"again: bridgegen simulate {path}",
             f"playback: {run.report}",
             f"files: {' '.join(str(file) for file in files)}",
             "parameters:",
-            *(f"  {key} = {_told(one)}" for key, one in facts.parameters.items()),
+            *(f"  {key} = {_text_of(one)}" for key, one in facts.parameters.items()),
             "metrics:",
             *(f"  {key} = {value}" for key, value in values.items()),
         ]
     )
-    case = Case(group, f"critical {path.stem}", "failure" if blamed else None, message, text)
-    properties = values | {key: _told(one) for key, one in facts.parameters.items()}
+    case = Case(group, f"critical {path.stem}", "failure" if failed else None, message, text)
+    properties = values | {key: _text_of(one) for key, one in facts.parameters.items()}
     properties |= {"cause": facts.cause or "", "evaluation": str(facts.evaluation)}
     if facts.robustness is not None:
         properties |= {"mode": str(facts.mode), "robustness": f"{facts.robustness:.6g}"}
     return Suite(f"{name} {path.stem}", [case], properties)
 
 
-def _is_to_blame(facts: Facts, figures: Sequence[str]) -> bool:
-    """Say whether a critical scenario speaks for a broken criterion, by its quick cause."""
+def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
+    """Return whether a critical scenario contributes to a failed criterion, by its quick cause."""
     cause = facts.quick_cause if "quick_cause" in facts.model_fields_set else facts.cause
     return any(name == cause if name in _CAUSES else name not in _OF_THE_RUN for name in figures)
 
 
-def _told(one: ParameterValue | Quantity) -> str:
-    """Return a value with its unit; null is infinite, as what it is written from has no NaN."""
+def _text_of(one: ParameterValue | Quantity) -> str:
+    """Return a value with its unit; null is infinite, since exported values are never NaN."""
     if one.value is None:
         return "inf"
     if isinstance(one.value, str):
