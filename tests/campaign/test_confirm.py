@@ -122,7 +122,7 @@ def test_what_is_elsewhere_there_is_found(folder, double):
         assert f"d_min is {one.there.d_min:.2f} m there" in one.explanation
         assert one.differences.closest.time >= 2.0
         assert "bv diverges first, from 2.00 s on: at" in one.explanation
-        assert "diverges first" not in one.explanation
+        assert "deviating since" not in one.explanation
         (track,) = one.tracks
         assert (track.entity, track.first) == ("bv", 40)
     assert (found.summary.confirmed, found.summary.lost) == (0, 4)

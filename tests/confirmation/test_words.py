@@ -219,8 +219,8 @@ def test_a_missed_contact_is_explained_by_what_differs_before_it():
     )
     assert text.endswith(
         "No contact there; here with bv at 3.00 s. "
-        "cone does not exist there. bv diverges first, from 1.00 s on: at 1.05 s it is present only "
-        "here."
+        "cone does not exist there. bv diverges first, from 1.00 s on: at 1.05 s it is present "
+        "only here."
     )
 
 

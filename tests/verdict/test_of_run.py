@@ -111,13 +111,13 @@ def test_mistakes_are_found_before_anything_runs(cli, tmp_path, run):
     search = ("search", "crossroads-s4", "--out", tmp_path / "run")
     refused(*search, "--fail-if", "r_critic", message="--fail-if must read")
     refused(*search, "--fail-if", "d_min<2", message="unknown figure of --fail-if 'd_min'")
-    refused(*search, "--no-causes", "--fail-if", "planning > 0", message="causes must be sought")
+    refused(*search, "--no-causes", "--fail-if", "planning > 0", message="not determine causes")
     refused(*search, "--junit", __file__, message="is not JUnit XML")
     assert not (tmp_path / "run").exists()
     file = run.scenarios[0]
     refused("simulate", file, "--fail-if", "r_critic > 0", message="unknown figure")
     refused("simulate", file, "--fail-if", "map < 0.5", message="needs detections")
-    with pytest.raises(InputError, match="causes must be sought"):
+    with pytest.raises(InputError, match="does not determine causes"):
         PassFailCriteria.read(["control == 0"], None, causes=False)
 
 

@@ -1,7 +1,7 @@
 """A stand-in of esmini's library: it plays what the embedded simulator makes of the file.
 
 It goes wrong where the parameter ``fault`` says so, and takes it ill if the ego is not where it
-should be when it is looked at. Run as the program of a seat's process.
+should be when it is looked at. Run as the program of an esmini process.
 """
 
 import os
@@ -17,7 +17,7 @@ from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-from bridgegen.simulation.esmini import seat
+from bridgegen.simulation.esmini import process
 from bridgegen.simulation.esmini.files import ScenarioFile
 
 LOGS, REFUSES, HANGS, DIES, NAN, HANGS_AT_ONCE = 1, 2, 3, 4, 5, 6
@@ -106,8 +106,8 @@ class StandIn:
 
 def answering(path, folder):
     library = StandIn(Path(path))
-    return library.version, seat.Answers(library, Path(folder)).answer
+    return library.version, process.Answers(library, Path(folder)).answer
 
 
 if __name__ == "__main__":
-    seat.main(answering)
+    process.main(answering)

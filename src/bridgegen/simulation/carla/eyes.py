@@ -35,15 +35,15 @@ LATE = 2.0
 class Eyes:
     """Follows one row with a camera and a LiDAR.
 
-    Frames arrive when they arrive; which instant each is of is told by its number, so that what
-    comes of them does not depend on when.
+    Frames arrive asynchronously; the number of a frame gives its instant, so that results do not
+    depend on the time of arrival.
 
     Args:
         stage: with the ego, to which the sensors are attached.
         program: the compiled storyboard.
         joint: the scenario, for the truth.
         period: between two frames [s].
-        detector: of the user's; None: nobody looks.
+        detector: of the user, or None.
         folder: new, for what is recorded; None: nothing is.
     """
 
@@ -86,13 +86,13 @@ class Eyes:
         self._boxes: list[tuple[object, ...]] = []
 
     def begin(self, first: int) -> None:
-        """See `Watch`."""
+        """See `RowObserver`."""
         self._first = first
         if self._detector is not None:
             self._ask(self._detector.reset)
 
     def reached(self, k: int, snapshot: "carla.WorldSnapshot") -> None:
-        """See `Watch`: look at what has arrived."""
+        """See `RowObserver`: look at what has arrived."""
         self._last = snapshot.frame
         self._take()
 
@@ -151,14 +151,14 @@ class Eyes:
             raw = np.frombuffer(scan.raw_data, np.float32).reshape(-1, 4)
             points = frame.points(raw, self.view.place)
         pixels = np.frombuffer(image.raw_data, np.uint8).reshape(image.height, image.width, 4)
-        told = Frame(
+        seen = Frame(
             time=k * TIME_STEP,
             image=np.ascontiguousarray(pixels[:, :, 2::-1]),
             intrinsics=self.view.intrinsics,
             camera=np.array(self.view.place),
             points=points,
         )
-        answer = self._ask(self._detector.detect, told)
+        answer = self._ask(self._detector.detect, seen)
         try:
             boxes = checked(answer)
         except (ValueError, TypeError) as error:
@@ -187,5 +187,5 @@ class Eyes:
         try:
             return call(*arguments)
         except Exception as error:
-            told = f"the detector: {type(error).__name__}: {error}"
-            raise DriverError("raised", told) from error
+            message = f"the detector: {type(error).__name__}: {error}"
+            raise DriverError("raised", message) from error

@@ -28,11 +28,11 @@ class Found:
 
     def added(self, rollout: Rollout) -> Rollout:
         """Return the row's rollout, N = 1, with it."""
-        told = self.incidents.all(rollout)
-        if told:
-            rollout = replace(rollout, incidents={0: told})
+        incidents = self.incidents.all(rollout)
+        if incidents:
+            rollout = replace(rollout, incidents={0: incidents})
         if self.folder is not None:
-            write_incidents(self.folder, told, rollout.time_step)
+            write_incidents(self.folder, incidents, rollout.time_step)
             write_trace(self.folder / "trace.csv", rollout)
         if self.eyes is not None:
             detections = self.eyes.detections

@@ -1,4 +1,4 @@
-"""Egos that CARLA's own world drives: its autopilot, an agent of its Python package, a client."""
+"""Egos that are driven in CARLA: by its autopilot, by an agent of its package, by a client."""
 
 import math
 import time
@@ -17,39 +17,39 @@ if TYPE_CHECKING:
     import carla
 
 TRAFFIC_MANAGER = 6000
-"""How far the Traffic Manager's port is from the server's: 8000 beside 2000, as CARLA has it."""
+"""Offset of the Traffic Manager's port from the server's: 8000 for 2000, as in CARLA."""
 
 SPACING = 2.0
-"""Between two points of the route that a guest is told [m]."""
+"""Distance between two points of the route that a controller gets [m]."""
 
 WAIT_SECONDS = 60.0
-"""How long a client may take to take over the ego."""
+"""Time limit for a client to take control of the ego [s]."""
 
 
-class AskedSpeed:
-    """What the storyboard asks of the ego, told whenever it changes.
+class TargetSpeed:
+    """Forwards the storyboard's target speed of the ego whenever it changes.
 
     Args:
         joint: the scenario.
-        tell: takes it [km/h].
+        set_speed: receives it [km/h].
     """
 
-    def __init__(self, joint: CoSimulation, tell: Callable[[float], None]) -> None:
-        self._joint, self._tell, self._last = joint, tell, math.nan
+    def __init__(self, joint: CoSimulation, set_speed: Callable[[float], None]) -> None:
+        self._joint, self._set_speed, self._last = joint, set_speed, math.nan
 
-    def pass_on(self) -> None:
-        """Tell it, if it is new."""
+    def forward(self) -> None:
+        """Forward it, if it has changed."""
         asked = self._joint.target_speed
         if asked != self._last:
             self._last = asked
-            self._tell(3.6 * asked)
+            self._set_speed(3.6 * asked)
 
 
 class Autopilot:
-    """CARLA's Traffic Manager, told the route and the speed that the storyboard asks for.
+    """CARLA's Traffic Manager, with the route and the storyboard's target speed.
 
     Args:
-        server: whose it is.
+        server: that runs it.
         stage: with the ego.
         joint: the scenario.
         way: ``(n, 2)`` x, y [m] of the route.
@@ -64,7 +64,7 @@ class Autopilot:
         way: Float,
         settings: CarlaSettings,
     ) -> None:
-        self._ego, self._asked = stage.ego, AskedSpeed(joint, self._tell)
+        self._ego, self._asked = stage.ego, TargetSpeed(joint, self._set_speed)
         self._path = [frame.location(x, y) for x, y in spaced(way)]
         self._port = server.access.port + TRAFFIC_MANAGER
         self._manager: Any = server.client.get_trafficmanager(self._port)
@@ -72,35 +72,35 @@ class Autopilot:
         self._manager.set_random_device_seed(settings.seed)
 
     def begin(self, server: Server) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
         self._ego.set_autopilot(True, self._port)
         self._manager.auto_lane_change(self._ego, False)
         self._manager.set_path(self._ego, self._path)
 
     def control(self, k: int) -> None:
-        """See `AtTheWheel`: only the speed is told."""
-        self._asked.pass_on()
+        """See `EgoController`: it sets the speed only."""
+        self._asked.forward()
 
-    def _tell(self, kmh: float) -> None:
+    def _set_speed(self, kmh: float) -> None:
         if hasattr(self._manager, "set_desired_speed"):
             self._manager.set_desired_speed(self._ego, kmh)
-        else:  # 0.9.13 knows shares of the speed limit alone
+        else:  # 0.9.13 accepts only shares of the speed limit
             limit = max(self._ego.get_speed_limit(), 1.0)
             self._manager.vehicle_percentage_speed_difference(
                 self._ego, 100.0 * (1.0 - kmh / limit)
             )
 
     def end(self) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
         self._ego.set_autopilot(False, self._port)
         self._manager.set_synchronous_mode(False)
 
 
 class Agent:
-    """An agent of the package ``agents``, which comes with the user's CARLA and not with its wheel.
+    """An agent of the package ``agents``, which is part of CARLA but not of its wheel on PyPI.
 
     Args:
-        server: whose world it is.
+        server: with the world.
         stage: with the ego.
         joint: the scenario.
         way: ``(n, 2)`` x, y [m] of the route.
@@ -131,35 +131,35 @@ class Agent:
             self._agent: Any = BasicAgent(stage.ego)
         else:
             self._agent = BehaviorAgent(stage.ego, behavior=settings.agent)
-        self._asked = AskedSpeed(joint, self._agent.set_target_speed)
+        self._asked = TargetSpeed(joint, self._agent.set_target_speed)
         found = (server.worlds.map.get_waypoint(frame.location(x, y)) for x, y in spaced(way))
         self._plan = [(one, RoadOption.LANEFOLLOW) for one in found if one is not None]
 
     def begin(self, server: Server) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
         self._agent.set_global_plan(self._plan)
 
     def control(self, k: int) -> "carla.VehicleControl":
-        """See `AtTheWheel`."""
-        self._asked.pass_on()
+        """See `EgoController`."""
+        self._asked.forward()
         control: carla.VehicleControl = self._agent.run_step()
         return control
 
     def end(self) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
 
 
 class External:
-    """A client of the user's, which finds the ego by its role and controls it.
+    """A client of the user, which finds the ego by its role name and controls it.
 
-    It may take its time before it begins; then ticks come no faster than in reality.
+    It may start late; from then on ticks are not faster than real time.
 
     Args:
-        server: whose world it is.
+        server: with the world.
         stage: with the ego.
         joint: the scenario.
-        way: not told.
-        settings: not told.
+        way: not used.
+        settings: not used.
     """
 
     def __init__(
@@ -173,10 +173,10 @@ class External:
         self._stage, self._joint, self._last = stage, joint, -math.inf
 
     def begin(self, server: Server) -> None:
-        """See `AtTheWheel`: wait until somebody controls the ego.
+        """See `EgoController`: wait until a client controls the ego.
 
         Raises:
-            ServerError: nobody does.
+            ServerError: no client does in time.
         """
         import carla
 
@@ -194,26 +194,26 @@ class External:
         self._stage.start(self._joint.states(0))
 
     def control(self, k: int) -> None:
-        """See `AtTheWheel`: the client does."""
+        """See `EgoController`: the client does."""
         self._pace()
 
     def end(self) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
 
     def _pace(self) -> None:
-        """Leave the client the time that passes."""
+        """Wait for real time."""
         rest = self._last + TIME_STEP - time.monotonic()
         if rest > 0.0:
             time.sleep(rest)
         self._last = time.monotonic()
 
 
-GUESTS: Mapping[str, Callable[..., Any]] = {
+CONTROLLERS: Mapping[str, Callable[..., Any]] = {
     "carla-autopilot": Autopilot,
     "carla-agent": Agent,
     "carla-external": External,
 }
-"""By the name of the driver."""
+"""Controllers by the name of the driver."""
 
 
 def spaced(way: Float) -> Sequence[tuple[float, float]]:

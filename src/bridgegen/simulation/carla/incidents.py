@@ -17,7 +17,7 @@ LASTING = 20
 """A contact with the same actor within so many instants (1 s) of another is the same one."""
 
 ASIDE = 2.0
-"""A stop line holds for who crosses it at most so far from its point [m]: on its lane."""
+"""A stop line applies to vehicles that cross it within this distance of its point [m]."""
 
 COLLISION, LANE_INVASION, RED_LIGHT = "collision", "lane invasion", "red light"
 RED, RED_AND_YELLOW = 1, 2  # of Rollout.lights
@@ -46,7 +46,7 @@ class Incidents:
         self._first = frame
 
     def reached(self, k: int, snapshot: "carla.WorldSnapshot") -> None:
-        """See `Watch`: they tell by themselves."""
+        """See `RowObserver`: the sensors report by themselves."""
 
     def _collided(self, event: Any) -> None:
         other = event.other_actor
@@ -57,7 +57,7 @@ class Incidents:
         self._told.append((event.frame, LANE_INVASION, ", ".join(sorted(kinds))))
 
     def all(self, rollout: Rollout) -> tuple[Incident, ...]:
-        """Return them in the order in which they took place; what lasts is told once.
+        """Return them in the order in which they took place; a lasting incident is listed once.
 
         Args:
             rollout: of this row, N = 1.

@@ -1,4 +1,4 @@
-"""CARLA's traffic lights: found by where they stand, frozen, and driven by the storyboard."""
+"""CARLA's traffic lights: matched by position, frozen, and controlled by the storyboard."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,11 +20,11 @@ REACH = 12.0
 a Town's lights hang elsewhere than the map says, but hold back the same lane."""
 
 STATES = ("Off", "Red", "Red", "Yellow", "Green")
-"""CARLA's word for each of ours, see `Rollout.lights`; it has no red with yellow."""
+"""CARLA's states for those of `Rollout.lights`; it has no red with yellow."""
 
 
 def positions(model: OpenDrive, ids: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return where signals of a road network stand: x, y [m] by id."""
+    """Return the positions of a road network's signals: x, y [m] by id."""
     wanted, found = set(ids), {}
     for road in model.roads:
         for signal in road.signals:
@@ -37,7 +37,7 @@ def positions(model: OpenDrive, ids: Sequence[str]) -> dict[str, tuple[float, fl
 def matched(
     wanted: Mapping[str, tuple[float, float]], known: Sequence[Sequence[tuple[float, float]]]
 ) -> dict[str, int]:
-    """Return which light is which, the nearest pairs first, each once.
+    """Match lights to signals, the nearest pairs first, each once.
 
     Args:
         wanted: where the map's stand [m], by id.
@@ -91,7 +91,7 @@ class Lights:
         self._shown: list[int] = []
 
     def begin(self) -> None:
-        """Freeze them all, and put them out."""
+        """Freeze all lights, and switch them off."""
         if self._actors:
             self._world.freeze_all_traffic_lights(True)
         self._shown = [-1] * len(self._actors)
@@ -99,7 +99,7 @@ class Lights:
             self._set(i, 0)
 
     def show(self, states: npt.NDArray[np.int8]) -> None:
-        """Set them, ``(S,)``, see `Rollout.lights`; what does not change costs nothing."""
+        """Set the states ``(S,)``, see `Rollout.lights`; only changes are sent."""
         for i, state in zip(self._numbers, states.tolist(), strict=True):
             self._set(i, state)
 

@@ -19,7 +19,7 @@ ALIKE = 0.3
 
 @dataclass(frozen=True)
 class Truth:
-    """Who is where at an instant.
+    """The states of all entities at an instant.
 
     Attributes:
         states: ``(E, 4)``, see `CoSimulation.states`.
@@ -61,8 +61,8 @@ class Truth:
 def matched(answer: Checked, truth: Truth, view: View) -> Float:
     """Return the rows of an instant's detections ``(E, 8)``, see `bridgegen.ego.detections`.
 
-    The most confident chooses first, among those whom nobody has chosen. What stands for nobody has
-    no row: it is not counted.
+    In order of confidence, each detection is assigned to an entity that is still free. Detections
+    without an entity have no row: they are not counted.
     """
     n_entities = len(truth.states)
     rows = np.zeros((n_entities, column.DETECTION))

@@ -26,7 +26,7 @@ grip, or no power, would make up for it long afterwards."""
 
 PEDAL_RATE, STEERING_RATE = 8.0, 2.5
 """Shares of full travel per second: a foot goes from throttle to brake in 0.25 s; a wheel is turned
-from straight to full lock in 0.4 s, as nobody does who is not in need."""
+from straight to full lock in 0.4 s, as in an emergency."""
 
 STANDING = 0.1
 """Slower [m/s], and not meant to go, it is held by the brake."""

@@ -1,4 +1,4 @@
-"""One row: our storyboard and driver in CARLA's world, instant by instant."""
+"""One row: BridgeGen's storyboard and driver in CARLA's world, step by step."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,37 +16,37 @@ if TYPE_CHECKING:
 
 
 class Stopped(Exception):
-    """The simulator is to stop."""
+    """The simulator has been asked to stop."""
 
 
-class AtTheWheel(Protocol):
-    """Who drives the ego in CARLA."""
+class EgoController(Protocol):
+    """Controls the ego in CARLA."""
 
     def begin(self, server: Server) -> None:
-        """Take over, at the first instant; ticks may pass, if the ego is put back then."""
+        """Take control at the first instant; ticks may pass if the ego is then put back."""
 
     def end(self) -> None:
-        """Let go; the server may be gone."""
+        """Release control; the server may have ended."""
 
     def control(self, k: int) -> "carla.VehicleControl | None":
-        """Return what it does at an instant; None, if CARLA has it from elsewhere."""
+        """Return the control at an instant; None if CARLA gets it from another source."""
 
 
-class Watch(Protocol):
-    """Who is told how a row goes on."""
+class RowObserver(Protocol):
+    """Observes the progress of a row."""
 
     def begin(self, frame: int) -> None:
-        """Take note of the frame of CARLA's in which instant 0 is."""
+        """Receive the number of CARLA's frame at instant 0."""
 
     def reached(self, k: int, snapshot: "carla.WorldSnapshot") -> None:
-        """Take note of an instant that is reached; the scenario has its states."""
+        """Receive the snapshot of an instant; the scenario has its states."""
 
 
-class Ours:
-    """A driver of ours at the pedals: its demands as a car's driver would carry them out.
+class BridgeGenDriver:
+    """A driver of BridgeGen; its demands are converted to pedals and steering.
 
     Args:
-        joint: the scenario, whose driver is asked.
+        joint: the scenario with the driver.
         car: the ego.
     """
 
@@ -55,47 +55,47 @@ class Ours:
         self._pedals = Pedals(car, float(joint.states(0)[0, 3]))
 
     def begin(self, server: Server) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
 
     def end(self) -> None:
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
 
     def control(self, k: int) -> "carla.VehicleControl":
-        """See `AtTheWheel`."""
+        """See `EgoController`."""
         acceleration, curvature = self._joint.demand(k)
         return self._pedals.control(acceleration, curvature, float(self._joint.states(k)[0, 3]))
 
 
 @dataclass(frozen=True)
-class Row:
-    """What one row needs.
+class CarlaRow:
+    """The parts of one row.
 
     Attributes:
         joint: the scenario, at its first instant.
-        stage: its actors, put up.
+        stage: its actors.
         weather: its weather.
         lights: its traffic lights.
-        wheel: who drives the ego; None: it is moved as the embedded simulator moves it.
-        watches: told how it goes on.
-        is_stopped: whether to stop.
+        controller: of the ego; None if it is moved as the embedded simulator moves it.
+        observers: of its progress.
+        is_stopped: returns whether to stop.
     """
 
     joint: CoSimulation
     stage: Stage
     weather: Weather
     lights: Lights
-    wheel: AtTheWheel | None
-    watches: Sequence[Watch]
+    controller: EgoController | None
+    observers: Sequence[RowObserver]
     is_stopped: Callable[[], bool]
 
     def run(self, server: Server) -> None:
         """Run it to its end.
 
         Raises:
-            RuntimeError: as CARLA raises them.
-            ServerError: an actor is gone.
-            DriverError: a driver of the user's own failed.
-            Stopped: it was to.
+            RuntimeError: raised by CARLA.
+            ServerError: an actor no longer exists.
+            DriverError: the user's driver failed.
+            Stopped: the simulator has been asked to stop.
         """
         joint, stage = self.joint, self.stage
         sky: Sky | None = None
@@ -108,35 +108,35 @@ class Row:
             sky = self._environment(server, k, sky, dry)
             if k == 0:
                 stage.settle(joint.states(0), joint.present(0))
-                if self.wheel is not None:
-                    self.wheel.begin(server)
-                for watch in self.watches:
-                    watch.begin(server.world.get_snapshot().frame)
+                if self.controller is not None:
+                    self.controller.begin(server)
+                for observer in self.observers:
+                    observer.begin(server.world.get_snapshot().frame)
             control: Any = None
-            if self.wheel is not None:
-                control = self.wheel.control(k)
+            if self.controller is not None:
+                control = self.controller.control(k)
                 joint.move(k, 0.0, 0.0)
             else:
                 joint.move(k, *joint.demand(k))
             if not joint.runs:
                 return
             k += 1
-            moves = stage.moves(joint.states(k), joint.present(k), ego=self.wheel is None)
+            moves = stage.moves(joint.states(k), joint.present(k), ego=self.controller is None)
             stage.do([*moves, *stage.drives(control)])
             snapshot = server.tick()
             stage.check(snapshot)
-            if self.wheel is not None:
+            if self.controller is not None:
                 joint.impose(k, [0], stage.ego_state(snapshot))
-            for watch in self.watches:
-                watch.reached(k, snapshot)
+            for observer in self.observers:
+                observer.reached(k, snapshot)
 
     def _environment(self, server: Server, k: int, last: Sky | None, dry: list[float]) -> Sky:
-        """Show weather and lights of an instant; what has not changed costs nothing."""
+        """Set the weather and the lights of an instant, if they have changed."""
         joint = self.joint
         sky = self.weather.at(k, joint.weather, joint.events)
         if last is None or sky.fields != last.fields:
             server.world.set_weather(sky.parameters())
-        if self.wheel is not None and (last is None or sky.friction != last.friction):
+        if self.controller is not None and (last is None or sky.friction != last.friction):
             friction_of(self.stage.ego, sky.friction, dry)
         self.lights.show(joint.lights)
         return sky

@@ -1,4 +1,4 @@
-"""The server: reached, restarted, set up for stepping and put back, and what its failures mean."""
+"""The server: connection, restart, synchronous mode, and the diagnosis of its failures."""
 
 import os
 import signal
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 VERSIONS = ("0.9.13", "0.9.14", "0.9.15", "0.9.16")
 
 BACK_OFF = (0.5, 1.0, 2.0, 4.0, 8.0)
-"""Seconds before each further attempt to reach a server that was there."""
+"""Waiting times before each further attempt to reach a lost server [s]."""
 
 START_SECONDS = 180.0
-"""How long a server that was started may take until it answers."""
+"""Time limit for a started server to answer [s]."""
 
 LOAD_SECONDS = 180.0
-"""How long a world may take to load."""
+"""Time limit for loading a world [s]."""
 
 ERROR, DIED, HUNG = (SIMULATOR_FAILURES[one] for one in ("raised", "died", "timed out"))
-"""Statuses of a row that the server failed."""
+"""Statuses of rows that failed because of the server."""
 
 MINE = "bridgegen"
-"""How the role of each of our actors begins, but the ego's."""
+"""Prefix of the role names of BridgeGen's actors except the ego."""
 
 
 class ServerError(Exception):
@@ -51,7 +51,7 @@ class ServerError(Exception):
 
 
 class Server:
-    """A CARLA server, and our one connection to it.
+    """A CARLA server with the connection to it.
 
     Args:
         access: where it is.
@@ -62,7 +62,8 @@ class Server:
         worlds: what it has loaded.
 
     Raises:
-        InputError: the package is not installed, nobody answers, or not in a version that we know.
+        InputError: the package is not installed, no server answers, or its version is not
+            supported.
     """
 
     def __init__(self, access: Access) -> None:
@@ -89,7 +90,7 @@ class Server:
 
     @property
     def world(self) -> "carla.World":
-        """What is loaded."""
+        """The loaded world."""
         return self.worlds.world
 
     @contextmanager
@@ -113,12 +114,12 @@ class Server:
                 world.set_weather(weather)
 
     def tick(self) -> "carla.WorldSnapshot":
-        """Let one step pass, and return what came of it."""
+        """Advance the world by one step; return its snapshot."""
         frame = self.world.tick(self.access.timeout)
         snapshot = self.world.get_snapshot()
         if snapshot.frame != frame:
             raise ServerError(
-                ERROR, f"somebody else ticks the server: frame {frame} was ours, and it is at "
+                ERROR, f"another client ticks the server: frame {frame} was ours, and it is at "
                 f"{snapshot.frame}",
             )  # fmt: skip
         return snapshot
@@ -132,7 +133,7 @@ class Server:
             self.client.set_timeout(self.access.timeout)
 
     def diagnosis(self, error: RuntimeError | ServerError) -> ServerError:
-        """Return what an error of CARLA's means: it says no more than a text."""
+        """Return the kind of a CARLA error, which has only a text."""
         if isinstance(error, ServerError):
             return error
         text = str(error)
@@ -141,7 +142,7 @@ class Server:
         return ServerError(HUNG if "time-out" in text else ERROR, text)
 
     def reconnect(self) -> None:
-        """Reach the server again, with patience; start it where we know how.
+        """Connect again, with several attempts; start the server if a command is known.
 
         Raises:
             ServerError: it is gone.
@@ -188,7 +189,7 @@ class Server:
         )
 
     def _answers(self) -> bool:
-        """Connect; say whether somebody is there.
+        """Connect; return whether a server answers.
 
         Raises:
             InputError: it is there, in a version that we do not know.
@@ -208,7 +209,7 @@ class Server:
                     f"{VERSIONS[-1]}, got {version}"
                 )
             self.maps = list(client.get_available_maps())
-            with self.turn:  # what is there then is nobody's
+            with self.turn:  # other actors belong to no row of ours
                 self.worlds.take(client.get_world())
                 sweep(client, self.world)
         except RuntimeError as error:
@@ -218,7 +219,7 @@ class Server:
         return True
 
     def _start(self) -> None:
-        """Start the server by the user's command; wait until it answers.
+        """Start the server with the user's command; wait until it answers.
 
         Raises:
             ServerError: it ended, or does not answer.
@@ -244,7 +245,7 @@ class Server:
 
 
 def is_listening(access: Access) -> bool:
-    """Say whether anything listens where the server should be; a server that hangs does."""
+    """Return whether the server's port is open, which is also true if it hangs."""
     try:
         with socket.create_connection((access.host, access.port), timeout=access.timeout):
             return True
@@ -253,9 +254,9 @@ def is_listening(access: Access) -> bool:
 
 
 def sweep(client: "carla.Client", world: "carla.World") -> None:
-    """Destroy what an earlier run of ours left behind when it was killed.
+    """Destroy the actors that a killed run of BridgeGen left behind.
 
-    Its ego is told from another's ``hero`` by our sensors on it.
+    Its ego differs from another client's ``hero`` by BridgeGen's sensors on it.
     """
     mine = [
         one for one in world.get_actors() if one.attributes.get("role_name", "").startswith(MINE)
@@ -265,7 +266,7 @@ def sweep(client: "carla.Client", world: "carla.World") -> None:
 
 
 def destroy(client: "carla.Client", actors: list[int]) -> None:
-    """Destroy actors; who is gone already is no matter."""
+    """Destroy actors; those that no longer exist are ignored."""
     import carla
 
     if actors:
@@ -273,7 +274,7 @@ def destroy(client: "carla.Client", actors: list[int]) -> None:
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """End a process and all that it has started."""
+    """End a process and its descendants."""
     for one in (signal.SIGTERM, signal.SIGKILL) if sys.platform != "win32" else (signal.SIGTERM,):
         with suppress(ProcessLookupError, PermissionError):
             if sys.platform == "win32":

@@ -1,4 +1,4 @@
-"""What can be chosen of how CARLA runs a scenario, and where it is."""
+"""Settings of a simulation in CARLA, and access to the server."""
 
 import os
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from bridgegen.errors import InputError
 Value = bool | int | float | str
 
 TIME_STEP = 0.05
-"""Between two ticks [s]: with CARLA's ten substeps, its physics then steps at most 0.01 s."""
+"""Time of a tick [s]: with CARLA's ten substeps, a physics step is at most 0.01 s."""
 
 MEANINGS: Mapping[str, str] = {
     "ego": "physics (CARLA's vehicle, pedals and steering by our driver), or kinematic (moved as "
@@ -22,7 +22,7 @@ MEANINGS: Mapping[str, str] = {
     "seed": "of the Traffic Manager, for --ego carla-autopilot",
     "sensor_period": "seconds between two frames of --record and --detector",
 }
-"""Of the settings, which change results."""
+"""Meanings of the settings, which affect results."""
 
 OPTIONS: Mapping[str, str] = {
     "--host": "where the server is; or set CARLA_HOST",
@@ -32,7 +32,7 @@ OPTIONS: Mapping[str, str] = {
     "--record": "a new folder for images, LiDAR points, boxes and incidents",
     "--detector": "a detector of your own, whose boxes are measured",
 }
-"""Of where it is, and what it is to leave here."""
+"""Meanings of the options of access and outputs, which do not."""
 
 AGENTS = ("basic", "cautious", "normal", "aggressive")
 
@@ -50,7 +50,7 @@ class CarlaSettings:
 
     @classmethod
     def of(cls, chosen: Mapping[str, Value]) -> Self:
-        """Return settings from what was chosen.
+        """Return checked settings.
 
         Raises:
             InputError: what is out of range, all of it at once.
@@ -85,12 +85,12 @@ class CarlaSettings:
 
 @dataclass(frozen=True)
 class Access:
-    """Where the server is, by the names of `OPTIONS`.
+    """Access to the server, by the names of `OPTIONS`.
 
     Attributes:
         host: its machine.
         port: of its first connection; it takes the next two, too.
-        command: starts it; empty: nobody does.
+        command: starts the server; empty if the user starts it.
         timeout: [s] that an answer may take.
         record: a folder for what the sensors record; empty: nothing is.
         detector: of the user's; empty: none.
@@ -105,7 +105,7 @@ class Access:
 
     @classmethod
     def of(cls, given: Mapping[str, Value]) -> Self:
-        """Return access from what was given; else from the environment, as on a worker's machine.
+        """Return access from options; else from the environment, as on a worker's machine.
 
         Raises:
             InputError: a port or a time that is none.

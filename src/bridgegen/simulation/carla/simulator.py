@@ -1,4 +1,4 @@
-"""CARLA as a simulator: our storyboard and our drivers in its world."""
+"""CARLA as a simulator: BridgeGen's storyboard and drivers in its world."""
 
 import threading
 import weakref
@@ -22,11 +22,11 @@ from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.carla.eyes import Eyes
 from bridgegen.simulation.carla.found import Found, refuse_used
-from bridgegen.simulation.carla.guests import GUESTS
+from bridgegen.simulation.carla.guests import CONTROLLERS
 from bridgegen.simulation.carla.incidents import Incidents
 from bridgegen.simulation.carla.lights import Lights
 from bridgegen.simulation.carla.pedals import Car
-from bridgegen.simulation.carla.row import AtTheWheel, Ours, Row, Stopped
+from bridgegen.simulation.carla.row import BridgeGenDriver, CarlaRow, EgoController, Stopped
 from bridgegen.simulation.carla.server import ERROR, Server, ServerError
 from bridgegen.simulation.carla.settings import TIME_STEP, Access, CarlaSettings
 from bridgegen.simulation.carla.stage import Stage
@@ -44,7 +44,7 @@ ROWS = 8
 """Rows between which the server is left stepping, and the measures of which come together."""
 
 TRIES = 2
-"""How often a row is tried that the server fails."""
+"""Maximum number of attempts for a row that fails because of the server."""
 
 
 @dataclass(frozen=True)
@@ -65,18 +65,18 @@ class CarlaRoads:
 class CarlaSimulator(AroundEmbedded):
     """A `Simulator` that a CARLA server runs, one row at a time.
 
-    The storyboard moves the participants, as in the embedded simulator; our driver drives the ego,
+    The storyboard moves the participants as in the embedded simulator; the driver controls the ego,
     which CARLA's physics moves.
 
     Args:
         embedded: the embedded one of the same storyboard and driver.
         storyboard: the scenario file, validated.
-        settings: how it works.
-        access: where it is.
+        settings: that affect results.
+        access: address of the server, and outputs.
 
     Raises:
-        InputError: another time step than CARLA's; or no server answers; or there is no such
-            detector, or the folder to record to is not empty.
+        InputError: the time step is not CARLA's, no server answers, the detector does not exist, or
+            the folder for recordings is not empty.
     """
 
     def __init__(
@@ -135,8 +135,8 @@ class CarlaSimulator(AroundEmbedded):
     ) -> Rollout:
         """See `Simulator`; one row after the other.
 
-        A row that the server fails is tried once more, when the server is there again; then it has
-        failed, with status 40, 41 or 42 and what CARLA said.
+        A row that fails because of the server is tried once more, when the server is available
+        again; then it has failed, with status 40, 41 or 42 and CARLA's message.
 
         Raises:
             InputError: see `Simulator`; or the server has no such map, light or model.
@@ -205,13 +205,13 @@ class CarlaSimulator(AroundEmbedded):
         joint: "CoSimulation",
         driver: Driver | None,
     ) -> Found:
-        """Run one row; return what was found besides.
+        """Run one row; return its incidents and detections.
 
         Raises:
-            RuntimeError: as CARLA raises them.
+            RuntimeError: raised by CARLA.
             ServerError: the server has failed.
-            DriverError: a driver of the user's own has.
-            Stopped: it was to stop.
+            DriverError: the user's driver has failed.
+            Stopped: the simulator has been asked to stop.
             InputError: the server has no such light or model, or another map.
         """
         server, program = self._server, self.embedded.program.changed(driver=driver)
@@ -228,13 +228,13 @@ class CarlaSimulator(AroundEmbedded):
                     ego_is_moved=self._moves_ego(program.driver),
                 )
             )  # fmt: skip
-            wheel = self._wheel(program.driver, stage, joint, way)
-            if wheel is not None:
-                stack.callback(_end, wheel)
+            controller = self._make_controller(program.driver, stage, joint, way)
+            if controller is not None:
+                stack.callback(_end, controller)
             incidents = Incidents(stage, program.names)
             eyes = self._eyes(stage, program, joint)
-            Row(
-                joint, stage, Weather(self._storyboard, program, values), lights, wheel,
+            CarlaRow(
+                joint, stage, Weather(self._storyboard, program, values), lights, controller,
                 [incidents] if eyes is None else [incidents, eyes], self._is_stopped.is_set,
             ).run(server)  # fmt: skip
             if eyes is not None:
@@ -242,7 +242,7 @@ class CarlaSimulator(AroundEmbedded):
         return Found(incidents, eyes if self._detector else None, self._folder())
 
     def _folder(self) -> Path | None:
-        """Return where the present row is recorded; None if it is not."""
+        """Return the folder of the current row's recording, or None."""
         if not self._server.access.record:
             return None
         return Path(self._server.access.record) / f"{self._number:06}"
@@ -257,20 +257,20 @@ class CarlaSimulator(AroundEmbedded):
         )  # fmt: skip
 
     def _moves_ego(self, driver: Driver) -> bool:
-        """Say whether the ego is moved as the embedded simulator moves it."""
+        """Return whether the ego is moved as the embedded simulator moves it."""
         return driver == STORYBOARD or (not driver.home and self._settings.ego == "kinematic")
 
-    def _wheel(
+    def _make_controller(
         self, driver: Driver, stage: Stage, joint: "CoSimulation", way: Float
-    ) -> AtTheWheel | None:
+    ) -> EgoController | None:
         if driver.home:
-            guest = GUESTS[driver.name](self._server, stage, joint, way, self._settings)
-            return cast(AtTheWheel, guest)
+            controller = CONTROLLERS[driver.name](self._server, stage, joint, way, self._settings)
+            return cast(EgoController, controller)
         if self._moves_ego(driver):
             return None
-        return Ours(joint, Car.of(stage.ego.get_physics_control()))
+        return BridgeGenDriver(joint, Car.of(stage.ego.get_physics_control()))
 
 
-def _end(wheel: AtTheWheel) -> None:
+def _end(controller: EgoController) -> None:
     with suppress(RuntimeError):
-        wheel.end()
+        controller.end()

@@ -1,4 +1,4 @@
-"""The actors of one row: put up, moved in one batch an instant, looked at, taken down."""
+"""The actors of one row: they are spawned, moved in one batch per instant, read, destroyed."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ HERO = "hero"
 """The role of the ego, by which other clients find it."""
 
 ALOFT, APART = 60.0, 12.0
-"""Where actors come to be: above the road, each higher than the last [m]; nothing is there."""
+"""Spawn height above the road [m], where no obstacles are; each actor is higher than the last."""
 
 BELOW = -40.0
-"""Where who is not there is kept: under the road [m]."""
+"""Height of absent actors: under the road [m]."""
 
 SETTLING = 20
-"""Ticks in which the ego comes to rest on its suspension before the scenario begins."""
+"""Ticks in which the ego settles on its suspension before the scenario starts."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Stage:
 
     Args:
         server: whose world it is.
-        program: the compiled storyboard, which says who takes part.
+        program: the compiled storyboard with the participants.
         storyboard: the file, which names their models.
         ego_model: the ego's blueprint; empty: as the storyboard says.
         ego_is_moved: whether the ego is moved as everybody else is, instead of by CARLA's physics.
@@ -92,10 +92,10 @@ class Stage:
         self.bodies: list[Body] = []
 
     def __enter__(self) -> Self:
-        """Put everybody up, above the road.
+        """Spawn all actors above the road.
 
         Raises:
-            InputError: the server has no model for somebody.
+            InputError: the server has no model for a participant.
             RuntimeError: as CARLA raises them.
         """
         try:
@@ -106,7 +106,7 @@ class Stage:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take everybody down, whatever has happened."""
+        """Destroy all actors, also after an error."""
         for sensor in self._sensors:
             with suppress(RuntimeError):
                 sensor.stop()
@@ -147,7 +147,7 @@ class Stage:
         return choose(self._objects[name], kind, (length, width, height), known)
 
     def attach(self, kind: str, transform: "carla.Transform", **attributes: object) -> Any:
-        """Attach a sensor to the ego; it is taken down with the others.
+        """Attach a sensor to the ego; it is destroyed with the actors.
 
         Args:
             kind: its blueprint.
@@ -163,11 +163,11 @@ class Stage:
         return sensor
 
     def moves(self, states: Float, present: Bool, *, ego: bool) -> list[Any]:
-        """Return the commands that put entities where they are to be.
+        """Return the commands that set the transforms of entities.
 
         Args:
             states: ``(E, 4)``, see `CoSimulation.states`.
-            present: ``(E,)``; who is not there goes under the road.
+            present: ``(E,)``; absent actors are moved under the road.
             ego: whether the ego, too.
         """
         commands = []
@@ -190,7 +190,7 @@ class Stage:
         return commands
 
     def _ground(self, state: Float) -> float:
-        """Return the road's height somewhere [m]; 0 where there is none."""
+        """Return the height of the road at a point [m]; 0 beside roads."""
         import carla
 
         spot = frame.location(float(state[0]), float(state[1]))
@@ -198,7 +198,7 @@ class Stage:
         return 0.0 if waypoint is None else float(waypoint.transform.location.z)
 
     def settle(self, states: Float, present: Bool) -> None:
-        """Make the first instant: everybody where they start, the ego on its wheels and rolling."""
+        """Set the first instant: all actors at their start, the ego settled and rolling."""
         import carla
 
         if self._ego_is_moved:
@@ -231,7 +231,7 @@ class Stage:
         )
 
     def drives(self, control: "carla.VehicleControl | None") -> list[Any]:
-        """Return the command that has the ego driven, if it is by us."""
+        """Return the command that applies the ego's control, if there is one."""
         import carla
 
         if control is None:
@@ -239,7 +239,7 @@ class Stage:
         return [carla.command.ApplyVehicleControl(self.bodies[0].id, control)]
 
     def do(self, commands: list[Any]) -> None:
-        """Have the server carry out commands, in one call.
+        """Have the server execute commands in one call.
 
         Raises:
             ServerError: it cannot: an actor is gone.
@@ -262,10 +262,10 @@ class Stage:
         return frame.seen(there.get_transform(), there.get_velocity(), body.centre, body.box)
 
     def check(self, snapshot: "carla.WorldSnapshot") -> None:
-        """Make sure that nobody is lost.
+        """Check that all actors exist.
 
         Raises:
-            ServerError: somebody is.
+            ServerError: an actor no longer exists.
         """
         for name, body in zip(self._program.names, self.bodies, strict=True):
             if not snapshot.has_actor(body.id):
@@ -273,12 +273,12 @@ class Stage:
 
 
 def dressed(blueprint: "carla.ActorBlueprint", role: str) -> None:
-    """Give a blueprint its role, and of what varies the first."""
+    """Set the role of a blueprint, and the first value of each of its attributes."""
     first = dict.fromkeys(("color", "driver_id"), "")
     for attribute in blueprint:
         if attribute.id == "role_name":
             blueprint.set_attribute("role_name", role)
-        elif attribute.id == "is_invincible":  # else who is run over is gone for good
+        elif attribute.id == "is_invincible":  # else a pedestrian that is run over is removed
             blueprint.set_attribute("is_invincible", "true")
         elif attribute.id in first and attribute.recommended_values:
             first[attribute.id] = attribute.recommended_values[0]
@@ -288,7 +288,7 @@ def dressed(blueprint: "carla.ActorBlueprint", role: str) -> None:
 
 
 def friction_of(ego: Any, scale: float, dry: list[float]) -> None:
-    """Give the ego's tyres the grip of a road.
+    """Set the friction of the ego's tyres.
 
     Args:
         ego: its actor.

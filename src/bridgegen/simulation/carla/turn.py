@@ -1,4 +1,4 @@
-"""Whose turn it is at a server: one scenario's at a time, of all processes on this machine.
+"""A lock of a server: one scenario runs at a time, of all processes on this machine.
 
 Two that ticked one server would each disturb the other's scenarios.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO
 
 POLL = 0.02
-"""Seconds between two looks at whether it is our turn."""
+"""Interval between two attempts to get the lock [s]."""
 
 
 class Turn:
@@ -56,5 +56,5 @@ _turns: dict[str, Turn] = {}
 
 
 def turn_at(address: str) -> Turn:
-    """Return the turn of a server, the same for all who ask in this process."""
+    """Return the lock of a server, one per process."""
     return _turns.setdefault(address, Turn(address))

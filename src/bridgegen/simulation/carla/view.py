@@ -1,4 +1,4 @@
-"""Where things are in the camera's image, and what is meant by a box in it."""
+"""Projection between the scene and the camera's image."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from bridgegen.arrays import Float
 
 @dataclass(frozen=True)
 class View:
-    """A camera without distortion that looks ahead, level.
+    """A level camera without distortion that looks ahead.
 
     Attributes:
         width: of the image [pixels].
@@ -36,7 +36,7 @@ class View:
         return np.array([[f, 0.0, 0.5 * self.width], [0.0, f, 0.5 * self.height], [0.0, 0.0, 1.0]])
 
     def outline(self, box: Float) -> Float | None:
-        """Return left, top, right, bottom of a box in the image ``(4,)``; None if it is not in it.
+        """Return left, top, right, bottom of a box in the image ``(4,)``; None if it is outside.
 
         Args:
             box: ``(7,)`` as `Boxes.boxes` has it.
@@ -58,7 +58,7 @@ class View:
         return edges if edges[2] - edges[0] > 1.0 and edges[3] - edges[1] > 1.0 else None
 
     def foot(self, pixels: Float) -> tuple[float, float] | None:
-        """Return where the lower edge of a box in the image stands: x, y [m] in the ego's frame.
+        """Return the ground point of a box's lower edge in the image: x, y [m] in the ego's frame.
 
         None, where that is above the horizon, or behind the image's lower edge.
         """

@@ -1,10 +1,10 @@
-"""CARLA's fourteen weather parameters, from what the storyboard says.
+"""CARLA's fourteen weather parameters, from the storyboard.
 
-Our own files say eleven of them as they are, in the properties of their road condition; they came
-from the ontology, with the paper's couplings. Of other files, the physical quantities are turned
-back by the inverse of what wrote them (``openx.openscenario.from_owl.weather``), and what
-OpenSCENARIO has no word for (puddles, where fog begins) follows from the same couplings. Three that
-the paper does not have, of how light scatters, are CARLA's own presets'; and there is no dust.
+Exported files contain eleven of them as properties of their road condition, from the ontology with
+the paper's couplings. In other files, they are computed from the physical quantities by the inverse
+of ``openx.openscenario.from_owl.weather``; quantities that OpenSCENARIO does not have (puddles,
+fog distance) follow from the same couplings. Three that the paper does not have, on the scattering
+of light, are those of CARLA's presets; there is no dust.
 """
 
 import math
@@ -62,7 +62,7 @@ PRESET = {
     "scattering_intensity": 1.0, "mie_scattering_scale": 0.03,
     "rayleigh_scattering_scale": 0.0331, "dust_storm": 0.0, "wind_intensity": 10.0,
 }  # fmt: skip
-"""Of CARLA's own ClearNoon, where nobody says anything."""
+"""Of CARLA's ClearNoon, the default."""
 
 _CLEAR, _THICK = 1e4, 200.0  # m: visibility without fog; and how many times less at 100 %
 _DRIZZLE, _CLOUDBURST = 0.1, 500.0  # mm/h: just above 0 %; and how many times more at 100 %
@@ -70,7 +70,7 @@ _DRIZZLE, _CLOUDBURST = 0.1, 500.0  # mm/h: just above 0 %; and how many times m
 
 @dataclass(frozen=True)
 class Sky:
-    """What CARLA is told at an instant.
+    """The weather that CARLA gets at an instant.
 
     Attributes:
         fields: the fourteen parameters, in their ranges.

@@ -1,4 +1,4 @@
-"""What the server has loaded: one of its own maps, or roads of ours."""
+"""The world of the server: one of its maps, or one generated from OpenDRIVE."""
 
 import hashlib
 import math
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     import carla
 
 VERTEX_DISTANCE, LONGEST = 2.0, 500.0
-"""Between two vertices of a road's mesh [m], and of one piece of mesh [m]."""
+"""Distance of two vertices of a road's mesh [m], and length of one piece of mesh [m]."""
 
 NOWHERE = "+proj=tmerc +lat_0=0 +lon_0=0"
-"""Where on Earth roads are that do not say it: what CARLA takes them for anyway."""
+"""The geo-reference of roads without one: CARLA's default."""
 
 ASTRAY = 1.5
-"""How far a route may be from the centre of the server's lane [m]: who changes lanes is off it."""
+"""Maximum distance of a route from the centre of the server's lane [m]; lane changes leave it."""
 
 
 class Worlds:
-    """The world that is loaded, and the key of what it was made from."""
+    """The loaded world, and the key of its source."""
 
     def __init__(self) -> None:
         self._world: carla.World | None = None
@@ -36,23 +36,23 @@ class Worlds:
 
     @property
     def world(self) -> "carla.World":
-        """The present one."""
+        """The loaded world."""
         assert self._world is not None
         return self._world
 
     @property
     def map(self) -> "carla.Map":
-        """Its roads, as CARLA reads them; asked for once a world."""
+        """Its roads as CARLA's map, read once per world."""
         if self._map is None:
             self._map = self.world.get_map()
         return self._map
 
     def take(self, world: "carla.World") -> None:
-        """Take the world that a server has, whatever it is."""
+        """Use the world that the server has loaded."""
         self._world, self._map, self._key, self._id = world, None, "", world.id
 
     def forget(self) -> None:
-        """Know nothing of what is loaded."""
+        """Forget the loaded world."""
         self._key = ""
 
     def load(
@@ -61,7 +61,7 @@ class Worlds:
         make: Callable[["carla.Client"], "carla.World"],
         key: str,
     ) -> None:
-        """Load a world, unless the same one is there still."""
+        """Load a world, unless it is loaded already."""
         present = client.get_world()
         if key != self._key or present.id != self._id:
             self.take(make(client))
@@ -69,7 +69,7 @@ class Worlds:
 
 
 class Town:
-    """One of the server's own maps.
+    """A map of the server.
 
     Args:
         name: of it, without its folder.
@@ -84,7 +84,7 @@ class Town:
 
 
 class Generated:
-    """Roads of ours.
+    """A world generated from OpenDRIVE roads.
 
     Args:
         model: them.
@@ -100,7 +100,7 @@ class Generated:
         self.key = hashlib.sha256(self._text.encode()).hexdigest()
 
     def __call__(self, client: "carla.Client") -> "carla.World":
-        """Have the server make a world of them: a mesh of the road, no walls, nobody in it."""
+        """Have the server generate the world: a mesh of the road, no walls, no actors."""
         import carla
 
         return client.generate_opendrive_world(
@@ -118,7 +118,7 @@ class Generated:
 
 
 def loader(model: OpenDrive, file: str, wanted: str, known: list[str]) -> Town | Generated:
-    """Return what loads the roads of a scenario.
+    """Return the loader of a scenario's roads.
 
     Args:
         model: them.
@@ -141,7 +141,7 @@ def loader(model: OpenDrive, file: str, wanted: str, known: list[str]) -> Town |
 
 
 def check(roads: "carla.Map", way: Float, name: str) -> None:
-    """Make sure that a route is where the server's map has lanes.
+    """Check that a route lies on lanes of the server's map.
 
     Args:
         roads: the server's.

@@ -1,8 +1,8 @@
-"""What esmini reads: the scenario as it is handed over, with the values of a row written into it.
+"""What esmini reads: the scenario as it is exported, with the values of a row.
 
-Whoever a driver of ours drives has esmini's ExternalController there, from the start on: it
-stays where it is told that it is. No other entity has a controller, for esmini does not know
-those that our files name. Expressions are worked out here: esmini keeps six digits of theirs.
+An entity with a driver of BridgeGen has esmini's ExternalController from the start: it keeps the
+state that it is given. No other entity has a controller, since esmini does not know those that
+BridgeGen's files name. Expressions are evaluated here: esmini keeps six digits of its results.
 """
 
 import tempfile
@@ -31,7 +31,7 @@ _EXTERNAL = "ExternalController"
 
 
 class Folder:
-    """A folder for files that nobody needs once this object is gone.
+    """A temporary folder that is removed with this object.
 
     Attributes:
         path: of it.
@@ -70,9 +70,9 @@ class RoadFiles:
 
 
 def _bare(model: OpenDrive) -> OpenDrive:
-    """Return a map without scenery, and without where on the globe it is.
+    """Return a map without scenery and geo-reference.
 
-    Nobody's motion depends on either, and esmini calls most kinds of both errors.
+    They do not affect motion, and esmini reports most kinds of them as errors.
     """
     header = replace(model.header, geo_reference=None, offset=None)
     roads = tuple(replace(road, objects=()) for road in model.roads)
@@ -83,7 +83,7 @@ class ScenarioFile:
     """A storyboard as esmini is to run it.
 
     Args:
-        storyboard: as it is handed over.
+        storyboard: as it is exported.
         driven: the names of the entities that drivers of ours drive.
     """
 
@@ -108,7 +108,7 @@ class ScenarioFile:
 
         Args:
             roads: the file of it.
-            course: who is where when on it, see `Simulator.roads`.
+            course: positions over time on it, see `Simulator.roads`.
         """
         root = etree.fromstring(self._data)
         for network in root.iterfind("./RoadNetwork/LogicFile"):
@@ -170,7 +170,7 @@ def _expression(text: str) -> Expr | None:
 
 
 def _worked_out(expression: Expr, values: Mapping[str, float]) -> str:
-    """Return what an expression comes to; itself, where it is not for us to say."""
+    """Return the value of an expression; the expression itself if it cannot be evaluated here."""
     if not expression.names <= values.keys():
         return str(expression)
     with np.errstate(all="ignore"):
@@ -195,7 +195,7 @@ def _named(event: Node) -> list[Node]:
 
 
 def _drive_from_outside(root: Node, name: str) -> None:
-    """Give an entity the controller that waits to be told, whatever the file does to its own."""
+    """Give an entity the controller for external states, whatever controller the file assigns."""
     for private in root.iterfind("./Storyboard/Init/Actions/Private"):
         if private.get("entityRef") == name:
             for action in [*private.iterfind("./PrivateAction/ControllerAction")]:

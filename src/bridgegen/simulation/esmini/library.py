@@ -1,7 +1,7 @@
-"""esmini's library: the few of its functions that are needed, with their types.
+"""The functions of esmini's library that are used, with their types.
 
 It holds one scenario at a time for the whole process, and what it cannot do may end the process; so
-it is loaded in processes of its own (`seat.py`), never in the one that searches.
+it is loaded in processes of its own (`process.py`), never in the one that searches.
 
 Source: esminiLib.hpp of esmini 3.6, https://github.com/esmini/esmini (MPL-2.0).
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 from bridgegen.errors import InputError
 
 OLDEST = 3
-"""The oldest major version whose functions and structures are these."""
+"""The oldest major version with these functions and structures."""
 
 EVENT, RUNNING = 6, 2  # StoryBoardElement::ElementType and ::State
 
@@ -23,7 +23,7 @@ _Changed = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_int, ctypes.c_int, c
 
 
 class _State(ctypes.Structure):
-    """SE_ScenarioObjectState; what a later version adds at its end finds room."""
+    """SE_ScenarioObjectState, with room for fields that a later version appends."""
 
     _fields_ = [
         *((name, ctypes.c_int) for name in ("id", "model_id", "ctrl_type")),
@@ -96,7 +96,7 @@ class Library:
         self._callback: object = None  # is called while the scenario runs, so it must live
 
     def _version(self) -> str:
-        """Return what the library says that it is; Windows' does not tell."""
+        """Return the version of the library; on Windows it is unknown."""
         for name in ("ESMINI_GIT_TAG", "ESMINI_BUILD_VERSION"):
             try:
                 said = ctypes.c_char_p.in_dll(self._functions, name).value
@@ -107,12 +107,12 @@ class Library:
         return "unknown"
 
     def begin(self, scenario: Path, log: Path, began: Callable[[str], None]) -> bool:
-        """Load a scenario and set its first instant; return whether that went well.
+        """Load a scenario and set its first instant; return whether that succeeded.
 
         Args:
             scenario: the ``.xosc`` file.
             log: the file to write its log to.
-            began: is told the path of each event that begins.
+            began: is called with the path of each event that starts.
         """
         call = self._functions
         call.SE_LogToConsole(False)
@@ -130,11 +130,11 @@ class Library:
         return bool(call.SE_Init(str(scenario).encode(), 0, 0, 0, 0) == 0)
 
     def close(self) -> None:
-        """End the scenario; its log is complete then."""
+        """End the scenario and complete its log."""
         self._functions.SE_Close()
 
     def step(self, seconds: float) -> None:
-        """Look at all conditions, act, and move everybody on."""
+        """Evaluate all conditions, execute actions, and move all entities."""
         self._functions.SE_StepDT(seconds)
 
     @property
@@ -144,11 +144,11 @@ class Library:
 
     @property
     def time(self) -> float:
-        """Of the simulation [s]."""
+        """Return the simulation time [s]."""
         return float(self._functions.SE_GetSimulationTime())
 
     def number(self, name: str) -> int:
-        """Return the number of an entity; -1 if it is not there."""
+        """Return the number of an entity; -1 if it does not exist."""
         return int(self._functions.SE_GetIdByName(name.encode()))
 
     def state(self, number: int) -> tuple[float, float, float, float] | None:
@@ -166,7 +166,7 @@ class Library:
     def report(
         self, number: int, x: float, y: float, h: float, v: float, a: float, turn: float
     ) -> None:
-        """Say where an entity is that somebody else drives.
+        """Set the state of an entity that is driven from outside.
 
         Args:
             number: its own.

@@ -9,7 +9,7 @@ _LONGEST = 300
 def error_in(log: Path) -> str | None:
     """Return the first error that a log tells of; None if there is none, or no log.
 
-    A warning is none: esmini warns of missing 3D models, say.
+    Warnings are ignored: esmini warns of missing 3D models, for example.
     """
     try:
         text = log.read_text(encoding="utf-8", errors="replace")

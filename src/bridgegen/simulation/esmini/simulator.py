@@ -1,4 +1,4 @@
-"""The simulator esmini: rows by one of its processes each, as many at a time as there are cores."""
+"""The simulator esmini: each row runs in a process; as many run at a time as there are cores."""
 
 import os
 import threading
@@ -20,33 +20,33 @@ from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
-from bridgegen.simulation.esmini.seat import Job, Row, Seat
+from bridgegen.simulation.esmini.process import EsminiProcess, EsminiRow, Job
 from bridgegen.simulation.rollout import SIMULATOR_FAILURES, Rollout, joined
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 LIBRARY = "ESMINI_LIB"
-"""The environment variable that names the library, where nothing else does."""
+"""Environment variable with the path of the library, if no option names it."""
 
 ROWS = 16
-"""Rows that a process runs at a time: they share what is to be made ready for them."""
+"""Rows of a chunk: they share their preparation."""
 
 SECONDS = 30.0
-"""esmini may take so long for a step, or to load a scenario with its map."""
+"""Time limit for a step of esmini, and for loading a scenario with its map [s]."""
 
 
 STEPS = 1
-"""Steps of esmini's that make one of ours, by default."""
+"""Default number of esmini's steps per time step of the scenario."""
 
 MOST_STEPS = 100
 
 
 def library_of(access: Mapping[str, object]) -> Path:
-    """Return the path of the library: what the option says, or the environment.
+    """Return the path of the library from the option or the environment.
 
     Raises:
-        InputError: neither says one.
+        InputError: neither is set.
     """
     named = access.get("--esmini-lib") or os.environ.get(LIBRARY)
     if not named:
@@ -58,7 +58,7 @@ def library_of(access: Mapping[str, object]) -> Path:
 
 
 def steps_of(settings: Mapping[str, object]) -> int:
-    """Return how many steps of esmini's make one of ours.
+    """Return the number of esmini's steps per time step of the scenario.
 
     Raises:
         InputError: out of range.
@@ -73,11 +73,11 @@ def steps_of(settings: Mapping[str, object]) -> int:
 
 
 class EsminiRoads(NamedTuple):
-    """Road networks, made ready.
+    """Road networks for both simulators.
 
     Attributes:
-        network: as ours.
-        files: as esmini's.
+        network: for the embedded simulator.
+        files: for esmini.
     """
 
     network: Network
@@ -85,23 +85,23 @@ class EsminiRoads(NamedTuple):
 
 
 class EsminiSimulator(AroundEmbedded):
-    """A `Simulator` that has esmini run the storyboard, and our drivers whom they drive.
+    """A `Simulator`: esmini runs the storyboard, BridgeGen's drivers drive their vehicles.
 
-    Where the storyboard moves the ego, esmini's own controller does.
+    If the storyboard moves the ego, esmini's default controller does.
 
     Args:
         embedded: the embedded one of the same storyboard and driver.
         storyboard: the scenario file, validated.
         library: the path of esmini's library.
-        steps: how many of its steps make one of ours.
-        seconds: that it may take for a step, or to load a scenario.
+        steps: number of its steps per time step of the scenario.
+        seconds: time limit for a step, and for loading a scenario [s].
 
     Attributes:
         embedded: see `Simulator`.
-        version: of esmini, as its library says.
+        version: of esmini.
 
     Raises:
-        InputError: the library is not there, is none of esmini's, or is too old; or a number is out
+        InputError: the library does not exist, is not esmini's, or is too old; or a number is out
             of range.
     """
 
@@ -124,11 +124,11 @@ class EsminiSimulator(AroundEmbedded):
         self._job = Job(embedded, ScenarioFile(storyboard, names), driven, steps)
         self._library, self._seconds = library, seconds + slow
         self._lock, self._is_stopped = threading.Lock(), threading.Event()
-        self._seats: list[Seat] = []
-        self._idle: list[Seat] = []
-        with self._seat() as seat:
-            seat.start()
-            self.version = seat.version
+        self._processes: list[EsminiProcess] = []
+        self._idle: list[EsminiProcess] = []
+        with self._idle_process() as process:
+            process.start()
+            self.version = process.version
 
     @property
     def rows_at_once(self) -> int:
@@ -143,7 +143,7 @@ class EsminiSimulator(AroundEmbedded):
     def roads(
         self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
     ) -> EsminiRoads:
-        """See `Simulator`: as the embedded one has them, and as files."""
+        """See `Simulator`: for the embedded simulator, and as files."""
         return EsminiRoads(self.embedded.roads(models, courses), RoadFiles(models, courses))
 
     def run(
@@ -155,53 +155,53 @@ class EsminiSimulator(AroundEmbedded):
         driver: Driver | None = None,
         dry: bool = False,
     ) -> Rollout:
-        """See `Simulator`: one row after the other, in a process of this call's own.
+        """See `Simulator`: one row after the other, in a process that only this call uses.
 
         Raises:
-            InputError: see `Simulator`; or a user's driver that cannot be made.
-            CallError: it has been stopped.
+            InputError: see `Simulator`; or the user's driver cannot be created.
+            CallError: the simulator has been stopped.
         """
         n = len(rows)
         if n == 0:
             return self.embedded.run(roads.network, rows, values)
         if not (rows.min() >= 0 and rows.max() < roads.network.n_networks):
             raise InputError(f"rows must name one of {roads.network.n_networks} road networks")
-        self.embedded.program.fill(values, n)  # says what is not finite
+        self.embedded.program.fill(values, n)  # checks that all values are finite
         columns = {name: np.broadcast_to(one, n) for name, one in values.items()}
         parts: list[tuple[Int, Rollout]] = []
-        with self._seat() as seat:
+        with self._idle_process() as process:
             for i, network in enumerate(rows.tolist()):
                 taken = {name: float(column[i]) for name, column in columns.items()}
-                row = Row(network, taken, driver, dry)
-                parts.append((np.array([i]), self._one(seat, roads, row)))
+                row = EsminiRow(network, taken, driver, dry)
+                parts.append((np.array([i]), self._run_row(process, roads, row)))
         return joined(parts) if n > 1 else parts[0][1]
 
     def stop(self) -> None:
         """See `Simulator`."""
         self._is_stopped.set()
         with self._lock:
-            for seat in self._seats:
-                seat.kill()
+            for process in self._processes:
+                process.kill()
 
-    def _one(self, seat: Seat, roads: EsminiRoads, row: Row) -> Rollout:
+    def _run_row(self, process: EsminiProcess, roads: EsminiRoads, row: EsminiRow) -> Rollout:
         try:
-            return seat.run(roads, row)
+            return process.run(roads, row)
         except CallError as error:
-            if self._is_stopped.is_set() or error.kind == "raised":  # a fault of ours
+            if self._is_stopped.is_set() or error.kind == "raised":  # an error of BridgeGen
                 raise
             status = SIMULATOR_FAILURES[error.kind]
             return self.embedded.failed(roads.network, row.network, row.values, status, str(error))
 
     @contextmanager
-    def _seat(self) -> "Iterator[Seat]":
-        """Lend a process that nobody else uses."""
+    def _idle_process(self) -> "Iterator[EsminiProcess]":
+        """Reserve a process."""
         with self._lock:
             if not self._idle:
-                self._seats.append(Seat(self._library, self._job, self._seconds))
-                self._idle.append(self._seats[-1])
-            seat = self._idle.pop()
+                self._processes.append(EsminiProcess(self._library, self._job, self._seconds))
+                self._idle.append(self._processes[-1])
+            process = self._idle.pop()
         try:
-            yield seat
+            yield process
         finally:
             with self._lock:
-                self._idle.append(seat)
+                self._idle.append(process)

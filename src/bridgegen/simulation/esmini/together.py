@@ -1,12 +1,11 @@
-"""One row: esmini runs the storyboard, and drivers of ours drive the ego and others in it.
+"""One row: esmini runs the storyboard, and BridgeGen's drivers drive the ego and others in it.
 
-At instant k esmini's participants are where they are, and so are those that we drive. The drivers
-are asked, and the next places of those are known; esmini looks at its conditions at k, with all of
-them, and moves everybody on, in steps that may be finer than ours. In between, who is driven is
-where a line from its place to the next one leads.
+At instant k the states of all participants are known. The drivers compute the next states of their
+vehicles; esmini evaluates its conditions at k and moves all participants, in steps that may be
+finer than the scenario's. Between two instants the states of driven vehicles are interpolated.
 
-What the storyboard has a driven participant do, our reading of the storyboard does: esmini takes
-such an action to be over at once.
+Actions of driven participants are executed by the embedded simulator's storyboard: esmini regards
+them as complete at once.
 """
 
 import math
@@ -20,14 +19,14 @@ from bridgegen.simulation.embedded.co_simulation import CoSimulation
 from bridgegen.simulation.esmini.library import Library
 
 SAME = 1e-3
-"""Sizes [m] that differ by less are the same."""
+"""Sizes that differ by less are equal [m]."""
 
 SOON = 1e-6
-"""A share of a step by which a time may be late, for rounding."""
+"""Tolerance of a time as a share of a step, for rounding."""
 
 
 class EsminiError(Exception):
-    """What esmini cannot do."""
+    """A scenario that esmini cannot run."""
 
 
 def run_together(
@@ -129,7 +128,7 @@ class _Row:
                 self._move_on(k)
 
     def _impose(self, k: int) -> None:
-        """Tell the driver where esmini's participants are."""
+        """Pass the states of esmini's participants to the drivers."""
         bodies, states, present = [], [], []
         late = k * self._joint.time_step - self._library.time if self._library.is_over else 0.0
         there = self._joint.present(k)
@@ -154,7 +153,7 @@ class _Row:
         self._joint.impose(k, bodies, states)
 
     def _move_on(self, k: int) -> None:
-        """Take esmini the rest of the way to the next instant; it has made one step."""
+        """Step esmini to the next instant; it has made one step."""
         here, there = self._joint.states(k), self._joint.states(k + 1)
         for i in range(1, self._steps):
             self._report(k, here + i / self._steps * (there - here))
@@ -163,7 +162,7 @@ class _Row:
                 return  # seen at the next instant
 
     def _report(self, k: int, states: Float) -> None:
-        """Tell esmini where those are that we drive, ``(E, 4)``."""
+        """Pass the states of driven entities, ``(E, 4)``, to esmini."""
         there = self._joint.present(k)
         for e in self._driven:
             if there[e] and self._numbers[e] >= 0:

@@ -18,7 +18,7 @@ from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulate import simulate_file
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
-from bridgegen.simulation.esmini import seat
+from bridgegen.simulation.esmini import process
 from bridgegen.simulation.esmini.simulator import EsminiSimulator
 
 from ..embedded.storyboards import (
@@ -57,7 +57,7 @@ def made(library, steps=1, seconds=30.0, others=None, text=TEXT):
 @pytest.fixture
 def library(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.setattr(seat, "PROGRAM", "stand_in_esmini")
+    monkeypatch.setattr(process, "PROGRAM", "stand_in_esmini")
     warm = tmp_path / "warm.xosc"
     warm.write_text(TEXT)
     (tmp_path / "map.xodr").write_bytes(to_xml(crossroads()))
@@ -138,9 +138,9 @@ def test_whoever_is_killed_leaves_nothing_behind(library, tmp_path):
         "from bridgegen.openx.logic_file import roads_of\n"
         "from bridgegen.openx.openscenario.read import read\n"
         "from bridgegen.simulation.embedded.simulator import EmbeddedSimulator\n"
-        "from bridgegen.simulation.esmini import seat\n"
+        "from bridgegen.simulation.esmini import process\n"
         "from bridgegen.simulation.esmini.simulator import EsminiSimulator\n"
-        "seat.PROGRAM = 'stand_in_esmini'\n"
+        "process.PROGRAM = 'stand_in_esmini'\n"
         f"path = Path({str(tmp_path / 'warm.xosc')!r})\n"
         "scenario = read(path)\n"
         "embedded = EmbeddedSimulator(scenario, 'x', driver=DRIVERS['route-follower'])\n"

@@ -1,6 +1,6 @@
-"""A process in which esmini runs scenarios, one after the other, with our driver beside it.
+"""A process in which esmini runs scenarios, one after the other, with BridgeGen's driver.
 
-esmini keeps what it holds in variables of the whole process, and may hang, crash or end it.
+esmini has global state, and may hang, crash or end its process.
 """
 
 import sys
@@ -15,7 +15,7 @@ from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 from bridgegen.simulation.esmini.library import Library
 from bridgegen.simulation.esmini.log import error_in
 
-if TYPE_CHECKING:  # the process greets as soon as it has the library
+if TYPE_CHECKING:  # the process answers as soon as it has loaded the library
     from bridgegen.ego import Driver
     from bridgegen.simulation.embedded.own_drivers import Layout
     from bridgegen.simulation.embedded.places.network import Network
@@ -23,27 +23,27 @@ if TYPE_CHECKING:  # the process greets as soon as it has the library
     from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
     from bridgegen.simulation.rollout import Rollout
 
-PROGRAM = "bridgegen.simulation.esmini.seat"
-"""What the process runs: this module."""
+PROGRAM = "bridgegen.simulation.esmini.process"
+"""The module that the process runs: this one."""
 
 START_SECONDS = 60.0
-"""The library may take so long to be loaded."""
+"""Time limit for loading the library [s]."""
 
 WARM_SECONDS = 900.0
-"""Our part may take so long to be compiled, where that has not been done before."""
+"""Time limit for the compilation of kernels [s]."""
 
 LOG, SCENARIO = "esmini.log", "row.xosc"
-"""Files in a seat's folder: of the row that runs."""
+"""Files of the current row in the folder of the process."""
 
 
 class Job(NamedTuple):
-    """What the rows of a simulator have in common.
+    """The data that all rows of a simulator share.
 
     Attributes:
-        embedded: the storyboard and the driver, as ours.
-        scenario: the storyboard, as esmini's.
-        driven: the numbers of the entities that drivers of ours drive.
-        steps: of esmini's that make one of ours.
+        embedded: the storyboard and the driver in the embedded simulator.
+        scenario: the storyboard for esmini.
+        driven: the numbers of the entities with drivers of BridgeGen.
+        steps: steps of esmini per time step of the scenario.
     """
 
     embedded: "EmbeddedSimulator"
@@ -52,14 +52,14 @@ class Job(NamedTuple):
     steps: int
 
 
-class Row(NamedTuple):
-    """What a row has of its own.
+class EsminiRow(NamedTuple):
+    """The data of one row.
 
     Attributes:
         network: the number of its road network.
         values: its parameters.
         driver: another driver, or None.
-        dry: whether the road is.
+        dry: whether the road is dry.
     """
 
     network: int
@@ -68,13 +68,13 @@ class Row(NamedTuple):
     dry: bool
 
 
-class Seat:
-    """This process's side.
+class EsminiProcess:
+    """A process that runs rows; this is the side of its parent.
 
     Args:
-        library: esmini's.
-        job: what it is to run.
-        seconds: that esmini may take for a step, or to load a scenario.
+        library: path of esmini's library.
+        job: what it runs.
+        seconds: time limit for a step of esmini, and for loading a scenario [s].
 
     Attributes:
         version: of esmini.
@@ -88,15 +88,15 @@ class Seat:
         self._folder = Folder()
         self._process = IsolatedProcess(PROGRAM, [str(library), str(self._folder.path)])
         self._shared = SharedArrays()
-        self._roads: object = None  # those that it has been sent
+        self._roads: object = None  # those that the process has
         self._is_warm = False
         self.version = ""
 
     def start(self) -> None:
-        """Begin the process, if it is not running.
+        """Start the process, if it is not running.
 
         Raises:
-            InputError: the library is not what it should be.
+            InputError: the library is not a usable esmini library.
         """
         import numpy as np
 
@@ -110,17 +110,17 @@ class Seat:
         self._roads, self._is_warm = None, False
         self._process.ask("take", self._job, self._layout, seconds=START_SECONDS)
 
-    def run(self, roads: "tuple[Network, RoadFiles]", row: Row) -> "Rollout":
+    def run(self, roads: "tuple[Network, RoadFiles]", row: EsminiRow) -> "Rollout":
         """Return the rollout of a row.
 
         Raises:
-            InputError: the library, or the driver of the user's own, is not what it should be.
+            InputError: the library, or the user's driver, is not usable.
             StorageError: its files cannot be written.
-            CallError: the process died, or did not answer in time.
+            CallError: the process ended, or did not answer in time.
         """
         self.start()
         sent = None if self._roads is roads else roads
-        self._roads = None  # until it is known to have them
+        self._roads = None  # until the process has confirmed them
         try:
             if not self._is_warm:
                 self._process.ask("warm", sent, row.network, seconds=WARM_SECONDS)
@@ -131,8 +131,8 @@ class Seat:
         except CallError as error:
             if error.kind in REFUSALS:
                 raise REFUSALS[error.kind](str(error)) from None
-            if said := error_in(self._folder.path / LOG):
-                raise type(error)(error.kind, f"{error}; its log: {said}") from None
+            if problem := error_in(self._folder.path / LOG):
+                raise type(error)(error.kind, f"{error}; its log: {problem}") from None
             raise
         self._roads = roads
         return rollout
@@ -142,20 +142,20 @@ class Seat:
         self._process.kill()
 
 
-# --- In the other process -------------------------------------------------------------------------
+# --- In the esmini process ------------------------------------------------------------------------
 
 REFUSALS: dict[str, type[BridgeGenError]] = {
     one.__name__: one for one in (InputError, StorageError)
 }
-"""What the user is told as it is, whichever process finds it."""
+"""Errors that are passed to the user unchanged, whichever process raises them."""
 
 
 LEFT: set[Path] = set()
-"""Folders, and a file, that nobody needs once the process that asks is gone."""
+"""Folders, and a file, to remove when the parent process has ended."""
 
 
 def clear() -> None:
-    """Remove what a process that was killed could not."""
+    """Remove the files that a killed parent process left behind."""
     for path in LEFT:
         if path.is_dir():
             rmtree(path, ignore_errors=True)
@@ -164,16 +164,16 @@ def clear() -> None:
 
 
 def answering(path: str, folder: str) -> tuple[str, Answer]:
-    """Load the library; return its version, and the answers."""
+    """Load the library; return its version, and the function that answers requests."""
     library = Library(Path(path))
     return library.version, Answers(library, Path(folder)).answer
 
 
 class Answers:
-    """What the process answers.
+    """Answers the requests to the process.
 
     Args:
-        library: esmini's.
+        library: of esmini.
         folder: for its files.
     """
 
@@ -182,7 +182,7 @@ class Answers:
         LEFT.add(folder)
 
     def answer(self, what: str, *rest: Any) -> Any:
-        """Answer a request: to take a job, to warm up for it, to run a row of it."""
+        """Answer a request: take a job, warm up for it, or run a row of it."""
         answers: dict[str, Answer] = {"take": self._take, "warm": self._warm, "run": self._run}
         try:
             return answers[what](*rest)
@@ -204,7 +204,7 @@ class Answers:
             self._template = cache(partial(_template, self._job.scenario, files))
 
     def _warm(self, roads: "tuple[Network, RoadFiles] | None", network: int) -> None:
-        """Have compiled, or loaded, what a row needs of ours: that is not esmini's time."""
+        """Compile or load the kernels that a row needs; esmini's time limit excludes it."""
         from bridgegen.ego import DRIVERS
 
         self._hold(roads)
@@ -218,7 +218,7 @@ class Answers:
                 return
             joint.move(k, *joint.demand(k))
 
-    def _run(self, roads: "tuple[Network, RoadFiles] | None", row: Row) -> "Rollout":
+    def _run(self, roads: "tuple[Network, RoadFiles] | None", row: EsminiRow) -> "Rollout":
         from bridgegen.ego.driver_process import DriverError
         from bridgegen.simulation.esmini.together import EsminiError, run_together
         from bridgegen.simulation.rollout import FAILURES, SIMULATOR_FAILURES
@@ -229,7 +229,7 @@ class Answers:
         program = job.embedded.program
         known = {name: value for name, value in row.values.items() if name in program.parameters}
         self._template(row.network).write(scenario, {**program.parameters, **known})
-        said, joint = None, None
+        problem, joint = None, None
         try:
             joint = job.embedded.co_simulation(
                 self._network, row.network, row.values, driver=row.driver, dry=row.dry
@@ -241,12 +241,12 @@ class Answers:
                     steps=job.steps, alive=self._alive,
                 )  # fmt: skip
         except EsminiError as error:
-            said = str(error)
+            problem = str(error)
         except DriverError as error:
             return _failed(job, self._network, row, FAILURES[error.kind], str(error))
         logged = error_in(log)
-        if logged or said:
-            message = ": ".join(filter(None, (said, logged)))
+        if logged or problem:
+            message = ": ".join(filter(None, (problem, logged)))
             return _failed(job, self._network, row, SIMULATOR_FAILURES["raised"], message)
         assert joint is not None
         return joint.rollout()
@@ -260,7 +260,7 @@ def _template(scenario: "ScenarioFile", files: "RoadFiles", network: int) -> Any
     return scenario.on(files.paths[network], course)
 
 
-def _failed(job: Job, network: "Network", row: Row, status: int, message: str) -> "Rollout":
+def _failed(job: Job, network: "Network", row: EsminiRow, status: int, message: str) -> "Rollout":
     return job.embedded.failed(network, row.network, row.values, status, message)
 
 
