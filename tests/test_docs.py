@@ -39,8 +39,9 @@ def test_every_scenario_has_its_picture(make, name):
 
 def test_the_language_is_described(make):
     from bridgegen.odd.schema import ScenarioFile
-    from bridgegen.odd.story import CONDITIONS, TYPES
+    from bridgegen.odd.story import CONDITIONS
     from bridgegen.odd.story_schema import EventSection, WaypointSection
+    from bridgegen.participants import TYPES
 
     text = (DOCS / "scenarios.md").read_text("utf-8")
     for kind in CONDITIONS:

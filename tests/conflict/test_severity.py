@@ -24,13 +24,13 @@ from bridgegen.ego.kinds import (
     BICYCLE,
     BUS,
     CAR,
-    MOTORBIKE,
+    MOTORCYCLE,
     NAMES,
     OTHER,
     PEDESTRIAN,
     TRUCK,
 )
-from bridgegen.odd.bodies import BODIES
+from bridgegen.participants import PARTICIPANTS
 
 KMH, MPH = 1 / 3.6, 0.44704  # m/s
 
@@ -43,7 +43,7 @@ KMH, MPH = 1 / 3.6, 0.44704  # m/s
         (CAR, "car"),
         (TRUCK, "truck"),
         (BUS, "bus"),
-        (MOTORBIKE, "motorcycle"),
+        (MOTORCYCLE, "motorcycle"),
         (BICYCLE, "bicycle"),
         (PEDESTRIAN, "pedestrian"),
         (ANIMAL, "animal"),
@@ -51,13 +51,13 @@ KMH, MPH = 1 / 3.6, 0.44704  # m/s
     ],
 )
 def test_masses_are_those_of_the_exported_storyboards(kind, body):
-    assert MASS[kind] == BODIES[body].mass
+    assert MASS[kind] == PARTICIPANTS[body].body.mass
 
 
 # Published points.
 
 
-@pytest.mark.parametrize(("kind", "kmh"), [(PEDESTRIAN, 29.0), (BICYCLE, 44.0), (MOTORBIKE, 48.0)])
+@pytest.mark.parametrize(("kind", "kmh"), [(PEDESTRIAN, 29.0), (BICYCLE, 44.0), (MOTORCYCLE, 48.0)])
 def test_ten_percent_of_lubbe(kind, kmh):
     """Lubbe et al. (2022), abstract: 10 % MAIS3+ at these closing speeds, in whole km/h."""
     below, above = p_mais3(kind, np.array([kmh - 1.0, kmh + 1.0]) * KMH, FRONT)
@@ -247,7 +247,7 @@ def test_a_speed_below_zero():
 # Laws.
 
 KINDS = st.integers(0, len(NAMES) - 1)
-WITH_PERSONS = st.sampled_from([CAR, TRUCK, BUS, MOTORBIKE, BICYCLE, PEDESTRIAN])
+WITH_PERSONS = st.sampled_from([CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN])
 SIDES = st.integers(0, len(DIRECTIONS) - 1)
 SPEEDS = st.floats(0.0, 80.0)  # m/s
 TANGENTIAL = st.floats(-80.0, 80.0)

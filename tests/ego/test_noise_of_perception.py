@@ -8,13 +8,12 @@ import pytest
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
 from bridgegen.ego import _weather_columns as column
+from bridgegen.ego._kind_tables import LAMPS, REFLECTANCE
 from bridgegen.ego._physics_kernels import (
     DROPOUT_TIME,
     ERROR_TIME,
     HEADING_ERROR,
-    LAMPS,
     MOUNT,
-    REFLECTANCE,
     veil,
 )
 from bridgegen.ego.detections import BOTH, CAMERA, HEADING, KIND, LENGTH, LIDAR, SEEN_BY, X, Y

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import InputError, ScenarioError
-from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.starter import start_scenario
+from bridgegen.participants import PARTICIPANTS
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_a_default_of_an_included_parameter(own):
 
 def test_bodies_in_one_lane_need_their_lengths(own):
     """A car ahead of a car: the rear of the one, the front of the other, and 0.4 m."""
-    car = BODIES["car"]
+    car = PARTICIPANTS["car"].body
     needed = car.rear + car.front + 0.4
     assert needed == pytest.approx(5.0)
     third = "  other: # car"
@@ -84,7 +84,7 @@ def test_a_jam_moves_as_one(own):
     tail, room, second, third = (
         X[:, space.index(name)] for name in ("tail", "room", "queue_2_at", "queue_3_at")
     )
-    car, truck = BODIES["car"], BODIES["truck"]
+    car, truck = PARTICIPANTS["car"].body, PARTICIPANTS["truck"].body
     np.testing.assert_allclose(second - truck.rear - (tail + car.front), room, atol=1e-9)
     np.testing.assert_allclose(third - car.rear - (second + truck.front), room, atol=1e-9)
 

@@ -22,7 +22,7 @@ def test_the_catalogues_vehicles_are_attentive_but_for_the_papers():
             one.name
             for one in scenario.participants
             if one.name != "ego"
-            and one.kind in ("vehicle", "bicycle", "pedestrian")
+            and one.conduct in ("vehicle", "bicycle", "pedestrian")
             and (one.speed != 0.0 or one.name in {event.participant for event in scenario.events})
         }
         wanted = "scripted" if name in PAPERS else "attentive"

@@ -77,8 +77,8 @@ from bridgegen.conflict._limits import (
     STOOD,
     TURN_TIME,
 )
-from bridgegen.conflict._type_kernels import is_vulnerable, strikes_with_front, turns
-from bridgegen.ego.kinds import ANIMAL, BICYCLE, PEDESTRIAN
+from bridgegen.conflict._type_kernels import strikes_with_front, turns
+from bridgegen.ego._kind_tables import IS_ANIMAL, IS_CYCLE, IS_PEDESTRIAN, IS_VULNERABLE
 
 
 @kernel
@@ -88,7 +88,7 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     ``at`` is the instant of the contact, or k itself; ``own`` the ego's zone, ``own_part`` [m/s]
     its share of the closing speed; ``appears``: one of the two is put into the other.
     """
-    on_foot = is_vulnerable(scene.kinds[e])
+    on_foot = IS_VULNERABLE[scene.kinds[e]]
     entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk = visible_from(scene, e, entry, k)
     since = risk
@@ -160,14 +160,14 @@ def rule_of(claim):
 def of_vulnerable(scene, e, k, kind, avoidable, whole):
     """Decide where the ego and a pedestrian, a cyclist or an animal meet."""
     what = scene.kinds[e]
-    if what == PEDESTRIAN:
+    if IS_PEDESTRIAN[what]:
         since = on_crosswalk_since(scene, e, k)
         if since <= k:
             since = visible_from(scene, e, since, k)
             could = braked(scene, 0, e, since, since, BRAKING) == CLEAR
             whole[DECIDED], whole[PREVENTABLE] = since, could
             return (EGO, CROSSWALK) if could else (NOBODY, STEPPED_OUT)
-    if what == BICYCLE:
+    if IS_CYCLE[what]:
         claim = scene.claims[e]
         if claim < 0:
             return EGO, rule_of(claim)
@@ -179,17 +179,17 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
             return EGO, LEFT_ITS_LANE
         if claim > 0 and not avoidable:
             return OTHER, rule_of(claim)
-    if what == PEDESTRIAN and avoidable:
+    if IS_PEDESTRIAN[what] and avoidable:
         mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
         if mine:
             return EGO, TURNING_GIVES_WAY
     if kind == VRU_INTO_SIDE:
-        if what != ANIMAL and ego_moved(scene, k, side_of(scene, e, k)):
+        if not IS_ANIMAL[what] and ego_moved(scene, k, side_of(scene, e, k)):
             return EGO, LEFT_ITS_LANE
-        return (NOBODY if what == ANIMAL else OTHER), INTO_THE_SIDE
+        return (NOBODY if IS_ANIMAL[what] else OTHER), INTO_THE_SIDE
     if avoidable:
         return EGO, COULD_HAVE_STOPPED
-    return (NOBODY if what == ANIMAL else OTHER), STEPPED_OUT
+    return (NOBODY if IS_ANIMAL[what] else OTHER), STEPPED_OUT
 
 
 @kernel

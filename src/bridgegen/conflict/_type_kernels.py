@@ -30,13 +30,7 @@ from bridgegen.conflict._limits import (
     TURN_TIME,
     TURNS,
 )
-from bridgegen.ego.kinds import ANIMAL, BICYCLE, OTHER, PEDESTRIAN
-
-
-@kernel
-def is_vulnerable(kind):
-    """Say whether a kind of body is a vulnerable road user, or an animal."""
-    return kind in (PEDESTRIAN, BICYCLE, ANIMAL)
+from bridgegen.ego._kind_tables import IS_OBSTACLE, IS_VULNERABLE
 
 
 @kernel
@@ -94,9 +88,9 @@ def type_of(e, first, n, k, dt, kinds, c, s, own, its, own_part, stood):
     cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
     if stood > 0.0:
         return EGO_STANDING
-    if is_vulnerable(kinds[e]):
+    if IS_VULNERABLE[kinds[e]]:
         return VRU_BY_FRONT if strikes_with_front(own, own_part) else VRU_INTO_SIDE
-    if kinds[e] == OTHER:
+    if IS_OBSTACLE[kinds[e]]:
         return OBJECT
     mine, theirs = turns(c, s, e, first, n, k, dt)
     if cosine >= SAME_WAY:

@@ -12,7 +12,7 @@ from bridgegen.conflict import _codes as codes
 from bridgegen.conflict import severity as injury
 from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
 from bridgegen.conflict.types import ConflictType, Responsible, Rule, Zone
-from bridgegen.ego.kinds import OTHER
+from bridgegen.ego._kind_tables import IS_OBSTACLE
 from bridgegen.metrics.metric import recorded, shared
 from bridgegen.metrics.motion import motion
 from bridgegen.simulation.rollout import Rollout
@@ -167,7 +167,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
         kind_a, kind_b = own[entities], other[entities]
         normal = real[rows, entities, codes.ACROSS]
         tangential = real[rows, entities, codes.ALONG]
-        fixed = (kind_b == OTHER) & _never_moves(rollout)[rows, entities]
+        fixed = np.array(IS_OBSTACLE)[kind_b] & _never_moves(rollout)[rows, entities]
         harm[rows, entities] = injury.severity(
             kind_a, kind_b, normal, tangential,
             _DIRECTION[whole[rows, entities, codes.ZONE_EGO]],

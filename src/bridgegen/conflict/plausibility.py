@@ -8,17 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
-from bridgegen.ego.kinds import (
-    ANIMAL,
-    BICYCLE,
-    BUS,
-    CAR,
-    MOTORBIKE,
-    OTHER,
-    PEDESTRIAN,
-    TRUCK,
-)
+from bridgegen.ego.kinds import OTHER
 from bridgegen.metrics.metric import distance, recorded, steps
+from bridgegen.participants import OBJECT_CLASSES
 from bridgegen.simulation.rollout import Rollout
 
 GRAVITY = 9.81
@@ -38,16 +30,20 @@ Brakes of cars take 0.2 s to 0.4 s to build up: Breuer and Bill, Bremsenhandbuch
 that is done within less, as scripts do, differs little from one that a body can do.
 """
 
-LIMITS: dict[int, tuple[float, float, float, float, float, float]] = {
-    CAR: (8.0, 11.0, 0.32, GRAVITY, SLIP, 0.0),
-    TRUCK: (3.0, 8.0, 0.2, 0.5 * GRAVITY, SLIP, 0.0),
-    BUS: (3.0, 8.0, 0.2, 0.5 * GRAVITY, SLIP, 0.0),
-    MOTORBIKE: (10.0, 11.0, 0.5, GRAVITY, SLIP, 0.0),
-    BICYCLE: (3.0, 7.0, 1.0, 0.7 * GRAVITY, SLIP, 0.0),
-    PEDESTRIAN: (8.0, 8.0, inf, inf, inf, 0.0),
-    ANIMAL: (13.0, 13.0, inf, inf, inf, 0.0),
-    OTHER: (inf, inf, inf, inf, inf, 1.0),
-}
+LIMITS: Float = np.array(
+    [
+        (
+            one.limits.acceleration,
+            one.limits.deceleration,
+            one.limits.curvature,
+            one.limits.lateral_g * GRAVITY,
+            inf if one.limits.slides else SLIP,
+            one.limits.is_prop,
+        )
+        for one in OBJECT_CLASSES
+    ]
+)
+LIMITS.setflags(write=False)
 """What bodies can do at most, by kind; generous, since a row that exceeds it is left out.
 
 Columns: acceleration and deceleration [m/s²]; curvature of the path of the rear axle [1/m]; lateral
@@ -186,7 +182,7 @@ def plausibility(rollout: Rollout) -> Plausibility:
 
     n, e, _ = rollout.shape
     kinds = rollout.kinds if len(rollout.kinds) else np.full(e, OTHER, np.int64)
-    limits = np.array([LIMITS[kind] for kind in kinds.tolist()])
+    limits = LIMITS[kinds]
     if not len(rollout.kinds):
         limits[:, _plausibility_kernels.IS_PROP] = 0.0
     cosine, sine = rollout.direction

@@ -23,16 +23,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.ego.kinds import (
-    BICYCLE,
-    BUS,
-    CAR,
-    MOTORBIKE,
-    NAMES,
-    OTHER,
-    PEDESTRIAN,
-    TRUCK,
-)
+from bridgegen.ego._kind_tables import IS_OBSTACLE
+from bridgegen.ego.kinds import CAR, NAMES
+from bridgegen.participants import OBJECT_CLASSES
 
 FRONT, REAR, SIDE = range(3)
 """Direction of the force on a vehicle: which end or side of it is struck."""
@@ -40,12 +33,12 @@ FRONT, REAR, SIDE = range(3)
 DIRECTIONS = ("front", "rear", "side")
 """In words, by number."""
 
-MASS: Float = np.array([1500.0, 16000.0, 18000.0, 300.0, 95.0, 75.0, 25.0, 50.0])
+MASS: Float = np.array([one.mass for one in OBJECT_CLASSES])
 """Mass [kg] by `bridgegen.ego.kinds`, as the storyboards that we export give them.
 
 Source: car 1,500 (a van is a ``CAR`` too): default of SUMO; mean of new cars in the EU 1,392 (ICCT,
 European Vehicle Market Statistics 2017/18, section 5), plus a passenger. Truck 16,000 and bus
-18,000: two axles, at most 18,000 (Directive 96/53/EC, Annex I, 2.3.1). Motorbike 300: 200 (SUMO)
+18,000: two axles, at most 18,000 (Directive 96/53/EC, Annex I, 2.3.1). Motorcycle 300: 200 (SUMO)
 and its rider with clothing and luggage. Bicycle 95: rider and a 20 kg bicycle. Pedestrian 75: a
 driver's mass in Regulation (EU) No 1230/2012, Article 2(4). Animal 25 (a roe deer) and other 50 (an
 obstacle that can be pushed): ours. SUMO: documentation, "Vehicle Type Parameter Defaults".
@@ -62,7 +55,7 @@ normal value 0.55, recommended range 0.3 to 1.0.
 _KMH = 3.6  # km/h in 1 m/s
 _MPH = 3600.0 / 1609.344  # mile/h in 1 m/s
 
-AGE = {"pedestrian": 46.0, "bicycle": 39.0, "motorbike": 40.0}
+AGE = {"pedestrian": 46.0, "bicycle": 39.0, "motorcycle": 40.0}
 """Age [years] at which the curves of Lubbe et al. (2022) are taken.
 
 Pedestrians and cyclists: the medians of their sample. Motorcyclists: the age at which their
@@ -115,7 +108,7 @@ _SIDE_TEN_PERCENT = 73.0 / 2.0 / _KMH  # delta-v of equal masses that close at 7
 CURVES = {
     "pedestrian": _lubbe("pedestrian", 2, -6.190, 0.078, 0.038),
     "bicycle": _lubbe("bicycle", 3, -7.467, 0.079, 0.047),
-    "motorbike": _lubbe("motorbike", 4, -4.555, 0.040, 0.011),
+    "motorcycle": _lubbe("motorcycle", 4, -4.555, 0.040, 0.011),
     "front": _FRONT,
     "rear": _wang("A-9, rear-end", -8.0329, 0.1793),
     "side": Curve(
@@ -138,18 +131,18 @@ def _tables() -> tuple[Float, Float]:
     """Return intercepts and slopes, (kinds, directions); without persons, -inf and 0."""
     shape = (len(NAMES), len(DIRECTIONS))
     intercept, slope = np.full(shape, -np.inf), np.zeros(shape)
-    for kind in (PEDESTRIAN, BICYCLE, MOTORBIKE):
-        curve = CURVES[NAMES[kind]]
-        intercept[kind], slope[kind] = curve.intercept, curve.slope
-    for kind in (CAR, TRUCK, BUS):
+    for kind, one in enumerate(OBJECT_CLASSES):
+        if one.injury is None:
+            continue
         for direction, name in enumerate(DIRECTIONS):
-            curve = CURVES[name]
+            curve = CURVES[name if one.injury == "occupant" else one.injury]
             intercept[kind, direction], slope[kind, direction] = curve.intercept, curve.slope
     return intercept, slope
 
 
 _INTERCEPT, _SLOPE = _tables()
-_UNPROTECTED: Bool = np.isin(np.arange(len(NAMES)), (PEDESTRIAN, BICYCLE, MOTORBIKE))
+_IS_OBSTACLE: Bool = np.array(IS_OBSTACLE)
+_UNPROTECTED: Bool = np.array([one.injury not in (None, "occupant") for one in OBJECT_CLASSES])
 
 
 def effective_speed(closing_normal: npt.ArrayLike, closing_tangential: npt.ArrayLike) -> Float:
@@ -216,9 +209,10 @@ def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike)
     5.3 m/s (19 km/h) on: published values are kept where the data are.
 
     Args:
-        kind: ``(N,)`` of `bridgegen.ego.kinds`; nobody is injured in an ``ANIMAL`` or ``OTHER``.
+        kind: ``(N,)`` of `bridgegen.ego.kinds`; nobody is injured where
+            `ObjectClass.injury` is None.
         speed: ``(N,)`` [m/s], ≥ 0: of a car, truck or bus its delta-v; of a pedestrian, bicycle or
-            motorbike the closing speed against a car's front. NaN stays NaN.
+            motorcycle the closing speed against a car's front. NaN stays NaN.
         direction: ``(N,)`` of `FRONT`, `REAR`, `SIDE`: of the force on a car, truck or bus; without
             effect for the others.
 
@@ -338,7 +332,11 @@ def _shares(
 ) -> tuple[Float, Float]:
     """Return each party's share of the closing speed: the inverse masses over their sum."""
     a, b = (
-        np.where((kind == OTHER) & ~np.asarray(movable, dtype=np.bool_), 0.0, 1.0 / MASS[kind])
+        np.where(
+            _IS_OBSTACLE[kind] & ~np.asarray(movable, dtype=np.bool_),
+            0.0,
+            1.0 / MASS[kind],
+        )
         for kind, movable in ((kind_a, movable_a), (kind_b, movable_b))
     )
     total = a + b

@@ -52,10 +52,10 @@ from bridgegen.ego._following_kernels import (
     follow,
     stop_for,
 )
+from bridgegen.ego._kind_tables import IS_ON_FOOT, IS_PEDESTRIAN, IS_VEHICLE, NEEDS_ROOM
 from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._path_kernels import COS, SIN, H, X, Y, locate, project
 from bridgegen.ego._yielding_kernels import COMMITTED, HORIZON, give_way
-from bridgegen.ego.kinds import ANIMAL, BICYCLE, MOTORBIKE, PEDESTRIAN
 
 MIND = 8
 RISK, GIVEN, BRAKES, STOPS_FOR, HALTED, ASKED, STRAIGHT_TO, STRAIGHT_ON = range(MIND)
@@ -143,7 +143,7 @@ def keep_to_leaders(
         beside = max(aside - left, right - aside) - wide - SIDE_GAP_ON_FOOT
         away = beside if along < straight else -1.0
         far[o] = max(max(dx * dx + dy * dy - reach * reach, front - lengths[o] - along), away)
-    walks = kinds[e] == PEDESTRIAN or kinds[e] == ANIMAL
+    walks = IS_ON_FOOT[kinds[e]]
     asked = math.inf
     for o in range(len(far)):
         if far[o] > 0.0 or o == e or not present[o]:
@@ -160,7 +160,7 @@ def keep_to_leaders(
         moves = w > STANDS
         if moves and HEAD_ON < parallel < SAME_WAY:
             continue  # it crosses: that is a matter of giving way
-        least = SIDE_GAP_ON_FOOT if kinds[o] in (BICYCLE, PEDESTRIAN) else SIDE_GAP
+        least = SIDE_GAP_ON_FOOT if NEEDS_ROOM[kinds[o]] else SIDE_GAP
         half_width = 0.5 * (bodies[o, 0] * abs(across) + bodies[o, 1] * abs(parallel))
         beside = d - left if d > left else min(d - right, 0.0)
         space = abs(beside) - half_width - half
@@ -204,7 +204,7 @@ def look(
         e, path, n, ds, p, s, v, min(aside[e], target), max(aside[e], target), present, seen, far,
         bodies, kinds, mind,
     )  # fmt: skip
-    if kinds[e] > MOTORBIKE:
+    if not IS_VEHICLE[kinds[e]]:
         return asked
     if p == e:
         rear = bodies[e, 0] - front
@@ -214,7 +214,7 @@ def look(
                 continue
             if s - rear > zone[1] or zone[0] - front - s > max(v, pace) * HORIZON:
                 continue
-            rank = -1 if kinds[o] == PEDESTRIAN else min(max(claims[o], -1), 1)
+            rank = -1 if IS_PEDESTRIAN[kinds[o]] else min(max(claims[o], -1), 1)
             other_front = bodies[o, 2] + 0.5 * bodies[o, 0]
             follows, stops_at = give_way(
                 s, v, pace, front, rear, zone, station[o], seen[W, o], seen[GAIN, o], rank,

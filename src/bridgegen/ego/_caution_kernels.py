@@ -12,6 +12,7 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.ego._following_kernels import COMFORT_DECELERATION
+from bridgegen.ego._kind_tables import HIDES_PEOPLE, IS_ON_FOOT
 from bridgegen.ego._shift_kernels import aside_at
 from bridgegen.ego._surroundings_kernels import (
     ACROSS,
@@ -23,7 +24,6 @@ from bridgegen.ego._surroundings_kernels import (
     NEAR,
 )
 from bridgegen.ego._tracking_kernels import KIND
-from bridgegen.ego.kinds import ANIMAL, BUS, PEDESTRIAN
 
 ENTER, LEAVE, RIGHT_END, LEFT_END = 0, 1, 2, 3
 """Columns of a crosswalk: where the ego's route enters and leaves it, and how far it reaches to
@@ -61,16 +61,16 @@ def careful_speed(around, tracks, crosswalks, s, front, half_width, shift, in_to
     for e in range(1, around.shape[0]):
         if around[e, NEAR] == 0.0 or around[e, AT] + around[e, HALF_LENGTH] < s:
             continue
-        kind = tracks[e, KIND]
+        kind = int(tracks[e, KIND])
         distance = around[e, AT] - around[e, HALF_LENGTH] - s - front
         aside = aside_at(shift, s + max(distance, 0.0))
         room = abs(around[e, ASIDE] - aside) - around[e, HALF_WIDTH] - half_width
         if room < 0.0 or math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS:
             continue
-        if kind in (PEDESTRIAN, ANIMAL):
+        if IS_ON_FOOT[kind]:
             if room < AT_SIDE or at_crosswalk(crosswalks, around[e, AT]):
                 best = min(best, slow_to(safe_speed(room, friction_limit), distance))
-        elif in_town and kind <= BUS and room < PARKED_ROOM:
+        elif in_town and HIDES_PEOPLE[kind] and room < PARKED_ROOM:
             best = min(best, slow_to(PARKED_SPEED, distance))
             hidden = hidden_speed(around, e, crosswalks, s, front, half_width, room, friction_limit)
             best = min(best, hidden)

@@ -11,6 +11,7 @@ heuristic: a short gap to somebody who is not slower needs no hard braking).
 import math
 
 from bridgegen.compiled import kernel
+from bridgegen.ego._kind_tables import NEEDS_ROOM
 from bridgegen.ego._shift_kernels import aside_at
 from bridgegen.ego._surroundings_kernels import (
     ACROSS,
@@ -24,7 +25,6 @@ from bridgegen.ego._surroundings_kernels import (
     NEAR,
 )
 from bridgegen.ego._tracking_kernels import KIND
-from bridgegen.ego.kinds import BICYCLE, PEDESTRIAN
 
 COMFORT_ACCELERATION = 1.5  # m/s²
 COMFORT_DECELERATION = 2.0  # m/s²
@@ -96,8 +96,7 @@ def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
         rear_end = around[e, AT] - around[e, HALF_LENGTH]
         beside = around[e, ASIDE] - aside_at(shift, max(rear_end - front, s))
         space = abs(beside) - around[e, HALF_WIDTH] - half_width
-        kind = tracks[e, KIND]
-        least = SIDE_GAP_ON_FOOT if kind in (BICYCLE, PEDESTRIAN) else SIDE_GAP
+        least = SIDE_GAP_ON_FOOT if NEEDS_ROOM[int(tracks[e, KIND])] else SIDE_GAP
         nearing = -around[e, ACROSS] if beside > 0.0 else around[e, ACROSS]
         moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
         if moves and HEAD_ON < around[e, COSINE] < SAME_WAY:

@@ -48,8 +48,8 @@ from bridgegen.ego._conflict_kernels import (
 )
 from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
+from bridgegen.ego._kind_tables import USES_LANES
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
-from bridgegen.ego.kinds import PEDESTRIAN
 
 REACTION = 0.75  # s
 COMFORT_BRAKING = 4.0  # m/s²
@@ -128,7 +128,7 @@ def drive_fsm(
     horizon = min(reach / max(v, 1.0), HORIZON)
     hides = math.inf  # how far ahead the vehicle is that hides those beyond
     for e in range(1, len(speed) if len(speed) > 2 else 1):
-        if present[e] and kinds[e] < PEDESTRIAN:
+        if present[e] and USES_LANES[kinds[e]]:
             ahead, _, aside, _, _ = place_on_way(
                 paths[own], path_n[own], path_ds[own], station[0], reach + FARTHER, bodies[0],
                 x[e, k], y[e, k], h[e, k], speed[e, k], bodies[e],
@@ -143,7 +143,7 @@ def drive_fsm(
         drives, side = False, math.inf
         if k > 0:
             turn = (h[e, k] - h[e, k - 1]) / dt
-        if kinds[e] < PEDESTRIAN:
+        if USES_LANES[kinds[e]]:
             ahead, gap, aside, side, along = place_on_way(
                 paths[own], path_n[own], path_ds[own], station[0], reach + FARTHER, bodies[0],
                 x[e, k], y[e, k], h[e, k], w, bodies[e],

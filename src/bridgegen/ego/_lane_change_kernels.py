@@ -28,6 +28,7 @@ from bridgegen.ego._following_kernels import (
     keep_distance,
     stop_for,
 )
+from bridgegen.ego._kind_tables import IS_ON_FOOT
 from bridgegen.ego._shift_kernels import aside_at, shift_length
 from bridgegen.ego._speed_kernels import FAST_ROAD, LEFT, LIMIT, RIGHT, sight_speed
 from bridgegen.ego._surroundings_kernels import (
@@ -43,7 +44,6 @@ from bridgegen.ego._surroundings_kernels import (
 )
 from bridgegen.ego._tracking_kernels import KIND
 from bridgegen.ego._yielding_kernels import ACROSS as CROSSES
-from bridgegen.ego.kinds import ANIMAL, PEDESTRIAN
 
 BEFORE, AFTER, BEGINS, LENGTH, HELD_UP = range(control.SIZE + 3, control.SIZE + 8)
 LAST = control.SIZE + 8
@@ -112,7 +112,7 @@ def slow_ahead(around, tracks, s, front, half_width, aside, pace):
         last = max(last, around[e, AT] + around[e, HALF_LENGTH])
         if rear < at:
             goes = speed > STANDS and around[e, COSINE] < SAME_WAY
-            at, who = rear, -1 if goes or tracks[e, KIND] in (PEDESTRIAN, ANIMAL) else e
+            at, who = rear, -1 if goes or IS_ON_FOOT[int(tracks[e, KIND])] else e
     return who, last
 
 

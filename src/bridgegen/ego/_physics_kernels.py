@@ -10,7 +10,6 @@ Lengths in metres, angles in radians, extinctions in 1/m, luminances in cd/m², 
 import math
 
 from bridgegen.compiled import kernel
-from bridgegen.ego.kinds import BICYCLE, BUS, MOTORBIKE, PEDESTRIAN, TRUCK
 
 # The air.
 KOSCHMIEDER = 2.996  # −ln 0.05: contrast is 5 % at the meteorological optical range; WMO-No. 8
@@ -44,8 +43,6 @@ TARGET_ALBEDO = 0.1  # dark clothes
 HEADLAMP = 20_000.0  # cd, low beam straight ahead; UN R112, class B: 10,100 at least at point 50R
 BEAM_WIDTH = 0.4  # tangent of the angle at which it has a quarter of that
 BACKSCATTER = 0.003  # 1/(m·sr), of headlamps in fog: its veil is HEADLAMP · β · this
-LAMPS = (10.0, 10.0, 10.0, 5.0, 2.0, 0.0, 0.0, 0.0)
-"""cd, of the lamps that each kind shows; UN R7 asks 4 of each of two rear lamps."""
 SIGNAL_LAMP = 200.0  # cd, of a traffic light; EN 12368, level 2
 SIGNAL_SIZE = 0.3  # m, its diameter; EN 12368
 PIXEL_ERROR = 1.0  # pixels, of a box's foot and side in a clear picture
@@ -53,8 +50,6 @@ CAMERA_FLOOR = 0.1  # m, of position, however close
 
 # The LiDAR.
 RATED_RANGE, RATED_REFLECTANCE = 200.0, 0.9  # m, at which 90 % is just seen; data sheets' practice
-REFLECTANCE = (0.3, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.2)
-"""Of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles more."""
 BEAM_AREA = 2.03e-5  # sr, between beams 0.2° and 0.33° apart
 ENOUGH_RETURNS = 5.0  # returns from a target of which half are recognised
 RANGE_NOISE = 0.09  # m·√2, at a signal-to-noise ratio of 1: σ = 0.09/√(2·SNR)
@@ -76,8 +71,6 @@ LEAST_CONFIDENCE = 0.3  # of what is detected at all
 LIDAR_CONFIDENCE = 0.6  # at most, without a picture …
 SURE_RETURNS = 20.0  # … of which so many returns give half
 SURE_PIXELS = 25.6  # pixels that give half of a camera's: twice what detection needs
-MISTAKEN_FOR = (TRUCK, BUS, TRUCK, BICYCLE, MOTORBIKE, BICYCLE, PEDESTRIAN, PEDESTRIAN)
-"""What each kind is taken for where its class is not recognised."""
 
 
 @kernel

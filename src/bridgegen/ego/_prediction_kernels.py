@@ -17,6 +17,7 @@ behind that station [m], the track, how its speed changes [m/s²], and who waits
 import math
 
 from bridgegen.compiled import kernel
+from bridgegen.ego._kind_tables import IS_VULNERABLE
 from bridgegen.ego._path_kernels import COS, SIN, X, Y, project
 from bridgegen.ego._surroundings_kernels import BEHIND, QUICKENING
 from bridgegen.ego._tracking_kernels import CONFIRMED, KIND, LENGTH, STATE, VX, VY, WIDTH, H
@@ -35,7 +36,6 @@ from bridgegen.ego._yielding_kernels import (
     WHO,
     ZONE,
 )
-from bridgegen.ego.kinds import ANIMAL, BICYCLE, PEDESTRIAN
 
 PASSAGE = ZONE + 7
 
@@ -131,7 +131,7 @@ def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, count
     for e in range(1, tracks.shape[0]):
         if tracks[e, STATE] < CONFIRMED:
             continue
-        x, y, h, kind = tracks[e, TRACK_X], tracks[e, TRACK_Y], tracks[e, H], tracks[e, KIND]
+        x, y, h = tracks[e, TRACK_X], tracks[e, TRACK_Y], tracks[e, H]
         gain = around[e, QUICKENING]
         on_way = False
         for j in range(first[e], first[e + 1] if known else first[e]):
@@ -150,7 +150,7 @@ def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, count
                 count = add_passage(
                     passages, count, zones[j], q, max(w, 0.0), half, e, gain, ranks[j]
                 )
-        if not on_way or kind in (BICYCLE, PEDESTRIAN, ANIMAL):
+        if not on_way or IS_VULNERABLE[int(tracks[e, KIND])]:
             count = add_straight(
                 path, n, ds, s, ahead, own_width, tracks[e], e, gain, passages, count
             )
@@ -181,7 +181,7 @@ def predict_truly(path, n, ds, s, ahead, own_width, tracks, around, paths, count
             w = math.hypot(tracks[e, VX], tracks[e, VY])
             half, rank = 0.5 * tracks[e, LENGTH], ranks[j] if j < len(ranks) else 0
             count = add_passage(passages, count, zones[j], q, w, half, e, gain, rank)
-        if tracks[e, KIND] in (BICYCLE, PEDESTRIAN, ANIMAL):
+        if IS_VULNERABLE[int(tracks[e, KIND])]:
             count = add_straight(
                 path, n, ds, s, ahead, own_width, tracks[e], e, gain, passages, count
             )

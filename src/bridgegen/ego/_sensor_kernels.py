@@ -14,15 +14,13 @@ import math
 from bridgegen.compiled import kernel
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
+from bridgegen.ego._kind_tables import LAMPS, MISTAKEN_FOR, REFLECTANCE
 from bridgegen.ego._occlusion_kernels import COS, DX, DY, LAST, SIN, D
 from bridgegen.ego._physics_kernels import (
     BOX_ERROR,
     HEADING_ERROR,
-    LAMPS,
     LEAST_CONFIDENCE,
     LIDAR_CONFIDENCE,
-    MISTAKEN_FOR,
-    REFLECTANCE,
     SURE_PIXELS,
     SURE_RETURNS,
     recognised,

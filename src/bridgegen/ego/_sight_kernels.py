@@ -12,13 +12,12 @@ import math
 from bridgegen.compiled import kernel
 from bridgegen.ego import _camera_kernels as camera
 from bridgegen.ego import _lidar_kernels as lidar
+from bridgegen.ego._kind_tables import LAMPS, REFLECTANCE
 from bridgegen.ego._physics_kernels import (
     CULL,
     ENOUGH_RETURNS,
     IDENTIFY,
-    LAMPS,
     NOTICE,
-    REFLECTANCE,
     SIGNAL_LAMP,
     SIGNAL_SIZE,
     veil,

@@ -39,8 +39,8 @@ from bridgegen.compiled import kernel
 from bridgegen.ego._ahead_kernels import place_on_way
 from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
+from bridgegen.ego._kind_tables import USES_LANES
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
-from bridgegen.ego.kinds import PEDESTRIAN
 
 CRITICAL_TTC = 2.0  # s, up to which a cut-in is dangerous
 CRITICAL_HEADWAY = 2.0 + 1e-6  # s, up to which a cut-out or a deceleration is; and rounding
@@ -93,7 +93,7 @@ def drive_un_r157(
     beyond, beyond_ahead, beyond_along = 0, math.inf, 0.0
     leaves = False
     for e in range(1, len(speed)):
-        if not present[e] or kinds[e] >= PEDESTRIAN:
+        if not present[e] or not USES_LANES[kinds[e]]:
             continue
         w = speed[e, k]
         slowing = (speed[e, k - 1] - w) / dt if k > 0 else 0.0

@@ -1,7 +1,12 @@
-"""What an entity is, as numbers that compiled code can hold."""
+"""What an entity is, as numbers that compiled code can hold: `OBJECT_CLASSES`, numbered."""
 
-CAR, TRUCK, BUS, MOTORBIKE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = range(8)
-"""From OpenSCENARIO's vehicle category, pedestrian category or miscellaneous object."""
+from bridgegen.participants import OBJECT_CLASSES
 
-NAMES = ("car", "truck", "bus", "motorbike", "bicycle", "pedestrian", "animal", "other")
+NAMES = tuple(one.name for one in OBJECT_CLASSES)
 """In words, by number."""
+
+CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
+    NAMES.index(name)
+    for name in ("car", "truck", "bus", "motorcycle", "bicycle", "pedestrian", "animal", "other")
+)
+"""Those that code asks for by name."""

@@ -86,7 +86,8 @@ def detection_range(sky: Sky, kind: int) -> DetectionRange:
     """
     from bridgegen.ego import _camera_kernels as camera
     from bridgegen.ego import _lidar_kernels as lidar
-    from bridgegen.ego._physics_kernels import LAMPS, REFLECTANCE, veil
+    from bridgegen.ego._kind_tables import LAMPS, REFLECTANCE
+    from bridgegen.ego._physics_kernels import veil
 
     weather = sky.numbers()
     width, height = _SIZES[kind]

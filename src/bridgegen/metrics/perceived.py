@@ -11,6 +11,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.ego import kinds
 from bridgegen.metrics.metric import recorded, shared, steps
+from bridgegen.participants import OBJECT_CLASSES
 from bridgegen.simulation.rollout import Rollout
 
 CLASSES = ("car", "heavy vehicle", "two-wheeler", "pedestrian", "other")
@@ -22,13 +23,8 @@ RANGES = np.array([50.0, 50.0, 40.0, 40.0, 30.0])
 THRESHOLDS = np.array([0.5, 1.0, 2.0, 4.0])
 """[m] A detection whose centre is nearer than this to the truth's is a hit, for each once."""
 
-CLASS_OF_KIND = np.array(
-    [
-        {"car": 0, "truck": 1, "bus": 1, "motorbike": 2, "bicycle": 2, "pedestrian": 3}.get(kind, 4)
-        for kind in kinds.NAMES
-    ]
-)
-"""``(8,)`` int64, the class of each of `bridgegen.ego.kinds`."""
+CLASS_OF_KIND = np.array([CLASSES.index(one.detection_class) for one in OBJECT_CLASSES])
+"""The class of each of `bridgegen.ego.kinds`, int64."""
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from dataclasses import replace
 from math import ceil
 
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.parameters import Axis, Parameter
 from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import speeds_of
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.story import Adversary, EventSpec, Participant, SpeedChange, Story
+from bridgegen.participants import PARTICIPANTS
 
 PERIOD = 0.5
 """Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
@@ -56,8 +56,8 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
 
     Args:
         scenario: of five layers.
-        participant: a vehicle or bicycle that keeps to lanes, not the ego; the first that the
-            scenario lets move by default.
+        participant: a vehicle or bicycle that keeps to lanes, not to rails, and not the ego; the
+            first that the scenario lets move by default.
 
     Raises:
         UnknownNameError: no such participant.
@@ -113,12 +113,13 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
 
 
 def _can_be_driven(one: Participant, story: Story) -> bool:
-    on_lanes = one.kind in ("vehicle", "bicycle") and not one.path
+    on_lanes = one.conduct in ("vehicle", "bicycle") and not one.path
+    on_lanes = on_lanes and not PARTICIPANTS[one.type].on_rails
     return on_lanes and one.name != "ego" and any(speed != 0.0 for speed in speeds_of(one, story))
 
 
 def _adversary(scenario: LogicalScenario, who: Participant, own: Iterable[EventSpec]) -> Adversary:
-    body = BODIES[who.type]
+    body = PARTICIPANTS[who.type].body
     changes = [a.change for event in own for a in event.actions if isinstance(a, SpeedChange)]
     rates = [one.rate for one in changes if one.rate is not None]
     numbers = [f"{k:02d}" for k in range(1, ceil(scenario.duration / PERIOD) + 1)]

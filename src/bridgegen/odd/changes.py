@@ -6,7 +6,6 @@ gets a derived quantity of its own.
 
 from collections.abc import Iterator
 
-from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Axis, Derived
 from bridgegen.odd.places import Places
@@ -16,6 +15,7 @@ from bridgegen.odd.roads import Quantity, RoadsSpec
 from bridgegen.odd.shape import section
 from bridgegen.odd.story import Jam, Participant, RoadWorks, Waypoint
 from bridgegen.odd.story_schema import JamSection, WorksSection
+from bridgegen.participants import PARTICIPANTS
 
 _BESIDE = 0.75
 """How far from the carriageway's edge a sign stands [m]; source: RSA 21, 0.5 to 1.5 m."""
@@ -64,7 +64,7 @@ class TemporaryChanges:
             tail = self._places.waypoint(given.tail, (*path, "tail"))
             ahead, names = 0.0, []
             for k, kind in enumerate(given.vehicles):
-                body = BODIES[kind]
+                body = PARTICIPANTS[kind].body
                 ahead += body.rear if k else 0.0
                 place = self._row(f"{name}_{k + 1}_at", tail, ahead, k, given.gap, path)
                 names.append(f"{name}_{k + 1}")

@@ -8,7 +8,6 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import ScenarioError
-from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.expression import parse
 from bridgegen.odd.kinds import slack
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest
@@ -17,6 +16,7 @@ from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import cap, speeds_of
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import probes
+from bridgegen.participants import PARTICIPANTS
 
 MAX_STEPS = 100_000
 
@@ -159,7 +159,7 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
         a, b = one.start, other.start
         if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):
             continue
-        body, others = BODIES[one.type], BODIES[other.type]
+        body, others = PARTICIPANTS[one.type].body, PARTICIPANTS[other.type].body
         ahead = _metres(a.distance, columns) - _metres(b.distance, columns)
         ahead = ahead if a.way == "out" else -ahead
         aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
@@ -186,9 +186,9 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
     for one in scenario.participants:
         for value in speeds_of(one, scenario.story):
             speed = _metres(value, columns)
-            allowed = np.asarray(BODIES[one.type].max_speed)
+            allowed = np.asarray(PARTICIPANTS[one.type].body.max_speed)
             why = f"a {one.type} can do"
-            if one.kind == "vehicle" and value != 0.0:
+            if one.conduct == "vehicle" and value != 0.0:
                 allowed = np.minimum(limit, allowed)
                 why = "road and weather allow"
             over = speed - allowed

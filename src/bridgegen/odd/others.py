@@ -14,7 +14,7 @@ DRIVERS = (ATTENTIVE, SCRIPTED)
 
 EGO = "ego"
 ABLE = ("vehicle", "bicycle", "pedestrian")
-"""The kinds of participants that get the driver which a scenario states for all."""
+"""How participants move that get the driver which a scenario states for all."""
 
 
 def require(name: str) -> str:
@@ -40,7 +40,7 @@ def driven(
         replace(one, driver=others)
         if not one.driver
         and one.name != EGO
-        and one.kind in ABLE
+        and one.conduct in ABLE
         and (one.speed != 0.0 or one.name in acting)
         else one
         for one in participants

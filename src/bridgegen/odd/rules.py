@@ -53,7 +53,7 @@ def bounds_between_layers(
     weathers = ("", *prefixes)
     yield from speed_bounds(roads.knobs["speed_limit"], story, parameters, prefixes, place)
     for one in story.participants:
-        if one.kind != "vehicle" or one.name == "ego":
+        if one.conduct != "vehicle" or one.name == "ego":
             continue  # the ego's driver is under test: what it dares is its own affair
         radius = bend(roads, one)
         if radius is None:
@@ -116,7 +116,7 @@ def bend(roads: RoadsSpec, one: Participant) -> str | None:
 
 def _speeds(story: Story) -> set[str]:
     """Return the parameters that are speeds of motor vehicles."""
-    vehicles = [one for one in story.participants if one.kind == "vehicle"]
+    vehicles = [one for one in story.participants if one.conduct == "vehicle"]
     return set().union(*(_speeds_of(one, story) for one in vehicles))
 
 

@@ -6,26 +6,9 @@ from types import MappingProxyType
 from typing import Literal
 
 from bridgegen.odd.roads import LETTERS, Quantity
+from bridgegen.participants import PARTICIPANTS, Conduct
 
 Way = Literal["in", "out"]
-Kind = Literal["vehicle", "bicycle", "pedestrian", "animal", "obstacle"]
-
-TYPES: Mapping[str, Kind] = MappingProxyType(
-    {
-        "car": "vehicle",
-        "van": "vehicle",
-        "truck": "vehicle",
-        "bus": "vehicle",
-        "motorcycle": "vehicle",
-        "emergency": "vehicle",
-        "bicycle": "bicycle",
-        "pedestrian": "pedestrian",
-        "animal": "animal",
-        "obstacle": "obstacle",
-    }
-)
-"""What a participant may be, and of what kind that is."""
-
 STRIPS = ("sidewalk", "shoulder")
 """What a waypoint may lie on besides driving lanes."""
 
@@ -67,7 +50,7 @@ class Participant:
 
     Attributes:
         name: "ego" for the system under test.
-        type: what it is, one of ``TYPES``.
+        type: what it is, one of `bridgegen.participants.TYPES`.
         start: where it stands at time 0.
         end: where its route ends; None: it goes on along its lane, or along its path.
         speed: [m/s] at time 0; of the ego also its target.
@@ -84,9 +67,9 @@ class Participant:
     driver: str = field(default="", repr=False, kw_only=True)
 
     @property
-    def kind(self) -> Kind:
-        """What kind of participant its type is."""
-        return TYPES[self.type]
+    def conduct(self) -> Conduct:
+        """The rules by which it moves."""
+        return PARTICIPANTS[self.type].seen_as.conduct
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,17 @@
 """The shape of what a scenario file says of its story: who, where, what happens, and when."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from bridgegen.odd.shape import LaneField, Number, QuantityField, ShapedSection, Word
+from bridgegen.participants import QUEUES, TYPE_NAMES, canonical
+
+if TYPE_CHECKING:
+    TypeName: TypeAlias = str
+    QueueName: TypeAlias = str
+else:
+    TypeName, QueueName = Literal[TYPE_NAMES], Literal[QUEUES]
 
 
 class WaypointSection(ShapedSection):
@@ -27,17 +34,14 @@ class WaypointSection(ShapedSection):
 class ParticipantSection(ShapedSection):
     """One road user; the one that is called ``ego`` is under test."""
 
-    type: Literal[
-        "car", "van", "truck", "bus", "motorcycle", "emergency",
-        "bicycle", "pedestrian", "animal", "obstacle",
-    ]  # fmt: skip
+    type: Annotated[TypeName, AfterValidator(canonical)]
     """What it is."""
     start: WaypointSection | None = None
     """Where it stands at time 0."""
     end: WaypointSection | None = None
     """Where its route ends; the ego's must."""
     path: list[WaypointSection] = []
-    """Instead of start and end: straight lines through places (pedestrian, animal, bicycle)."""
+    """Instead of start and end: straight lines through places; not of a vehicle or an obstacle."""
     speed: QuantityField = 0.0
     """At time 0 [m/s]; of the ego also its target."""
     driver: Word | None = None
@@ -105,7 +109,7 @@ class JamSection(ShapedSection):
 
     tail: WaypointSection
     """Where the last of them stands."""
-    vehicles: Annotated[list[Literal["car", "van", "truck", "bus"]], Field(min_length=1)]
+    vehicles: Annotated[list[QueueName], Field(min_length=1)]
     """Their types, the last first."""
     gap: QuantityField = 3.0
     """Between two of them [m]."""

@@ -11,7 +11,6 @@ from bridgegen.odd.roads import LETTERS, Quantity, RoadsSpec
 from bridgegen.odd.shape import section
 from bridgegen.odd.story import (
     CONDITIONS,
-    TYPES,
     Action,
     Change,
     ConditionSpec,
@@ -28,10 +27,16 @@ from bridgegen.odd.story_schema import (
     ParticipantSection,
     WaypointSection,
 )
+from bridgegen.participants import PARTICIPANTS, TYPES
 
 EGO = "ego"
 
-_WALKERS = ("pedestrian", "animal", "bicycle")
+_WALKERS = tuple(
+    name
+    for name in TYPES
+    if PARTICIPANTS[name].seen_as.conduct in ("pedestrian", "animal", "bicycle")
+)
+"""Types that may have a path of their own."""
 
 
 class Storyboard:
@@ -131,12 +136,19 @@ class Storyboard:
                 f"'{start.offset}'",
                 path,
             )
-        stands = TYPES[given.type] in ("obstacle", "pedestrian", "animal")
+        conduct = PARTICIPANTS[given.type].seen_as.conduct
+        if name == EGO and PARTICIPANTS[given.type].on_rails:
+            self._say(
+                f"the ego must be a vehicle that its driver can steer, a {given.type} runs on "
+                f"rails; got type '{given.type}'",
+                (*path, "type"),
+            )
+        stands = conduct in ("obstacle", "pedestrian", "animal")
         if stands and (given.speed != 0.0 or end is not None):
             self._say(f"{name} without a path stands: no speed, no end", path)
         if given.type == "pedestrian" and start.lane != "sidewalk":
             self._say(f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path)
-        if TYPES[given.type] == "vehicle" and start.lane == "sidewalk":
+        if conduct == "vehicle" and start.lane == "sidewalk":
             self._say(f"{name} must stand on a lane: vehicles are on roads only", path)
         return Participant(name, given.type, start, end, given.speed, driver=given.driver or "")
 
@@ -158,7 +170,7 @@ class Storyboard:
                 f"ego), got '{driver}'{hint}",
                 place,
             )
-        elif driver == ATTENTIVE and TYPES[given.type] == "obstacle":
+        elif driver == ATTENTIVE and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
             self._say(f"{name} is an obstacle, which nobody drives; got '{driver}'", place)
 
     def _check_route(
@@ -247,6 +259,8 @@ class Storyboard:
             actor = self._acting.get(str(given.participant))
             if actor is not None and (actor.end is not None or actor.path):
                 self._say(f"{actor.name} changes lane, so it has no end and no path", path)
+            if actor is not None and PARTICIPANTS[actor.type].on_rails:
+                self._say(f"{actor.name}, a {actor.type}, runs on rails and changes no lane", path)
             yield LaneChange(int(one.lanes), change)
 
     def _change(

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping
 import pyoxigraph as ox
 
 from bridgegen.errors import OntologyError
-from bridgegen.odd.bodies import BODIES
 from bridgegen.odd.others import ATTENTIVE
 from bridgegen.odd.story import (
     Action,
@@ -22,6 +21,7 @@ from bridgegen.odd.story import (
 from bridgegen.ontology.builder import Builder
 from bridgegen.ontology.roads import lane_name, road_name
 from bridgegen.ontology.site import Site
+from bridgegen.participants import PARTICIPANTS
 
 WEATHER = (
     ("has_rain", "Rain", ("precipitation", "precipitation_deposits")),
@@ -32,13 +32,6 @@ WEATHER = (
     ("has_road_state", "RoadState", ("wetness", "friction")),
 )
 """The parts of the weather; each parameter's data property is ``has_`` and its name."""
-
-CLASSES = {
-    "car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus", "motorcycle": "Motorcycle",
-    "emergency": "EmergencyVehicle", "bicycle": "Bicycle", "pedestrian": "Pedestrian",
-    "animal": "Animal", "obstacle": "Misc", "cone": "RoadCone", "sign": "ConstructionCard",
-}  # fmt: skip
-"""The class of each type of participant, and of what stands at road works."""
 
 CONDITIONS = {
     "time": "SimulationTimeCondition",
@@ -72,7 +65,7 @@ def add_participant(
         ideal: the stages of that which are ideal, separated by commas.
     """
     put, name = builder.put, one.name
-    node = builder.node(name, CLASSES[one.type])
+    node = builder.node(name, PARTICIPANTS[one.type].owl_class)
     put(node, "has_name", name)
     _add_body(builder, node, one.type)
     driver = driver if name == EGO else one.driver
@@ -87,7 +80,7 @@ def add_participant(
     teleport = builder.node(f"{name}_teleport", "TeleportAction")
     put(teleport, "has_position", start)
     put(node, "has_init_action", teleport)
-    if one.kind != "obstacle":
+    if one.conduct != "obstacle":
         speed = builder.node(f"{name}_init_speed", "SpeedAction")
         builder.quantity(speed, "has_target_speed", one.speed)
         put(node, "has_init_action", speed)
@@ -102,7 +95,7 @@ def add_participant(
 
 
 def _add_body(builder: Builder, node: ox.NamedNode, kind: str) -> None:
-    body = BODIES[kind]
+    body = PARTICIPANTS[kind].body
     values = {
         "has_box_length": body.length, "has_box_width": body.width, "has_box_height": body.height,
         "has_center_ahead": body.center_ahead,
@@ -278,7 +271,7 @@ def add_works(builder: Builder, works: RoadWorks, site: Site) -> ox.NamedNode:
     put(node, "closes_lane", builder.iri(lane))
     elements = [(f"{name}_cone_{k}", "cone", at) for k, at in enumerate(works.cones, start=1)]
     for element, kind, place in [*elements, (f"{name}_sign", "sign", works.sign)]:
-        part = builder.node(element, CLASSES[kind])
+        part = builder.node(element, PARTICIPANTS[kind].owl_class)
         put(node, "has_element", part)
         put(part, "has_name", element)
         _add_body(builder, part, kind)

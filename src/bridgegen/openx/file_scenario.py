@@ -22,11 +22,11 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario import validate
+from bridgegen.openx.openscenario import parameters, validate
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.scenario import EGO
-from bridgegen.openx.openscenario.parameters import kind_of
+from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.ranges import ranges_of
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.renaming import rename_entity
@@ -247,7 +247,7 @@ def with_values(
 def _literal(one: osc.ParameterDeclaration, value: float, known: Parameter | None) -> str:
     if known is not None and known.kind.names:
         return known.kind.text(value, str)
-    whole = kind_of(one.parameter_type) is not Kind.DOUBLE
+    whole = parameters.kind_of(one.parameter_type) is not Kind.DOUBLE
     return str(int(value)) if whole else format_double(value)
 
 
@@ -316,6 +316,7 @@ def _self_contained(scenario: FileScenario) -> osc.OpenScenario:
 
 
 def _type_of(body: Element) -> str:
-    if isinstance(body, osc.Vehicle):
-        return str(body.vehicle_category)
-    return "pedestrian" if isinstance(body, osc.Pedestrian) else "obstacle"
+    kind = kind_of(body)
+    if kind is not None:
+        return kind.name
+    return str(body.vehicle_category) if isinstance(body, osc.Vehicle) else "obstacle"

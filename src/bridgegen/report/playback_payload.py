@@ -11,6 +11,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.metrics.d_min import first_closest
+from bridgegen.participants import drawing_of
 from bridgegen.report.findings_payload import conflict_payload
 from bridgegen.report.playback import Course, Lamp, Playback, Sensed, Weather
 from bridgegen.report.series import packed
@@ -75,7 +76,8 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
                 "length": float(e.length),
                 "width": float(e.width),
                 "center_ahead": float(e.center_ahead),
-                "type": e.type,
+                "shape": drawing_of(e.type).shape,
+                "headlights": drawing_of(e.type).headlights,
             }
             for e in p.entities
         ],

@@ -35,7 +35,7 @@ def _participant(one: Participant) -> str:
         way = " to ".join(_place(point) for point in one.path)
         return f"{one.name}, a {one.type}, goes from {way} at {_number(one.speed, 'm/s')}."
     line = f"{one.name}, a {one.type}, starts at {_place(one.start)} at {_number(one.speed, 'm/s')}"
-    if one.kind == "obstacle" or (one.speed == 0.0 and one.end is None):
+    if one.conduct == "obstacle" or (one.speed == 0.0 and one.end is None):
         return f"{one.name}, a {one.type}, stands at {_place(one.start)}."
     return f"{line}{'' if one.end is None else f' and goes to {_place(one.end)}'}."
 

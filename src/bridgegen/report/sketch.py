@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.arrays import Bool, Float
+from bridgegen.participants import drawing_of
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.playback import AREA_KINDS, Entity, Lamp, Outline
 from bridgegen.report.scenery import Scenery, bodies, lamps
@@ -30,7 +31,8 @@ _LINES = {  # colour, width [m], dashes [m]
 }  # fmt: skip
 _COLOURS = ("#0063b0", "#f0a30a", "#00805f", "#a83f84")
 _LAMPS = {1: ("#ff4d4d", 0), 2: ("#ff4d4d", 0), 3: ("#ffd23f", 1), 4: ("#38d39f", 2)}
-_ROUND = ("pedestrian", "animal", "cone")
+_ROUND = ("person", "cone")
+_ROAD_WORKS = ("cone", "sign")
 
 
 class _View(NamedTuple):
@@ -81,14 +83,15 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
     parts = [*_roads(road.outlines, view), *_lamps(lamps(rollout, 0, road.lights), closest, view)]
     labels = []
     for e, body in enumerate(entities):
-        colour = "#d9480f" if body.type in ("cone", "sign") else _COLOURS[_number(e, moving)]
+        at_works = drawing_of(body.type).shape in _ROAD_WORKS
+        colour = "#d9480f" if at_works else _COLOURS[_number(e, moving)]
         if moving[e]:
             for first, end in _stays(there[e, : last + 1]):
                 parts += _way(body, where[e], (first, closest, end), colour, view)
         if not there[e, closest]:
             continue
         parts.append(_body(body, where[e, closest], colour, view))
-        if body.type not in ("cone", "sign"):
+        if not at_works:
             labels.append((body.name, colour, view.point(*_centre(body, where[e, closest]))))
     parts += _labels(labels)
     title = html.escape(f"{pipeline.scenario.title}, seen from above")
@@ -201,13 +204,14 @@ def _body(body: Entity, at: Float, colour: str, view: _View, *, start: bool = Fa
         else f'fill="{colour}" stroke="{_PAPER}" stroke-width="1.2"'
     )
     place = f'transform="translate({x:.1f} {y:.1f}) rotate({-math.degrees(at[2]):.1f})"'
-    if body.type in _ROUND:
+    drawn = drawing_of(body.type).shape
+    if drawn in _ROUND:
         return f'<circle r="{max(length, width) / 2:.1f}" {look} {place}/>'
     shape = (
         f'<rect x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" '
         f'height="{width:.1f}" rx="{width * 0.22:.1f}" {look}/>'
     )
-    if start or body.type in ("sign", "obstacle"):
+    if start or drawn in ("sign", "thing"):
         return f"<g {place}>{shape}</g>"
     screen = (
         f'<rect x="{length * 0.14:.1f}" y="{-width * 0.36:.1f}" width="{length * 0.12:.1f}" '

@@ -36,6 +36,9 @@ RESPONSIBLE = "responsible"
 SEVERITY = "severity"
 """The header's property for its severity, the probability of a MAIS3+ injury."""
 
+KIND = "participant_kind"
+"""Property of a body: its kind, where its category is only the nearest that the standard has."""
+
 DRIVER = "driver"
 """Property of a controller: the driver's name."""
 

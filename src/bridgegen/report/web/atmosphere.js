@@ -3,7 +3,6 @@
 const MOST_FOG = 0.7, MOST_DARK = 0.66;
 const LAMP_REACH = 14, BEAM = 38, BEAM_SPREAD = 0.34; // m, m, rad to either side
 const CLEAR = 1000; // m, who sees farther sees the whole picture
-const MOTORS = new Set(["car", "truck", "bus", "van", "trailer", "semitrailer", "motorbike", "motorcycle", "train", "tram"]);
 
 // 0 by day to 1 in a moonless night, by the luminance of the ground [cd/m²].
 function darkness({ background }) {
@@ -59,7 +58,7 @@ class Atmosphere {
     for (const at of kept.street_lights) shine(...view.toScreen(at), LAMP_REACH, 0, 2 * Math.PI);
     state.entities.forEach((s, e) => {
       const body = kept.entities[e];
-      if (!isPlaced(s) || !(e === 0 || MOTORS.has(body.type))) return;
+      if (!isPlaced(s) || !(e === 0 || body.headlights)) return;
       const reach = body.center_ahead + body.length / 2;
       for (const side of [-0.35, 0.35]) {
         const [x, y] = view.toScreen([

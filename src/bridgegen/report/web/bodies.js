@@ -1,6 +1,5 @@
 // What stands and moves in the bird's-eye view: vehicles, people, things, traffic lights. In metres.
 
-const SMALL = { pedestrian: "person", animal: "person", bicycle: "cycle", motorcycle: "cycle", cone: "cone", sign: "sign", obstacle: "thing" };
 const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
   { at: 2.2, lit: [1, 2], colour: "#ff4d4d" }, { at: 0, lit: [2, 3], colour: "#ffd23f" }, { at: -2.2, lit: [4], colour: "#38d39f" },
 ];
@@ -16,7 +15,7 @@ function drawBody(c, entity, state, colour, scale) {
   c.save();
   c.translate(...boxCentre(entity, state.x, state.y, state.h));
   c.rotate(state.h);
-  if (entity.type in SMALL) {
+  if (entity.shape !== "vehicle") {
     drawSmall(c, entity, colour, scale);
     c.restore();
     return;
@@ -43,8 +42,8 @@ function drawBody(c, entity, state, colour, scale) {
 }
 
 // People, cycles and things: seen from afar they are a few pixels, so they are told by their shape.
-function drawSmall(c, { type, length, width }, colour, scale) {
-  const shape = SMALL[type], half = Math.max(0.5 * Math.max(length, width), 2.5 / scale);
+function drawSmall(c, { shape, length, width }, colour, scale) {
+  const half = Math.max(0.5 * Math.max(length, width), 2.5 / scale);
   c.beginPath();
   if (shape === "person" || shape === "cone") c.arc(0, 0, half, 0, 2 * Math.PI);
   else if (shape === "cycle") c.ellipse(0, 0, Math.max(length / 2, half), Math.max(width / 2, 2 / scale), 0, 0, 2 * Math.PI);

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.odd.bodies import BODIES
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.scenario_runner.blueprints import VEHICLES, blueprint
+from bridgegen.openx.openscenario.scenario_runner.blueprints import SIZES, blueprint
+from bridgegen.participants import PARTICIPANTS
 
 AXLE = osc.Axle(0.6, 0.65, 1.6, 2.8, 0.3)
 
@@ -26,7 +26,10 @@ def of(body):
     return body.length, body.width, body.height
 
 
-CAR, VAN, TRUCK, BUS, MOTORBIKE, BICYCLE = VEHICLES
+CAR, VAN, TRUCK, BUS = (osc.VehicleCategory(one) for one in ("car", "van", "truck", "bus"))
+MOTORBIKE, BICYCLE = osc.VehicleCategory.MOTORBIKE, osc.VehicleCategory.BICYCLE
+BODY = {name: one.body for name, one in PARTICIPANTS.items()}
+KINDS = [one for one in PARTICIPANTS.values() if one.written.element == "Vehicle" and one.carla]
 
 
 @pytest.mark.parametrize(
@@ -41,13 +44,13 @@ CAR, VAN, TRUCK, BUS, MOTORBIKE, BICYCLE = VEHICLES
     ],
 )
 def test_vehicles_of_the_catalogue(category, kind, name):
-    assert blueprint(vehicle(category, *of(BODIES[kind]))) == name
+    assert blueprint(vehicle(category, *of(BODY[kind]))) == name
 
 
 def test_an_emergency_vehicle_looks_like_one():
-    body = vehicle(VAN, *of(BODIES["emergency"]), role=osc.Role.AMBULANCE)
+    body = vehicle(VAN, *of(BODY["emergency"]), role=osc.Role.AMBULANCE)
     assert blueprint(body) == "vehicle.ford.ambulance"
-    assert blueprint(vehicle(VAN, *of(BODIES["van"]), role=osc.Role.CIVIL)).endswith("sprinter")
+    assert blueprint(vehicle(VAN, *of(BODY["van"]), role=osc.Role.CIVIL)).endswith("sprinter")
 
 
 @pytest.mark.parametrize(("height", "name"), [(1.75, "0001"), (1.1, "0010"), (1.32, "0012")])
@@ -61,9 +64,14 @@ def test_pedestrians_by_their_height(height, name):
 @pytest.mark.parametrize(
     ("name", "category", "size", "expected"),
     [
-        ("roadcone", "obstacle", of(BODIES["cone"]), "static.prop.constructioncone"),
-        ("constructioncard", "pole", of(BODIES["sign"]), "static.prop.warningconstruction"),
-        ("misc", "obstacle", of(BODIES["obstacle"]), "static.prop.haybale"),
+        ("roadcone", "obstacle", of(BODY["cone"]), "static.prop.constructioncone"),
+        (
+            "constructioncard",
+            "pole",
+            of(BODY["sign"]),
+            "static.prop.warningconstruction",
+        ),
+        ("misc", "obstacle", of(BODY["obstacle"]), "static.prop.haybale"),
         ("any", "barrier", (4.0, 0.5, 1.0), "static.prop.streetbarrier"),
         ("any", "building", (4.0, 4.0, 4.0), None),
     ],
@@ -82,8 +90,9 @@ def test_what_carla_has_not():
 sizes = st.tuples(*[st.floats(0.1, 30.0)] * 3)
 
 
-@given(st.sampled_from(list(VEHICLES)), sizes)
-def test_none_of_the_kind_is_nearer(category, size):
-    found = blueprint(vehicle(category, *size))
-    distances = {name: math.dist(one, size) for name, one in VEHICLES[category].items()}
+@given(st.sampled_from(KINDS), sizes)
+def test_none_of_the_kind_is_nearer(kind, size):
+    role = None if kind.written.role is None else osc.Role(kind.written.role)
+    found = blueprint(vehicle(osc.VehicleCategory(kind.written.category), *size, role=role))
+    distances = {name: math.dist(SIZES[name], size) for name in kind.carla}
     assert distances[found] == min(distances.values())

@@ -1,32 +1,15 @@
 """OWL2OpenSCENARIO, its entities: bodies, and who drives them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
+from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, KIND
 from bridgegen.openx.openscenario.values import format_double
+from bridgegen.participants import PARTICIPANTS, ParticipantKind
 
-CATEGORIES = {
-    "Car": osc.VehicleCategory.CAR,
-    "Van": osc.VehicleCategory.VAN,
-    "Truck": osc.VehicleCategory.TRUCK,
-    "Bus": osc.VehicleCategory.BUS,
-    "Motorcycle": osc.VehicleCategory.MOTORBIKE,
-    "EmergencyVehicle": osc.VehicleCategory.VAN,
-    "Bicycle": osc.VehicleCategory.BICYCLE,
-}
-WALKERS = {
-    "Pedestrian": osc.PedestrianCategory.PEDESTRIAN,
-    "Animal": osc.PedestrianCategory.ANIMAL,
-}
-OBJECTS = {
-    "Misc": osc.MiscObjectCategory.OBSTACLE,
-    "RoadCone": osc.MiscObjectCategory.OBSTACLE,
-    "ConstructionCard": osc.MiscObjectCategory.POLE,
-}
 MAX_SPEED = "max_speed"
 """Property of somebody on foot: how fast they can go [m/s]; the standard has it for vehicles."""
 
@@ -88,33 +71,40 @@ def scenario_object(individuals: Individuals, name: str, node: Subject) -> osc.S
 
 
 def _body(individuals: Individuals, node: Subject) -> osc.Vehicle | osc.Pedestrian | osc.MiscObject:
-    for name, category in CATEGORIES.items():
-        if individuals.is_a(node, name):
-            role = osc.Role.AMBULANCE if name == "EmergencyVehicle" else None
-            return _vehicle(individuals, node, category, role)
-    for name, walker in WALKERS.items():
-        if individuals.is_a(node, name):
-            fastest = individuals.optional_number(node, "has_max_speed")
-            said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
-            return osc.Pedestrian(
-                name=walker.value,
-                pedestrian_category=walker,
-                mass=individuals.number(node, "has_mass"),
-                bounding_box=_box(individuals, node),
-                properties=osc.Properties(said),
-                model3d=walker.value,
-            )
-    for name, kind in OBJECTS.items():
-        if individuals.is_a(node, name):
-            return osc.MiscObject(
-                name=name.lower(),
-                misc_object_category=kind,
-                mass=individuals.number(node, "has_mass"),
-                bounding_box=_box(individuals, node),
-                properties=osc.Properties(),
-            )
-    known = ", ".join((*CATEGORIES, *WALKERS, *OBJECTS))
+    for kind in PARTICIPANTS.values():
+        if individuals.is_a(node, kind.owl_class):
+            return _MAKE[kind.written.element](individuals, node, kind)
+    known = ", ".join(kind.owl_class for kind in PARTICIPANTS.values())
     raise UnsupportedError(f"{individuals.describe(node)} must be one of {known} to be written")
+
+
+def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
+    """Return the property that names a kind of which the category does not say all."""
+    return () if kind.written.is_exact else (osc.Property(KIND, kind.name),)
+
+
+def _pedestrian(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Pedestrian:
+    fastest = individuals.optional_number(node, "has_max_speed")
+    said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
+    name = kind.written.name or kind.written.category
+    return osc.Pedestrian(
+        name=name,
+        pedestrian_category=osc.PedestrianCategory(kind.written.category),
+        mass=individuals.number(node, "has_mass"),
+        bounding_box=_box(individuals, node),
+        properties=osc.Properties((*said, *_stated(kind))),
+        model3d=name,
+    )
+
+
+def _object(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.MiscObject:
+    return osc.MiscObject(
+        name=kind.written.name or kind.written.category,
+        misc_object_category=osc.MiscObjectCategory(kind.written.category),
+        mass=individuals.number(node, "has_mass"),
+        bounding_box=_box(individuals, node),
+        properties=osc.Properties(_stated(kind)),
+    )
 
 
 def _box(individuals: Individuals, node: Subject) -> osc.BoundingBox:
@@ -127,13 +117,11 @@ def _box(individuals: Individuals, node: Subject) -> osc.BoundingBox:
     )
 
 
-def _vehicle(
-    individuals: Individuals, node: Subject, category: osc.VehicleCategory, role: osc.Role | None
-) -> osc.Vehicle:
-    width = individuals.number(node, "has_box_width")
+def _vehicle(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Vehicle:
+    width, written = individuals.number(node, "has_box_width"), kind.written
     return osc.Vehicle(
-        name=category.value,
-        vehicle_category=category,
+        name=written.name or written.category,
+        vehicle_category=osc.VehicleCategory(written.category),
         bounding_box=_box(individuals, node),
         performance=osc.Performance(
             individuals.number(node, "has_max_speed"),
@@ -144,10 +132,18 @@ def _vehicle(
             _axle(_MAX_STEERING, width, individuals.number(node, "has_wheelbase")),
             _axle(0.0, width, 0.0),
         ),
-        properties=osc.Properties(),
-        role=role,
+        properties=osc.Properties(_stated(kind)),
+        role=None if written.role is None else osc.Role(written.role),
         mass=individuals.optional_number(node, "has_mass"),
     )
+
+
+_MAKE: Mapping[
+    str,
+    Callable[
+        [Individuals, Subject, ParticipantKind], osc.Vehicle | osc.Pedestrian | osc.MiscObject
+    ],
+] = {"Vehicle": _vehicle, "Pedestrian": _pedestrian, "MiscObject": _object}
 
 
 def _axle(max_steering: float, body_width: float, x: float) -> osc.Axle:

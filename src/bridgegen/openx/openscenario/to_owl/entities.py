@@ -4,12 +4,8 @@ import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
-from bridgegen.openx.openscenario.from_owl.entities import (
-    CATEGORIES,
-    MAX_SPEED,
-    OBJECTS,
-    WALKERS,
-)
+from bridgegen.openx.openscenario.from_owl.entities import MAX_SPEED
+from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.to_owl.actions import (
     add_route,
     add_trajectory,
@@ -17,11 +13,10 @@ from bridgegen.openx.openscenario.to_owl.actions import (
 )
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
 from bridgegen.openx.openscenario.to_owl.places import add_position
+from bridgegen.participants import PARTICIPANTS
 
-_EMERGENCY = "EmergencyVehicle"
-_VEHICLES = {category: name for name, category in CATEGORIES.items() if name != _EMERGENCY}
-_EMERGENCY_ROLES = (osc.Role.AMBULANCE, osc.Role.FIRE, osc.Role.POLICE)
-_FURNITURE = {osc.MiscObjectCategory.POLE: "ConstructionCard"}
+_ROAD_WORKS = {one.written.name: one for one in PARTICIPANTS.values() if not one.takes_part}
+_FURNITURE = {osc.MiscObjectCategory.POLE: PARTICIPANTS["sign"]}
 
 
 def add_participant(
@@ -65,10 +60,10 @@ def add_element(
     name, body = builder.text(one.name), one.entity_object
     if not isinstance(body, osc.MiscObject):
         raise UnsayableError(body, f"{type(body).__name__} {name} at road works")
-    own = {key.lower(): key for key in OBJECTS if key != "Misc"}
     category = builder.choice(osc.MiscObjectCategory, body.misc_object_category)
-    cls = own.get(builder.text(body.name)) or _FURNITURE.get(category, "RoadCone")
-    node = _add_body(builder, one, name, cls)
+    named = _ROAD_WORKS.get(builder.text(body.name))
+    kind = named or _FURNITURE.get(category, PARTICIPANTS["cone"])
+    node = _add_body(builder, one, name, kind.owl_class)
     place = add_position(builder, f"{name}_place", _teleport(one, actions).position)
     builder.put(node, "has_position", place)
     for wrapped in actions:
@@ -85,17 +80,13 @@ def _class_of(builder: StoryBuilder, body: Body) -> str:
     if isinstance(body, osc.ExternalObjectReference):
         raise UnsayableError(body, f"the ExternalObjectReference {body.name}")
     if isinstance(body, osc.MiscObject):
-        return "Misc"
-    if isinstance(body, osc.Pedestrian):
-        walker = builder.choice(osc.PedestrianCategory, body.pedestrian_category)
-        return next((name for name, one in WALKERS.items() if one is walker), "Pedestrian")
-    role = None if body.role is None else builder.choice(osc.Role, body.role)
-    category = builder.choice(osc.VehicleCategory, body.vehicle_category)
-    if role in _EMERGENCY_ROLES and category in _VEHICLES:
-        return _EMERGENCY
-    if category not in _VEHICLES:
+        return PARTICIPANTS["obstacle"].owl_class
+    kind = kind_of(body, builder.text)
+    if kind is None:
+        assert isinstance(body, osc.Vehicle)  # every Pedestrian has one
+        category = builder.choice(osc.VehicleCategory, body.vehicle_category)
         raise UnsayableError(body, f"a Vehicle of the category {category}")
-    return _VEHICLES[category]
+    return kind.owl_class
 
 
 def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: str) -> ox.NamedNode:

@@ -2,46 +2,19 @@
 
 import math
 
-from bridgegen.ego.kinds import (
-    ANIMAL,
-    BICYCLE,
-    BUS,
-    CAR,
-    MOTORBIKE,
-    OTHER,
-    PEDESTRIAN,
-    TRUCK,
-)
+from bridgegen.ego.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.participant_kinds import object_class_of
 from bridgegen.simulation.embedded.compiler.tables import Tables
 
 Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReference
-
-_VEHICLES = {
-    osc.VehicleCategory.BICYCLE: BICYCLE,
-    osc.VehicleCategory.BUS: BUS,
-    osc.VehicleCategory.CAR: CAR,
-    osc.VehicleCategory.MOTORBIKE: MOTORBIKE,
-    osc.VehicleCategory.SEMITRAILER: TRUCK,
-    osc.VehicleCategory.TRAILER: TRUCK,
-    osc.VehicleCategory.TRAIN: OTHER,
-    osc.VehicleCategory.TRAM: BUS,
-    osc.VehicleCategory.TRUCK: TRUCK,
-    osc.VehicleCategory.VAN: CAR,
-}
 
 _STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
 
 
 def kind(body: Body) -> int:
     """Return what an entity is, see `bridgegen.ego.kinds`."""
-    if isinstance(body, osc.Vehicle):
-        category = body.vehicle_category
-        return OTHER if isinstance(category, osc.ParameterRef) else _VEHICLES.get(category, OTHER)
-    if isinstance(body, osc.Pedestrian):
-        is_animal = body.pedestrian_category is osc.PedestrianCategory.ANIMAL
-        return ANIMAL if is_animal else PEDESTRIAN
-    return OTHER
+    return NAMES.index(object_class_of(body).name)
 
 
 def measures(tables: Tables, body: Body) -> tuple[float, ...]:

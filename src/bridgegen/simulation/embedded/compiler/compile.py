@@ -6,8 +6,8 @@ import numpy as np
 
 from bridgegen.arrays import Int
 from bridgegen.ego import STORYBOARD, Driver
+from bridgegen.ego._kind_tables import IS_VEHICLE
 from bridgegen.ego.drivers import ATTENTIVE, SCRIPTED
-from bridgegen.ego.kinds import MOTORBIKE
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
@@ -263,7 +263,7 @@ class _Compiler:
             return "it is an object, which does not move by itself"
         if self.actions.is_timed(e):
             return "it follows a trajectory with times"
-        drives = kind(body) <= MOTORBIKE
+        drives = IS_VEHICLE[kind(body)]
         if drives and isinstance(self.paths[e], AlongTrajectory):
             return "it follows a trajectory, and is on no lane"
         return ""
