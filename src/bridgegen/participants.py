@@ -292,9 +292,22 @@ _TRAM = ObjectClass(
     hides_people=True,
     carla=_BUS.carla,
 )
+_E_SCOOTER = ObjectClass(
+    name="e-scooter",
+    conduct="bicycle",  # eKFV § 10: it goes where bicycles go
+    mass=95.0,
+    lamps=2.0,  # eKFV § 5: as a bicycle's
+    reflectance=0.1,  # its rider's clothes; it is small itself
+    mistaken_for="pedestrian",  # its rider stands
+    detection_class="two-wheeler",
+    limits=MotionLimits(3.0, 7.0, 1.0, 0.7, slides=False),  # as a bicycle's
+    injury="bicycle",  # stands in: there is no curve of closing speed for its riders
+    hides_people=False,
+    carla=_BICYCLE.carla,
+)
 
 OBJECT_CLASSES = (
-    _CAR, _TRUCK, _BUS, _MOTORCYCLE, _BICYCLE, _PEDESTRIAN, _ANIMAL, _OTHER, _TRAM,
+    _CAR, _TRUCK, _BUS, _MOTORCYCLE, _BICYCLE, _PEDESTRIAN, _ANIMAL, _OTHER, _TRAM, _E_SCOOTER,
 )  # fmt: skip
 """By code, which files record and detectors answer: new ones come last.
 
@@ -376,6 +389,19 @@ _ALL = (
         seen_as=_BICYCLE,
         owl_class="Bicycle",
         written=Written("Vehicle", "bicycle"),
+        drawing=Drawing("cycle"),
+        carla=(
+            "vehicle.bh.crossbike", "vehicle.diamondback.century", "vehicle.gazelle.omafiets",
+        ),
+    ),
+    ParticipantKind(
+        name="e-scooter",
+        # With its rider, who stands on it. eKFV § 1: 20 km/h, 2.0 m by 0.7 m and 55 kg at most;
+        # § 4: brakes of 3.5 m/s² at least. Of common models, rounded: 1.2 m and 20 kg.
+        body=Body(1.2, 0.6, 1.9, 0.45, 0.9, 5.56, 1.5, 3.5, 95.0),
+        seen_as=_E_SCOOTER,
+        owl_class="EScooter",
+        written=Written("Vehicle", "bicycle", name="e-scooter", is_exact=False),
         drawing=Drawing("cycle"),
         carla=(
             "vehicle.bh.crossbike", "vehicle.diamondback.century", "vehicle.gazelle.omafiets",
