@@ -29,7 +29,11 @@ def evaluate(X: Float) -> SimpleNamespace:
     F = ((X - 0.3) ** 2).sum(axis=1, keepdims=True)
     metrics = np.repeat(F, len(METRICS), axis=1)
     status = np.zeros(len(X), np.int8)
-    return SimpleNamespace(messages={}, metrics=metrics, F=F, critical=F[:, 0] < 0.5, status=status)
+    critical = F[:, 0] < 0.5
+    return SimpleNamespace(
+        messages={}, cause=None, findings=None, metrics=metrics, F=F, critical=critical,
+        status=status,
+    )  # fmt: skip
 
 
 def main() -> None:

@@ -55,7 +55,15 @@ class Climber:
 def simulate(X):
     F = ((X - 0.77) ** 2).sum(axis=1, keepdims=True)
     status = np.zeros(len(F), np.int64)
-    return SimpleNamespace(messages={}, metrics=F, F=F, critical=F[:, 0] < 0.1, status=status)
+    return SimpleNamespace(
+        messages={},
+        cause=None,
+        findings=None,
+        metrics=F,
+        F=F,
+        critical=F[:, 0] < 0.1,
+        status=status,
+    )
 
 
 def opened(folder: Path) -> Store:

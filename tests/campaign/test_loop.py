@@ -47,7 +47,13 @@ class Simulator:
         status = np.where(X[:, 0] < 0.1, 2, 0)
         F[status == 2] = np.nan
         return SimpleNamespace(
-            messages={}, metrics=F * 2, F=F, critical=F[:, 0] < 0.01, status=status
+            messages={},
+            cause=None,
+            findings=None,
+            metrics=F * 2,
+            F=F,
+            critical=F[:, 0] < 0.01,
+            status=status,
         )
 
 
@@ -286,7 +292,7 @@ def test_all_that_is_known_of_a_row_is_told(open_store):
     class Caused(Simulator):
         def __call__(self, X):
             result = super().__call__(X)
-            return SimpleNamespace(**vars(result), cause=np.where(result.critical, 2, 0))
+            return SimpleNamespace(**vars(result) | {"cause": np.where(result.critical, 2, 0)})
 
     search = Scripted([0.5, 0.05, 0.7], [0.7, 0.5])
     go(open_store(), search, 10, simulate=Caused())
@@ -350,7 +356,10 @@ def evaluate(X):
     F = ((X - 0.3) ** 2).sum(axis=1, keepdims=True)
     status = np.where(X[:, 0] > 0.8, 1, 0)
     F[status == 1] = np.nan
-    return SimpleNamespace(messages={}, metrics=F, F=F, critical=F[:, 0] < 0.01, status=status)
+    critical = F[:, 0] < 0.01
+    return SimpleNamespace(
+        messages={}, cause=None, findings=None, metrics=F, F=F, critical=critical, status=status
+    )
 
 if os.path.exists(folder + "/run.sqlite"):
     store = Store.open(folder, write=True)

@@ -120,7 +120,15 @@ def evaluate(X: Float, n_obj: int = 1) -> SimpleNamespace:
     status = np.where(X[:, 0] > 0.9, 1, 0)  # a tenth of the cube cannot be simulated
     F[status == 1] = np.nan
     m[status == 1] = np.nan
-    return SimpleNamespace(messages={}, metrics=m, F=F, critical=m[:, 0] < 0.1, status=status)
+    return SimpleNamespace(
+        messages={},
+        cause=None,
+        findings=None,
+        metrics=m,
+        F=F,
+        critical=m[:, 0] < 0.1,
+        status=status,
+    )
 
 
 def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed: int = 3):

@@ -33,7 +33,15 @@ def evaluate(X):
     F[status == 1] = np.nan
     critical = F[:, 0] < 0.05
     metrics = np.hstack([F, F * 2, 1.0 / F, -F])
-    return SimpleNamespace(messages={}, metrics=metrics, F=F, critical=critical, status=status)
+    return SimpleNamespace(
+        messages={},
+        cause=None,
+        findings=None,
+        metrics=metrics,
+        F=F,
+        critical=critical,
+        status=status,
+    )
 
 
 def results_of(U):

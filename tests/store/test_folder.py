@@ -23,7 +23,8 @@ from bridgegen.errors import StorageError
 from bridgegen.store import Store
 
 def append(store, n=40, n_x=50):
-    result = SimpleNamespace(messages={}, metrics=np.zeros((n, 1)), F=np.zeros((n, 1)),
+    result = SimpleNamespace(messages={}, cause=None, findings=None,
+                             metrics=np.zeros((n, 1)), F=np.zeros((n, 1)),
                              critical=np.zeros(n, bool), status=np.zeros(n, int))
     store.append(np.full((n, 2), 0.1), np.random.random((n, n_x)), result, 0.0)
 
@@ -50,6 +51,8 @@ def create(folder):
 def append(store, n=3):
     result = SimpleNamespace(
         messages={},
+        cause=None,
+        findings=None,
         metrics=np.zeros((n, 1)),
         F=np.zeros((n, 1)),
         critical=np.zeros(n, bool),
@@ -268,6 +271,8 @@ def check_full(folder, said, cause):
         assert store.read().batch[-1] == n // 40 - 1
         result = SimpleNamespace(
             messages={},
+            cause=None,
+            findings=None,
             metrics=np.zeros((2, 1)),
             F=np.zeros((2, 1)),
             critical=np.zeros(2),

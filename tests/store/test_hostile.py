@@ -19,6 +19,7 @@ def make(folder):
     with Store.create(folder, {"seed": 1}, ["a", "b"], ["m"], n_var=2, n_obj=1) as store:
         result = SimpleNamespace(
             messages={1: "no route"},
+            findings=None,
             metrics=np.zeros((3, 1)),
             F=np.zeros((3, 1)),
             critical=np.zeros(3, bool),
@@ -42,7 +43,8 @@ def read_all(folder, write):
         found = (len(store), store.n_batches, store.seconds, store.failures(), store.checkpoint())
         if write:
             result = SimpleNamespace(
-                messages={0: "x"}, metrics=np.zeros((1, 1)), F=np.zeros((1, 1)),
+                messages={0: "x"}, cause=None, findings=None,
+                metrics=np.zeros((1, 1)), F=np.zeros((1, 1)),
                 critical=np.zeros(1, bool), status=np.zeros(1, int),
             )  # fmt: skip
             store.append(np.zeros((1, 2)), np.zeros((1, 2)), result, 2.0)

@@ -21,6 +21,8 @@ def batch(n, seed=0, n_var=3):
     rng = np.random.default_rng(seed)
     result = SimpleNamespace(
         messages={},
+        cause=None,
+        findings=None,
         metrics=rng.normal(size=(n, 3)),
         F=rng.normal(size=(n, 2)),
         critical=rng.random(n) < 0.5,
@@ -71,6 +73,8 @@ numbers = hnp.arrays(np.float64, (3, 2), elements=st.floats(width=64))
 def test_every_float_comes_back_bit_for_bit(X, F, U, tmp_path_factory):
     result = SimpleNamespace(
         messages={},
+        cause=None,
+        findings=None,
         metrics=np.hstack([X, F[:, :1]]),
         F=F,
         critical=np.zeros(3, bool),
@@ -248,6 +252,8 @@ def test_any_name_is_a_column(tmp_path):
     X = np.arange(2.0 * n).reshape(2, n)
     result = SimpleNamespace(
         messages={},
+        cause=None,
+        findings=None,
         metrics=X[:, :4] + 100,
         F=np.zeros((2, 1)),
         critical=np.zeros(2, bool),

@@ -12,7 +12,7 @@ import numpy as np
 
 from bridgegen.arrays import Float, as_float
 from bridgegen.campaign.met import Met
-from bridgegen.campaign.told import Told
+from bridgegen.campaign.result_log import ResultLog
 from bridgegen.errors import InputError, StorageError
 from bridgegen.search import Algorithm, Restorable, TakesNotes
 from bridgegen.store import Checkpoint, Evaluated, Rows, Store
@@ -160,7 +160,7 @@ class _Session:
         self._recorded, self._seconds_before = len(store), store.seconds
         self._began: float | None = None
         self._known = Met()
-        self._told = Told(store.n_obj, len(store.metrics))
+        self._log = ResultLog(store.n_obj, len(store.metrics))
         self._idle = 0
 
     @property
@@ -178,7 +178,7 @@ class _Session:
             X = as_float("X", self._decode(rows.U), rows.X.shape) + 0.0
             self._compare("X", X, rows.X, int(rows.id[0]))
             self._known.meet(X, self._budget)
-            self._told.add(rows)
+            self._log.add(rows)
             self._report(int(rows.id[-1]) + 1, rows, replayed=True)
         self._idle = saved.idle
         try:
@@ -203,16 +203,16 @@ class _Session:
         old = fresh[: max(0, self._recorded - done)]
         for rows, take in ((old, self._replay), (fresh[len(old) :], self._simulate)):
             if rows:
-                self._told.add(take(U[rows], X[rows], int(ids[rows[0]])))
+                self._log.add(take(U[rows], X[rows], int(ids[rows[0]])))
         self.batches += 1
         self.repeated += int(np.count_nonzero(ids >= 0)) - len(fresh)
         if len(self._known) >= self._budget:
             # The budget may have cut this batch short, and nobody will ask again.
             if isinstance(self._algorithm, TakesNotes):
-                self._algorithm.tell(U, self._told.results(ids))
+                self._algorithm.tell(U, self._log.results(ids))
             return Reason.BUDGET
 
-        self._algorithm.tell(U, self._told.results(ids))
+        self._algorithm.tell(U, self._log.results(ids))
         self._idle = 0 if fresh else self._idle + 1
         if len(self._known) >= self._recorded:
             self._save()

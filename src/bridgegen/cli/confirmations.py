@@ -40,9 +40,9 @@ def confirm(
     from bridgegen.campaign.confirm import confirm as confirm_run
     from bridgegen.screen.confirmation import ConfirmationScreen, print_confirmation
     from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.verdict.of_confirmation import ConfirmationGate
+    from bridgegen.verdict.of_confirmation import ConfirmationCriteria
 
-    gate = ConfirmationGate.read(fail_if or (), junit)
+    criteria = ConfirmationCriteria.read(fail_if or (), junit)
     choice = options.read_simulator(simulator, simulator_set, connection)
     assert choice is not None
     with ConfirmationScreen() as screen:
@@ -57,5 +57,5 @@ def confirm(
             progress=screen.progress,
         )
     print_confirmation(found, as_json=as_json)
-    if not print_outcomes(gate.judge(found)):
+    if not print_outcomes(criteria.judge(found)):
         raise typer.Exit(FAILED)

@@ -50,9 +50,9 @@ def search(
     """Search a scenario for critical concrete scenarios."""
     from bridgegen import campaign
     from bridgegen.screen.search import SearchScreen, print_summary
-    from bridgegen.verdict.of_run import Gate
+    from bridgegen.verdict.of_run import PassFailCriteria
 
-    gate = Gate.read(fail_if or (), junit, causes=options.causes)
+    criteria = PassFailCriteria.read(fail_if or (), junit, causes=options.causes)
     chosen = common.read_simulator(simulator, simulator_set, connection)
     options = replace(options, simulator=chosen or EMBEDDED)
     with SearchScreen(options.budget) as screen:
@@ -60,7 +60,7 @@ def search(
             scenario, **vars(options), out=out, workers=workers, watch=screen.watch
         )
     print_summary(run, screen.seconds)
-    _end(gate.judge(run))
+    _end(criteria.judge(run))
 
 
 @app.command(rich_help_panel=FILES)
@@ -96,9 +96,9 @@ def resume(
     """
     from bridgegen import campaign
     from bridgegen.screen.search import SearchScreen, print_summary
-    from bridgegen.verdict.of_run import Gate
+    from bridgegen.verdict.of_run import PassFailCriteria
 
-    gate = Gate.of_run(fail_if or (), junit, folder)
+    criteria = PassFailCriteria.of_run(fail_if or (), junit, folder)
     with SearchScreen() as screen:
         run = campaign.resume(
             folder,
@@ -108,7 +108,7 @@ def resume(
             watch=screen.watch,
         )
     print_summary(run, screen.seconds)
-    _end(gate.judge(run))
+    _end(criteria.judge(run))
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -245,9 +245,9 @@ def simulate(
     from bridgegen.screen.files import conflict_facts, print_file_result
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
-    from bridgegen.verdict.of_file import FileGate
+    from bridgegen.verdict.of_file import FileCriteria
 
-    gate = FileGate.read(fail_if or (), junit)
+    criteria = FileCriteria.read(fail_if or (), junit)
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
     result = simulate_file(
@@ -257,7 +257,7 @@ def simulate(
         others=others,
         time_limit=time_limit,
         metrics=read_names(metrics),
-        also=gate.metrics,
+        also=criteria.metrics,
         time_step=dt,
         skipped=skipped,
         simulator=common.read_simulator(simulator, simulator_set, connection) or EMBEDDED,
@@ -284,7 +284,7 @@ def simulate(
         print(json.dumps(facts, indent=2))
     else:
         print_file_result(file, result)
-    _end(gate.judge(file, result))
+    _end(criteria.judge(file, result))
 
 
 @app.command("check-driver", rich_help_panel=SEARCH)

@@ -23,11 +23,7 @@ DIGESTED = 4096
 
 
 class Evaluated(Protocol):
-    """The evaluation of n rows: any object with these arrays.
-
-    Optional attributes: ``cause``, ``(n,)`` integers, a `Cause` each, and ``findings``, the
-    `Findings` of n rows; they are not recorded if they are missing or None.
-    """
+    """The evaluation of n rows: any object with these arrays."""
 
     @property
     def metrics(self) -> Float:
@@ -44,6 +40,14 @@ class Evaluated(Protocol):
     @property
     def status(self) -> npt.NDArray[np.integer[Any]]:
         """``(n,)`` integers, 0 is success."""
+
+    @property
+    def cause(self) -> npt.NDArray[np.integer[Any]] | None:
+        """``(n,)`` integers, a `Cause` each; None where causes are not sought."""
+
+    @property
+    def findings(self) -> Findings | None:
+        """The decisive conflict of each row; None where conflicts are not recorded."""
 
     @property
     def messages(self) -> Mapping[int, str]:
@@ -203,12 +207,11 @@ class Columns:
             ]
         )
         status, critical = np.asarray(result.status), np.asarray(result.critical)
-        found = getattr(result, "cause", None)
-        cause = np.zeros(n, np.int8) if found is None else np.asarray(found)
+        cause = np.zeros(n, np.int8) if result.cause is None else np.asarray(result.cause)
         for name, array in (("status", status), ("critical", critical), ("cause", cause)):
             if array.shape != (n,):
                 raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
-        findings = getattr(result, "findings", None) or Findings.none(n)
+        findings = result.findings or Findings.none(n)
         if len(findings) != n:
             raise ValueError(f"findings must be those of {n} rows, got {len(findings)}")
         parts = zip(

@@ -76,10 +76,6 @@ class ConfirmationCriteria:
         return outcomes
 
 
-ConfirmationGate = ConfirmationCriteria
-"""The name by which the command line imports it."""
-
-
 def figures_of(found: RunConfirmation) -> dict[str, float]:
     """Return FIGURES of a confirmation; NaN is an unknown figure."""
     s, nan = found.summary, float("nan")

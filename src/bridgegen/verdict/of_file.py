@@ -71,7 +71,3 @@ class FileCriteria:
             cases = [case_of(group, one) for one in outcomes]
             write_junit(self.junit, [Suite(file.name, cases, facts)])
         return outcomes
-
-
-FileGate = FileCriteria
-"""The name by which the command line imports it."""

@@ -113,10 +113,6 @@ class PassFailCriteria:
         return outcomes
 
 
-Gate = PassFailCriteria
-"""The name by which the command line imports it."""
-
-
 def figures_of(run: Run) -> dict[str, float]:
     """Return FIGURES of a run; NaN is an unknown figure."""
     s, nan = run.summary, float("nan")

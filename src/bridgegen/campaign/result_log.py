@@ -1,4 +1,4 @@
-"""What an algorithm is told of the rows that it asked for."""
+"""The results that an algorithm gets for the rows that it asked for."""
 
 from array import array
 
@@ -10,8 +10,8 @@ from bridgegen.search import Results
 from bridgegen.store import Evaluated
 
 
-class Told:
-    """What every row came to, by id; the same bits live and in a replay."""
+class ResultLog:
+    """Results of every evaluated row, by row id; the same bits in a search and in its replay."""
 
     def __init__(self, n_obj: int, n_metrics: int) -> None:
         self._n_obj, self._n_metrics = n_obj, n_metrics
@@ -26,8 +26,7 @@ class Told:
         metrics = np.where(np.isnan(metrics), np.nan, metrics)
         ok = (np.asarray(result.status) == 0) & np.isfinite(F).all(axis=1)
         critical = np.asarray(result.critical, np.bool_) & ok
-        found = getattr(result, "cause", None)
-        cause = np.full(len(F), Cause.NONE) if found is None else np.asarray(found)
+        cause = np.full(len(F), Cause.NONE) if result.cause is None else np.asarray(result.cause)
         for kept, values in (
             (self._F, F),
             (self._metrics, metrics),
