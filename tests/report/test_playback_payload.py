@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from bridgegen.participants import PARTICIPANTS
 from bridgegen.report.playback import Course, Sensed, Weather
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
 from bridgegen.report.series import unpacked
@@ -26,6 +27,21 @@ def test_a_road_is_within_half_a_centimetre(report):
     for told, lane in zip(road_payload(p), p.lanes, strict=True):
         points = np.cumsum(np.reshape(told["points"], (-1, 2)), axis=0) / ROAD_SCALE
         assert np.abs(points - lane.points).max() <= 0.5 / ROAD_SCALE + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape", "headlights"),
+    [
+        *((one.name, one.drawing.shape, one.drawing.headlights) for one in PARTICIPANTS.values()),
+        ("train", "vehicle", True),
+    ],
+)
+def test_the_page_is_told_how_each_kind_is_drawn(report, kind, shape, headlights):
+    p = report.kept[0]
+    ego, other = p.entities
+    read = sent(replace(p, entities=(ego, replace(other, type=kind))))["entities"]
+    assert (read[0]["shape"], read[0]["headlights"]) == ("vehicle", True)
+    assert (read[1]["shape"], read[1]["headlights"]) == (shape, headlights)
 
 
 @given(
