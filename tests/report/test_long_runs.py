@@ -1,6 +1,7 @@
 import numpy as np
 
 from bridgegen.report import payload
+from bridgegen.report.batches_payload import batches_payload
 from bridgegen.report.data import Column, Evaluations
 
 
@@ -23,4 +24,4 @@ def test_a_long_run_is_thinned_evenly_and_keeps_the_kept(monkeypatch):
     assert np.diff(found).max() <= 42
     assert rows["columns"][0]["values"] == found.tolist()
     assert not (found % 100 == 0).any()
-    assert len(payload._batches(evaluations)["share"]) == 25
+    assert len(batches_payload(evaluations)["share"]) == 25

@@ -5,18 +5,16 @@ import subprocess
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
-from importlib.resources import files
 
 import pytest
 
 from bridgegen.errors import StorageError
-from bridgegen.report import page, scenario_page, show
+from bridgegen.report import page
 from bridgegen.report.page import write_report
 from bridgegen.report.payload import to_json
+from bridgegen.report.sections import SECTIONS
 
-STYLES = (*page.STYLES, *scenario_page.STYLES)
 PAGES = ("page.html", "show.html", "scenario.html")
-OURS = dict.fromkeys((*page.SCRIPTS, *show.SCRIPTS, *STYLES, *PAGES))
 VOID = {"meta", "link", "input", "br", "img", "hr"}
 
 
@@ -94,7 +92,10 @@ def test_nothing_is_fetched(written):
     assert policy.startswith("default-src 'none';")
     assert "http" not in policy
     assert "connect-src 'none'" in policy
-    own = b"".join(map(page._own, OURS)).decode()
+    parts = [page._own(name) for name in (*PAGES, "scenario.css")]
+    for entries in (page.REPORT, ("show.js",)):
+        parts += page._bundled(entries)
+    own = b"".join(parts).decode()
     own = own.replace("http://www.w3.org/2000/svg", "")  # a namespace's name is no address
     for word in ("http:", "https:", "fetch(", "XMLHttpRequest", "import(", "url(", "@import"):
         assert word not in own
@@ -105,32 +106,35 @@ def test_the_data_inside_is_the_data(written, report):
 
 
 def test_every_id_that_a_script_asks_for_exists(written):
-    scripts = b"".join(page._own(name) for name in (*page.SCRIPTS, *page.SERVED)).decode()
+    scripts = page._bundled(page.SERVED)[0].decode()
     asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
     assert len(asked) > 30
     assert asked <= set(Page(written).values("id"))
 
 
 def test_every_id_of_the_picture_page_exists():
-    scripts = b"".join(map(page._own, show.SCRIPTS)).decode()
+    scripts = page._bundled(("show.js",))[0].decode()
     asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
     assert asked <= set(re.findall(r'id="([\w-]+)"', page._own("show.html").decode()))
 
 
-def test_no_name_is_declared_by_two_scripts():
-    """They share one scope, where a second function would silently replace the first."""
-    scripts = b"\n".join(map(page._own, (*page.SCRIPTS, *page.SERVED))).decode()
-    declared = re.findall(r"^(?:async )?(?:function|class|const|let) (\w+)", scripts, re.M)
-    assert len(declared) == len(set(declared)) > 50
+def test_every_style_of_ours_is_used():
+    ours = [file.name for file in page.WEB.iterdir() if file.name.endswith(".css")]
+    assert len(ours) > 8
+    needed = [page._bundled(page.SERVED)[1], page._own("scenario.css")]
+    assert [name for name in ours if not any(page._own(name) in one for one in needed)] == []
 
 
-def test_every_file_of_ours_is_used():
-    ours = {
-        f.name
-        for f in files("bridgegen.report").joinpath("web").iterdir()
-        if f.name.endswith((".js", ".css"))
-    }
-    assert ours == {*page.SCRIPTS, *page.SERVED, *show.SCRIPTS, *STYLES}
+def test_every_section_has_a_place_and_its_data(written):
+    """A section names its element in its module; what it draws, here and there."""
+    ids = Page(written).values("id")
+    sent = json.loads(embedded(written))
+    for section in SECTIONS:
+        text = page._own(section.module).decode()
+        assert f'key: "{section.key}"' in text
+        assert section.key in sent
+        (host,) = re.findall(r'addSection\(\{ id: "([\w-]+)"', text)
+        assert (host in ids) != ("title: " in text.partition("addSection(")[2])
 
 
 @pytest.mark.parametrize(

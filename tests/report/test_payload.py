@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from bridgegen.report.data import Column
-from bridgegen.report.payload import decimals, payload, significant, to_json
+from bridgegen.report.payload import payload, to_json
 from bridgegen.report.playback_payload import SCALE
+from bridgegen.report.rounding import decimals, significant
 from bridgegen.report.series import unpacked
 
 HOSTILE = [

@@ -48,6 +48,14 @@ def tables(notes: Mapping[str, Any], space: SearchSpace) -> tuple[NoteTable, ...
     return tuple(found)
 
 
+def notes_payload(notes: Sequence[NoteTable]) -> list[dict[str, Any]]:
+    """Return tables as the plain data that the page shows."""
+    return [
+        {"title": t.title, "columns": t.columns, "rows": t.rows, "left_out": t.left_out}
+        for t in notes
+    ]
+
+
 def _is_table(value: Any) -> bool:
     return isinstance(value, list) and len(value) > 0 and all(isinstance(v, dict) for v in value)
 

@@ -3,7 +3,6 @@
 import html
 import importlib.util
 import re
-from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -11,34 +10,17 @@ from pathlib import Path
 from bridgegen.disk import write_whole
 from bridgegen.errors import BridgeGenError
 from bridgegen.report.data import ReportData
+from bridgegen.report.modules import bundle
 from bridgegen.report.payload import to_json
+from bridgegen.report.sections import SECTIONS
 
-SCRIPTS = (
-    "common.js", "page.js", "regions.js", "elsewhere.js", "filters.js", "causes.js", "modes.js",
-    "notes.js", "inflate.js", "downloads.js", "playbacks.js",
-    "table.js", "table_tools.js", "address.js", "series.js", "unpack.js", "geometry.js", "view.js",
-    "bodies.js", "labels.js", "senses.js", "course.js", "atmosphere.js", "words.js", "conflict.js",
-    "scene.js", "strip.js", "curves.js", "picture.js", "player.js", "parallel.js", "front.js",
-    "near.js", "charts.js", "coverage.js", "coverage_pairs.js",
-)  # fmt: skip
-"""Joined in this order into one function scope; ``page.js`` holds what the others share."""
+WEB = files("bridgegen.report").joinpath("web")
 
-SERVED = ("live.js",)
-"""Besides, where the page is served; a page on disk has nothing that could ask for anything."""
+REPORT = (*(section.module for section in SECTIONS), "page.js")
+"""Modules that the report is made of, besides those that they import."""
 
-STYLES = (
-    "page.css",
-    "picture.css",
-    "coverage.css",
-    "causes.css",
-    "notes.css",
-    "table.css",
-    "regions.css",
-    "elsewhere.css",
-    "playback.css",
-    "live.css",
-    "modes.css",
-)
+SERVED = ("motion.js", *REPORT, "live.js")
+"""The same where the page is served; a page on disk has nothing that could ask for anything."""
 
 
 def write_report(path: Path, data: ReportData) -> None:
@@ -62,59 +44,73 @@ def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
     connect = b"'self'" if live else b"'none'"
     text = to_json(data, live=live)
-    scripts = (*SERVED, *SCRIPTS) if live else SCRIPTS
-    return filled("page.html", scripts, title, text, plotly=_plotly(), connect=connect)
+    script, style = _bundled(SERVED if live else REPORT)
+    return filled(
+        "page.html", title, style, data=text.encode("ascii"), script=script, plotly=_plotly(),
+        connect=connect,
+    )  # fmt: skip
 
 
-def write_page(
-    path: Path,
-    template: str,
-    scripts: Iterable[str],
-    title: str,
-    data: str,
-    styles: Iterable[str] = STYLES,
-    **more: bytes,
-) -> None:
-    """Write a page, whole or not at all; arguments as for `filled`.
+def write_page(path: Path, entry: str, title: str, data: str) -> None:
+    """Write a page, whole or not at all.
+
+    Args:
+        path: of the page.
+        entry: a module of ``web`` with a template beside it ("show.js", "show.html").
+        title: plain text.
+        data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
 
     Raises:
         StorageError: the file cannot be written.
     """
-    write_whole(path, filled(template, scripts, title, data, styles, **more))
+    script, style = _bundled((entry,))
+    template = entry.replace(".js", ".html")
+    write_whole(path, filled(template, title, style, script=script, data=data.encode("ascii")))
 
 
-def filled(
-    template: str,
-    scripts: Iterable[str],
-    title: str,
-    data: str,
-    styles: Iterable[str] = STYLES,
-    **more: bytes,
-) -> list[bytes]:
+def write_still_page(path: Path, template: str, title: str, body: bytes) -> None:
+    """Write a page without scripts, whole or not at all.
+
+    Args:
+        path: of the page.
+        template: a file of ``web``, with a style beside it.
+        title: plain text.
+        body: HTML.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    style = _own("common.css") + b"\n" + _own(template.replace(".html", ".css"))
+    write_whole(path, filled(template, title, style, body=body))
+
+
+def filled(template: str, title: str, css: bytes, **more: bytes) -> list[bytes]:
     """Return a page in parts; what is put in is never searched for placeholders again.
 
     Args:
         template: a file of ``web``.
-        scripts: files of ``web``.
         title: plain text.
-        data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
-        styles: files of ``web``.
+        css: its style.
         more: of the template's other placeholders.
     """
-    fill = {
-        "title": html.escape(title).encode("utf-8", "replace"),
-        "css": b"\n".join(map(_own, styles)),
-        "data": data.encode("ascii"),
-        "scripts": b"\n".join(map(_own, scripts)),
-        **more,
-    }
+    fill = {"title": html.escape(title).encode("utf-8", "replace"), "css": css, **more}
     parts = re.split(rb"\{\{(\w+)\}\}", _own(template))
     return [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
 
 
 @cache
+def _bundled(entries: tuple[str, ...]) -> tuple[bytes, bytes]:
+    script, style = bundle(entries, _text)
+    return script.encode(), style.encode()
+
+
+def _text(name: str) -> str | None:
+    file = WEB.joinpath(name)
+    return file.read_text("utf-8") if file.is_file() else None
+
+
 def _own(name: str) -> bytes:
-    return files("bridgegen.report").joinpath("web", name).read_bytes()
+    return WEB.joinpath(name).read_bytes()
 
 
 @cache

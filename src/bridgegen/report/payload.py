@@ -6,22 +6,14 @@ number that is NaN or infinite becomes null.
 
 import json
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.cause import CAUSES, Cause
+from bridgegen.arrays import Bool
 from bridgegen.report import convergence, sentences
-from bridgegen.report.confirmation_payload import confirmations_payload
-from bridgegen.report.coverage_payload import coverage_payload
 from bridgegen.report.data import Column, Evaluations, ReportData
-from bridgegen.report.findings_payload import (
-    findings_payload,
-    implausible_payload,
-    triage_payload,
-)
+from bridgegen.report.findings_payload import findings_payload, implausible_payload
 from bridgegen.report.packed import packed_files, packed_motions, road_key
 from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.playback_payload import (
@@ -30,20 +22,12 @@ from bridgegen.report.playback_payload import (
     playback_payload,
     road_payload,
 )
-from bridgegen.report.regions_payload import regions_payload
+from bridgegen.report.rounding import significant
+from bridgegen.report.sections import sections_payload
 from bridgegen.search.dominance import by_merit, non_dominated
-
-DIGITS = 5
-"""Significant digits of the largest value of a column in bulk."""
 
 ROWS = 20_000
 """Rows of a longer run that the page holds, evenly spread; the iterations show all of it."""
-
-TRENDS = {"d_min": False, "v_d": True}
-"""The metrics shown over iterations, and whether a larger one is worse."""
-
-TRENDS_OF_HARM = {"harm": True, "d_min": False}
-"""Likewise, where harm makes a scenario critical."""
 
 
 def to_json(data: ReportData, *, live: bool = False) -> str:
@@ -69,7 +53,6 @@ def script_json(value: Any) -> str:
 
 def payload(data: ReportData) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings."""
-    elsewhere = confirmations_payload(data.confirmations)
     harm = data.summary.harm
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
@@ -84,7 +67,7 @@ def payload(data: ReportData) -> dict[str, Any]:
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
     motions = packed_motions(data.more, index)
     wanted = [*(one.evaluation for one in data.kept), *motions["evaluations"]]
-    wanted += [one["evaluation"] for each in elsewhere for one in each["scenarios"]]
+    wanted += [one.evaluation for each in data.confirmations for one in each.scenarios]
     modes = data.triage.modes if data.triage else ()
     wanted += [one.shown for one in modes]
     shown = _shown(data.evaluations, wanted)
@@ -92,23 +75,14 @@ def payload(data: ReportData) -> dict[str, Any]:
         "live": False,
         "summary": _summary(data),
         "rows": _rows(data.evaluations, shown, harm=harm),
-        "triage": triage_payload(data.triage) if data.triage else None,
         "minimal": packed_motions(data.minimal, index),
         "implausible": implausible_payload(data.evaluations.findings),
-        "regions": regions_payload(data.regions, data.evaluations, shown) if data.regions else None,
-        "confirmations": elsewhere,
-        "batches": _batches(data.evaluations, TRENDS_OF_HARM if harm else TRENDS),
-        "causes": _causes(data.evaluations),
+        **sections_payload(data, shown),
         "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
         "kept": kept,
         "packed": motions,
         "files": packed_files(data.files),
-        "coverage": coverage_payload(data.coverage) if data.coverage else None,
-        "notes": [
-            {"title": t.title, "columns": t.columns, "rows": t.rows, "left_out": t.left_out}
-            for t in data.notes
-        ],
         "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
     }
 
@@ -132,10 +106,7 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
             "front": _front(e, shown),
         },
         "implausible": implausible_payload(e.findings),
-        "batches": _batches(e, TRENDS_OF_HARM if harm else TRENDS),
-        "causes": _causes(e),
-        "regions": regions_payload(data.regions, e, shown) if data.regions else None,
-        "confirmations": confirmations_payload(data.confirmations),
+        **sections_payload(data, shown, grown=True),
     }
 
 
@@ -221,16 +192,6 @@ def _front(e: Evaluations, ok: Bool) -> list[int]:
     return places
 
 
-def _causes(e: Evaluations) -> dict[str, Any] | None:
-    """Return how many evaluations have each cause; number 0 is none."""
-    if e.cause is None:
-        return None
-    return {
-        "labels": ["none", *(one.label for one in CAUSES)],
-        "counts": [int(np.count_nonzero(e.cause == one)) for one in Cause],
-    }
-
-
 def _column(column: Column, group: str, ok: Any) -> dict[str, Any]:
     return {
         "name": column.name,
@@ -243,50 +204,6 @@ def _column(column: Column, group: str, ok: Any) -> dict[str, Any]:
         **column.labels,
         "values": significant(column.values[ok]),
     }
-
-
-def _batches(e: Evaluations, trends_of: Mapping[str, bool] = TRENDS) -> dict[str, Any]:
-    found = convergence.batches(e)
-    n = found.first.size
-    trends = {}
-    for column in e.metrics:
-        if column.name in trends_of:
-            values = np.where(e.status == 0, column.whole, np.nan)
-            t = convergence.trend(values, found.group, n, larger_is_worse=trends_of[column.name])
-            trends[column.name] = {
-                "unit": column.unit,
-                "median": significant(t.median),
-                "lower": significant(t.lower),
-                "upper": significant(t.upper),
-                "best": significant(t.best),
-            }
-    return {
-        "first": found.first.tolist(),
-        "last": found.last.tolist(),
-        "evaluations": found.evaluations.tolist(),
-        "share": significant(found.share),
-        "cumulative": significant(found.cumulative),
-        "trends": trends,
-    }
-
-
-def significant(values: Float, digits: int = DIGITS) -> list[float | None]:
-    """Round to ``digits`` significant digits of the largest finite magnitude."""
-    finite = np.abs(values[np.isfinite(values)])
-    top = float(finite.max()) if finite.size else 0.0
-    if top == 0.0:
-        return decimals(values, 0)
-    return decimals(values, digits - 1 - math.floor(math.log10(top)))
-
-
-def decimals(values: Float, places: int) -> list[float | None]:
-    """Round to decimal places; null for what is not finite, and no negative zero."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        rounded = np.round(values, min(places, 300)) + 0.0  # 10**300: the last that float64 holds
-    kept = np.where(np.isfinite(rounded), rounded, values)
-    if np.isfinite(kept).all():
-        return kept.tolist()  # type: ignore[no-any-return]
-    return [value if math.isfinite(value) else None for value in kept.tolist()]
 
 
 def _number(value: float | None) -> float | None:

@@ -7,11 +7,9 @@ from pathlib import Path
 from bridgegen.odd.parameters import Bound, Derived, Parameter
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.pipeline import Pipeline
-from bridgegen.report.page import write_page
+from bridgegen.report.page import write_still_page
 from bridgegen.report.scenario_words import story_lines
 from bridgegen.report.sketch import sketch
-
-STYLES = ("page.css", "scenario.css")
 
 
 def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
@@ -22,7 +20,7 @@ def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
     """
     title = f"{scenario.name}: {scenario.title}"
     body = "\n".join(_body(scenario)).encode("utf-8", "replace")
-    write_page(path, "scenario.html", (), title, "", styles=STYLES, body=body)
+    write_still_page(path, "scenario.html", title, body)
 
 
 def _body(scenario: LogicalScenario) -> Iterator[str]:

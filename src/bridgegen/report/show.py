@@ -13,7 +13,6 @@ from bridgegen.report.payload import script_json
 from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.scenario_page import write_scenario_page
 
-SCRIPTS = ("common.js", "picture.js", "show.js")
 GENERATOR = "bridgegen show"
 """As which its pages say they are made."""
 
@@ -67,5 +66,5 @@ def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
     violations = check(individuals, scenario)
     one = paint(individuals, violations, constraints_in_words(scenario))
     title = f"{owl.name}: {one.name}" if one.name else owl.name
-    write_page(out, "show.html", SCRIPTS, title, script_json(pictures_payload([one])))
+    write_page(out, "show.js", title, script_json(pictures_payload([one])))
     return out, len(violations)

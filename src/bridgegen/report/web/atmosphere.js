@@ -1,7 +1,15 @@
 // Fog, darkness, rain and snow over the road, weaker than they are: whoever is there is drawn on top, and stays in sight.
 
-const MOST_FOG = 0.7, MOST_DARK = 0.66;
-const LAMP_REACH = 14, BEAM = 38, BEAM_SPREAD = 0.34; // m, m, rad to either side
+import { palette } from "./colours.js";
+import { boxCentre, isPlaced } from "./geometry.js";
+import { pill } from "./labels.js";
+import { number } from "./numbers.js";
+
+const MOST_FOG = 0.7;
+const MOST_DARK = 0.66;
+const LAMP_REACH = 14; // m
+const BEAM = 38; // m
+const BEAM_SPREAD = 0.34; // rad to either side
 const CLEAR = 1000; // m, who sees farther sees the whole picture
 
 // 0 by day to 1 in a moonless night, by the luminance of the ground [cd/m²].
@@ -13,7 +21,7 @@ function isWet({ friction, rain }) {
   return rain > 0 || friction < 0.95;
 }
 
-class Atmosphere {
+export class Atmosphere {
   constructor() {
     this.layer = document.createElement("canvas");
   }

@@ -1,16 +1,20 @@
 // What stands and moves in the bird's-eye view: vehicles, people, things, traffic lights. In metres.
 
+import { palette } from "./colours.js";
+import { boxCentre } from "./geometry.js";
+import { lightAt } from "./unpack.js";
+
 const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
   { at: 2.2, lit: [1, 2], colour: "#ff4d4d" }, { at: 0, lit: [2, 3], colour: "#ffd23f" }, { at: -2.2, lit: [4], colour: "#38d39f" },
 ];
 
-function roundBox(c, x, y, width, height, radius) {
+export function roundBox(c, x, y, width, height, radius) {
   c.beginPath();
   if (c.roundRect) c.roundRect(x, y, width, height, radius);
   else c.rect(x, y, width, height);
 }
 
-function drawBody(c, entity, state, colour, scale) {
+export function drawBody(c, entity, state, colour, scale) {
   const { length, width } = entity;
   c.save();
   c.translate(...boxCentre(entity, state.x, state.y, state.h));
@@ -67,7 +71,7 @@ function drawSmall(c, { shape, length, width }, colour, scale) {
 }
 
 // A housing beside the lane, red farthest ahead; the place of the lamp that is lit tells as much as its colour.
-function drawLamps(c, lamps, index, scale) {
+export function drawLamps(c, lamps, index, scale) {
   for (const lamp of lamps) {
     const state = lightAt(lamp, index), r = Math.max(0.45, 3.2 / scale);
     c.save();
@@ -90,7 +94,7 @@ function drawLamps(c, lamps, index, scale) {
 }
 
 // Posts; where it is dark, ``atmosphere.js`` lights what is below them.
-function drawStreetLights(c, posts, scale) {
+export function drawStreetLights(c, posts, scale) {
   c.fillStyle = "#f4c542";
   c.strokeStyle = "#10161d";
   c.lineWidth = 1 / scale;

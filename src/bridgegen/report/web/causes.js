@@ -1,16 +1,23 @@
 // The causes of the critical scenarios: a bar, and a button for each that filters the page.
 
-const CAUSE_HELP = [
+import { $, NARROW, element } from "./common.js";
+import { data } from "./data.js";
+import { filters } from "./filters.js";
+import { hook } from "./hook.js";
+import { number } from "./numbers.js";
+import { addSection } from "./sections.js";
+
+export const CAUSE_HELP = [
   "", "gone with ideal perception", "gone with a careful and competent driver", "gone with ideal control or on a dry road",
   "gone with none of these",
 ];
 
 class Causes {
-  constructor(causes, hook) {
+  constructor(causes) {
     this.chosen = null;
     this.fill(causes);
-    $("causes").hidden = false;
     hook.cause = (label) => this.choose(label === null ? null : this.labels.indexOf(label));
+    document.addEventListener("grown", () => this.fill(data.causes));
     // It can be filtered by in the table and in the parallel coordinates as well.
     document.addEventListener("filters", ({ detail }) => {
       const range = detail.get("cause");
@@ -54,3 +61,5 @@ class Causes {
     for (const [k, button] of this.buttons) button.setAttribute("aria-pressed", `${k === i}`);
   }
 }
+
+addSection({ id: "causes", key: "causes", draw: (found) => new Causes(found) });

@@ -1,16 +1,21 @@
 // The decisive conflict of the scenario in the player: its sentence, its instants, where the bodies meet.
 
+import { palette } from "./colours.js";
+import { $, element } from "./common.js";
+import { boxCentre, isPlaced } from "./geometry.js";
+import { quantity, shareText } from "./numbers.js";
+
 // Zones of a body by number, see bridgegen.conflict.types: edges are stretches, corners are points; shares of half length and width.
 const ZONES = {
   1: [[1, 1], [1, -1]], 2: [[1, 1]], 3: [[1, 1], [-1, 1]], 4: [[-1, 1]],
   5: [[-1, 1], [-1, -1]], 6: [[-1, -1]], 7: [[1, -1], [-1, -1]], 8: [[1, -1]],
 };
+
 const ZONE_SHOWN = 1; // s, before and after the instant
-
 const INSTANTS = { contact: "contact", "near miss": "least time to collision", "collision course": "least time to collision" };
-const ZONED = ["contact", "near miss"];
+export const ZONED = ["contact", "near miss"];
 
-function fillConflict(kept) {
+export function fillConflict(kept) {
   const found = kept.conflict, words = $("conflict");
   words.hidden = !found;
   $("to-decided").hidden = !found || !ZONED.includes(found.conflict);
@@ -28,7 +33,7 @@ function fillConflict(kept) {
 }
 
 // The figures of the conflict as lines of the details.
-function conflictLines(found) {
+export function conflictLines(found) {
   if (!found) return [];
   const line = (name, value, title = "") => element("div", { title }, element("span", { class: "name" }, name), element("b", {}, value));
   const told = (name) => quantity(...found.numbers[name], 3);
@@ -48,7 +53,7 @@ function conflictLines(found) {
 }
 
 // The edges or corners that meet, near the instant at which they do.
-function drawZones(c, kept, state, scale) {
+export function drawZones(c, kept, state, scale) {
   const found = kept.conflict;
   if (!found || !ZONED.includes(found.conflict)) return;
   if (Math.abs(state.index - found.instant) * kept.time_step > ZONE_SHOWN) return;
@@ -75,7 +80,7 @@ function drawZones(c, kept, state, scale) {
 }
 
 // A ring on both ways where they were at the instant that decided.
-function drawDecided(c, kept, centres, scale) {
+export function drawDecided(c, kept, centres, scale) {
   const found = kept.conflict;
   if (!found || !ZONED.includes(found.conflict)) return;
   for (const e of [0, found.partner_number]) {

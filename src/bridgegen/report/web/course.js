@@ -1,6 +1,9 @@
 // Where the ego means to go: a band as wide as it is, as far as it would come within three seconds at the
 // acceleration that it plans now, with a mark for each of them and a bar where it would stand.
 
+import { palette } from "./colours.js";
+import { isPlaced } from "./geometry.js";
+
 const AHEAD = 3; // s
 const ROUTE = 60; // m of the way that are drawn beyond
 
@@ -35,7 +38,7 @@ function alongWay(way, shift, from, to) {
 }
 
 // Stations of the ego's front now, after each of the seconds ahead, and whether it would stand by then.
-function intentionAt(kept, state) {
+export function intentionAt(kept, state) {
   const { course } = kept, i = course?.at[state.index] ?? -1;
   if (i < 0 || course.way[i] < 0 || course.station[i] === null || !isPlaced(state.entities[0])) return null;
   const body = kept.entities[0], v = Math.max(0, state.entities[0].v);
@@ -50,7 +53,7 @@ function intentionAt(kept, state) {
   };
 }
 
-function drawCourse(c, kept, state, scale) {
+export function drawCourse(c, kept, state, scale) {
   const meant = intentionAt(kept, state);
   if (!meant) return;
   const { way, shift, front, end, stands, marks } = meant, half = kept.entities[0].width / 2;

@@ -1,11 +1,16 @@
 // Coverage of pairs: a triangle with a cell for each pair of parameters, and the chosen pair's bins.
 
+import { MOST_TEXTS, arrowKeys, binCell, binRange, binTicks, depth, percent, share, withUnit } from "./bins.js";
+import { $, element } from "./common.js";
+import { data } from "./data.js";
+import { number } from "./numbers.js";
+
 const READINGS = {
   evaluated: "Per cent of the feasible pairs of bins that were evaluated. Choose a cell to see its bins.",
   critical: "Per cent of the feasible pairs of bins that hold a critical scenario. Choose a cell to see its bins.",
 };
 
-class Pairs {
+export class Pairs {
   constructor({ parameters, pairs }) {
     this.parameters = parameters;
     this.reading = "evaluated";

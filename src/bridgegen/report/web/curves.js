@@ -1,10 +1,20 @@
 // Distance, time to collision, speeds and accelerations over time; a click or a drag jumps to an instant.
 
-const FAR = 20, LATE = 10; // m, s: what is beyond runs out of its panel, where what is near would be flat otherwise
+import { DASHES, palette } from "./colours.js";
+import { ZONED } from "./conflict.js";
+import { data } from "./data.js";
+import { colourOf, playersOf } from "./geometry.js";
+import { number } from "./numbers.js";
+import { Strip } from "./strip.js";
+import { FONT, fitCanvas } from "./view.js";
+
+// What is beyond runs out of its panel, where what is near would be flat otherwise.
+const FAR = 20; // m
+const LATE = 10; // s
 const CURVE_FONT = FONT.replace("600 12px", "11.5px");
 const HARD = 4.9; // m/s², what the metric n_brake counts
 
-function roundStep(least) {
+export function roundStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((m) => m * power).find((step) => step >= least * 0.999);
 }
@@ -17,7 +27,7 @@ function ticks(low, high, wanted) {
 
 const present = (values) => values.filter((value) => value !== null);
 
-class Curves {
+export class Curves {
   constructor(canvas, jump) {
     this.canvas = canvas;
     const to = (event) => {
@@ -39,6 +49,7 @@ class Curves {
       name: e === null ? "" : kept.entities[e].name,
     });
     const gaps = present(kept.distance), least = Math.min(...gaps, Infinity), speeds = present(players.flatMap((e) => kept.v[e]));
+    /** @type {any[]} */
     const panels = [{
       title: "distance", unit: "m", lines: [line(kept.distance)], low: 0, high: least < 8 ? Math.min(Math.max(1, ...gaps) * 1.05, FAR) : Math.max(1, ...gaps) * 1.05,
       mark: critical === null ? null : [critical, `critical below ${number(critical, 3)} m`],
@@ -133,7 +144,10 @@ class Curves {
     }
   }
 
-  // An instant, and a value, in pixels.
+  /**
+   * An instant, and a value, in pixels.
+   * @param {any} panel
+   */
   scales({ left, right, top, bottom, low, high }) {
     const last = Math.max(1, this.kept.n_steps - 1);
     return {

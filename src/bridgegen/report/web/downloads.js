@@ -1,6 +1,10 @@
 // The files of a scenario: out of the page itself where it holds them, else from where they lie.
 
-function fileLink(name) {
+import { element } from "./common.js";
+import { data } from "./data.js";
+import { inflated } from "./inflate.js";
+
+export function fileLink(name) {
   // Always relative: a path with a scheme or a leading slash cannot lead elsewhere.
   const href = `./${name.split("/").map(encodeURIComponent).join("/")}`, short = name.split("/").at(-1);
   const held = Object.hasOwn(data.files, name), title = held ? "Saved from this page" : "Beside this page, in the run's folder";

@@ -1,5 +1,10 @@
 // What the page is narrowed to: ranges of columns, and a region. The table and the charts follow.
 
+import { columns, rows } from "./data.js";
+import { isInMode } from "./findings.js";
+import { isInRegion } from "./region_rows.js";
+import { elsewhereBy } from "./verdicts.js";
+
 class Filters {
   constructor() {
     this.ranges = new Map(); // column's name → [low, high]
@@ -54,4 +59,5 @@ class Filters {
     document.dispatchEvent(new CustomEvent("filters", { detail: this.ranges }));
   }
 }
-const filters = new Filters();
+
+export const filters = new Filters();

@@ -1,5 +1,12 @@
 // The Pareto front of a search for many objectives: the evaluations that no other one dominates.
 
+import { palette } from "./colours.js";
+import { $ } from "./common.js";
+import { rows } from "./data.js";
+import { filters } from "./filters.js";
+import { number, titled } from "./numbers.js";
+import { plain } from "./plots.js";
+
 const objectives = () => rows.columns.filter((column) => column.group === "objective").map((column) => column.name);
 
 // Objectives, or the metrics that they are made of, on both axes: there the front is one.
@@ -14,7 +21,7 @@ function frontRows(x, y) {
   return there.sort((a, b) => x[a] - x[b] || y[b] - y[a]);
 }
 
-function frontTrace(nameX, nameY, x, y) {
+export function frontTrace(nameX, nameY, x, y) {
   const part = frontRows(x, y), line = objectives().length === 2 && showsObjectives(nameX, nameY);
   return {
     type: "scatter", mode: line ? "lines+markers" : "markers", name: `Pareto front (${number(part.length)})`,
@@ -26,7 +33,7 @@ function frontTrace(nameX, nameY, x, y) {
 }
 
 // A button that puts two objectives on the axes; the next two when they are there.
-function connectFront(draw) {
+export function connectFront(draw) {
   const names = objectives(), button = $("show-front");
   button.hidden = names.length < 2;
   $("front-note").hidden = names.length < 2;

@@ -1,10 +1,13 @@
 // Oriented boxes: corners, and the nearest points of two of them.
 
-function boxCentre(entity, x, y, h) {
+import { entityColour } from "./colours.js";
+
+/** @returns {[number, number]} */
+export function boxCentre(entity, x, y, h) {
   return [x + entity.center_ahead * Math.cos(h), y + entity.center_ahead * Math.sin(h)];
 }
 
-function boxCorners(entity, x, y, h) {
+export function boxCorners(entity, x, y, h) {
   const [cx, cy] = boxCentre(entity, x, y, h);
   const ux = Math.cos(h), uy = Math.sin(h), a = entity.length / 2, b = entity.width / 2;
   return [[a, b], [-a, b], [-a, -b], [a, -b]].map(([p, q]) => [cx + p * ux - q * uy, cy + p * uy + q * ux]);
@@ -34,7 +37,7 @@ function nearestPoints(first, second) {
 }
 
 // The state at a fractional step: straight between the recorded instants, exact on them.
-function stateAt(kept, position) {
+export function stateAt(kept, position) {
   const last = kept.n_steps - 1;
   const k = Math.min(last, Math.max(0, Math.floor(position + 1e-9)));
   const f = k === last ? 0 : Math.max(0, position - k);
@@ -53,7 +56,7 @@ function stateAt(kept, position) {
 
 // The bodies that are named and have a curve: the ego, all that move, and who is nearest at the end.
 // Of a row of cones or of parked cars the others are scenery.
-function playersOf(kept) {
+export function playersOf(kept) {
   if (kept.players) return kept.players;
   kept.players = kept.entities.map((_, e) => (e === 0 || kept.v[e].some((v) => v > 0.05) ? e : -1)).filter((e) => e >= 0);
   if (kept.closest !== null) {
@@ -64,13 +67,13 @@ function playersOf(kept) {
 }
 
 // The ego is always the same colour; those that are named count on from it, whatever stands about besides.
-function colourOf(kept, e) {
+export function colourOf(kept, e) {
   const place = playersOf(kept).indexOf(e);
   return entityColour(place < 0 ? 3 : place);
 }
 
 // The entity nearest to the ego, and the two nearest points of their boxes.
-function nearestTo(kept, state) {
+export function nearestTo(kept, state) {
   const [ego, ...others] = state.entities;
   if (!isPlaced(ego)) return null;
   const corners = boxCorners(kept.entities[0], ego.x, ego.y, ego.h);
@@ -83,4 +86,4 @@ function nearestTo(kept, state) {
   return best;
 }
 
-const isPlaced = (state) => state.x !== null && state.y !== null && state.h !== null;
+export const isPlaced = (state) => state.x !== null && state.y !== null && state.h !== null;

@@ -1,13 +1,15 @@
 // Reads what the page holds deflated, see packed.py.
 
-async function inflated(text) {
+import { data } from "./data.js";
+
+export async function inflated(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 // A chunk's playbacks, with the roads that come with them, as those of the page's own.
-function taken({ playbacks, roads, pictures }) {
+export function taken({ playbacks, roads, pictures }) {
   const first = data.roads.length;
   data.roads.push(...roads);
   for (const one of playbacks) {
@@ -17,7 +19,7 @@ function taken({ playbacks, roads, pictures }) {
   return playbacks;
 }
 
-class Packed {
+export class Packed {
   constructor({ chunk, evaluations, texts }) {
     this.chunk = chunk;
     this.texts = texts;

@@ -1,11 +1,18 @@
 // The words in the bird's-eye view, in pixels: who is who, which light shows what, how long a metre is.
 
+import { roundBox } from "./bodies.js";
+import { palette } from "./colours.js";
+import { boxCorners, colourOf, isPlaced } from "./geometry.js";
+import { SIGNALS, lightAt } from "./unpack.js";
+import { FONT } from "./view.js";
+
+/** @type {(a: number[], b: number[]) => number} */
 function overlap([ax0, ay0, ax1, ay1], [bx0, by0, bx1, by1]) {
   return Math.max(0, Math.min(ax1, bx1) - Math.max(ax0, bx0)) * Math.max(0, Math.min(ay1, by1) - Math.max(ay0, by0));
 }
 
 // A text in a rounded box about (x, y), kept inside the picture.
-function pill(c, { width, height }, text, x, y, colour, fill = palette.label) {
+export function pill(c, { width, height }, text, x, y, colour, fill = palette.label) {
   c.font = FONT;
   const w = c.measureText(text).width + 14, h = 20;
   const left = Math.min(width - w - 4, Math.max(4, x - w / 2));
@@ -24,7 +31,7 @@ function pill(c, { width, height }, text, x, y, colour, fill = palette.label) {
 
 // A body's label goes to that one of eight places around it which hides least; the side away from the
 // others and the place it had before are preferred, so that it does not jump about.
-class Labels {
+export class Labels {
   constructor(kept) {
     this.kept = kept;
     this.places = [];
@@ -68,7 +75,7 @@ class Labels {
 }
 
 // What a light shows, as a word beside it, on the side that traffic does not come from. Returns the words' boxes.
-function labelLamps(c, kept, index, view, size) {
+export function labelLamps(c, kept, index, view, size) {
   const boxes = [];
   c.font = FONT.replace("600 12px", "600 11px");
   c.textBaseline = "middle";
@@ -90,7 +97,7 @@ function labelLamps(c, kept, index, view, size) {
   return boxes;
 }
 
-function drawScaleBar(c, { height }, scale) {
+export function drawScaleBar(c, { height }, scale) {
   const metres = [1, 2, 5, 10, 20, 50, 100].find((m) => m * scale >= 50) ?? 100;
   const x = 14, y = height - 16;
   c.fillStyle = palette.label;

@@ -1,12 +1,15 @@
 // A page that is served takes in what is new of its run, while another process goes on with it.
 
+import { $ } from "./common.js";
+import { columns, data, rows } from "./data.js";
+import { filters } from "./filters.js";
+import { number } from "./numbers.js";
+
 const EVERY = 1500; // ms between two questions while the run grows
 const SELDOM = 5000; // once it has ended, or nobody answers
 
 class Live {
-  // grown(): told that there are more rows.
-  constructor(grown) {
-    this.grown = grown;
+  constructor() {
     this.finished = data.summary.finished;
     $("live").hidden = false;
     $("live-reload").addEventListener("click", () => location.reload());
@@ -66,7 +69,10 @@ class Live {
     Object.assign(rows, { n, n_failed, n_critical, rank, front });
     Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions, confirmations: told.confirmations, implausible: told.implausible });
     if (shape() !== before) location.reload(); // there is something that the page has no place for yet
-    else this.grown();
+    else {
+      document.dispatchEvent(new CustomEvent("grown"));
+      filters.tell();
+    }
   }
 }
 
@@ -92,12 +98,4 @@ function append(list, more) {
   return list;
 }
 
-// The motion of an evaluation from the server; null if it cannot be had after all.
-async function askMotion(evaluation) {
-  try {
-    const told = await (await fetch(`motion/${evaluation}`)).json();
-    return told.playback ? taken({ ...told, playbacks: [told.playback] })[0] : null;
-  } catch {
-    return null;
-  }
-}
+new Live();

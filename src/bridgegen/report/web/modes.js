@@ -1,33 +1,31 @@
 // The failure modes: the ways in which the driver comes to harm, or what is known where there is none.
 
+import { $, NARROW, element } from "./common.js";
+import { data } from "./data.js";
+import { filters } from "./filters.js";
+import { nearestToHarm } from "./findings.js";
+import { hook } from "./hook.js";
+import { number, shareText } from "./numbers.js";
+import { minimals } from "./playbacks.js";
+import { addSection } from "./sections.js";
+
 const CAUSES_SAID = {
   perception: "perception", planning: "planning", control: "control",
   unavoidable: "unavoidable: no fix removes the harm", sensitive: "sensitive: small changes of the parameters alone remove most of the harm",
 };
 
-// A share of 1 in per cent, with two significant digits.
-function shareText(value) {
-  if (value === null || value === undefined) return "–";
-  const p = 100 * value;
-  return `${p === 0 || p >= 10 ? Math.round(p) : p >= 0.1 ? p.toPrecision(2) : p.toPrecision(1)}${NARROW}%`;
-}
-
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 class Modes {
-  // show(evaluation), showMinimal(evaluation): play a row of the page, or the minimal form of it.
-  constructor(show, showMinimal) {
-    this.show = show;
-    this.showMinimal = showMinimal;
+  constructor() {
     this.chosen = null;
     document.addEventListener("filters", () => this.mark());
+    document.addEventListener("grown", () => this.fill());
     this.fill();
   }
 
   fill() {
     const found = data.triage;
-    $("modes").hidden = !found;
-    if (!found) return;
     const n = found.modes.length + found.more;
     $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} comes to harm` : "No failure found";
     $("modes-lead").textContent = found.bound.sentence;
@@ -40,7 +38,11 @@ class Modes {
     $("modes-note").textContent = notes.join(" ");
     const nearest = nearestToHarm();
     $("modes-nearest").hidden = n > 0 || nearest === null;
-    $("modes-nearest").onclick = () => this.show(nearest);
+    $("modes-nearest").onclick = () => this.play(nearest);
+  }
+
+  play(evaluation) {
+    hook.show?.(evaluation, 0, true);
   }
 
   card(mode) {
@@ -50,7 +52,7 @@ class Modes {
     const severity = mode.severity > 0 ? [fact(shareText(mode.severity), "worst severity", "highest probability of a MAIS3+ injury")] : [];
     const name = data.kept.find(({ evaluation }) => evaluation === mode.shown)?.name ?? `evaluation ${number(mode.shown + 1)}`;
     const play = element("button", { type: "button", class: "primary", "aria-label": `Play ${name}, mode ${mode.number}` }, `▶ ${name}`);
-    play.addEventListener("click", () => this.show(mode.shown));
+    play.addEventListener("click", () => this.play(mode.shown));
     const only = element("button", { type: "button", class: "quiet", "aria-pressed": "false", title: "Show only scenarios of this conflict, responsibility and rule below" }, "Its scenarios");
     only.addEventListener("click", () => filters.inMode(filters.mode === mode.number ? null : mode.number));
     this.buttons.push([mode.number, only]);
@@ -86,7 +88,7 @@ class Modes {
     const parts = [text];
     if (minimals.has(mode.shown)) {
       const play = element("button", { type: "button", class: "quiet", "aria-label": `Play the simplest form of mode ${mode.number}` }, `▶ ${one.name || "simplest form"}`);
-      play.addEventListener("click", () => this.showMinimal(mode.shown));
+      play.addEventListener("click", () => hook.showMinimal?.(mode.shown));
       parts.push(element("p", { class: "mode-buttons" }, play));
     }
     return [element("div", { class: "mode-minimal" }, ...parts)];
@@ -97,31 +99,4 @@ class Modes {
   }
 }
 
-// The evaluation that came nearest to harm where no failure was found and the page holds its motion; else null.
-function nearestToHarm() {
-  if (!data.triage || data.triage.modes.length) return null;
-  const found = data.triage.bound.least.find(({ evaluation }) => evaluation !== null && rows.evaluation.includes(evaluation));
-  return found && (data.live || data.packed.evaluations.includes(found.evaluation)) ? found.evaluation : null;
-}
-
-// How many rows have traffic that could not happen, and why.
-function fillImplausible() {
-  const { count, reasons } = data.implausible;
-  $("implausible").hidden = !count;
-  if (!count) return;
-  const share = shareText(count / Math.max(1, rows.n));
-  $("implausible").textContent = `Left out as implausible: ${number(count)} of ${number(rows.n)} (${share}): ${reasons.map(([text, n]) => `${text} (${number(n)})`).join("; ")}.`;
-}
-
-// Whether a row has the conflict of a failure mode; its cause and place are not compared.
-function isInMode(i, k) {
-  const mode = data.triage?.modes.find((one) => one.number === k), finding = findingOf(i);
-  if (!mode || !finding) return false;
-  const [conflict, type, responsible, rule] = finding;
-  return conflict === mode.conflict && type === mode.conflict_type && responsible === mode.responsible && rule === mode.rule && Boolean(rows.critical[i]);
-}
-
-// Conflict, type, responsible, rule and partner of a row of the page; null where none are recorded.
-function findingOf(i) {
-  return rows.findings ? rows.findings.keys[rows.findings.at[i]] : null;
-}
+addSection({ id: "modes", key: "triage", draw: () => new Modes() });

@@ -1,28 +1,41 @@
 // Charts are drawn when they come near the screen, and anew, after something has changed, when they are near it.
 
+import { darkScheme } from "./colours.js";
+import { hook } from "./hook.js";
+
 class NearScreen {
-  // charts: what draws each element. drawn(): told after each drawing.
-  constructor(charts, drawn) {
-    this.charts = charts;
-    this.drawn = drawn;
+  constructor() {
+    this.charts = new Map(); // element → what draws it
     this.near = new Set();
-    this.stale = new Set(charts.keys());
+    this.stale = new Set();
+  }
+
+  add(plot, draw) {
+    this.charts.set(plot, draw);
+    this.stale.add(plot);
+    hook.charts = this.charts.size;
+  }
+
+  // Draws from now on: what draws with Plotly must wait until Plotly is there.
+  begin() {
     const watch = new IntersectionObserver((entries) => {
       for (const { isIntersecting, target } of entries) {
         this.near[isIntersecting ? "add" : "delete"](target);
         if (isIntersecting && this.stale.has(target)) this.draw(target);
       }
     }, { rootMargin: "500px" });
-    for (const plot of charts.keys()) watch.observe(plot);
+    for (const plot of this.charts.keys()) watch.observe(plot);
     addEventListener("beforeprint", () => {
       for (const plot of [...this.stale]) this.draw(plot); // paper shows what no screen has shown
     });
+    darkScheme.addEventListener("change", () => this.all());
+    document.addEventListener("grown", () => this.all());
   }
 
   draw(plot) {
     this.stale.delete(plot);
     this.charts.get(plot)();
-    this.drawn();
+    hook.chartsDrawn += 1;
   }
 
   again(plot) {
@@ -35,3 +48,6 @@ class NearScreen {
     for (const plot of this.charts.keys()) this.again(plot);
   }
 }
+
+export const near = new NearScreen();
+hook.drawCharts = () => near.begin();

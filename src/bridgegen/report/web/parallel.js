@@ -1,7 +1,19 @@
 // Parallel coordinates on a canvas: one line per evaluation, a filter on any axis.
 
-const MOST_LINES = 1500, QUICK_LINES = 400; // the latter while a filter is on its way
+import { palette } from "./colours.js";
+import { $, NARROW, element } from "./common.js";
+import { roundStep } from "./curves.js";
+import { columns, data, rows } from "./data.js";
+import { filters } from "./filters.js";
+import { near } from "./near.js";
+import { number, titled, turned, unitText } from "./numbers.js";
+import { drawnRegions } from "./regions.js";
+import { addSection } from "./sections.js";
+import { subsample } from "./subsample.js";
+import { FONT, fitCanvas } from "./view.js";
 
+const MOST_LINES = 1500;
+const QUICK_LINES = 400; // while a filter is on its way
 const least = (values) => values.reduce((a, b) => Math.min(a, b), Infinity);
 
 class Parallel {
@@ -194,6 +206,7 @@ class Parallel {
     }
     $("filter-clear").addEventListener("click", () => filters.clear());
     document.addEventListener("filters", () => this.changed());
+    document.addEventListener("grown", () => this.rescale());
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.listen();
   }
@@ -224,3 +237,12 @@ class Parallel {
     this.canvas.addEventListener("pointercancel", () => { drag = null; });
   }
 }
+
+function connectParallel(found, host) {
+  host.hidden = !found.critical.length || !found.telling.length;
+  if (host.hidden) return;
+  const canvas = $("parallel"), parallel = new Parallel(canvas, () => near.again(canvas));
+  near.add(canvas, () => parallel.draw());
+}
+
+addSection({ id: "parallel-card", key: "rows", draw: connectParallel });

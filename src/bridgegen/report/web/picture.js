@@ -1,10 +1,12 @@
 // A scenario's individuals in five columns: boxes by layer and class, links to the one in focus,
 // violated constraints in red, with a mark and the reason. Drawn from `pictures_payload`.
 
+import { element } from "./common.js";
+
 const MEMBERS = 200; // boxes of a group that are put on the page at a time
 const SVG = "http://www.w3.org/2000/svg";
 
-class Picture {
+export class Picture {
   constructor(host, payload) {
     this.host = host;
     this.layers = payload.layers;

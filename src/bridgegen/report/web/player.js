@@ -1,8 +1,21 @@
 // The clock of the playback and its controls; the scene and the curves draw what it says.
 
-const PLAY_ICON = "M4 2v12l10-6z", PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
+import { addressOf } from "./address.js";
+import { $, copy } from "./common.js";
+import { ZONED, fillConflict } from "./conflict.js";
+import { intentionAt } from "./course.js";
+import { Curves } from "./curves.js";
+import { data } from "./data.js";
+import { boxCentre, isPlaced, stateAt } from "./geometry.js";
+import { ghostsAt, ghostsOf } from "./ghosts.js";
+import { Scene } from "./scene.js";
+import { detectionAt, lightAt, unpack, weatherAt } from "./unpack.js";
+import { stateWords, weatherWords } from "./words.js";
 
-class Player {
+const PLAY_ICON = "M4 2v12l10-6z";
+const PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
+
+export class Player {
   constructor(hook) {
     this.hook = hook;
     this.playing = false;

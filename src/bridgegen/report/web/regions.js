@@ -1,26 +1,13 @@
-// Critical regions: which rows lie in them, and the table that tells what fresh scenarios say of them.
+// Critical regions: the table of what fresh scenarios say of them.
 
-let regionList = [];
-let inRegions = []; // rows of the page
-
-function takeRegions() {
-  regionList = data.regions?.regions ?? [];
-  inRegions = regionList.map((region) => new Set(region.rows));
-}
-takeRegions();
-
-function isInRegion(i, region) {
-  return inRegions[region].has(i);
-}
-
-// The number of the first region that a row lies in, those that hold first; null in none.
-function regionOf(i) {
-  const k = inRegions.findIndex((one) => one.has(i));
-  return k < 0 ? null : regionList[k].number;
-}
+import { $, NARROW, element } from "./common.js";
+import { filters } from "./filters.js";
+import { number } from "./numbers.js";
+import { regionList } from "./region_rows.js";
+import { addSection } from "./sections.js";
 
 // Those that are drawn in the charts: the chosen one, or all that hold.
-function drawnRegions() {
+export function drawnRegions() {
   return regionList.filter((region, k) => (filters.region === null ? region.confirmed : filters.region === k));
 }
 
@@ -39,7 +26,6 @@ class Regions {
       : `No box was confirmed in which at least ${least}${NARROW}% of all scenarios are critical, with ${sure}${NARROW}% confidence.`;
     $("regions-body").replaceChildren(...regionList.map((region, k) => this.row(region, k)));
     document.addEventListener("filters", () => this.show());
-    $("regions").hidden = false;
   }
 
   row(region, k) {
@@ -63,3 +49,5 @@ class Regions {
     this.buttons.forEach((button, k) => button.setAttribute("aria-pressed", `${filters.region === k}`));
   }
 }
+
+addSection({ id: "regions", key: "regions", draw: (found) => new Regions(found) });

@@ -1,6 +1,22 @@
 // The bird's-eye view: road, vehicles, trails, on a canvas; x to the right, y up, in metres.
 
+import { Atmosphere } from "./atmosphere.js";
+import { drawBody, drawLamps, drawStreetLights } from "./bodies.js";
+import { palette } from "./colours.js";
+import { drawDecided, drawZones } from "./conflict.js";
+import { drawCourse } from "./course.js";
+import { data } from "./data.js";
+import { boxCentre, boxCorners, colourOf, isPlaced, nearestTo, playersOf, stateAt } from "./geometry.js";
+import { drawElsewhere } from "./ghosts.js";
+import { Labels, drawScaleBar, labelLamps, pill } from "./labels.js";
+import { measured } from "./numbers.js";
+import { detectedBoxes, drawDetections } from "./senses.js";
+import { detectionAt, unpackLine, weatherAt } from "./unpack.js";
+import { View, fitCanvas } from "./view.js";
+import { detectionWords } from "./words.js";
+
 const AREAS = { driving: "asphalt", junction: "asphalt", shoulder: "asphalt-2", sidewalk: "asphalt-2", median: "ground", stripe: "marking" };
+
 const LINES = { // colour, width [m], dashes [m]
   edge: ["marking", 0.14, []], solid: ["marking", 0.14, []], broken: ["marking", 0.14, [3, 3]],
   centre: ["marking", 0.2, []], stop: ["stop", 0.45, []], route: ["accent", 0.12, [1, 1]],
@@ -10,7 +26,7 @@ const LINES = { // colour, width [m], dashes [m]
 const TOO_SMALL = 2; // pixels per metre: below that a car is a few pixels
 const AROUND = 100; // m across, that are shown where the ego is kept in the middle
 
-class Scene {
+export class Scene {
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.view = new View(canvas, changed);

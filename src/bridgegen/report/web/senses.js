@@ -1,8 +1,12 @@
 // What the ego's sensors made of the others, over the truth: told apart by shape, not by colour alone.
 
+import { palette } from "./colours.js";
+import { boxCentre, isPlaced } from "./geometry.js";
+import { detectionAt } from "./unpack.js";
+
 // Seen: four corners about the detected box. Displaced: that box dashed, and a line from where the body is.
 // Missed: the body itself is hatched and ringed.
-function drawDetections(c, kept, state, scale) {
+export function drawDetections(c, kept, state, scale) {
   state.entities.forEach((s, e) => {
     const found = e > 0 && isPlaced(s) ? detectionAt(kept, e, state.index) : null;
     if (!found) return;
@@ -11,6 +15,7 @@ function drawDetections(c, kept, state, scale) {
   });
 }
 
+/** @type {(c: CanvasRenderingContext2D, found: any, scale: number) => void} */
 function drawFound(c, { status, x, y, h, length, width, truth }, scale) {
   const least = 7 / scale, a = Math.max(length / 2, least), b = Math.max(width / 2, least);
   const displaced = status === "displaced";
@@ -37,7 +42,7 @@ function drawFound(c, { status, x, y, h, length, width, truth }, scale) {
     if (!displaced) continue;
     c.setLineDash([]);
     c.beginPath();
-    c.moveTo(...truth);
+    c.moveTo(truth[0], truth[1]);
     c.lineTo(x, y);
     c.stroke();
     c.beginPath();
@@ -80,7 +85,7 @@ function drawMissed(c, entity, s, scale) {
 }
 
 // The boxes on the screen [pixels] of what was detected elsewhere than it is; no label should hide them.
-function detectedBoxes(kept, state, view) {
+export function detectedBoxes(kept, state, view) {
   return state.entities.flatMap((_, e) => {
     const found = e > 0 ? detectionAt(kept, e, state.index) : null;
     if (found?.status !== "displaced") return [];

@@ -1,6 +1,6 @@
 // Numbers over time, see series.py: runs of [first instant, length, value, difference, second differences …].
 
-function unpackSeries(runs, n, scale) {
+export function unpackSeries(runs, n, scale) {
   const values = new Array(n).fill(null);
   for (const [first, length, start, ...told] of runs) {
     let value = start, step = 0;

@@ -1,10 +1,17 @@
 // When the ego saw whom: a row over time for each body that is named, above the curves.
 
-const ROW = 15, HEAD = 24, MOST_ROWS = 4;
+import { palette } from "./colours.js";
+import { colourOf, playersOf } from "./geometry.js";
+import { detectionAt } from "./unpack.js";
 
-class Strip {
+const ROW = 15;
+const HEAD = 24;
+const MOST_ROWS = 4;
+
+export class Strip {
   constructor(kept) {
     this.kept = kept;
+    this.left = this.right = this.top = this.bottom = 0; // see place
     const named = kept.sensed ? playersOf(kept).filter((e) => e > 0).slice(0, MOST_ROWS) : [];
     this.rows = named.map((e) => ({ e, name: kept.entities[e].name, spells: this.spells(e) }));
   }

@@ -1,6 +1,15 @@
 // The table of all critical scenarios: sorted, filtered; only the rows in sight are in the document.
 
-const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
+import { $, element } from "./common.js";
+import { columns, data, rows } from "./data.js";
+import { filters } from "./filters.js";
+import { findingOf } from "./findings.js";
+import { measured, number, shareText, turned, unitText, worded } from "./numbers.js";
+import { SOURCES, playbacks } from "./playbacks.js";
+import { regionOf } from "./region_rows.js";
+import { elsewhere, elsewhereBy, verdictCell } from "./verdicts.js";
+
+export const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
 const LISTED_OF_HARM = ["severity", "harm", "d_min", "v_d"];
 const TEXTS = ["conflict", "type", "responsible", "partner"]; // of a row's finding
 const PLACE_OF = { conflict: 0, type: 1, responsible: 2, partner: 4 };
@@ -9,7 +18,7 @@ const UNDER = { cause: "quick label", responsible: "responsible", severity: "MAI
 const ROW_HEIGHT = 32; // as in table.css
 const SPARE = 6; // rows above and below those in sight
 
-class Table {
+export class Table {
   // open(i, play): told the row of the page to be shown.
   constructor(open) {
     this.open = open;
@@ -66,7 +75,7 @@ class Table {
     const order = (a, b) => {
       const [x, y] = [key.get(a), key.get(b)];
       // What does not exist sorts last, whichever way.
-      return (x === null) - (y === null) || sign * (typeof x === "string" ? x.localeCompare(y) : x - y) || (rows.rank[a] || Infinity) - (rows.rank[b] || Infinity) || a - b;
+      return Number(x === null) - Number(y === null) || sign * (typeof x === "string" ? x.localeCompare(y) : x - y) || (rows.rank[a] || Infinity) - (rows.rank[b] || Infinity) || a - b;
     };
     this.order = there.sort(order);
     for (const th of $("list-head").querySelectorAll("th")) {
@@ -173,6 +182,7 @@ class Table {
     $("only-kept").addEventListener("change", () => this.refill());
     $("list-clear").addEventListener("click", () => { $("only-kept").checked = false; filters.clear(); });
     document.addEventListener("filters", () => this.refill());
+    document.addEventListener("grown", () => this.refill());
     document.addEventListener("shown", ({ detail }) => this.mark(detail));
   }
 }

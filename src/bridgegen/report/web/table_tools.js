@@ -1,6 +1,13 @@
 // The fields above the table of critical scenarios: by a metric, by cause, by region.
 
-class TableTools {
+import { $, element } from "./common.js";
+import { data, rows } from "./data.js";
+import { filters } from "./filters.js";
+import { titled } from "./numbers.js";
+import { LISTED } from "./table.js";
+import { VERDICTS, elsewhere } from "./verdicts.js";
+
+export class TableTools {
   constructor(table) {
     this.table = table;
     const metrics = rows.columns.filter((column) => column.group === "metric");

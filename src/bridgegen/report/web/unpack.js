@@ -1,13 +1,20 @@
 // A playback as it is written (playback_payload.py) made into arrays, once; and what holds at an instant of it.
 
+import { data } from "./data.js";
+import { boxCentre } from "./geometry.js";
+import { unpackSeries } from "./series.js";
+
 const LETTERS = { "-": [-1, true], 0: [0, true], 1: [1, true], 2: [2, true], 3: [3, true], m: [0, false], a: [1, false], b: [2, false], c: [3, false] };
 const SENSORS = ["nobody", "camera", "LiDAR", "camera and LiDAR"];
-const SIGNALS = ["off", "red", "red and yellow", "yellow", "green"];
-
+export const SIGNALS = ["off", "red", "red and yellow", "yellow", "green"];
 const running = (differences) => { let sum = 0; return differences.map((d) => (sum += d)); };
 
-// x, y of a line's points [m], from the differences in whole units.
-function unpackLine(told) {
+/**
+ * x, y of a line's points [m], from the differences in whole units.
+ * @returns {[number, number][]}
+ */
+export function unpackLine(told) {
+  /** @type {[number, number][]} */
   const points = [];
   let x = 0, y = 0;
   for (let i = 0; i < told.length; i += 2) {
@@ -18,7 +25,7 @@ function unpackLine(told) {
   return points;
 }
 
-function unpack(kept) {
+export function unpack(kept) {
   if (kept.x) return kept;
   const n = kept.n_steps, { series } = kept, scale = data.scale;
   const one = (name) => unpackSeries(series[name], n, scale[name]);
@@ -76,7 +83,7 @@ function unpackCourse(told, n) {
 
 // What the ego's sensors made of an entity in the latest frame; null where nobody asks, or where it is
 // too far away for a miss to count.
-function detectionAt(kept, e, index) {
+export function detectionAt(kept, e, index) {
   const frame = kept.sensed?.frame[index] ?? -1;
   const found = frame < 0 ? null : kept.sensed.entities[e][frame];
   if (!found || found.by < 0 || (found.by === 0 && !found.counts)) return null;
@@ -90,10 +97,10 @@ function detectionAt(kept, e, index) {
   };
 }
 
-function lightAt(lamp, index) {
+export function lightAt(lamp, index) {
   return lamp.changes.reduce((now, [k, to]) => (k <= index ? to : now), 0);
 }
 
-function weatherAt(kept, index) {
+export function weatherAt(kept, index) {
   return kept.weather.reduce((now, one) => (one.step <= index ? one : now), null);
 }

@@ -1,7 +1,7 @@
 // Canvases: sharp on every screen; and the part of the world that the bird's-eye view shows.
 
 // Fits a canvas to its place on the page in device pixels; returns its size in CSS pixels.
-function fitCanvas(canvas, options) {
+export function fitCanvas(canvas, options) {
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth, height = canvas.clientHeight;
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -13,12 +13,12 @@ function fitCanvas(canvas, options) {
   return { context, width, height, ratio };
 }
 
-const FONT = '600 12px system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
-
-const ABOVE = 46, BELOW = 38; // pixels that the clock and the scale bar take
+export const FONT = '600 12px system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
+const ABOVE = 46;
+const BELOW = 38; // pixels that the clock and the scale bar take
 
 // Where the middle of the canvas lies in the world [m], and how many pixels a metre has.
-class View {
+export class View {
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.changed = changed;

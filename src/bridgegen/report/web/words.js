@@ -1,6 +1,12 @@
 // The moment in words: for who cannot see the picture, and for who wants to copy it.
 
-function weatherWords(weather) {
+import { intentionAt } from "./course.js";
+import { isPlaced, playersOf } from "./geometry.js";
+import { elsewhereWords } from "./ghosts.js";
+import { number } from "./numbers.js";
+import { SIGNALS, detectionAt, lightAt, weatherAt } from "./unpack.js";
+
+export function weatherWords(weather) {
   const { sun, visual_range: range, rain, snow, friction } = weather, words = [];
   const degrees = (sun * 180) / Math.PI;
   words.push(degrees < -6 ? "night" : degrees < 0 ? "dusk" : "day");
@@ -12,7 +18,7 @@ function weatherWords(weather) {
   return words.join(", ");
 }
 
-function detectionWords(found) {
+export function detectionWords(found) {
   if (!found) return "";
   if (found.status === "missed") return "missed";
   const off = found.status === "displaced" ? `seen ${found.off.toFixed(1)} m off` : "seen";
@@ -29,7 +35,7 @@ function intentionWords(kept, state) {
 }
 
 // All that the picture and the curves show now, in sentences.
-function stateWords(kept, state) {
+export function stateWords(kept, state) {
   const value = (v, unit, places) => (v === null || v === undefined ? "none" : `${v.toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−")} ${unit}`);
   const told = [`${state.time.toFixed(2)} s`];
   const [ego] = state.entities;

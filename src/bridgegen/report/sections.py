@@ -1,0 +1,94 @@
+"""The sections of the report: what each draws, and the module of ``web`` that draws it.
+
+A section is a module that adds itself (``addSection`` in ``web/sections.js``) with its style beside
+it, a function here that returns what it draws, and its line in `SECTIONS`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from bridgegen.arrays import Bool
+from bridgegen.report.batches_payload import TRENDS, TRENDS_OF_HARM, batches_payload
+from bridgegen.report.causes_payload import causes_payload
+from bridgegen.report.confirmation_payload import confirmations_payload
+from bridgegen.report.coverage_payload import coverage_payload
+from bridgegen.report.data import ReportData
+from bridgegen.report.findings_payload import triage_payload
+from bridgegen.report.notes import notes_payload
+from bridgegen.report.regions_payload import regions_payload
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the report.
+
+    Attributes:
+        module: of ``web``.
+        key: of what it draws in the page's data.
+        payload: returns that, as plain data, from the report's data and the rows that the page
+            holds, ``(N,)`` bool; None where there is nothing to draw. Without it the section draws
+            the rows, which every page holds.
+        grows: whether a page that is served takes it anew with every batch.
+    """
+
+    module: str
+    key: str = "rows"
+    payload: Callable[[ReportData, Bool], Any] | None = None
+    grows: bool = False
+
+
+def _triage(data: ReportData, _shown: Bool) -> Any:
+    return triage_payload(data.triage) if data.triage else None
+
+
+def _causes(data: ReportData, _shown: Bool) -> Any:
+    return causes_payload(data.evaluations)
+
+
+def _confirmations(data: ReportData, _shown: Bool) -> Any:
+    return confirmations_payload(data.confirmations)
+
+
+def _batches(data: ReportData, _shown: Bool) -> Any:
+    return batches_payload(data.evaluations, TRENDS_OF_HARM if data.summary.harm else TRENDS)
+
+
+def _regions(data: ReportData, shown: Bool) -> Any:
+    return regions_payload(data.regions, data.evaluations, shown) if data.regions else None
+
+
+def _coverage(data: ReportData, _shown: Bool) -> Any:
+    return coverage_payload(data.coverage) if data.coverage else None
+
+
+def _notes(data: ReportData, _shown: Bool) -> Any:
+    return notes_payload(data.notes)
+
+
+SECTIONS = (
+    Section("modes.js", "triage", _triage),
+    Section("causes.js", "causes", _causes, grows=True),
+    Section("elsewhere.js", "confirmations", _confirmations, grows=True),
+    Section("trends.js", "batches", _batches, grows=True),
+    Section("regions.js", "regions", _regions, grows=True),
+    Section("scatter.js"),
+    Section("parallel.js"),
+    Section("coverage.js", "coverage", _coverage),
+    Section("notes.js", "notes", _notes),
+)
+
+
+def sections_payload(data: ReportData, shown: Bool, *, grown: bool = False) -> dict[str, Any]:
+    """Return what the sections draw, by key.
+
+    Args:
+        data: of the report.
+        shown: ``(N,)``, the rows that the page holds.
+        grown: only of the sections that a served page takes anew.
+    """
+    return {
+        one.key: one.payload(data, shown)
+        for one in SECTIONS
+        if one.payload is not None and (one.grows or not grown)
+    }

@@ -1,0 +1,49 @@
+// The chosen scenario: its figures, its files, what it is made of.
+
+import { CAUSE_HELP } from "./causes.js";
+import { $, element } from "./common.js";
+import { conflictLines } from "./conflict.js";
+import { columns, data } from "./data.js";
+import { fileLink } from "./downloads.js";
+import { number, quantity, turned, worded } from "./numbers.js";
+import { Picture } from "./picture.js";
+
+export function fillDetails(kept) {
+  const line = (name, value, column) => {
+    const text = element("b", {}, worded(value, column) ?? quantity(turned(value, column), column?.unit ?? ""));
+    const box = element("div", { title: column?.description ?? "" }, element("span", { class: "name" }, name), text);
+    const { low, high } = column ?? {};
+    if (typeof low === "number" && high > low && value !== null) {
+      const mark = element("i");
+      mark.style.left = `${(100 * Math.min(1, Math.max(0, (value - low) / (high - low)))).toFixed(1)}%`;
+      box.append(element("span", { class: "range", title: column.words ? column.words.join(", ") : `range ${number(low)} to ${quantity(turned(high, column), column.unit)}` }, mark));
+    }
+    return box;
+  };
+  const lines = (values) => Object.entries(values).map(([name, value]) => line(name, value, columns.get(name)));
+  const heading = kept.minimal ? `Scenario ${kept.name}, simplest form of evaluation` : `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"}`;
+  const name = element("h3", {}, `${heading} ${number(kept.evaluation + 1)}`);
+  const cause = kept.cause ? [element("div", { title: `Quick label, of one replay: ${CAUSE_HELP[data.causes.labels.indexOf(kept.cause)]}` }, element("span", { class: "name" }, "cause (quick label)"), element("b", {}, kept.cause))] : [];
+  const metrics = kept.conflict ? [element("h3", {}, "Its metrics")] : [];
+  $("measures").replaceChildren(name, ...cause, ...conflictLines(kept.conflict), ...metrics, ...lines(kept.metrics));
+  const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
+  if (kept.files.length) {
+    const links = kept.files.map(fileLink);
+    parts.push(element("h3", {}, "Its files"), element("div", { class: "files" }, ...links));
+  }
+  $("details").replaceChildren(...parts);
+}
+
+// What the chosen scenario is made of.
+export const showPicture = (() => {
+  let picture = null;
+  return (kept) => {
+    $("made-of").hidden = kept.picture === null;
+    if (kept.picture === null) return;
+    const pictures = kept.pictures ?? data.pictures;
+    picture ??= new Picture($("layers"), pictures);
+    Object.assign(picture, { layers: pictures.layers, columns: pictures.columns });
+    picture.show(pictures.pictures[kept.picture]);
+    $("made-of-title").textContent = `What scenario ${kept.name} is made of`;
+  };
+})();

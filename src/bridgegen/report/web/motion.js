@@ -1,0 +1,16 @@
+// The motion of scenarios from the server, of a page that is served.
+
+import { taken } from "./inflate.js";
+import { playbacks } from "./playbacks.js";
+
+// The motion of an evaluation from the server; null if it cannot be had after all.
+async function askMotion(evaluation) {
+  try {
+    const told = await (await fetch(`motion/${evaluation}`)).json();
+    return told.playback ? taken({ ...told, playbacks: [told.playback] })[0] : null;
+  } catch {
+    return null;
+  }
+}
+
+playbacks.ask = askMotion;

@@ -1,0 +1,13 @@
+// What the page's modules find beside the browser's own, for their type check (jsconfig.json).
+
+declare const Plotly: any; // beside the script, from its package
+
+interface Window {
+  bridgegen: any;
+}
+
+interface DocumentEventMap {
+  filters: CustomEvent; // detail: ranges by column
+  shown: CustomEvent; // detail: the evaluation in the player
+  grown: CustomEvent; // of a page that is served: there are more rows
+}
