@@ -83,7 +83,7 @@ def test_the_page_s_data_say_what_the_record_says(found, record):
     assert one["sentences"][0].startswith("2 of 3 confirmed in esmini 3.6 (95 %: 21–94 %); 1 not:")
     assert data["summary"]["sentences"][-1] == one["sentences"][0]
     json.dumps(data, allow_nan=False)
-    assert news(found, 100)["confirmations"] == data["confirmations"]
+    assert news(found, 100)["sections"]["confirmations"] == data["confirmations"]
 
 
 def test_a_track_is_where_it_was_to_the_centimetre(found, report):

@@ -69,6 +69,15 @@ def test_every_parameter_has_a_strip_with_its_counts(page, report):
     assert axes == list(dict.fromkeys(one.axis for one in found.parameters))
 
 
+def test_the_edges_of_the_bins_stand_below_them(page):
+    strips = page.locator("#strips .strip")
+    for k in range(strips.count()):
+        bins = strips.nth(k).locator(".bins").bounding_box()
+        ticks = strips.nth(k).locator(".ticks").bounding_box()
+        assert bins["y"] + bins["height"] <= ticks["y"] < bins["y"] + bins["height"] + 10
+        assert (ticks["x"], ticks["width"]) == (bins["x"], bins["width"])
+
+
 def test_the_figures_say_what_feasible_means(page, report):
     texts = page.locator("#ways li").all_inner_texts()
     for text, way in zip(texts, report.coverage.total.ways, strict=True):

@@ -110,7 +110,7 @@ def test_news_are_the_rows_that_the_page_lacks(growing):
     assert (told["rows"]["n"], told["whole"], told["finished"]) == (100, False, False)
     assert told["rows"]["critical"] == rows.critical[70:100].astype(int).tolist()
     assert told["rows"]["cause"] is None or len(told["rows"]["cause"]) == 30
-    assert sum(told["causes"]["counts"]) == 100
+    assert sum(told["sections"]["causes"]["counts"]) == 100
     ranks = np.array(told["rows"]["rank"])
     assert len(ranks) == 100
     order = np.flatnonzero(ranks)[np.argsort(ranks[ranks > 0])]

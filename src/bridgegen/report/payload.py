@@ -91,7 +91,7 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
     """Return what a page lacks that knows the first ``after`` evaluations.
 
     Of the rows those that are new, and the ranks of all; or all of them anew, ``whole``, where a
-    long run is thinned. Everything else as it is now.
+    long run is thinned. Everything else as it is now: what sections draw is under ``sections``.
     """
     e, harm = data.evaluations, data.summary.harm
     shown = _shown(e, [])
@@ -106,7 +106,7 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
             "front": _front(e, shown),
         },
         "implausible": implausible_payload(e.findings),
-        **sections_payload(data, shown, grown=True),
+        "sections": sections_payload(data, shown, grown=True),
     }
 
 

@@ -67,7 +67,7 @@ class Live {
     takeFindings(told);
     const { n, n_failed, n_critical, rank, front } = told.rows;
     Object.assign(rows, { n, n_failed, n_critical, rank, front });
-    Object.assign(data, { summary: told.summary, batches: told.batches, causes: told.causes, regions: told.regions, confirmations: told.confirmations, implausible: told.implausible });
+    Object.assign(data, { summary: told.summary, implausible: told.implausible, ...told.sections });
     if (shape() !== before) location.reload(); // there is something that the page has no place for yet
     else {
       document.dispatchEvent(new CustomEvent("grown"));
