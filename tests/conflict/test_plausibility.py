@@ -325,7 +325,7 @@ def test_collisions_are_those_that_plain_geometry_finds():
 )
 def test_what_bodies_can_do_is_as_published(kind, starts, brakes, radius, across):
     """The numbers of the sources that `LIMITS` names: m/s², m/s², m, m/s²."""
-    most = LIMITS[kind]
-    assert most[:2] == (starts, brakes)
+    most = LIMITS[kind].tolist()
+    assert most[:2] == [starts, brakes]
     assert 1.0 / most[2] == pytest.approx(radius)
     assert most[3] == pytest.approx(across)

@@ -230,7 +230,7 @@ def test_rows_without_contact_stay_nan():
 
 @pytest.mark.parametrize("kind", [-1, len(NAMES)])
 def test_a_kind_that_does_not_exist(kind):
-    with pytest.raises(ValueError, match=f"kind_b must be 0 to 7 .*, got {kind}"):
+    with pytest.raises(ValueError, match=f"kind_b must be 0 to {len(NAMES) - 1} .*, got {kind}"):
         delta_v(CAR, kind, 1.0, 0.0)
 
 
