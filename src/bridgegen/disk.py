@@ -119,7 +119,7 @@ def refuse_other(page: Path, generator: str, what: str) -> None:
         StorageError: another file exists there, or the file cannot be read.
     """
     if page.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{page}: the {what} is a page, its name must end in .html")
+        raise InputError(f"{page}: the name of the {what} must end in .html")
     mark = f'<meta name="generator" content="{generator}">'.encode()
     try:
         with page.open("rb") as file:

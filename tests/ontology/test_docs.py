@@ -252,7 +252,7 @@ def test_the_file_is_the_page_and_an_earlier_one_is_replaced(tmp_path, text):
 def test_another_file_is_not_overwritten(tmp_path):
     path = tmp_path / "notes.html"
     path.write_text("my notes")
-    with pytest.raises(StorageError, match="is no documentation, and is not overwritten"):
+    with pytest.raises(StorageError, match="is not a documentation page, and is not overwritten"):
         write_docs(path)
     assert path.read_text() == "my notes"
 

@@ -28,7 +28,7 @@ def write_docs(out: Path) -> None:
         InputError: its name does not end in .html.
         StorageError: it cannot be written, or is something else already.
     """
-    refuse_other(out, "bridgegen ontology docs", "documentation")
+    refuse_other(out, "bridgegen ontology docs", "documentation page")
     write_whole(out, [to_html(tbox()).encode("utf-8", "replace")])
 
 
