@@ -135,13 +135,13 @@ def test_what_matters_is_shown_and_the_rest_is_not_lost(picture):
 
 
 def test_a_new_class_finds_its_column(individuals):
-    cls = ox.NamedNode("https://example.org/own#Tram")
+    cls = ox.NamedNode("https://example.org/own#Trolleybus")
     own = [
         ox.Quad(cls, ox.NamedNode("http://www.w3.org/2000/01/rdf-schema#subClassOf"), bg("Bus")),
-        ox.Quad(node("tram"), TYPE, cls),
+        ox.Quad(node("trolley"), TYPE, cls),
     ]
-    tram = box(paint(Individuals([*individuals.quads, *own])), "tram")
-    assert (tram.layer, tram.cls) == (4, "Tram")
+    trolley = box(paint(Individuals([*individuals.quads, *own])), "trolley")
+    assert (trolley.layer, trolley.cls) == (4, "Trolleybus")
     same = [ox.Quad(cls, EQUIVALENT_CLASS, bg("Fog")), ox.Quad(node("mist"), TYPE, cls)]
     assert box(paint(Individuals([*individuals.quads, *same])), "mist").layer == 5
 
