@@ -25,7 +25,7 @@ def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def declaration(name: str, *, shown: str | None = None) -> Any:
-    """Return what typer is told of an option of a search, for a command that takes it alone.
+    """Return the typer declaration of a search option, for a command that takes it alone.
 
     Args:
         name: of the field of `SearchOptions`.

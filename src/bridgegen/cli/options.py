@@ -84,7 +84,7 @@ Junit = Annotated[
 def read_simulator(
     name: str | None, settings: list[str] | None, connection: Connection
 ) -> SimulatorChoice | None:
-    """Read the choice of a simulator; None if there is none.
+    """Read the choice of a simulator; None if none is named.
 
     Args:
         name: of it.

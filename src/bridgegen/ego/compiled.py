@@ -130,7 +130,7 @@ def _compile(function: Callable[..., Any]) -> Any:
     except InputError:
         raise
     except Exception as error:  # numba lets through what its passes happen to raise
-        raise InputError(_told(function, error)) from None
+        raise InputError(_described(function, error)) from None
 
 
 def _callback(code: Any) -> Any:
@@ -154,7 +154,7 @@ def _callback(code: Any) -> Any:
     return numba.cfunc(signature, nopython=True, error_model="numpy")(call)
 
 
-def _told(function: Callable[..., Any], error: Exception) -> str:
+def _described(function: Callable[..., Any], error: Exception) -> str:
     """Return in one line why numba cannot compile a function."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     if isinstance(error, KeyError):  # a field that a record has not

@@ -225,7 +225,7 @@ def answering(spec: str) -> tuple[int | None, Answer]:
     return None, answer
 
 
-def _told(error: Exception) -> str:
+def _described(error: Exception) -> str:
     """Return an exception in one line, with the line of the driver's that raised it."""
     if isinstance(error, InputError):
         return str(error)
@@ -234,4 +234,4 @@ def _told(error: Exception) -> str:
 
 
 if __name__ == "__main__":
-    serve(partial(answering, sys.argv[1]), _told)
+    serve(partial(answering, sys.argv[1]), _described)

@@ -19,7 +19,7 @@ def _literal(value: str | osc.ParameterRef) -> str | None:
 
 
 def kind_of(body: Element, resolve: Resolve = _literal) -> ParticipantKind | None:
-    """Return the kind of a body, None where there is none for it.
+    """Return the kind of a body; None if no kind of ours fits.
 
     The property `KIND` decides; then a vehicle's role; then its category, of what stands at road
     works its name.

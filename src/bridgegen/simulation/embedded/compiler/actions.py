@@ -50,15 +50,15 @@ class Actions:
         tables: the compiler's; takes down what cannot be run.
         paths: of the entities; trajectories of events are added.
         positions: takes the places that they name.
-        everywhere: compiles what concerns all.
+        global_actions: compiles what concerns all.
         controllers: compiles who drives.
     """
 
     def __init__(
         self, tables: Tables, paths: list[PathSpec], positions: Positions,
-        everywhere: GlobalActions, controllers: Controllers,
+        global_actions: GlobalActions, controllers: Controllers,
     ) -> None:  # fmt: skip
-        self._tables, self._paths, self._everywhere = tables, paths, everywhere
+        self._tables, self._paths, self._global_actions = tables, paths, global_actions
         self._positions, self._controllers = positions, controllers
         self._driven: list[Element] = []
         self.routes: list[tuple[Spot, ...]] = []
@@ -81,11 +81,11 @@ class Actions:
     def begin_with_all(self, action: Element) -> None:
         """Add what concerns all from the start on."""
         if isinstance(action, osc.ParameterAction | osc.VariableAction):
-            for row in self._everywhere.rows(action):
+            for row in self._global_actions.rows(action):
                 self.initial.append(len(self.rows))
                 self.rows.append((*row, 0))
         else:
-            self._everywhere.begin_with(action)
+            self._global_actions.begin_with(action)
 
     def add(self, part: osc.Action, named: Sequence[int], selected: Sequence[int]) -> None:
         """Add an action of an event; one that cannot be run is taken down and left out.
@@ -102,7 +102,7 @@ class Actions:
             if isinstance(change, osc.EntityAction):
                 self._presence(change)
             else:
-                self.rows += self._everywhere.rows(change)
+                self.rows += self._global_actions.rows(change)
         elif not isinstance(part.action, osc.PrivateAction):
             self._tables.unsupported(part.action, type(part.action).__name__)
         else:

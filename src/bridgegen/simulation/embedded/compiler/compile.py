@@ -95,10 +95,10 @@ class _Compiler:
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
         self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
-        self.everywhere = GlobalActions(self.tables, scenario)
+        self.global_actions = GlobalActions(self.tables, scenario)
         self.controllers = Controllers(self.tables, scenario)
         self.actions = Actions(
-            self.tables, self.paths, self.positions, self.everywhere, self.controllers
+            self.tables, self.paths, self.positions, self.global_actions, self.controllers
         )
         self.start = Start(self.tables, self.paths, self.positions, self.actions, self.controllers)
 
@@ -124,7 +124,7 @@ class _Compiler:
         step = declared.time_step(self.scenario, self.place, time_step)
         storyboard = self.scenario.storyboard
         found = nodes(storyboard)
-        self.triggers = Triggers(self.tables, step, found, self.positions, self.everywhere)
+        self.triggers = Triggers(self.tables, step, found, self.positions, self.global_actions)
         objects = [one.entity_object for one in self.tables.objects]
         bodies = np.array([measures(self.tables, one) for one in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
@@ -165,8 +165,8 @@ class _Compiler:
             raise UnsupportedError(*self.tables.problems)
         conditions = table(self.triggers.conditions, 5)
         conditions[:, DELAY] = np.minimum(conditions[:, DELAY], n_steps)
-        everywhere, signals = self.everywhere, self.everywhere.signals
-        time = everywhere.first_time
+        global_actions, signals = self.global_actions, self.global_actions.signals
+        time = global_actions.first_time
         first_time = -1 if time is None else self.tables.slot(time[0])
         waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
         leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
@@ -207,15 +207,15 @@ class _Compiler:
             starts=table(self.start.ordered_places(), 2),
             places=table(self.positions.rows, 8),
             spots=tuple(self.positions.spots),
-            weathers=everywhere.environments.rows,
-            values=np.array(everywhere.values.slots, dtype=np.int64),
+            weathers=global_actions.environments.rows,
+            values=np.array(global_actions.values.slots, dtype=np.int64),
             lights=tuple(signals.lights),
             first_states=np.array(signals.first_states, dtype=np.int8),
             controllers=table(signals.controllers, 4),
             phases=table(signals.phases, 3),
             changes=table(signals.changes, 2),
             first_phases=np.array(
-                [everywhere.first_phases.get(c, -1) for c in range(len(signals.controllers))],
+                [global_actions.first_phases.get(c, -1) for c in range(len(signals.controllers))],
                 dtype=np.int64,
             ),
             first_time=first_time,

@@ -106,7 +106,7 @@ class Probes:
         tables: the compiler's.
         nodes: the storyboard's elements.
         positions: takes the places that probes name.
-        everywhere: knows lights, controllers and values.
+        global_actions: knows lights, controllers and values.
 
     Attributes:
         marks, clearances, ranges: as `Program` has them.
@@ -114,13 +114,13 @@ class Probes:
 
     def __init__(
         self, tables: Tables, nodes: "Sequence[Node]", positions: Positions,
-        everywhere: GlobalActions,
+        global_actions: GlobalActions,
     ) -> None:  # fmt: skip
         self._tables, self._nodes, self._positions = tables, nodes, positions
         self.marks: list[int] = []
         self.clearances: list[tuple[int, ...]] = []
         self.ranges: list[tuple[float, float]] = []
-        self._signals, self._values = everywhere.signals, everywhere.values
+        self._signals, self._values = global_actions.signals, global_actions.values
 
     def by_value(self, condition: Element) -> list[Probe]:
         """Return the probes of a condition that no entity triggers."""

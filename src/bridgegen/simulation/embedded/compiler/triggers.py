@@ -41,7 +41,7 @@ class Triggers:
         time_step: float,
         nodes: "Sequence[Node]",
         positions: Positions,
-        everywhere: GlobalActions,
+        global_actions: GlobalActions,
     ) -> None:
         self.triggers: list[tuple[int, int]] = []
         self.groups: list[tuple[int, int]] = []
@@ -50,7 +50,7 @@ class Triggers:
         self.stop_time = 0.0
         self._tables = tables
         self._time_step = time_step
-        self.looks = Probes(tables, nodes, positions, everywhere)
+        self.looks = Probes(tables, nodes, positions, global_actions)
 
     def add(self, trigger: osc.Trigger | None) -> int:
         """Append a trigger and return its number; -1 if it is missing."""

@@ -243,7 +243,7 @@ def _simulate(
     arrays: Any = seen(layout)
     state, record = State(*arrays[: len(State._fields)]), Record(*arrays[len(State._fields) :])
     raised: list[str] = []
-    sys.unraisablehook = lambda error: raised.append(_told(error))
+    sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
         code = code_of(ask, plan, _roads[0], state, record)
         plan = plan._replace(driver_code=code, own_code=address)
@@ -264,7 +264,7 @@ def _answer(
     """Ask the driver; return its answer, what it keeps, and what it raised."""
     answer = np.zeros(ANSWER)
     raised: list[str] = []
-    sys.unraisablehook = lambda error: raised.append(_told(error))
+    sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
         call_from_python(address, (told[EGO:], told[:EGO], ahead, others, memory, answer))
     finally:
@@ -272,7 +272,7 @@ def _answer(
     return answer, memory, "".join(raised)
 
 
-def _told(unraisable: Any) -> str:
+def _described(unraisable: Any) -> str:
     """Return in one line what a compiled driver raised; numba knows the line of most."""
     error, here = unraisable.exc_value, Path(__file__).name
     for place in reversed(traceback.extract_tb(unraisable.exc_traceback)):
