@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.campaign.campaign import Watch, resume, run_search
+from bridgegen.campaign.campaign import SearchCallbacks, resume, run_search
 from bridgegen.errors import Interrupted
 from bridgegen.evaluation import Evaluation
 from bridgegen.odd.reader import load
@@ -73,7 +73,7 @@ def search(folder: Path, rows: int, *, until: int | None = None) -> None:
     try:
         run_search(
             SCENARIO, algorithm="random", settings={"population": 400}, budget=rows, seed=0,
-            out=folder, watch=Watch(batch=batch),
+            out=folder, callbacks=SearchCallbacks(batch=batch),
         )  # fmt: skip
     except Interrupted:
         if until is None:

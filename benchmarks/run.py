@@ -24,7 +24,7 @@ from perception import perception
 from rates import Rate, processor_time, rate_of
 from traffic import ALL, traffic_rate
 
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import bridgegen as bg
-from bridgegen.campaign.handover import handed_over, not_exported, read_facts
+from bridgegen.campaign.exported import exported_scenarios, not_exported, read_facts
 from bridgegen.comparison.plan import begin, make_plan
 from bridgegen.confirmation.record import read_record as read_confirmation
 from bridgegen.confirmation.schema import Outcome, Record, Scenario
@@ -139,7 +139,10 @@ READERS = {
     "regions.json": read_regions,
     "confirmation-esmini.json": read_confirmation,
     "not-exported.json": lambda path: not_exported(path.parent),
-    "critical/0001.json": lambda path: (handed_over(path.parent.parent, 60), read_facts(path)),
+    "critical/0001.json": lambda path: (
+        exported_scenarios(path.parent.parent, 60),
+        read_facts(path),
+    ),
     "compare.json": read_comparison,
 }
 
@@ -219,4 +222,4 @@ def test_what_never_ends_is_refused(tmp_path, name):
 
 def test_a_scenario_of_an_evaluation_that_is_not_there(run):
     with pytest.raises(BridgeGenError, match="the run has no evaluation"):
-        handed_over(run, 1)
+        exported_scenarios(run, 1)

@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -136,3 +136,21 @@ def test_a_metric_that_the_driver_gives_no_rise_to_is_refused():
     assert first.startswith("the metric 'map' needs detections, and the driver 'route-follower' ")
     assert first.endswith("perceive (--ego): reference")
     assert "'iou'" in second
+
+
+def test_some_rows_of_a_replay_are_those_of_a_replay_of_some_rows():
+    pipeline = made(ALL_AXES, "reference")
+    X, at = rows(pipeline, 6), np.array([4, 1])
+    some, alone = pipeline.replay(X).take(at), pipeline.replay(X[at])
+    for one in fields(some.rollout):
+        if one.init:
+            np.testing.assert_equal(
+                getattr(some.rollout, one.name), getattr(alone.rollout, one.name)
+            )
+    steps = len(alone.intentions.steps)  # those of the longest row
+    for name in ("way", "station", "acceleration", "shift"):
+        np.testing.assert_equal(
+            getattr(some.intentions, name)[:, :steps], getattr(alone.intentions, name)
+        )
+    np.testing.assert_equal(some.ways, alone.ways)
+    np.testing.assert_equal(some.weathers, alone.weathers)

@@ -28,7 +28,7 @@ import pytest
 import yaml
 from typer.main import get_command
 
-from bridgegen.campaign.handover import NOT_EXPORTED
+from bridgegen.campaign.exported import NOT_EXPORTED
 from bridgegen.cli import app, main
 from bridgegen.odd.json_schema import schema
 from bridgegen.odd.plain_yaml import read_plain_yaml

@@ -163,3 +163,15 @@ class Replay:
     intentions: Intentions | None
     ways: Sequence[Mapping[int, Float]]
     weathers: Sequence[Sequence[tuple[int, Float]]]
+
+    def take(self, at: Int) -> "Replay":
+        """Return some of the rows."""
+        if np.array_equal(at, np.arange(self.rollout.shape[0])):
+            return self
+        meant, rows = self.intentions, at.tolist()
+        return Replay(
+            self.rollout.take(at),
+            None if meant is None else meant.take(at),
+            [self.ways[row] for row in rows] if self.ways else [],
+            [self.weathers[row] for row in rows],
+        )

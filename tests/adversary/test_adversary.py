@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import bridgegen as bg
 from bridgegen.adversary import OBSERVED
 from bridgegen.campaign.coverage import coverage_of
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.errors import InputError
 from bridgegen.odd.adversary import MARGIN, adversarial
 from bridgegen.odd.reader import load

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import handover
+from bridgegen.campaign import critical
 from bridgegen.campaign.beforehand import corners
-from bridgegen.campaign.handover import Refused, not_exported
+from bridgegen.campaign.exported import NOT_EXPORTED, Refused, not_exported
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import OntologyError, StorageError
 from bridgegen.odd.reader import load
@@ -76,14 +77,14 @@ def test_an_adversary_s_scenario_is_tried_too(tmp_path):
 
 
 def test_what_cannot_be_exported_is_left_out_and_named(tmp_path, monkeypatch, capsys):
-    write = handover.write_scenario
+    write = critical.write_scenario
 
     def refuse(pipeline, x, folder, name, *cause, **given):
         if name == "0002":
             raise OntologyError(f"{name}.owl: no such lane", f"{name}.owl: nor road")
         return write(pipeline, x, folder, name, *cause, **given)
 
-    monkeypatch.setattr(handover, "write_scenario", refuse)
+    monkeypatch.setattr(critical, "write_scenario", refuse)
     run = bg.run_search("crossroads-s3", budget=60, keep=3, out=tmp_path / "run")
     assert [path.stem for path in run.scenarios] == ["0001", "0003"]
     (left,) = run.not_exported
@@ -95,11 +96,11 @@ def test_what_cannot_be_exported_is_left_out_and_named(tmp_path, monkeypatch, ca
     said = f"0002, evaluation {left.evaluation + 1}: 0002.owl: no such lane; 0002.owl: nor road"
     assert said in capsys.readouterr().out
 
-    monkeypatch.setattr(handover, "write_scenario", write)  # mended, and resumed
+    monkeypatch.setattr(critical, "write_scenario", write)  # mended, and resumed
     again = bg.resume(run.folder)
     assert len(again.scenarios) == 3
     assert again.not_exported == ()
-    assert not (run.folder / handover.NOT_EXPORTED).exists()
+    assert not (run.folder / NOT_EXPORTED).exists()
 
 
 def test_a_refused_scenario_leaves_no_files(bus_on_a_shoulder, tmp_path):
@@ -108,12 +109,12 @@ def test_a_refused_scenario_leaves_no_files(bus_on_a_shoulder, tmp_path):
     folder = tmp_path / "files"
     folder.mkdir()
     with pytest.raises(OntologyError, match=r"one\.owl: on_lane of lead"):
-        handover.write_scenario(pipeline, pipeline.space.row({}), folder, "one")
+        write_scenario(pipeline, pipeline.space.row({}), folder, "one")
     assert list(folder.iterdir()) == []
 
 
 def test_a_damaged_list_of_refused_scenarios(tmp_path):
-    path = tmp_path / handover.NOT_EXPORTED
+    path = tmp_path / NOT_EXPORTED
     path.write_text(json.dumps([{"name": "0001"}]), "utf-8")
     with pytest.raises(StorageError, match="resume"):
         not_exported(tmp_path)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import Watch
-from bridgegen.campaign.handover import most_critical
+from bridgegen.campaign import SearchCallbacks
+from bridgegen.campaign.critical import most_critical
 from bridgegen.cli import main
 from bridgegen.conflict.findings import COLUMNS
 from bridgegen.errors import InputError, StorageError, UnknownNameError
@@ -453,7 +453,7 @@ def test_what_an_algorithm_refuses_leaves_no_folder(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs files that can be deleted while open")
-@pytest.mark.parametrize("when", ["batch", "triage", "hand over", "report"])
+@pytest.mark.parametrize("when", ["batch", "triage", "export", "report"])
 def test_a_folder_that_is_deleted_in_mid_run_is_said_to_be(tmp_path, when):
     folder, batches = tmp_path / "run", []
 
@@ -466,9 +466,10 @@ def test_a_folder_that_is_deleted_in_mid_run_is_said_to_be(tmp_path, when):
         if name == when:
             shutil.rmtree(folder)
 
+    on = SearchCallbacks(batch=on_batch, stage=on_stage)
     with pytest.raises(StorageError) as stop:
         bg.run_search("crossroads-s4", budget=200, keep=1, ego="route-follower", causes=False,
-                      out=folder, watch=Watch(batch=on_batch, stage=on_stage))  # fmt: skip
+                      out=folder, callbacks=on)  # fmt: skip
     assert str(stop.value) == (
         f"{folder}: run.sqlite was deleted or moved during the run; if it was deleted, "
         "its evaluations are lost"
@@ -486,7 +487,9 @@ def test_ctrl_c_does_not_say_that_a_deleted_run_can_be_resumed(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(StorageError, match="was deleted or moved"):
-        bg.run_search("crossroads-s4", budget=200, out=folder, watch=Watch(batch=on_batch))
+        bg.run_search(
+            "crossroads-s4", budget=200, out=folder, callbacks=SearchCallbacks(batch=on_batch)
+        )
 
 
 def test_an_exported_file_that_is_deleted_while_the_report_is_made_costs_no_evaluation(tmp_path):
@@ -498,5 +501,5 @@ def test_an_exported_file_that_is_deleted_while_the_report_is_made_costs_no_eval
 
     with pytest.raises(StorageError, match="the evaluations are kept, 'bridgegen resume"):
         bg.run_search("crossroads-s4", budget=120, keep=1, ego="route-follower", causes=False,
-                      out=folder, watch=Watch(stage=on_stage))  # fmt: skip
+                      out=folder, callbacks=SearchCallbacks(stage=on_stage))  # fmt: skip
     assert bg.resume(folder).scenarios

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.validate import validate_file
 from bridgegen.odd.reader import load, names
 from bridgegen.options import PipelineOptions

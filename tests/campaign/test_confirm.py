@@ -11,7 +11,6 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.campaign.confirm import confirm
-from bridgegen.campaign.handover import handed_over
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import FileFormatError, InputError, Interrupted
 from bridgegen.simulation import choice
@@ -91,7 +90,7 @@ def record_of(folder):
 
 def test_the_same_simulator_confirms_everything_and_nobody_parts(folder, double):
     found = confirm(folder, elsewhere())
-    kept = handed_over(folder)
+    kept = bg.Run(folder).exported()
     assert [(one.name, one.evaluation) for one in found.scenarios] == [
         (one.name, one.evaluation) for one in kept
     ]
@@ -172,7 +171,7 @@ def test_rows_are_the_most_critical_ones_and_earlier_ones_are_kept(folder, doubl
         rows = store.read()
     best = np.flatnonzero(rows.critical)[np.argsort(rows.F[rows.critical, 0], kind="stable")]
     assert [one.evaluation for one in found.scenarios] == best[:20].tolist()
-    kept = {one.evaluation: one.name for one in handed_over(folder)}
+    kept = {one.evaluation: one.name for one in bg.Run(folder).exported()}
     assert [one.name for one in found.scenarios] == [kept.get(k) for k in best[:20]]
     new = len([k for k in best[:20] if k not in kept])
     assert (found.ran, double.ran) == (new, 4 + new)

@@ -10,7 +10,7 @@ from lxml import etree
 
 import bridgegen as bg
 from bridgegen.campaign.export import FLAVOURS, export
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import FileFormatError, InputError, StorageError, UnsupportedError
 from bridgegen.odd.reader import load, names
@@ -275,7 +275,7 @@ def test_refusals(run, catalogue, tmp_path):
 
 def test_a_run_that_kept_nothing(tmp_path):
     run = bg.run_search("crossroads-s4", budget=5, keep=0, out=tmp_path / "run")
-    with pytest.raises(InputError, match="no scenario was handed over"):
+    with pytest.raises(InputError, match="no scenario was exported"):
         export(run.folder, "recorded")
 
 

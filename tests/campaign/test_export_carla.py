@@ -9,7 +9,7 @@ from lxml import etree
 
 import bridgegen as bg
 from bridgegen.campaign.export import export
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.odd.reader import load, names
 from bridgegen.openx.openscenario import model as osc

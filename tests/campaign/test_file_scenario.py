@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 import bridgegen as bg
-from bridgegen.campaign import Watch
+from bridgegen.campaign import SearchCallbacks
 from bridgegen.campaign.validate import validate_file
 from bridgegen.cli import main
 from bridgegen.errors import BridgeGenError, InputError, Interrupted, StorageError
@@ -103,7 +103,13 @@ def test_interrupted_and_resumed_is_as_if_undisturbed(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted):
-        search(tmp_path / "b", algorithm="pso", budget=240, keep=2, watch=Watch(batch=stop))
+        search(
+            tmp_path / "b",
+            algorithm="pso",
+            budget=240,
+            keep=2,
+            callbacks=SearchCallbacks(batch=stop),
+        )
     assert 80 <= len(rows_of(tmp_path / "b" / "run")) < 240
     resumed = bg.resume(tmp_path / "b" / "run")
     assert same(whole.folder, resumed.folder)

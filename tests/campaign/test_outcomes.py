@@ -7,7 +7,7 @@ import pyoxigraph as ox
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.cause import CAUSES
 from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, analyse
 from bridgegen.conflict.outcomes import with_outcomes
@@ -309,7 +309,7 @@ def test_findings_of_an_earlier_run_are_replaced_or_left_out(found, tmp_path):
     assert findings_of(tmp_path, "cause") == (cause, cause)
     summary = summarise(analyse(rollout))
     assert summary is not None
-    write_scenario(pipeline, x, tmp_path, "conflict", rollout=rollout, found=summary)
+    write_scenario(pipeline, x, tmp_path, "conflict", rollout=rollout, conflict=summary)
     conflict = nothing | {
         "conflict_type": summary.type,
         "responsible": summary.responsible,

@@ -50,12 +50,9 @@ def copied(folder, place, **changes):
 def test_regions_hold_for_scenarios_found_by_trying(folder, found):
     """Independent rows of the whole space, those outside a region thrown away."""
     from bridgegen.campaign.restored import pipeline_of
-    from bridgegen.campaign.settings import Settings
 
     assert len(found.found.confirmed) >= 2
-    with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, folder)
-        pipeline = pipeline_of(settings, store.metrics, folder, causes=False)
+    pipeline = pipeline_of(bg.Run(folder), "regions")
     space = pipeline.space
     X = space.decode(np.random.default_rng(99).random((2000, space.n_var)))
     result = pipeline.evaluate(X)

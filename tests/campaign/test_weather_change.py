@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.validate import validate_file
 from bridgegen.odd.reader import load
 from bridgegen.odd.starter import start_scenario

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import Watch
+from bridgegen.campaign import SearchCallbacks
 from bridgegen.errors import UnknownNameError
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
@@ -48,7 +48,9 @@ def test_processes_find_what_threads_find_whoever_is_killed(
             os.kill(pool.pids[-1], signal.SIGKILL)
             killed.append(pool.pids[-1])
 
-    run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=pool, watch=Watch(batch=kill))
+    run = bg.run_search(
+        **SEARCH, out=tmp_path / "run", workers=pool, callbacks=SearchCallbacks(batch=kill)
+    )
     pool.close()
     assert len(set(killed)) == 2
     assert same_rows(run.folder, undisturbed.folder)

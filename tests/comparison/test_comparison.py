@@ -17,7 +17,7 @@ import pytest
 import bridgegen as bg
 from bridgegen.campaign.coverage import coverage_of
 from bridgegen.cli import main
-from bridgegen.comparison import Watch
+from bridgegen.comparison import ComparisonCallbacks
 from bridgegen.comparison.plan import Cell
 from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.search.random import Random
@@ -169,8 +169,8 @@ def test_killed_and_gone_on_with_it_is_the_same(done, tmp_path):
     kept = finished(out)
     assert kept >= 1
     told = []
-    watch = Watch(begun=lambda plan, ended, made: told.append((ended, made)))
-    again = bg.compare("crossroads-s4", **GRID, workers=1, out=out, watch=watch)
+    callbacks = ComparisonCallbacks(begun=lambda plan, ended, made: told.append((ended, made)))
+    again = bg.compare("crossroads-s4", **GRID, workers=1, out=out, callbacks=callbacks)
     assert told[0][0] >= kept
     assert told[0][1] == 120 * told[0][0]
     assert not again.gaps
@@ -185,7 +185,9 @@ def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path):
     out = tmp_path / "s4"
     small = {**GRID, "seeds": 1}
     with pytest.raises(Interrupted) as caught:
-        bg.compare("crossroads-s4", **small, workers=1, out=out, watch=Watch(batch=stop))
+        bg.compare(
+            "crossroads-s4", **small, workers=1, out=out, callbacks=ComparisonCallbacks(batch=stop)
+        )
     assert "stopped after 1 of 2 runs; resume with 'bridgegen compare" in str(caught.value)
     assert f"--seeds 1 --budget 120 --out {out}'" in str(caught.value)
     assert finished(out) == 1

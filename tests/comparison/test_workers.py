@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from bridgegen.comparison.runs import Task, Watcher, evaluations_of
+from bridgegen.comparison.runs import RunCallbacks, Task, evaluations_of
 from bridgegen.comparison.workers import run_all
 from bridgegen.options import SearchOptions
 
@@ -22,9 +22,9 @@ def task(folder: Path, name: str, **more: object) -> Task:
 
 def test_a_process_that_dies_costs_one_run(tmp_path):
     told: list[tuple[str, bool]] = []
-    watcher = Watcher(ended=lambda name, failure: told.append((name, failure is None)))
+    callbacks = RunCallbacks(ended=lambda name, failure: told.append((name, failure is None)))
     tasks = [task(tmp_path, "bomb", junction=Bomb()), task(tmp_path, "0")]
-    failures = run_all(tasks, 2, watcher)
+    failures = run_all(tasks, 2, callbacks)
     assert list(failures) == ["bomb"]
     assert failures["bomb"] in (
         "its process ended with exit status 7",

@@ -6,7 +6,7 @@ import pytest
 
 from bridgegen import ego
 from bridgegen.campaign import run_search
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load

@@ -78,7 +78,7 @@ def test_the_command_line_has_them_all():
 def test_options_are_what_their_command_line_says(options, monkeypatch):
     found = {}
 
-    def keep(scenario, *, out, workers, watch, **given):
+    def keep(scenario, *, out, workers, callbacks, **given):
         found.update(given)
         raise InputError("not today")
 

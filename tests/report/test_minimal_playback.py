@@ -4,18 +4,14 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.settings import Settings
 from bridgegen.report.playbacks import minimal_playbacks
-from bridgegen.store import Store
 
 
 def test_it_is_the_exported_scenario(tmp_path):
     run = bg.run_search("pedestrian-behind-parked", budget=80, keep=2, ego="route-follower",
                         out=tmp_path / "run")  # fmt: skip
     mode = next(one for one in run.modes if one.minimal is not None)
-    with Store.open(run.folder) as store:
-        settings = Settings.from_dict(store.settings, run.folder)
-        pipeline = pipeline_of(settings, store.metrics, run.folder, command="view", causes=False)
+    pipeline = pipeline_of(run, "view")
     (played,) = minimal_playbacks(pipeline, [("m", mode.shown, (), mode.minimal)])
     exported = bg.simulate_file(run.folder / "critical" / f"{mode.minimal.name}.xosc")
     assert played.metrics["harm"] == pytest.approx(mode.minimal.harm)

@@ -19,11 +19,10 @@ from shapely.geometry import Point, box
 
 import bridgegen as bg
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.settings import Settings
 from bridgegen.cli import main
 from bridgegen.comparison.drawing import DARK
 from bridgegen.errors import InputError, Interrupted, StorageError
-from bridgegen.reproduction import Watch, paper, pictures, protocol, reproduction
+from bridgegen.reproduction import ReproductionCallbacks, paper, pictures, protocol, reproduction
 from bridgegen.reproduction.figures.crossroads import collision_points, crossing_of
 from bridgegen.reproduction.figures.fronts import spread_curve
 from bridgegen.reproduction.protocol import PRINTED
@@ -198,7 +197,7 @@ def test_interrupted_and_gone_on_with_it_is_the_same(
 
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Interrupted) as caught:
-        bg.reproduce(**tiny, workers=1, watch=Watch(batch=stop))
+        bg.reproduce(**tiny, workers=1, callbacks=ReproductionCallbacks(batch=stop))
     told = str(caught.value)
     stopped, _, command = told.partition("; resume with ")
     assert re.fullmatch(rf"stopped after 1\d of {COUNT} runs", stopped)
@@ -313,8 +312,7 @@ def test_collisions_lie_in_both_bodies(done):
     assert crossing.of == len(X) > 0
     assert len(crossing.collisions) == len(X)  # few enough to be drawn, all of them
     assert crossing.ends == (("P1", "P6"), ("P7", "P2"))
-    with Store.open(run) as store:
-        pipeline = pipeline_of(Settings.from_dict(store.settings, run), store.metrics, run)
+    pipeline = pipeline_of(bg.Run(run), "reproduce")
     rollout = pipeline.rollout(X)
     for row, place in enumerate(crossing.collisions[:20]):
         t = int(np.flatnonzero(rollout.distance[row, 1] <= 0.0)[0])

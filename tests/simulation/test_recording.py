@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.cli import main
 from bridgegen.conflict.recorded import measure_recording
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, UnknownNameError

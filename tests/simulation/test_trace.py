@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from bridgegen.campaign.handover import write_scenario
+from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.reader import load

@@ -7,7 +7,6 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.settings import Settings
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.store import Store
 from bridgegen.triage import JSON_FILE
@@ -30,9 +29,7 @@ def run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pipeline(run):
-    with Store.open(run.folder) as store:
-        settings = Settings.from_dict(store.settings, run.folder)
-        return pipeline_of(settings, store.metrics, run.folder)
+    return pipeline_of(run, "resume", causes=True)
 
 
 def facts(path):

@@ -48,7 +48,7 @@ class Growing:
         self._store.append(rows.U, rows.X, result, seconds=0.1 * (start + n))
 
     def end(self) -> None:
-        """End the run, and hand over."""
+        """End the run, and export."""
         self._store.finish("budget")
         self._store.close()
         shutil.copytree(self._source / "critical", self.folder / "critical", dirs_exist_ok=True)

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.campaign.report import write_run_report
+from bridgegen.campaign import Run
+from bridgegen.campaign.report import rewrite_report
 from bridgegen.cli import main
 from bridgegen.errors import InputError, StorageError
 from bridgegen.report.payload import ROWS
@@ -167,7 +168,7 @@ def test_what_was_handed_over_must_be_readable(growing):
     growing.grow(5)
     (growing.folder / "critical").mkdir()
     (growing.folder / "critical" / "0001.json").write_text('{"evaluation": "one"}')
-    with pytest.raises(StorageError, match=r"0001\.json: is not what was handed over"):
+    with pytest.raises(StorageError, match=r"0001\.json: is not what was exported"):
         RunView(growing.folder).page()
 
 
@@ -227,8 +228,8 @@ def test_links_that_lead_out_of_the_run_are_not_followed(finished, tmp_path):
         with pytest.raises(StorageError, match=rf"{name}: is a link to a place outside"):
             RunView(folder).file(name)
     view, refused = RunView(folder), r"0001\.xosc: is a link to a place outside"
-    with Store.open(folder) as store, pytest.raises(StorageError, match=refused):
-        write_run_report(view._pipeline, store, view.settings, view._rows, view._kept())
+    with pytest.raises(StorageError, match=refused):
+        rewrite_report(Run(folder), view._pipeline, print)
     (folder / "critical/0002.xosc").unlink()
     (folder / "critical/0002.xosc").symlink_to("0001.owl")  # inside: their own files
     assert RunView(folder).file("critical/0002.xosc") == RunView(folder).file("critical/0001.owl")

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import Watch
+from bridgegen.campaign import SearchCallbacks
 from bridgegen.errors import UnknownNameError, WorkersError
 from bridgegen.store import Store
 from bridgegen.workers import Lost, open_workers
@@ -229,7 +229,9 @@ def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
         if progress.evaluations == 80:
             threading.Timer(0.02, lambda: (nodes.obey("kill node"), done.set())).start()
 
-    run = bg.run_search(**SEARCH, out=tmp_path / "run", workers=cluster, watch=Watch(batch=disturb))
+    run = bg.run_search(
+        **SEARCH, out=tmp_path / "run", workers=cluster, callbacks=SearchCallbacks(batch=disturb)
+    )
     assert done.wait(10.0)
     assert same_rows(run.folder, undisturbed.folder)
     nodes.obey("grow")
@@ -275,7 +277,7 @@ def test_a_cluster_that_is_lost_is_told_and_the_run_can_be_gone_on_with(
     ):
         bg.run_search(
             **SEARCH, out=place, workers="ray",
-            watch=Watch(batch=lambda progress: (lose(progress), time.sleep(4.0))),
+            callbacks=SearchCallbacks(batch=lambda progress: (lose(progress), time.sleep(4.0))),
         )  # fmt: skip
     resumed = bg.resume(place)
     assert same_rows(resumed.folder, undisturbed.folder)

@@ -1,4 +1,4 @@
-"""A campaign from start to finish: search, hand over, report; and going on with one."""
+"""A campaign from start to finish: search, triage, export, report; and resuming one."""
 
 import hashlib
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import numpy as np
 from bridgegen import search as toolkit
 from bridgegen.campaign.beforehand import refuse_beforehand
 from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
-from bridgegen.campaign.handover import hand_over, most_critical
+from bridgegen.campaign.critical import export_critical, most_critical
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
@@ -31,20 +31,20 @@ from bridgegen.workers import Choice, Workers, open_workers
 
 
 @dataclass(frozen=True)
-class Watch:
-    """Who wants to know how a campaign is getting on; each is called from the same thread.
+class SearchCallbacks:
+    """Called as a campaign progresses, all from the same thread.
 
     Attributes:
-        stage: told what begins: "compile", "search", "triage", "hand over", "report".
-        workers: told who evaluates, before anything is.
-        batch: told after each batch.
-        written: told how many scenarios are handed over.
+        stage: with the stage that begins: "compile", "search", "triage", "export", "report".
+        workers: with the workers, before they evaluate anything.
+        batch: with the progress, after each batch.
+        exported: with the number of scenarios exported so far.
     """
 
     stage: Callable[[str], None] = lambda stage: None
     workers: Callable[[Workers], None] = lambda workers: None
     batch: Callable[[Progress], None] = lambda progress: None
-    written: Callable[[int], None] = lambda count: None
+    exported: Callable[[int], None] = lambda count: None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +72,8 @@ class SearchArguments(SearchOptions):
             "of this process by default, one for each core. No result depends on it."
         },
     )
-    watch: Watch | None = field(
-        default=None, metadata={"help": "Told how the search is getting on."}
+    callbacks: SearchCallbacks | None = field(
+        default=None, metadata={"help": "Called as the search progresses."}
     )
 
 
@@ -85,13 +85,13 @@ def run_search(given: SearchArguments) -> Run:
         The finished run.
 
     Raises:
-        InputError: anything that the arguments or files say wrongly; or a scenario at the defaults
+        InputError: arguments or files that break a rule; or a scenario at the defaults
             or the corners of the ranges that could not be exported.
         StorageError: the folder exists or cannot be written.
-        WorkersError: there are no workers, or they are lost; ``resume`` goes on.
+        WorkersError: there are no workers, or they are lost; ``resume`` continues.
         Interrupted: Ctrl-C; likewise.
     """
-    watch = given.watch or Watch()
+    callbacks = given.callbacks or SearchCallbacks()
     catalogue = driven_by(load(given.scenario, given.distribution), given.others)
     budget = catalogue.budget if given.budget is None else given.budget
     seed = catalogue.seed if given.seed is None else given.seed
@@ -116,12 +116,12 @@ def run_search(given: SearchArguments) -> Run:
     refuse_used(folder)
     if given.cause is not None and not given.causes:
         raise InputError(f"to search for the cause '{given.cause}', causes must be sought")
-    with open_workers(given.workers) as crew:
-        watch.workers(crew)
+    with open_workers(given.workers) as pool:
+        callbacks.workers(pool)
         pipeline = Pipeline(
-            logical, space, given, road_map=roads, simulator=given.simulator, workers=crew
+            logical, space, given, road_map=roads, simulator=given.simulator, workers=pool
         )
-        watch.stage("compile")
+        callbacks.stage("compile")
         pipeline.warm_up()
         refuse_beforehand(pipeline)
         chosen = pipeline.choose_objective(objectives=columns, seed=seed)
@@ -148,7 +148,7 @@ def run_search(given: SearchArguments) -> Run:
             folder, made_with.to_dict(), space.names, pipeline.metrics,
             n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
         ) as store:  # fmt: skip
-            return _go(pipeline, searcher, store, made_with, watch, given.deliver)
+            return _go(pipeline, searcher, store, made_with, callbacks, given.deliver)
 
 
 def resume(
@@ -158,20 +158,20 @@ def resume(
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     workers: Choice = None,
-    watch: Watch | None = None,
+    callbacks: SearchCallbacks | None = None,
 ) -> Run:
-    """Go on with a run that was interrupted or killed; a finished one gets its files again.
+    """Resume a run that was interrupted or killed; a finished one gets its files again.
 
     The result is that of an undisturbed run, to the last bit.
 
     Args:
         folder: of the run.
-        ego: where a driver of your own drives, that same driver: what a folder names is never
-            imported by itself.
-        simulator: the run's, with where it is on this machine; the run's by default.
+        ego: where a driver of your own drives, that same driver: code that a folder names is never
+            imported unasked.
+        simulator: the run's, with its place on this machine; as recorded by default.
         deliver: as for ``run_search``.
         workers: likewise.
-        watch: told how it is getting on.
+        callbacks: called as it progresses.
 
     Raises:
         StorageError: not a run, in use, made by another version, or not writable.
@@ -179,17 +179,17 @@ def resume(
         WorkersError: there are no workers, or they are lost.
         Interrupted: Ctrl-C.
     """
-    watch = watch or Watch()
-    with Store.open(folder, write=True) as store, open_workers(workers) as crew:
-        watch.workers(crew)
-        settings = Settings.from_dict(store.settings, store.folder)
+    callbacks = callbacks or SearchCallbacks()
+    with Store.open(folder, write=True) as store, open_workers(workers) as pool:
+        callbacks.workers(pool)
+        run = Run.of(store)
         pipeline = pipeline_of(
-            settings, store.metrics, store.folder, ego=ego, simulator=simulator, workers=crew
+            run, "resume", ego=ego, causes=True, simulator=simulator, workers=pool
         )
-        watch.stage("compile")
+        callbacks.stage("compile")
         pipeline.warm_up()
-        searcher = _algorithm(pipeline, settings)
-        return _go(pipeline, searcher, store, settings, watch, deliver)
+        searcher = _algorithm(pipeline, run.settings)
+        return _go(pipeline, searcher, store, run.settings, callbacks, deliver)
 
 
 def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
@@ -209,14 +209,19 @@ def _go(
     algorithm: toolkit.Algorithm,
     store: Store,
     settings: Settings,
-    watch: Watch,
+    callbacks: SearchCallbacks,
     deliver: bool,
 ) -> Run:
-    """Search up to the budget, then hand over and report if that is wanted."""
-    watch.stage("search")
+    """Search up to the budget; then export and report, if ``deliver``."""
+    callbacks.stage("search")
     try:
         result = run_loop(
-            algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, watch.batch
+            algorithm,
+            pipeline.space.decode,
+            pipeline.evaluate,
+            store,
+            settings.budget,
+            callbacks.batch,
         )
     except WorkersError as error:
         raise _workers_lost(error, store) from error
@@ -224,9 +229,9 @@ def _go(
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
     if not deliver:
-        return Run(store.folder)
+        return Run.of(store)
     try:
-        _finish(pipeline, store, settings, watch)
+        return _finish(pipeline, store, settings, callbacks)
     except KeyboardInterrupt:
         store.require_there()
         raise Interrupted(store.folder, result.evaluations, settings.budget) from None
@@ -240,34 +245,43 @@ def _go(
             f"{error.filename or store.folder}: cannot be read or written: {error.strerror}; the "
             f"evaluations are kept, 'bridgegen resume {store.folder}' writes the files"
         ) from None
-    return Run(store.folder)
 
 
 def _workers_lost(error: WorkersError, store: Store) -> WorkersError:
     store.require_there()
     problem = f"{error}; {len(store)} evaluations are kept"
-    return WorkersError(f"{problem}, go on with 'bridgegen resume {store.folder}'")
+    return WorkersError(f"{problem}, resume with 'bridgegen resume {store.folder}'")
 
 
-def _finish(pipeline: Pipeline, store: Store, settings: Settings, watch: Watch) -> None:
-    watch.stage("triage")
-    rows, found = Recorded(store, whole=WHOLE), None
+def _finish(
+    pipeline: Pipeline, store: Store, settings: Settings, callbacks: SearchCallbacks
+) -> Run:
+    """Triage the results, export the most critical scenarios, and write the report."""
+    callbacks.stage("triage")
+    rows, record = Recorded(store, whole=WHOLE), None
     best = np.zeros(0, dtype=np.int64)
     if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
         triaged = triage(
             pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep
         )
-        found, best = triaged.record, np.array(triaged.exports, dtype=np.int64)
-        write_record(store.folder, found)
+        record, best = triaged.record, np.array(triaged.exports, dtype=np.int64)
+        write_record(store.folder, record)
     if pipeline.objective.rule == "thresholds" and len(best) < settings.keep:
-        # What the paper calls critical is kept besides, in the paper's order.
+        # Fill up with what the paper calls critical, in the paper's order.
         at = np.flatnonzero(rows.critical)
         more = at[most_critical(rows.U[at], rows.F[at], rows.critical[at], settings.keep)]
         best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]
-    watch.stage("hand over")
-    kept = hand_over(pipeline, rows.take(best), store.folder, watch.written, found)
-    watch.stage("report")
-    write_run_report(pipeline, store, settings, rows, kept)
+    callbacks.stage("export")
+    chosen = rows.take(best)
+    # One simulation, for the files and the playback.
+    replay = pipeline.replay(chosen.X) if len(best) else None
+    rollout = replay.rollout if replay else None
+    exported = export_critical(pipeline, chosen, rollout, store.folder, callbacks.exported, record)
+    callbacks.stage("report")
+    run = Run.of(store, rows)
+    there = np.flatnonzero(np.isin(best, [one.evaluation for one in exported]))
+    write_run_report(pipeline, run, rows, exported, replay.take(there) if replay else None)
+    return run
 
 
 def _absolute(path: Path | str | None) -> str | None:

@@ -1,19 +1,17 @@
-"""A run's critical scenarios, run again in another simulator; the record lies in its folder."""
+"""Confirmation of a run's critical scenarios in another simulator; the record is in its folder."""
 
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bridgegen.campaign.elsewhere import run_elsewhere
-from bridgegen.campaign.handover import handed_over
-from bridgegen.campaign.report import write_run_report
+from bridgegen.campaign.report import rewrite_report
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.run import REPORT
-from bridgegen.campaign.settings import Settings
+from bridgegen.campaign.run import Run
 from bridgegen.confirmation.record import (
     check_rows,
     file_name,
@@ -24,33 +22,32 @@ from bridgegen.confirmation.schema import Record, Scenario
 from bridgegen.confirmation.summary import ConfirmationSummary, summarise
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.pipeline import Pipeline
-from bridgegen.report.data import WHOLE
 from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.store import Recorded, Rows, Store
+from bridgegen.store import Rows
 from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.triage.record import read_record as read_triage
 from bridgegen.workers import Choice, open_workers
 
 SECONDS = 1.0
-"""How long what has come is kept in memory alone [s]."""
+"""Results may wait so long before they are written [s]."""
 
 Tally = Counter[bool | None]
 """How many scenarios are confirmed (True), are not (False), and failed (None)."""
 
 MOST_TRACKS = 100
-"""Scenarios of which it is kept where everybody was: some ten kilobytes each."""
+"""Scenarios whose tracks are recorded: some ten kilobytes each."""
 
 
 @dataclass(frozen=True)
 class RunConfirmation:
-    """What a confirmation came to.
+    """The result of a confirmation.
 
     Attributes:
         folder: the run's.
         record: of all that was ever confirmed of the run in that simulator.
-        scenarios: those that were asked for now, most critical first.
-        ran: how many of these were run now; the others had been.
+        scenarios: those that this call was asked for, most critical first.
+        ran: how many of these it ran; the others had been confirmed before.
         files: that were written.
     """
 
@@ -62,7 +59,7 @@ class RunConfirmation:
 
     @property
     def summary(self) -> ConfirmationSummary:
-        """Of the scenarios that were asked for."""
+        """The counts over ``scenarios``."""
         return summarise(self.scenarios)
 
 
@@ -79,90 +76,81 @@ def confirm(
 ) -> RunConfirmation:
     """Run a run's critical scenarios in another simulator, and compare.
 
-    What comes is written to ``confirmation-SIMULATOR.json`` in the run's folder; what is there
-    already is not run again, unless it failed. A report that is there is written again.
+    The results are written to ``confirmation-SIMULATOR.json`` in the run's folder; a scenario that
+    it has already is not run again, unless it failed. An existing report is written again.
 
     Args:
         folder: of the run, finished or not.
-        simulator: the other one; by its name, where nothing else need be said.
-        rows: how many of the run's critical scenarios, the most critical ones; those that were
-            handed over by default.
-        again: whether to forget what was confirmed before.
+        simulator: the other one; its name, where it needs no settings.
+        rows: how many of the run's critical scenarios, the most critical ones; the exported
+            ones by default.
+        again: whether to discard earlier results.
         ego: where a driver of your own drives, that same driver.
-        workers: who runs the other simulator, see ``run_search``.
-        stage: told what begins: "compile", "confirm", "report".
-        progress: told how many scenarios are done, of how many, and how many of them are confirmed
-            (True), not confirmed (False), not run (None).
+        workers: run the other simulator, see ``run_search``.
+        stage: called as a stage begins: "compile", "confirm", "report".
+        progress: called with the number of scenarios done, of all, and the numbers of confirmed
+            (True), not confirmed (False) and failed ones (None).
 
     Raises:
-        WorkersError: there are no workers, or they are lost; the same again goes on.
+        WorkersError: there are no workers, or they are lost; the same call resumes.
         StorageError: not a run, its scenario or map is not what it was, or not writable.
-        FileFormatError: an earlier record is none, or another run's.
-        InputError: nothing to confirm, it is the run's own simulator, it is not where it should be
-            or was another one before; or the ego has to be named.
-        Interrupted: Ctrl-C; the same again goes on.
+        FileFormatError: an earlier record is damaged, or another run's.
+        InputError: nothing to confirm; the simulator is the run's own, is missing, or differs from
+            that of the earlier record; or the ego has to be named.
+        Interrupted: Ctrl-C; the same call resumes.
     """
     stage = stage or (lambda name: None)
     if isinstance(simulator, str):
         simulator = SimulatorChoice(simulator)
     if rows is not None and rows < 1:
         raise InputError(f"1 <= rows must hold, got {rows}")
-    with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, store.folder)
-        every, names, place = store.read(), store.metrics, store.folder
+    run = Run(folder)
+    every, settings, place = run.rows(), run.settings, run.folder
     if simulator.name == settings.simulator.name:
         raise InputError(
             f"{place}: was searched in the simulator {simulator.name}; confirm it in another one "
             "(--simulator)"
         )
-    handed = {one.evaluation: one.name for one in handed_over(place, len(every))}
-    asked = _chosen(place, every, handed, rows, settings.budget)
+    names = {one.evaluation: one.name for one in run.exported(len(every))}
+    asked = _chosen(place, every, names, rows, settings.budget)
     command = f"confirm --simulator {simulator.name}"
-    here = pipeline_of(settings, names, place, ego=ego, command=command, causes=False)
+    here = pipeline_of(run, command, ego=ego)
     stage("compile")
     here.warm_up()
-    elsewhere = replace(settings, simulator=simulator, cause=None)
     with open_workers(workers) as crew:
-        there = pipeline_of(
-            elsewhere, names, place,
-            ego=ego, command=command, causes=False, simulator=simulator, workers=crew,
-        )  # fmt: skip
-        empty = _empty(here, there, simulator, settings, place)
+        there = pipeline_of(run, command, ego=ego, elsewhere=simulator, workers=crew)
+        empty = _empty(here, there, simulator, run)
         known = {} if again else _known(place, empty, every)
         todo = [k for k in asked if k not in known or known[k].there is None]
-        book = _Book(place, empty, known, handed, _merit(every), _robustness(place, every))
-        book.write()  # a folder that cannot be written is said before anything is run
+        growing = _GrowingRecord(
+            place, empty, known, names, _merit(every), _robustness(place, every)
+        )
+        growing.write()  # fails before anything is run, if the folder cannot be written
         stage("confirm")
         try:
             for one in run_elsewhere(here, there, every, todo):
-                book.add(one)
+                growing.add(one)
                 if progress:
-                    progress(book.tally.total(), len(todo), book.tally)
+                    progress(growing.tally.total(), len(todo), growing.tally)
         except KeyboardInterrupt:
-            raise _stopped(place, simulator.name, rows, book.tally.total(), len(todo)) from None
+            raise _stopped(place, simulator.name, rows, growing.tally.total(), len(todo)) from None
         finally:
-            record = book.write()
-    files = [place / file_name(simulator.name)]
-    if (place / REPORT).is_file():
-        stage("report")
-        try:
-            with Store.open(folder) as store:
-                rows_now = Recorded(store, whole=WHOLE)
-                kept = handed_over(place, len(rows_now))
-                files.append(write_run_report(here, store, settings, rows_now, kept))
-        except KeyboardInterrupt:
-            raise _stopped(place, simulator.name, rows, len(todo), len(todo)) from None
-    return RunConfirmation(place, record, tuple(book.of(asked)), len(todo), tuple(files))
+            record = growing.write()
+    try:
+        report = rewrite_report(run, here, stage)
+    except KeyboardInterrupt:
+        raise _stopped(place, simulator.name, rows, len(todo), len(todo)) from None
+    files = (place / file_name(simulator.name), *report)
+    return RunConfirmation(place, record, tuple(growing.of(asked)), len(todo), files)
 
 
 def _empty(
     here: Pipeline,
     there: Pipeline,
     simulator: SimulatorChoice,
-    settings: Settings,
-    place: Path,
+    run: Run,
 ) -> Record:
-    """Return the record of a run of which nothing is confirmed yet."""
+    """Return the record of a run before its first confirmation."""
     objective = here.objective
     version = getattr(there.simulator, "version", "")
     known = any(letter.isdigit() for letter in version)  # esmini may not know its own
@@ -170,8 +158,8 @@ def _empty(
         simulator=simulator.name,
         label=f"{simulator.name} {version}" if known else simulator.name,
         settings=dict(simulator.settings),
-        reference=settings.simulator.name,
-        run=str(place),
+        reference=run.settings.simulator.name,
+        run=str(run.folder),
         scenario=here.scenario.name,
         ego=here.driver.label,
         thresholds=objective.thresholds,
@@ -181,11 +169,11 @@ def _empty(
     )
 
 
-class _Book:
+class _GrowingRecord:
     """A record that grows.
 
     Attributes:
-        tally: of what was run now.
+        tally: of the scenarios that were run by this call.
     """
 
     def __init__(
@@ -193,28 +181,28 @@ class _Book:
         folder: Path,
         empty: Record,
         known: dict[int, Scenario],
-        handed: dict[int, str],
+        names: dict[int, str],
         merit: dict[int, int],
         robustness: dict[int, float | None],
     ) -> None:
         self.tally: Tally = Counter()
         self._folder, self._empty = folder, empty
-        self._found, self._handed, self._merit = known, handed, merit
+        self._found, self._names, self._merit = known, names, merit
         self._robustness = robustness
         self._written = 0.0
 
     def add(self, one: Scenario) -> None:
-        """Take down what became of a scenario; write it soon."""
+        """Add a scenario's result; write it within ``SECONDS``."""
         self._found[one.evaluation] = one
         self.tally[one.confirmed] += 1
         if time.monotonic() - self._written >= SECONDS:
             self.write()
 
     def of(self, evaluations: Sequence[int]) -> list[Scenario]:
-        """Return what became of some evaluations, with names of files and robustness."""
+        """Return the results of some evaluations, with names of files and robustness."""
         return [
             self._found[k].model_copy(
-                update={"name": self._handed.get(k), "robustness": self._robustness.get(k)}
+                update={"name": self._names.get(k), "robustness": self._robustness.get(k)}
             )
             for k in evaluations
         ]
@@ -233,17 +221,17 @@ class _Book:
 
 
 def _chosen(
-    folder: Path, every: Rows, handed: dict[int, str], rows: int | None, budget: int
+    folder: Path, every: Rows, names: dict[int, str], rows: int | None, budget: int
 ) -> list[int]:
     """Return the evaluations to confirm, most critical first.
 
     Raises:
-        InputError: there is none.
+        InputError: there is nothing to confirm.
     """
-    if rows is None and handed:
-        if outside := [k for k in handed if not 0 <= k < len(every) or every.status[k] != 0]:
+    if rows is None and names:
+        if outside := [k for k in names if not 0 <= k < len(every) or every.status[k] != 0]:
             raise InputError(f"{folder}: has no result of evaluation {outside[0] + 1}")
-        return list(handed)
+        return list(names)
     order = sorted(_merit(every).items(), key=lambda one: one[1])
     finish = f"'bridgegen resume {folder}'"
     if not order:
@@ -278,11 +266,11 @@ def _robustness(folder: Path, every: Rows) -> dict[int, float | None]:
 
 
 def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
-    """Return what was confirmed before, in the same way.
+    """Return the results of the earlier record, by evaluation.
 
     Raises:
-        InputError: it was another way.
-        FileFormatError: the record is none, or another run's.
+        InputError: simulator, settings or criteria were others.
+        FileFormatError: the record is damaged, or another run's.
     """
     path = folder / file_name(empty.simulator)
     earlier = read_record(path)

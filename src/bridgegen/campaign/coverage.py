@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from bridgegen.campaign.restored import searched
+from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.odd.coverage import MAX_STRENGTH, Coverage, coverage
-from bridgegen.store import Store
 
 
 def coverage_of(
@@ -24,10 +24,8 @@ def coverage_of(
         StorageError: not a run, or its scenario or map is not what it was.
         InputError: the scenario or the map is missing; bins or strength out of range.
     """
-    with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, store.folder)
-        rows = store.read()
-    space = searched(settings, Path(folder))[1]
+    run = Run(folder)
+    rows, space = run.rows(), searched(run)[1]
     ok = rows.status == 0
     found = coverage(space, rows.X[ok], rows.critical[ok], bins=bins, strength=strength)
-    return settings, found
+    return run.settings, found

@@ -1,4 +1,4 @@
-"""Handed-over scenarios in other flavours, each with its map: what other tools ask for."""
+"""Exported scenarios in the flavours that other tools ask for, each with its map."""
 
 import os
 import re
@@ -8,8 +8,9 @@ from functools import partial
 from importlib.resources import files as resources
 from pathlib import Path
 
-from bridgegen.campaign.handover import FOLDER, MINIMAL, keyed
-from bridgegen.campaign.settings import Settings
+from bridgegen.campaign.exported import FOLDER, MINIMAL
+from bridgegen.campaign.run import Run
+from bridgegen.campaign.scenario_files import keyed
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import (
     FileFormatError,
@@ -31,7 +32,6 @@ from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulate import simulate_file
 from bridgegen.simulation.embedded.compiler import compile_storyboard
-from bridgegen.store import Store
 
 EXPORT = "export"
 
@@ -53,7 +53,7 @@ def export(
     source's own.
 
     Args:
-        source: the folder of a run, for its handed-over scenarios, or one ``.xosc`` file.
+        source: the folder of a run, for its exported scenarios, or one ``.xosc`` file.
         flavour: one of `FLAVOURS`.
         scenarios: names of a run's scenarios ("0001", "minimal-01"); all but the minimal ones by
             default.
@@ -117,8 +117,7 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
 
 def _town_of(run: Path) -> str | None:
     """Return the town that a run was made on; None if it was made on another map."""
-    with Store.open(run) as store:
-        made_on = Settings.from_dict(store.settings, run).road_map
+    made_on = Run(run).settings.road_map
     stem = Path(made_on).stem if made_on else ""
     return stem if _TOWN.fullmatch(stem) else None
 
@@ -129,11 +128,11 @@ def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
         if scenarios:
             raise InputError(f"{source}: scenarios are chosen of a run; this is one scenario")
         return [source]
-    Store.open(source).close()  # says what is no run
+    Run(source)  # refuses what is not a run
     kept = {path.stem: path for path in sorted((source / FOLDER).glob("*.xosc"))}
     if not kept:
         raise InputError(
-            f"{source}: no scenario was handed over ({FOLDER}/ has none): the run found nothing "
+            f"{source}: no scenario was exported ({FOLDER}/ has none): the run found nothing "
             f"critical, or is to be finished first: bridgegen resume {source}"
         )
     for name in scenarios:

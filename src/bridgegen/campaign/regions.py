@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.campaign.handover import handed_over
-from bridgegen.campaign.report import write_run_report
+from bridgegen.campaign.report import rewrite_report
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.run import REPORT
-from bridgegen.campaign.settings import Settings
+from bridgegen.campaign.run import Run
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError
 from bridgegen.odd.space import SearchSpace
@@ -21,9 +19,7 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
 from bridgegen.regions.owl import carriers, classes, statable
 from bridgegen.regions.record import JSON_FILE, to_json
-from bridgegen.report.data import WHOLE
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.store import Recorded, Store
 from bridgegen.workers import Choice, open_workers
 
 OWL_FILE = "regions.owl"
@@ -38,7 +34,7 @@ class RunRegions:
         folder: the run's.
         space: what was searched.
         found: the regions.
-        record: how they were found and all that is known of them, as JSON's types.
+        record: how they were found, and their figures, as JSON's types.
         files: those that were written.
         unstated: confirmed regions that the ontology cannot state, for it does not carry a
             parameter that they name.
@@ -66,19 +62,19 @@ def regions_of(
 ) -> RunRegions:
     """Find and verify the critical regions of a run, finished or not; write them beside it.
 
-    ``regions.json`` has all of them, ``regions.owl`` a class for each that is confirmed. A report
-    that is there is written again, with the regions.
+    ``regions.json`` has all of them, ``regions.owl`` a class for each that is confirmed. A
+    report that exists is written again, with the regions.
 
     Args:
         folder: of the run.
         ego: where a driver of your own drives, that same driver.
-        simulator: the run's, with where it is on this machine; the run's by default.
+        simulator: the run's, with its place on this machine; as recorded by default.
         samples: fresh scenarios to simulate in each region.
         at_least: the share of critical scenarios that makes a region critical.
         seed: of the fresh scenarios; the run's by default.
-        workers: who simulates, see ``run_search``; the results do not depend on it.
-        stage: told what begins: "compile", "regions", "report".
-        progress: told how many fresh scenarios are simulated, of how many.
+        workers: simulate, see ``run_search``; the results do not depend on them.
+        stage: called as a stage begins: "compile", "regions", "report".
+        progress: called with the number of fresh scenarios simulated, and of all.
 
     Raises:
         StorageError: not a run, its scenario or map is not what it was, or not writable.
@@ -89,15 +85,10 @@ def regions_of(
     stage = stage or (lambda name: None)
     if seed is not None and not 0 <= seed <= MAX_SEED:
         raise InputError(f"0 <= seed <= {MAX_SEED} must hold, got {seed}")
-    with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, store.folder)
-        rows = store.read()
-        metrics, finished, place = store.metrics, store.finished is not None, store.folder
+    run = Run(folder)
+    rows, settings, place = run.rows(), run.settings, run.folder
     with open_workers(workers) as crew:
-        pipeline = pipeline_of(
-            settings, metrics, place, ego=ego, command="regions", causes=False,
-            simulator=simulator, workers=crew,
-        )  # fmt: skip
+        pipeline = pipeline_of(run, "regions", ego=ego, simulator=simulator, workers=crew)
         space, ok = pipeline.space, rows.status == 0
         check(space, rows.critical[ok], samples, at_least)
         stage("compile")
@@ -116,7 +107,7 @@ def regions_of(
         "cause": settings.cause,
         "algorithm": settings.algorithm,
         "evaluations": len(rows),
-        "finished": finished,
+        "finished": run.finished,
         "samples": samples,
         "at_least": at_least,
         "seed": seed,
@@ -127,12 +118,7 @@ def regions_of(
     origin = f"{len(rows)} evaluations of {settings.algorithm} with seed {settings.seed}"
     stated = _state(pipeline, found, place / OWL_FILE, origin)
     files = [place / JSON_FILE, *([place / OWL_FILE] if stated else [])]
-    if (place / REPORT).is_file():
-        stage("report")
-        with Store.open(folder) as store:
-            every = Recorded(store, whole=WHOLE)
-            kept = handed_over(place, len(every))
-            files.append(write_run_report(pipeline, store, settings, every, kept))
+    files += rewrite_report(run, pipeline, stage)
     return RunRegions(
         place, space, found, record,
         files=tuple(files),
@@ -158,5 +144,5 @@ def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Re
         driver = pipeline.driver.label
         save(classes(stated, space, carried, driver=driver, origin=origin), path)
     else:
-        path.unlink(missing_ok=True)  # an earlier one would say what was not found now
+        path.unlink(missing_ok=True)  # an earlier one would state regions that were not found now
     return list(stated.values())

@@ -1,100 +1,113 @@
-"""The report of a run on disk, as it stands."""
+"""The report of a run on disk."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from bridgegen.campaign.handover import FOLDER, MINIMAL, Kept
-from bridgegen.campaign.run import REPORT
+from bridgegen.campaign.exported import FOLDER, MINIMAL, Exported
+from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.confirmation.record import read_records
 from bridgegen.disk import read_inside
+from bridgegen.evaluation import Replay
 from bridgegen.pipeline import Pipeline
 from bridgegen.regions.record import JSON_FILE, read_record
 from bridgegen.report.build import build_report
-from bridgegen.report.data import ReportData
+from bridgegen.report.data import WHOLE, ReportData
 from bridgegen.report.page import write_report
 from bridgegen.store import Recorded, Rows, Store
-from bridgegen.store.summary import summarise
 from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.triage.record import Triage
 from bridgegen.triage.record import read_record as read_triage
 
 
+def rewrite_report(run: Run, pipeline: Pipeline, stage: Callable[[str], None]) -> tuple[Path, ...]:
+    """Write the report of a run again, as it stands, if there is one; return the file.
+
+    Args:
+        run: on disk.
+        pipeline: the run's.
+        stage: called with "report" before it begins.
+
+    Raises:
+        StorageError, FileFormatError: see `write_run_report`.
+    """
+    if not run.report.is_file():
+        return ()
+    stage("report")
+    with Store.open(run.folder) as store:
+        rows = Recorded(store, whole=WHOLE)
+        return (write_run_report(pipeline, Run.of(store, rows), rows, run.exported(len(rows))),)
+
+
 def write_run_report(
     pipeline: Pipeline,
-    store: Store,
-    settings: Settings,
+    run: Run,
     rows: Rows | Recorded,
-    kept: Sequence[Kept],
+    exported: Sequence[Exported],
+    replay: Replay | None = None,
 ) -> Path:
     """Write a run's report, its critical regions included if they are known; return its path.
 
     Args:
         pipeline: the run's.
-        store: the run's.
-        settings: of the run.
+        run: as these rows stand.
         rows: all of it, in order.
-        kept: what was handed over, most critical first.
+        exported: its exported scenarios, most critical first.
+        replay: of these scenarios, if they have been simulated.
 
     Raises:
         StorageError: the page cannot be written.
-        FileFormatError: the regions' file, or a confirmation's, is not one, or another run's.
+        FileFormatError: the regions' file, or a confirmation's, is damaged, or another run's.
     """
-    path = store.folder / REPORT
-    names = [*(name for one in kept for name in one.files), *minimal_files(store.folder)]
-    files = {name: read_inside(store.folder, name) for name in names}
-    data = run_data(pipeline, store, settings, rows, kept, files=files, more=True)
-    write_report(path, data)
-    return path
+    names = [*(name for one in exported for name in one.files), *minimal_files(run.folder)]
+    files = {name: read_inside(run.folder, name) for name in names}
+    data = run_data(pipeline, run, rows, exported, files=files, more=True, replay=replay)
+    write_report(run.report, data)
+    return run.report
 
 
 def run_data(
     pipeline: Pipeline,
-    store: Store,
-    settings: Settings,
+    run: Run,
     rows: Rows | Recorded,
-    kept: Sequence[Kept],
+    exported: Sequence[Exported],
     *,
     coverage: bool = True,
     files: Mapping[str, bytes] | None = None,
     more: bool = False,
+    replay: Replay | None = None,
 ) -> ReportData:
-    """Return what the report of a run says.
+    """Return the data of a run's report.
 
     Args:
         pipeline: the run's.
-        store: the run's.
-        settings: of the run.
+        run: as these rows stand.
         rows: all of it, in order.
-        kept: what was handed over, most critical first.
-        coverage: whether to count what was covered.
-        files: that were handed over, by their paths in the run's folder, if the page holds them.
-        more: whether the page holds the motion of more than ``kept``.
+        exported: its exported scenarios, most critical first.
+        coverage: whether to count the coverage of the search space.
+        files: the exported files, by their paths in the run's folder, if the page holds them.
+        more: whether the page holds the motion of other scenarios, too.
+        replay: of the exported scenarios, if they have been simulated.
 
     Raises:
-        FileFormatError: the file of the triage, the regions or a confirmation is not one, or is
+        FileFormatError: the file of the triage, the regions or a confirmation is damaged, or
             another run's.
     """
-    metric = store.metrics.index
-    # Of a run that goes on, results change before they are read; they take time to digest.
-    known = store.finished is not None or (store.folder / TRIAGE_FILE).is_file()
+    settings, folder = run.settings, run.folder
+    # The results of a run that is being searched change before they are read; digesting is slow.
+    known = run.finished or (folder / TRIAGE_FILE).is_file()
     results = rows.digest() if known else None
-    summary = summarise(
-        rows.critical, rows.status == 0,
-        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
-        store.seconds,
-    )  # fmt: skip
     return build_report(
-        pipeline, rows, summary,
-        kept=[(one.name, one.evaluation, one.files) for one in kept],
+        pipeline, rows, run.summary,
+        kept=[(one.name, one.evaluation, one.files) for one in exported], replay=replay,
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
-        command=settings.command(store.folder), finished=store.finished is not None,
-        version=store.version, notes=store.notes, view=view_command(store.folder),
-        regions=read_record(store.folder / JSON_FILE),
-        confirmations=read_records(store.folder, rows.X, rows.metrics), coverage=coverage,
-        hashes=_hashes(settings, results), triage=_triage(store.folder, results),
-        minimal_files=minimal_files(store.folder),
+        command=settings.command(folder), finished=run.finished,
+        version=run.version, notes=run.notes, view=view_command(folder),
+        regions=read_record(folder / JSON_FILE),
+        confirmations=read_records(folder, rows.X, rows.metrics), coverage=coverage,
+        hashes=_hashes(settings, results), triage=_triage(folder, results),
+        minimal_files=minimal_files(folder),
         files=files, more=more,
     )  # fmt: skip
 

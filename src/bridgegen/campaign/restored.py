@@ -1,11 +1,11 @@
-"""What a run was made with, made again: its search space, its map, its pipeline."""
+"""A run's scenario, search space, map and pipeline, built again from its settings."""
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from bridgegen.campaign.chosen import as_judged
+from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.campaign.settings import Settings
 from bridgegen.ego import STORYBOARD, is_spec
@@ -23,46 +23,47 @@ from bridgegen.workers import Workers
 
 
 def pipeline_of(
-    settings: Settings,
-    metrics: Sequence[str],
-    folder: Path,
+    run: Run,
+    command: str,
     *,
     ego: str | None = None,
-    command: str = "resume",
-    causes: bool | None = None,
+    causes: bool = False,
     simulator: SimulatorChoice | None = None,
+    elsewhere: SimulatorChoice | None = None,
     workers: Workers | None = None,
 ) -> Pipeline:
-    """Return the pipeline that a run was made with, its objective included.
+    """Return the pipeline of a run, its objective included.
 
     Args:
-        settings: of the run.
-        metrics: that it records.
-        folder: of the run.
+        run: on disk.
+        command: the BridgeGen command that asks, for messages.
         ego: where a driver of the user's drives, that same driver.
-        command: who asks, for messages.
-        causes: whether to find causes, as the run did by default; where only one counts, they are
-            found all the same.
-        simulator: the run's, with where it is on this machine; the run's by default.
-        workers: who evaluates; threads by default, one for each core.
+        causes: whether to determine causes as the run did; where only one cause counts, they are
+            determined all the same.
+        simulator: the run's, with its place on this machine; as recorded by default.
+        elsewhere: another simulator than the run's, to compare with; there, no cause is asked for.
+        workers: evaluate the rows; threads by default, one for each core.
 
     Raises:
         StorageError: the scenario or the map is not what it was.
         InputError: the scenario or the map is missing; or the ego or the simulator is another, or
             must be named.
     """
+    settings, folder = run.settings, run.folder
+    if elsewhere is not None:
+        settings = replace(settings, simulator=elsewhere, cause=None)
     _check_driver(settings, ego, folder, command)
-    scenario, space, roads = searched(settings, folder)
+    scenario, space, roads = searched(run)
     pipeline = Pipeline(
         scenario,
         space,
         PipelineOptions.of(
             settings,
             ego=_ego(settings),
-            causes=settings.causes if causes is None else causes,
+            causes=settings.causes and causes,
         ),
         road_map=roads,
-        recorded=metrics,
+        recorded=run.metrics,
         simulator=_simulator(settings, simulator, folder),
         workers=workers,
     )
@@ -102,15 +103,14 @@ def _check_driver(settings: Settings, ego: str | None, folder: Path, command: st
         raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")
 
 
-def searched(
-    settings: Settings, folder: Path
-) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
+def searched(run: Run) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
     """Return the scenario of a run, the space that it searched, and its map if it has one.
 
     Raises:
         StorageError: the scenario or the map is not what it was.
         InputError: the scenario or the map is missing.
     """
+    settings, folder = run.settings, run.folder
     logical = driven_by(load(settings.scenario, settings.distribution), settings.others)
     if logical.fingerprint != settings.fingerprint:
         what = " or its distribution" if settings.distribution else ""

@@ -1,18 +1,25 @@
-"""A run on disk, as people and notebooks look at it."""
+"""A run on disk: what every command and notebook that reads one starts from."""
 
 from collections import Counter
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from bridgegen.campaign.handover import FOLDER, MINIMAL, Refused, not_exported
+from bridgegen.campaign.exported import (
+    FOLDER,
+    MINIMAL,
+    Exported,
+    Refused,
+    exported_scenarios,
+    not_exported,
+)
 from bridgegen.campaign.settings import Settings
 from bridgegen.simulation.rollout import STATUS_MESSAGES
-from bridgegen.store import Recorded, Store
-from bridgegen.store.summary import summarise
+from bridgegen.store import Recorded, Rows, Store
+from bridgegen.store.summary import Summary, summarise
 from bridgegen.triage.record import JSON_FILE, Mode, Triage, read_record
 
 if TYPE_CHECKING:
@@ -26,12 +33,12 @@ class Run:
 
     Attributes:
         folder: of the run.
-        settings: what it was made with.
+        settings: with which it was made.
         finished: whether it has ended.
-        failures: why evaluations failed, and how many for each reason.
-        summary: its figures.
-        notes: what the algorithm learnt, by title; nothing where it takes no notes. nsga2-dt: its
-            trees' critical boxes.
+        metrics: names of the metrics that it records.
+        version: of BridgeGen that made it.
+        notes: of the algorithm, by title; empty where it takes none. nsga2-dt: its trees' critical
+            boxes.
     """
 
     def __init__(self, folder: Path | str) -> None:
@@ -40,30 +47,58 @@ class Run:
         Raises:
             StorageError: not a run, or damaged.
         """
-        self.folder = Path(folder)
+        with Store.open(folder) as store:
+            self._take(store)
+
+    @classmethod
+    def of(cls, store: Store, rows: Rows | Recorded | None = None) -> Self:
+        """Return the run of a store that is open.
+
+        Args:
+            store: of the run.
+            rows: all of its evaluations, where they have been read: the summary is of these.
+        """
+        self = cls.__new__(cls)
+        self._take(store)
+        if rows is not None:
+            self.summary, self.failures = _summary(store, rows), _failures(store, rows)
+        return self
+
+    def _take(self, store: Store) -> None:
+        self.folder = store.folder
+        self.settings = Settings.from_dict(store.settings, store.folder)
+        self.finished = store.finished is not None
+        self.metrics, self.version, self.notes = store.metrics, store.version, store.notes
+
+    @cached_property
+    def summary(self) -> Summary:
+        """The key figures."""
         with Store.open(self.folder) as store:
-            self.settings = Settings.from_dict(store.settings, self.folder)
-            self.finished = store.finished is not None
-            self.notes = store.notes
-            rows = Recorded(store, whole=("d_min", "v_d"))
-            self.failures = _in_words(rows, store.failures())
-            self.summary = summarise(
-                rows.critical,
-                rows.status == 0,
-                rows.metrics[:, store.metrics.index("d_min")],
-                rows.metrics[:, store.metrics.index("v_d")],
-                rows.cause,
-                store.seconds,
-            )
+            return _summary(store, Recorded(store, whole=("d_min", "v_d")))
+
+    @cached_property
+    def failures(self) -> Counter[str]:
+        """The number of failed evaluations for each reason, the most frequent first."""
+        with Store.open(self.folder) as store:
+            return _failures(store, Recorded(store))
+
+    def rows(self) -> Rows:
+        """Return every evaluation, in the order of recording."""
+        with Store.open(self.folder) as store:
+            return store.read()
 
     def frame(self) -> "pd.DataFrame":
         """Return every evaluation as a row: parameters, metrics, objectives, status, critical."""
         with Store.open(self.folder) as store:
             return store.frame()
 
+    def exported(self, evaluations: int | None = None) -> tuple[Exported, ...]:
+        """Return the exported scenarios; see `exported_scenarios`."""
+        return exported_scenarios(self.folder, evaluations)
+
     @property
     def scenarios(self) -> tuple[Path, ...]:
-        """The handed-over OpenSCENARIO files, the most critical first."""
+        """The OpenSCENARIO files of the exported scenarios, the most critical first."""
         return tuple(sorted((self.folder / FOLDER).glob("[0-9]*.xosc")))
 
     @property
@@ -73,7 +108,7 @@ class Run:
 
     @cached_property
     def triage(self) -> Triage | None:
-        """What is known of its failures and of the space; None before the run has finished.
+        """Its failure modes and the bound on the space; None before the run has finished.
 
         Raises:
             FileFormatError: its record is damaged, or another run's.
@@ -86,7 +121,7 @@ class Run:
 
     @property
     def modes(self) -> tuple[Mode, ...]:
-        """The ways in which the driver comes to harm, robust ones first; see ``triage``."""
+        """The failure modes, robust ones first; see ``triage``."""
         return self.triage.modes if self.triage is not None else ()
 
     @property
@@ -104,11 +139,22 @@ class Run:
         return f"Run({str(self.folder)!r}: {s.critical} critical of {s.evaluations} evaluations)"
 
 
-def _in_words(rows: Recorded, said: Mapping[int, str]) -> Counter[str]:
-    """Return why evaluations failed, the most frequent reason first."""
+def _summary(store: Store, rows: Rows | Recorded) -> Summary:
+    metric = store.metrics.index
+    return summarise(
+        rows.critical, rows.status == 0,
+        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
+        store.seconds,
+    )  # fmt: skip
+
+
+def _failures(store: Store, rows: Rows | Recorded) -> Counter[str]:
+    messages: Mapping[int, str] = store.failures()
     failed = np.flatnonzero(rows.status)
     reasons = Counter(
-        ": ".join([STATUS_MESSAGES.get(status, f"status {status}"), *filter(None, [said.get(i)])])
+        ": ".join(
+            [STATUS_MESSAGES.get(status, f"status {status}"), *filter(None, [messages.get(i)])]
+        )
         for i, status in zip(failed.tolist(), rows.status[failed].tolist(), strict=True)
     )
     return Counter(dict(reasons.most_common()))

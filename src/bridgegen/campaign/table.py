@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import COLUMNS
@@ -83,7 +84,7 @@ def _write(name: str, folder: Path, path: Path, sample: float) -> Path:
 
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, store.folder)
+        settings = Run.of(store).settings
         said = dict(zip(RUN, _said(name, settings), strict=True))
         schema = _schema(store, said, settings, sample)
         try:

@@ -69,6 +69,6 @@ def compare(
             workers=workers,
             out=out,
             **vars(options),
-            watch=screen.watch,
+            callbacks=screen.callbacks,
         )
     print_comparison(result, screen.seconds)

@@ -56,7 +56,7 @@ def reproduce(
             road_map=road_map,
             junction=junction,
             out=out,
-            watch=screen.watch,
+            callbacks=screen.callbacks,
         )
     print_reproduction(result, screen.seconds)
     if result.gaps:

@@ -57,7 +57,7 @@ def search(
     options = replace(options, simulator=chosen or EMBEDDED)
     with SearchScreen(options.budget) as screen:
         run = campaign.run_search(
-            scenario, **vars(options), out=out, workers=workers, watch=screen.watch
+            scenario, **vars(options), out=out, workers=workers, callbacks=screen.callbacks
         )
     print_summary(run, screen.seconds)
     _end(criteria.judge(run))
@@ -105,7 +105,7 @@ def resume(
             ego=ego,
             simulator=read_access(connection),
             workers=workers,
-            watch=screen.watch,
+            callbacks=screen.callbacks,
         )
     print_summary(run, screen.seconds)
     _end(criteria.judge(run))

@@ -1,6 +1,6 @@
 """Comparisons of algorithms: a grid of runs, what is measured of them, and how sure that is."""
 
-from bridgegen.comparison.comparison import Watch, compare
+from bridgegen.comparison.comparison import ComparisonCallbacks, compare
 from bridgegen.comparison.result import Comparison
 
-__all__ = ["Comparison", "Watch", "compare"]
+__all__ = ["Comparison", "ComparisonCallbacks", "compare"]

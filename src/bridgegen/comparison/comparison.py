@@ -11,7 +11,7 @@ from bridgegen.comparison.page import write_page
 from bridgegen.comparison.plan import Cell, Plan, begin, make_plan
 from bridgegen.comparison.record import read, space_of
 from bridgegen.comparison.result import Comparison
-from bridgegen.comparison.runs import Task, Watcher, evaluations_of
+from bridgegen.comparison.runs import RunCallbacks, Task, evaluations_of
 from bridgegen.comparison.table import summarise, write_tables
 from bridgegen.comparison.workers import run_all
 from bridgegen.errors import Interrupted, StorageError
@@ -25,12 +25,12 @@ LOCK = "compare.lock"
 
 
 @dataclass(frozen=True)
-class Watch(Watcher):
-    """Who wants to know how a comparison is getting on.
+class ComparisonCallbacks(RunCallbacks):
+    """Called as a comparison progresses.
 
     Attributes:
-        begun: told the plan, how many of its runs have ended already, and their evaluations.
-        stage: told what begins when the runs are done: "read", "draw".
+        begun: with the plan, the number of its runs that have ended already, and their evaluations.
+        stage: with the stage that begins when the runs are done: "read", "draw".
     """
 
     begun: Callable[[Plan, int, int], None] = lambda plan, ended, made: None
@@ -86,8 +86,8 @@ class ComparisonArguments(CommonOptions):
         default=True,
         metadata={"help": "Whether to write tables, figures and page; a later call can do it."},
     )
-    watch: Watch | None = field(
-        default=None, metadata={"help": "Told how the comparison is getting on."}
+    callbacks: ComparisonCallbacks | None = field(
+        default=None, metadata={"help": "Called as the comparison progresses."}
     )
 
 
@@ -108,7 +108,8 @@ def compare(given: ComparisonArguments) -> Comparison:
         StorageError: the folder holds something else, is being written, or cannot be.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
-    watch, scenarios, algorithms = given.watch or Watch(), given.scenarios, given.algorithms
+    callbacks = given.callbacks or ComparisonCallbacks()
+    scenarios, algorithms = given.scenarios, given.algorithms
     who = read_choice(given.workers)
     plan = make_plan(
         [scenarios] if isinstance(scenarios, str | Path) else scenarios,
@@ -130,8 +131,8 @@ def compare(given: ComparisonArguments) -> Comparison:
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:
-        failures = _run(plan, who, watch, done)
-        return _conclude(plan, failures, watch, deliver=given.deliver)
+        failures = _run(plan, who, callbacks, done)
+        return _conclude(plan, failures, callbacks, deliver=given.deliver)
     except KeyboardInterrupt:
         raise Interrupted(
             plan.out, len(done), len(plan.cells), what="runs", command=plan.command()
@@ -140,13 +141,15 @@ def compare(given: ComparisonArguments) -> Comparison:
         lock.release()
 
 
-def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> dict[Cell, str]:
+def _run(
+    plan: Plan, who: int | str | None, callbacks: ComparisonCallbacks, done: list[str]
+) -> dict[Cell, str]:
     """Make the runs that are missing; return why some failed.
 
     Args:
         plan: the runs.
         who: makes them, as ``read_choice`` returns it.
-        watch: told how it is getting on.
+        callbacks: called as it progresses.
         done: is given the name of each run that has ended, this time or earlier.
     """
     failures, tasks, made = {}, [], 0
@@ -162,22 +165,23 @@ def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> di
             made += evaluations
         else:
             tasks.append(_task(plan, cell))
-    watch.begun(plan, len(done), made)
+    callbacks.begun(plan, len(done), made)
 
     def ended(name: str, failure: str | None) -> None:
         done.append(name)
-        watch.ended(name, failure)
+        callbacks.ended(name, failure)
 
     at_once, cluster = (who, None) if isinstance(who, int) else (_cores(), who)
-    failed = run_all(tasks, at_once, Watcher(watch.compile, watch.batch, ended), cluster)
+    of_runs = RunCallbacks(callbacks.compile, callbacks.batch, ended)
+    failed = run_all(tasks, at_once, of_runs, cluster)
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
 
 
 def _conclude(
-    plan: Plan, failures: Mapping[Cell, str], watch: Watch, *, deliver: bool
+    plan: Plan, failures: Mapping[Cell, str], callbacks: ComparisonCallbacks, *, deliver: bool
 ) -> Comparison:
     """Read the runs, measure and test them, and write it all if that is wanted."""
-    watch.stage("read")
+    callbacks.stage("read")
     gaps, records = dict(failures), {}
     spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
     for cell in plan.cells:
@@ -203,7 +207,7 @@ def _conclude(
     result = Comparison(plan, records, measured, gaps, lines, kinds)
     if deliver:
         write_tables(plan, records, values, gaps, lines, kinds)
-        watch.stage("draw")
+        callbacks.stage("draw")
         write_page(result)
     return result
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.campaign.restored import searched
-from bridgegen.campaign.settings import Settings
+from bridgegen.campaign.run import Run
 from bridgegen.comparison.distinct import distinct, normalised
 from bridgegen.comparison.fronts import front
 from bridgegen.conflict.findings import Findings
@@ -85,8 +85,7 @@ def space_of(folder: Path) -> SearchSpace:
         StorageError: not a run, or its scenario or map is not what it was.
         InputError: the scenario or the map is missing.
     """
-    with Store.open(folder) as store:
-        return searched(Settings.from_dict(store.settings, folder), folder)[1]
+    return searched(Run(folder))[1]
 
 
 def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart: float) -> Record:
@@ -103,7 +102,7 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
         StorageError: not a run, or damaged.
     """
     with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, folder)
+        settings = Run.of(store).settings
         terms = Objective.from_dict(settings.optimised).names
         reader = _Reader(terms, store.metrics, points(budget))
         for rows in store.rows():

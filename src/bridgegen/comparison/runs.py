@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bridgegen.campaign import Watch, resume, run_search
+from bridgegen.campaign import SearchCallbacks, resume, run_search
 from bridgegen.campaign.loop import Progress
 from bridgegen.errors import BridgeGenError, InputError, Interrupted
 from bridgegen.options import SearchOptions
@@ -32,13 +32,13 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Watcher:
-    """Who wants to know how the runs are getting on; each is called from the same thread.
+class RunCallbacks:
+    """Called as runs progress, all from the same thread.
 
     Attributes:
-        compile: told that the simulator is being compiled, maybe.
-        batch: told a run's name and its evaluations so far.
-        ended: told a run's name, and why it failed if it did.
+        compile: before the first run, whose simulator may have to be compiled.
+        batch: with a run's name and its evaluations so far.
+        ended: with a run's name, and why it failed or None.
     """
 
     compile: Callable[[], None] = lambda: None
@@ -64,13 +64,13 @@ def attempt(
     batch: Callable[[int], None],
     stage: Callable[[str], None],
 ) -> str | None:
-    """Make a run, or go on with it, without hand-over and report.
+    """Search or resume a run, without export and report.
 
     Args:
         task: the run.
         cluster: where its scenarios are simulated; None is here, in one thread.
-        batch: told the evaluations so far.
-        stage: told what begins, "compile" or "search".
+        batch: called with the evaluations so far.
+        stage: called as a stage begins, "compile" or "search".
 
     Returns:
         Why it failed, or None.
@@ -80,11 +80,15 @@ def attempt(
         KeyboardInterrupt: Ctrl-C; what is done is kept.
     """
 
-    def told(progress: Progress) -> None:
+    def count(progress: Progress) -> None:
         batch(progress.evaluations)
 
-    watch = Watch(stage=stage, batch=told)
-    how: dict[str, Any] = {"deliver": False, "workers": cluster or Threads(1), "watch": watch}
+    callbacks = SearchCallbacks(stage=stage, batch=count)
+    how: dict[str, Any] = {
+        "deliver": False,
+        "workers": cluster or Threads(1),
+        "callbacks": callbacks,
+    }
     begun = (task.folder / FILE).exists()
     try:
         if begun:

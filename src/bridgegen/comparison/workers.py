@@ -8,14 +8,14 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from bridgegen.comparison.runs import Task, Watcher, attempt
+from bridgegen.comparison.runs import RunCallbacks, Task, attempt
 from bridgegen.kernel_cache import is_compiled
 from bridgegen.workers.process import Process, Said
 from bridgegen.workers.processes import ending
 
 
 def run_all(
-    tasks: Iterable[Task], at_once: int, watcher: Watcher, cluster: str | None = None
+    tasks: Iterable[Task], at_once: int, callbacks: RunCallbacks, cluster: str | None = None
 ) -> dict[str, str]:
     """Make runs; no result depends on how many at a time.
 
@@ -24,7 +24,7 @@ def run_all(
         at_once: so many at a time, ≥ 1. One is made in this process.
         cluster: where their scenarios are simulated, "ray" or "ray://HOST:PORT"; by default, a run
             is one thread.
-        watcher: told how they are getting on.
+        callbacks: called as they progress.
 
     Returns:
         Why runs failed, by name.
@@ -36,34 +36,34 @@ def run_all(
     waiting = deque(tasks)
     at_once = min(at_once, len(waiting))
     if at_once > 1:
-        return _Pool(waiting, watcher, cluster).run(at_once)
-    return _here(waiting, watcher, cluster)
+        return _Pool(waiting, callbacks, cluster).run(at_once)
+    return _here(waiting, callbacks, cluster)
 
 
-def _here(tasks: Iterable[Task], watcher: Watcher, cluster: str | None) -> dict[str, str]:
+def _here(tasks: Iterable[Task], callbacks: RunCallbacks, cluster: str | None) -> dict[str, str]:
     failures = {}
 
     def stage(name: str) -> None:
         if name == "compile":
-            watcher.compile()
+            callbacks.compile()
 
     for task in tasks:
 
         def batch(evaluations: int, name: str = task.name) -> None:
-            watcher.batch(name, evaluations)
+            callbacks.batch(name, evaluations)
 
         failure = attempt(task, cluster, batch, stage)
         if failure is not None:
             failures[task.name] = failure
-        watcher.ended(task.name, failure)
+        callbacks.ended(task.name, failure)
     return failures
 
 
 class _Pool:
     """Gives the waiting runs to the processes, one each."""
 
-    def __init__(self, waiting: deque[Task], watcher: Watcher, cluster: str | None) -> None:
-        self._waiting, self._watcher, self._cluster = waiting, watcher, cluster
+    def __init__(self, waiting: deque[Task], callbacks: RunCallbacks, cluster: str | None) -> None:
+        self._waiting, self._callbacks, self._cluster = waiting, callbacks, cluster
         self._making: dict[Process, Task] = {}
         self._said: Said = queue.SimpleQueue()
         self._failures: dict[str, str] = {}
@@ -96,9 +96,9 @@ class _Pool:
     def _take(self, process: Process, kind: str, *rest: Any) -> None:
         name = self._making[process].name
         if kind == "stage" and rest == ("compile",):
-            self._watcher.compile()
+            self._callbacks.compile()
         elif kind == "batch":
-            self._watcher.batch(name, *rest)
+            self._callbacks.batch(name, *rest)
         elif kind == "raised":
             raise rest[0]
         elif kind == "answer":
@@ -119,7 +119,7 @@ class _Pool:
     def _ended(self, name: str, failure: str | None) -> None:
         if failure is not None:
             self._failures[name] = failure
-        self._watcher.ended(name, failure)
+        self._callbacks.ended(name, failure)
 
 
 def make(task: Task, cluster: str | None, say: Callable[..., None]) -> str | None:

@@ -1,4 +1,4 @@
-"""From a run's rows to the report's data: the kept scenarios are rolled out again for playback."""
+"""From a run's rows to the report's data."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import comb
@@ -13,6 +13,7 @@ from bridgegen.confirmation.schema import Record
 from bridgegen.conflict import quantities
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.errors import ScenarioError
+from bridgegen.evaluation import Replay
 from bridgegen.objective import Objective
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.pipeline import Pipeline
@@ -59,6 +60,7 @@ def build_report(
     summary: Summary,
     *,
     kept: Sequence[tuple[str, int, tuple[str, ...]]],
+    replay: Replay | None = None,
     algorithm: str,
     seed: int,
     budget: int,
@@ -82,8 +84,9 @@ def build_report(
         pipeline: what evaluated the rows.
         rows: all of the run, in order.
         summary: of the same rows.
-        kept: name, evaluation and files of the handed-over scenarios, most critical first; what
-            is handed over has kept all constraints.
+        kept: name, evaluation and files of the exported scenarios, most critical first; an
+            exported scenario satisfies all constraints.
+        replay: of these scenarios; simulated here by default.
         algorithm: its name.
         seed: of the run.
         budget: of the run.
@@ -150,7 +153,7 @@ def build_report(
     return ReportData(
         head,
         _evaluations(pipeline, rows),
-        playbacks(pipeline, rows, kept),
+        playbacks(pipeline, rows, kept, replay=replay),
         _coverage(pipeline, rows) if coverage else None,
         tables(notes, pipeline.space),
         regions,

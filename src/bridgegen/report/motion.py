@@ -10,7 +10,7 @@ from bridgegen.store import Recorded, Rows
 
 
 class Named(Protocol):
-    """A scenario that was handed over."""
+    """An exported scenario."""
 
     @property
     def name(self) -> str:
@@ -22,7 +22,7 @@ class Named(Protocol):
 
 
 def motion_payload(
-    pipeline: Pipeline, rows: Rows | Recorded, evaluation: int, handed: Named | None = None
+    pipeline: Pipeline, rows: Rows | Recorded, evaluation: int, exported: Named | None = None
 ) -> dict[str, Any]:
     """Return a scenario's playback, with the road and the picture that belong to it.
 
@@ -33,10 +33,10 @@ def motion_payload(
         pipeline: what evaluated the rows.
         rows: of the run, in order.
         evaluation: which of them, from 0.
-        handed: what it was handed over as, if it was.
+        exported: its name and files, if it was exported.
     """
-    name = handed.name if handed else f"evaluation {evaluation + 1}"
-    (one,) = playbacks(pipeline, rows, [(name, evaluation, handed.files if handed else ())])
+    name = exported.name if exported else f"evaluation {evaluation + 1}"
+    (one,) = playbacks(pipeline, rows, [(name, evaluation, exported.files if exported else ())])
     return {
         "roads": [road_payload(one)],
         "pictures": pictures_payload([one.picture]) if one.picture else None,

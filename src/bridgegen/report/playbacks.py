@@ -1,4 +1,4 @@
-"""The kept scenarios, rolled out again, with all that their playback shows."""
+"""Scenarios of a run with all that their playback shows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,6 +57,7 @@ def playbacks(
     kept: Sequence[tuple[str, int, tuple[str, ...]]],
     *,
     brief: bool = False,
+    replay: Replay | None = None,
 ) -> tuple[Playback, ...]:
     """Return the playbacks of some of a run's scenarios.
 
@@ -66,6 +67,7 @@ def playbacks(
         kept: name, evaluation and files of each, most critical first.
         brief: without the individuals' picture and the ego's planned course, which take most of the
             time.
+        replay: of these scenarios; simulated here by default.
     """
     if not kept:
         return ()
@@ -77,7 +79,8 @@ def playbacks(
         )
         for k, (name, evaluation, files) in enumerate(kept)
     ]  # fmt: skip
-    return _played(pipeline, shown, pipeline.replay(some.X, plans=not brief), brief=brief)
+    replay = pipeline.replay(some.X, plans=not brief) if replay is None else replay
+    return _played(pipeline, shown, replay, brief=brief)
 
 
 def minimal_playbacks(

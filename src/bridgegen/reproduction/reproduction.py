@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridgegen.cause import CAUSES
-from bridgegen.comparison.comparison import Watch as ComparisonWatch
-from bridgegen.comparison.comparison import compare
+from bridgegen.comparison.comparison import ComparisonCallbacks, compare
 from bridgegen.comparison.plan import RUNS, Cell
 from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.runs import evaluations_of
@@ -38,15 +37,16 @@ TIMES = ("seconds_to_k", "runtime")
 
 
 @dataclass(frozen=True)
-class Watch:
-    """Who wants to know how a reproduction is getting on.
+class ReproductionCallbacks:
+    """Called as a reproduction progresses.
 
     Attributes:
-        begun: told the protocol, how many of its runs have ended already, and their evaluations.
-        compile: told that the simulator is being compiled, maybe.
-        batch: told a run's name and its evaluations so far.
-        ended: told a run's name, and why it failed if it did.
-        stage: told what begins when the runs are done: "read", "draw".
+        begun: with the protocol, the number of its runs that have ended already, and their
+            evaluations.
+        compile: before the first run, whose simulator may have to be compiled.
+        batch: with a run's name and its evaluations so far.
+        ended: with a run's name, and why it failed or None.
+        stage: with the stage that begins when the runs are done: "read", "draw".
     """
 
     begun: Callable[[Protocol, int, int], None] = lambda protocol, ended, made: None
@@ -95,7 +95,7 @@ def reproduce(
     workers: int | str | None = None,
     road_map: Path | str | None = None,
     junction: str | None = None,
-    watch: Watch | None = None,
+    callbacks: ReproductionCallbacks | None = None,
 ) -> Reproduction:
     """Run the paper's evaluation, Section V, and write it down beside the paper's numbers.
 
@@ -113,7 +113,7 @@ def reproduce(
         road_map: a map to run on, CARLA's Town05 as in the paper, say; a generated crossroads by
             default.
         junction: which junction of the map.
-        watch: told how it is getting on.
+        callbacks: called as it progresses.
 
     Returns:
         The reproduction. A run that failed is a gap in it; PPO is missing where its packages are.
@@ -123,7 +123,7 @@ def reproduce(
         StorageError: the folder holds something else, is being written, or cannot be.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
-    watch = watch or Watch()
+    callbacks = callbacks or ReproductionCallbacks()
     read_choice(workers)  # before there is a folder
     protocol = make_protocol(
         seeds=seeds,
@@ -137,16 +137,16 @@ def reproduce(
     done: set[str] = set()
     comparisons: dict[str, Comparison] = {}
     try:
-        _tell_begun(protocol, watch, done)
+        _tell_begun(protocol, callbacks, done)
         for part in PARTS:
-            seen = _watch_part(part, watch, done)
+            seen = _callbacks_of(part, callbacks, done)
             arguments = protocol.arguments(part)
             comparisons[part.name] = compare(
-                **arguments, workers=workers, deliver=False, watch=seen
+                **arguments, workers=workers, deliver=False, callbacks=seen
             )
-        watch.stage("read")
+        callbacks.stage("read")
         found = _read(protocol, comparisons)
-        watch.stage("draw")
+        callbacks.stage("draw")
         document = tell(found, pictures(found, comparisons[PRINTED.name]))
         _write(found, document)
     except (KeyboardInterrupt, Interrupted):
@@ -178,7 +178,7 @@ def _begin(protocol: Protocol) -> None:
     write_whole(out / MARK, [json.dumps(mark, indent=1).encode()])
 
 
-def _tell_begun(protocol: Protocol, watch: Watch, done: set[str]) -> None:
+def _tell_begun(protocol: Protocol, callbacks: ReproductionCallbacks, done: set[str]) -> None:
     made = 0
     for part, cell in protocol.cells():
         try:
@@ -188,19 +188,21 @@ def _tell_begun(protocol: Protocol, watch: Watch, done: set[str]) -> None:
         if is_ended:
             done.add(_name(part, cell.name))
             made += evaluations
-    watch.begun(protocol, len(done), made)
+    callbacks.begun(protocol, len(done), made)
 
 
-def _watch_part(part: Part, watch: Watch, done: set[str]) -> ComparisonWatch:
-    """Return who watches one comparison, and passes on what it is told under the part's name."""
+def _callbacks_of(
+    part: Part, callbacks: ReproductionCallbacks, done: set[str]
+) -> ComparisonCallbacks:
+    """Return the callbacks of one comparison, which name its runs by their part."""
 
     def ended(name: str, failure: str | None) -> None:
         done.add(_name(part, name))
-        watch.ended(_name(part, name), failure)
+        callbacks.ended(_name(part, name), failure)
 
-    return ComparisonWatch(
-        compile=watch.compile,
-        batch=lambda name, evaluations: watch.batch(_name(part, name), evaluations),
+    return ComparisonCallbacks(
+        compile=callbacks.compile,
+        batch=lambda name, evaluations: callbacks.batch(_name(part, name), evaluations),
         ended=ended,
     )
 

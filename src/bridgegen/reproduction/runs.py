@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from bridgegen import campaign
 from bridgegen.arrays import Bool, Float
-from bridgegen.campaign.settings import Settings
 from bridgegen.comparison.plan import Cell
 from bridgegen.objective import PAPER_FACTOR, Objective
 from bridgegen.reproduction.paper import WEIGHTS
@@ -76,7 +76,7 @@ def read_run(folder: Path, name: str, replay: str) -> Run:
         StorageError: not a run, or damaged.
     """
     with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, folder)
+        settings = campaign.Run.of(store).settings
         rows, names, seconds = store.read(), store.metrics, store.seconds
     column = {metric: rows.metrics[:, names.index(metric)] for metric in (*WEIGHTS, "n_collision")}
     ok = (rows.status == 0) & np.isfinite(column["d_min"]) & np.isfinite(column["v_d"])

@@ -10,7 +10,7 @@ from rich.table import Table
 from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
-    from bridgegen.comparison import Comparison, Watch
+    from bridgegen.comparison import Comparison, ComparisonCallbacks
     from bridgegen.comparison.plan import Plan
 
 _STAGES = {"read": "reading the runs", "draw": "drawing"}
@@ -58,11 +58,11 @@ class ComparisonScreen(RunsScreen):
     """A comparison's live progress."""
 
     @property
-    def watch(self) -> "Watch":
+    def callbacks(self) -> "ComparisonCallbacks":
         """The callbacks for a comparison."""
-        from bridgegen.comparison import Watch
+        from bridgegen.comparison import ComparisonCallbacks
 
-        return Watch(
+        return ComparisonCallbacks(
             compile=self.say_compiling, batch=self.batch, ended=self.end, begun=self._begin,
             stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
         )  # fmt: skip

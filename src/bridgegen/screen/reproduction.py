@@ -7,7 +7,7 @@ from rich.console import Console
 from bridgegen.screen.comparison import RunsScreen
 
 if TYPE_CHECKING:
-    from bridgegen.reproduction import Reproduction, Watch
+    from bridgegen.reproduction import Reproduction, ReproductionCallbacks
     from bridgegen.reproduction.protocol import Protocol
 
 _STAGES = {"read": "reading the runs", "draw": "drawing"}
@@ -17,11 +17,11 @@ class ReproductionScreen(RunsScreen):
     """A reproduction's live progress: evaluations of all runs, runs that have ended."""
 
     @property
-    def watch(self) -> "Watch":
+    def callbacks(self) -> "ReproductionCallbacks":
         """The callbacks for a reproduction."""
-        from bridgegen.reproduction import Watch
+        from bridgegen.reproduction import ReproductionCallbacks
 
-        return Watch(
+        return ReproductionCallbacks(
             begun=self._begin, compile=self.say_compiling, batch=self.batch, ended=self.end,
             stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
         )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
-    from bridgegen.campaign import Run, Watch
+    from bridgegen.campaign import Run, SearchCallbacks
     from bridgegen.campaign.loop import Progress
     from bridgegen.triage import Triage
     from bridgegen.workers import Workers
@@ -15,7 +15,7 @@ _STAGES = {
     "compile": "compiling",
     "search": "",  # the bar says it; a terminal has but 80 columns
     "triage": "testing what was found",
-    "hand over": "writing the critical scenarios",
+    "export": "writing the critical scenarios",
     "report": "writing the report",
 }
 
@@ -39,11 +39,11 @@ class SearchScreen(Live):
         self._workers: Workers | None = None
 
     @property
-    def watch(self) -> "Watch":
+    def callbacks(self) -> "SearchCallbacks":
         """The callbacks for a campaign."""
-        from bridgegen.campaign import Watch
+        from bridgegen.campaign import SearchCallbacks
 
-        return Watch(stage=self._stage, workers=self._meet, batch=self._batch)
+        return SearchCallbacks(stage=self._stage, workers=self._meet, batch=self._batch)
 
     def _meet(self, workers: "Workers") -> None:
         self._workers = workers

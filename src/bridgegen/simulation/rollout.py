@@ -159,6 +159,18 @@ class Rollout:
             distance[~(self.present & self.present[:, :1])] = np.inf
         return distance
 
+    def take(self, at: Int) -> "Rollout":
+        """Return some of the scenarios, in the order of their positions ``at``."""
+        arrays = {name: getattr(self, name) for name in _BY_ROW}
+        taken = {name: array[at] for name, array in arrays.items() if len(array)}
+        rows = list(enumerate(at.tolist()))
+        return replace(
+            self,
+            **taken,
+            messages={k: self.messages[row] for k, row in rows if row in self.messages},
+            incidents={k: self.incidents[row] for k, row in rows if row in self.incidents},
+        )
+
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",

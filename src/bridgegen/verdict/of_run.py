@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from bridgegen.campaign.handover import Facts, ParameterValue, Quantity, read_facts
+from bridgegen.campaign.exported import Facts, ParameterValue, Quantity, read_facts
 from bridgegen.campaign.run import Run
-from bridgegen.campaign.settings import Settings
 from bridgegen.cause import CAUSES
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, StorageError
-from bridgegen.store import Store
 from bridgegen.triage.words import mode_in_words
 from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
@@ -89,9 +87,7 @@ class PassFailCriteria:
         """Read the criteria for an existing run; see ``read``."""
         if not texts and junit is None:
             return cls((), None)
-        with Store.open(folder) as store:
-            settings = Settings.from_dict(store.settings, folder)
-        return cls.read(texts, junit, causes=settings.causes)
+        return cls.read(texts, junit, causes=Run(folder).settings.causes)
 
     @property
     def figures(self) -> set[str]:

@@ -1,15 +1,14 @@
-"""A run as the site that shows it: its page, what is new, any scenario's motion, its files."""
+"""A run as a site: its page, the news since, the motion of any scenario, its files."""
 
 import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bridgegen.campaign.handover import Kept, handed_over
 from bridgegen.campaign.regions import OWL_FILE
 from bridgegen.campaign.report import minimal_files, run_data
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.settings import Settings
+from bridgegen.campaign.run import Run
 from bridgegen.confirmation.record import file_name, read_records
 from bridgegen.confirmation.schema import Record
 from bridgegen.disk import read_inside
@@ -25,7 +24,7 @@ from bridgegen.triage.record import JSON_FILE as TRIAGE_FILE
 
 
 class RunView:
-    """A run that may be growing in another process; it is read only, and never held.
+    """A run, read only, that another process may be extending.
 
     May be called from several threads at a time.
 
@@ -46,15 +45,10 @@ class RunView:
         ego: str | None = None,
         simulator: SimulatorChoice | None = None,
     ) -> None:
-        self.folder = Path(folder)
+        self._run = Run(folder)
+        self.folder, self.settings = self._run.folder, self._run.settings
         self._rows: Recorded | None = None
-        with Store.open(folder) as store:
-            self.settings = Settings.from_dict(store.settings, store.folder)
-            metrics = store.metrics
-        self._pipeline = pipeline_of(
-            self.settings, metrics, self.folder, ego=ego, command="view", causes=False,
-            simulator=simulator,
-        )  # fmt: skip
+        self._pipeline = pipeline_of(self._run, "view", ego=ego, simulator=simulator)
         self._lock = threading.Lock()
 
     def fragment(self, evaluation: int) -> str:
@@ -76,8 +70,8 @@ class RunView:
         """Return the run's page, as it stands."""
         with self._lock, Store.open(self.folder) as store:
             rows = self._read(store)
-            kept = handed_over(self.folder, len(rows))
-            data = run_data(self._pipeline, store, self.settings, rows, kept)
+            run = Run.of(store, rows)
+            data = run_data(self._pipeline, run, rows, run.exported(len(rows)))
             return b"".join(report_page(data, live=True))
 
     def news(self, after: int) -> Mapping[str, Any]:
@@ -86,12 +80,12 @@ class RunView:
             rows = self._read(store)
             state = {
                 "finished": store.finished is not None,
-                "kept": len(self._kept()),
+                "kept": len(self._run.exported()),
                 "elsewhere": sum(len(one.scenarios) for one in self._elsewhere(rows)),
             }
             if len(rows) == after:
                 return state
-            data = run_data(self._pipeline, store, self.settings, rows, (), coverage=False)
+            data = run_data(self._pipeline, Run.of(store, rows), rows, (), coverage=False)
             return {**state, **news(data, after)}
 
     def motion(self, evaluation: int) -> Mapping[str, Any] | None:
@@ -100,21 +94,18 @@ class RunView:
             rows = self._read(store)
             if evaluation >= len(rows) or rows.status[evaluation] != 0:
                 return None
-            known = {one.evaluation: one for one in self._kept()}
+            known = {one.evaluation: one for one in self._run.exported()}
             return motion_payload(self._pipeline, rows, evaluation, known.get(evaluation))
 
     def file(self, name: str) -> bytes | None:
-        """Return a handed-over file, or a record of what came later; None of any other name."""
-        names = {name for one in self._kept() for name in one.files} | {JSON_FILE, OWL_FILE}
+        """Return an exported file, or a record of a later command; None for any other name."""
+        names = {name for one in self._run.exported() for name in one.files} | {JSON_FILE, OWL_FILE}
         names |= {file_name(name) for name in SIMULATORS}
         names |= {TRIAGE_FILE, *minimal_files(self.folder)}
         try:
             return read_inside(self.folder, name) if name in names else None
         except FileNotFoundError:
             return None
-
-    def _kept(self) -> tuple[Kept, ...]:
-        return handed_over(self.folder)
 
     def _elsewhere(self, rows: Recorded) -> tuple[Record, ...]:
         return read_records(self.folder, rows.X, rows.metrics)

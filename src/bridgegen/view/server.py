@@ -64,7 +64,7 @@ class Site(Protocol):
         """Return the motion of an evaluation, from 0; None if there is no such row."""
 
     def file(self, name: str) -> bytes | None:
-        """Return a handed-over file by its path in the run's folder; None if there is none."""
+        """Return an exported file by its path in the run's folder; None if there is none."""
 
 
 @dataclass(frozen=True)

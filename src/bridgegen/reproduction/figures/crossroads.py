@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bridgegen import campaign
 from bridgegen.arrays import Float
 from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.settings import Settings
 from bridgegen.comparison.drawing import Theme, blank
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.report.playback import AREA_KINDS, Outline
@@ -18,7 +18,6 @@ from bridgegen.reproduction.figures.look import SIZE, WIDE, legend
 from bridgegen.reproduction.paper import DESIGNS, POINTS
 from bridgegen.reproduction.runs import Run
 from bridgegen.simulation.accidents import accidents
-from bridgegen.store import Store
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,9 +63,7 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
     Raises:
         StorageError: the run cannot be read.
     """
-    with Store.open(folder) as store:
-        settings = Settings.from_dict(store.settings, folder)
-        pipeline = pipeline_of(settings, store.metrics, folder, causes=False)
+    pipeline = pipeline_of(campaign.Run(folder), "reproduce")
     scenario = pipeline.scenario
     assert isinstance(scenario, LogicalScenario)
     X = np.concatenate([run.X[run.collision] for run in runs])

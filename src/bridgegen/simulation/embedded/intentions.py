@@ -41,6 +41,12 @@ class Intentions:
     acceleration: Float
     shift: Float
 
+    def take(self, at: Int) -> "Intentions":
+        """Return some of the rows."""
+        return Intentions(
+            self.steps, self.way[at], self.station[at], self.acceleration[at], self.shift[at]
+        )
+
 
 def intentions(
     program: Program,

@@ -1,0 +1,227 @@
+"""The most critical distinct scenarios of a run, exported as files that other tools run."""
+
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.campaign.exported import FOLDER, NOT_EXPORTED, Exported, Refused
+from bridgegen.campaign.scenario_files import write_scenario
+from bridgegen.cause import Cause
+from bridgegen.conflict import quantities
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.harm import Count
+from bridgegen.conflict.quantities import QUANTITIES
+from bridgegen.conflict.summary import ConflictSummary, summarise
+from bridgegen.errors import OntologyError, StorageError
+from bridgegen.pipeline import Pipeline
+from bridgegen.search.dominance import by_merit
+from bridgegen.simulation.rollout import Rollout
+from bridgegen.store import Rows
+from bridgegen.triage.distinct import distinct
+from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Triage
+
+
+def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
+    """Return the rows of the most critical scenarios that differ from each other, best first.
+
+    Args:
+        U: ``(N, n_var)`` unit-cube rows.
+        F: ``(N, n_obj)``, minimised; `by_merit` orders them.
+        critical: ``(N,)``, only these are kept.
+        keep: how many at most.
+    """
+    order = np.flatnonzero(critical)
+    order = order[by_merit(F[order])]
+    kept = distinct(U, order, keep)
+    return order[np.isin(order, kept)]
+
+
+def export_critical(
+    pipeline: Pipeline,
+    rows: Rows,
+    rollout: Rollout | None,
+    folder: Path,
+    progress: Callable[[int], None] | None = None,
+    triage: Triage | None = None,
+) -> tuple[Exported, ...]:
+    """Write each row's ``.owl``, ``.xodr``, ``.xosc`` and ``.json`` into ``folder/critical``.
+
+    The folder is replaced as a whole, once all of it is written. A scenario whose individuals break
+    a rule is left out, and named in ``NOT_EXPORTED``; see `not_exported`. Minimal scenarios of the
+    failure modes are written beside them, as ``minimal-01.*`` and so on.
+
+    Args:
+        pipeline: evaluated the rows.
+        rows: the scenarios, most critical first.
+        rollout: of these rows; None if there are none.
+        folder: the run's.
+        progress: called with the number of rows written, after each.
+        triage: the run's, if there is one.
+
+    Raises:
+        StorageError: the folder cannot be written.
+    """
+    target, fresh = folder / FOLDER, folder / f"{FOLDER}.part"
+    exported, refused = [], []
+    conflicts = _conflicts(rollout, pipeline.objective.count)
+    try:
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir()
+        for i, conflict in enumerate(conflicts):
+            name, tested = f"{i + 1:04d}", None
+            if triage is not None:
+                tested = triage.neighbourhood(int(rows.id[i]))
+                if tested is not None and pipeline.cause is not None:  # the run counts quick causes
+                    tested = tested.model_copy(update={"cause": ""})
+            quick = Cause(rows.cause[i])
+            try:
+                files = write_scenario(
+                    pipeline, rows.X[i], fresh, name, _cause(quick, tested),
+                    rollout=rollout, row=i, conflict=conflict,
+                )  # fmt: skip
+            except OntologyError as error:
+                refused.append(Refused(name, int(rows.id[i]), error.problems))
+                continue
+            files.append(fresh / f"{name}.json")
+            facts = (
+                _facts(pipeline, rows, i, name)
+                | _triaged(name, quick, tested, triage)
+                | {"conflict": None if conflict is None else conflict.to_dict()}
+            )
+            files[-1].write_text(_json(facts), encoding="utf-8")
+            paths = tuple(f"{FOLDER}/{file.name}" for file in files)
+            exported.append(Exported(name, int(rows.id[i]), paths))
+            if progress:
+                progress(i + 1)
+        for mode in triage.modes if triage else ():
+            if mode.minimal is not None:
+                try:
+                    _write_minimal(pipeline, mode, mode.minimal, fresh)
+                except OntologyError as error:
+                    refused.append(Refused(mode.minimal.name, mode.worst, error.problems))
+        shutil.rmtree(target, ignore_errors=True)
+        fresh.rename(target)
+        _write_refused(refused, folder / NOT_EXPORTED)
+    except OSError as error:
+        raise StorageError(
+            f"{target}: cannot be written: {error.strerror}; the evaluations are kept, "
+            f"'bridgegen resume {folder}' writes the files"
+        ) from None
+    return tuple(exported)
+
+
+def _conflicts(rollout: Rollout | None, count: Count) -> list[ConflictSummary | None]:
+    """Return the decisive conflict of each scenario."""
+    if rollout is None:
+        return []
+    found = analyse(rollout)
+    return [summarise(found, row, count) for row in range(rollout.shape[0])]
+
+
+def _write_refused(refused: list[Refused], path: Path) -> None:
+    """Write the refused scenarios with their problems; remove the file if there is none."""
+    if not refused:
+        path.unlink(missing_ok=True)
+        return
+    text = json.dumps([asdict(one) for one in refused], indent=2, ensure_ascii=False)
+    path.write_text(f"{text}\n", encoding="utf-8")
+
+
+def _cause(quick: Cause, tested: Neighbourhood | None) -> Cause:
+    """Return the cause that a scenario's files state: that of its neighbours, where tested."""
+    if tested is None or not tested.cause:
+        return quick
+    return Cause.NONE if tested.cause == "sensitive" else Cause.named(tested.cause)
+
+
+def _triaged(
+    name: str, quick: Cause, tested: Neighbourhood | None, triage: Triage | None
+) -> dict[str, object]:
+    """Return the triage's findings on an exported scenario, as JSON's types."""
+    modes = [one.number for one in (triage.modes if triage else ()) if name in one.exports]
+    cause = tested.cause if tested is not None and tested.cause else quick.label
+    return {
+        "cause": cause or None,
+        "quick_cause": quick.label or None,
+        "mode": modes[0] if modes else None,
+        "robustness": tested.robustness if tested is not None else None,
+    }
+
+
+def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Path) -> None:
+    """Write a mode's minimal scenario; its metrics are those of its own rollout."""
+    X = np.array([minimal.x])
+    rollout = pipeline.rollout_again(X, np.array([minimal.noise_key], dtype=np.uint64))
+    conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
+    metrics = quantities.evaluate(rollout, pipeline.metrics)
+    critical = pipeline.objective.critical(metrics, pipeline.metrics)
+    noise = minimal.noise_key if pipeline.driver.stages else None  # others have no noise
+    write_scenario(
+        pipeline, X[0], folder, minimal.name, rollout=rollout, noise=noise, conflict=conflict
+    )
+    facts = {
+        "name": minimal.name,
+        "scenario": pipeline.scenario.name,
+        "ego": pipeline.driver.label,
+        "mode": mode.number,
+        "title": mode.title,
+        "sentence": minimal.sentence,
+        "conditions": [one.model_dump() for one in minimal.conditions],
+        "critical": bool(critical[0]),
+        "noise_key": minimal.noise_key,
+        "robustness": minimal.robustness,
+        "conflict": None if conflict is None else conflict.to_dict(),
+        "parameters": _parameters(pipeline, X[0]),
+        "metrics": _named(
+            dict(zip(pipeline.metrics, metrics[0].tolist(), strict=True)),
+            {name: QUANTITIES[name].unit for name in pipeline.metrics},
+        ),
+        "F": pipeline.objective.F(metrics, pipeline.metrics)[0][0].tolist(),
+    }
+    (folder / f"{minimal.name}.json").write_text(_json(facts), encoding="utf-8")
+
+
+def _json(facts: Mapping[str, object]) -> str:
+    return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, object]:
+    """Return one scenario's parameters and metrics; what is infinite or NaN is None."""
+    return {
+        "name": name,
+        "evaluation": int(rows.id[i]),
+        "scenario": pipeline.scenario.name,
+        "ego": pipeline.driver.label,
+        "critical": bool(rows.critical[i]),
+        "implausible": rows.findings.implausible[i] or None,
+        "parameters": _parameters(pipeline, rows.X[i]),
+        "metrics": _named(
+            dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),
+            {name: QUANTITIES[name].unit for name in pipeline.metrics},
+        ),
+        "F": rows.F[i].tolist(),
+    }
+
+
+def _parameters(pipeline: Pipeline, x: Float) -> dict[str, dict[str, float | str | None]]:
+    """Return the parameters of a row as people read them."""
+    units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
+    values = _named(pipeline.facts(x), units)
+    for name in values.keys() & pipeline.space.parameters.keys():
+        kind = pipeline.space.parameters[name].kind
+        values[name]["value"] = kind.written(float(x[pipeline.space.index(name)]))
+    return values
+
+
+def _named(
+    values: Mapping[str, float], units: Mapping[str, str]
+) -> dict[str, dict[str, float | str | None]]:
+    return {
+        name: {"value": value if np.isfinite(value) else None, "unit": units[name]}
+        for name, value in values.items()
+    }
