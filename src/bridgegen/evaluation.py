@@ -1,4 +1,4 @@
-"""What a batch of rows came to: evaluated, or rolled out to be looked at."""
+"""The results of a batch of rows: evaluations, trials, replays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,17 +20,17 @@ from bridgegen.simulation.rollout import Rollout
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a batch of N rows came to.
+    """The evaluation of a batch of N rows.
 
     Attributes:
         metrics: ``(N, M)`` float64, NaN in a failed row.
         F: ``(N, n_obj)`` float64, minimised; a filler in a failed row.
-        critical: ``(N,)`` bool, of those of the cause that is asked for, if one is.
+        critical: ``(N,)`` bool; only rows of the requested cause, if there is one.
         status: ``(N,)`` int8, 0 is success.
         findings: the decisive conflict of each row.
-        messages: by row, what else there is to say of its failure.
-        cause: ``(N,)`` int8, the `Cause` of what the thresholds call critical; None where causes
-            are not sought.
+        messages: details of failures, by row.
+        cause: ``(N,)`` int8, the `Cause` of each row that the thresholds call critical; None where
+            causes are not determined.
     """
 
     metrics: Float
@@ -64,14 +64,14 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Trials:
-    """What N rows came to that are driven to see whether harm persists.
+    """The results of N rows that are simulated to test whether harm persists.
 
     Attributes:
         harm: ``(N,)`` float64, 0 where there is no result.
         severity: ``(N,)`` float64, probability of MAIS3+ in the ego's collision.
-        ok: ``(N,)`` bool, the simulation succeeded and the traffic could happen.
+        ok: ``(N,)`` bool, the simulation succeeded and its traffic is plausible.
         findings: the decisive conflict of each row.
-        place: ``(N,)`` texts, where on its route the ego's front is then; see
+        place: ``(N,)`` texts, the place of the ego's front on its route at that conflict; see
             `bridgegen.conflict.place`.
     """
 
@@ -92,14 +92,14 @@ class Trials:
 
     @classmethod
     def of(cls, rollout: Rollout, roads: Network, which: Int, harm: str, count: Count) -> "Trials":
-        """Return what a rollout came to.
+        """Return the results of a rollout.
 
         Args:
             rollout: of N rows.
             roads: compiled.
             which: ``(N,)``, the road network of each row.
             harm: the quantity that counts, "harm" or "harm_any".
-            count: whose conflicts do.
+            count: whose conflicts count.
         """
         n = rollout.shape[0]
         conflicts = analyse(rollout)
@@ -149,14 +149,14 @@ class Trials:
 
 @dataclass(frozen=True)
 class Replay:
-    """A rollout of N rows, with what it does not hold itself.
+    """A rollout of N rows with the egos' plans and the weather.
 
     Attributes:
-        rollout: what happened.
-        intentions: what the egos meant to do, if that was asked for.
-        ways: by row and number the ways that these name, ``(n, 2)`` float64 [m] each.
+        rollout: the motion.
+        intentions: the egos' plans, if they were requested.
+        ways: by row and number the ways that the plans name, ``(n, 2)`` float64 [m] each.
         weathers: by row the weather from the start on, and from each change of it: the instant, and
-            ``(WEATHER,)`` as sensors feel it (``ego._weather_columns``).
+            ``(WEATHER,)`` as the sensors perceive it (``ego._weather_columns``).
     """
 
     rollout: Rollout

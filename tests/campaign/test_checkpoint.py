@@ -212,7 +212,7 @@ def test_a_state_that_the_algorithm_refuses(tmp_path):
     go(tmp_path / "run", budget=30)
     with opened(tmp_path / "run") as store:
         store.save(Checkpoint(5, 0, b'{"other": 1}'))
-    with pytest.raises(StorageError, match="cannot be gone on with: it is another algorithm's"):
+    with pytest.raises(StorageError, match="cannot be restored: it is another algorithm's"):
         go(tmp_path / "run")
 
 

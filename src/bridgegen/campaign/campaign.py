@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen import search as toolkit
-from bridgegen.campaign.beforehand import refuse_beforehand
 from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.campaign.critical import export_critical, most_critical
+from bridgegen.campaign.exportable import require_exportable
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
@@ -123,7 +123,7 @@ def run_search(given: SearchArguments) -> Run:
         )
         callbacks.stage("compile")
         pipeline.warm_up()
-        refuse_beforehand(pipeline)
+        require_exportable(pipeline)
         chosen = pipeline.choose_objective(objectives=columns, seed=seed)
         made_with = Settings.of(
             given,

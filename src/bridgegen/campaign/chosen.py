@@ -1,4 +1,4 @@
-"""What the user chooses of the objective, instead of the scenario's."""
+"""The objective as the user's options change the scenario's."""
 
 from dataclasses import replace
 from typing import Any, cast, get_args
@@ -13,14 +13,14 @@ from bridgegen.options import CommonOptions
 from bridgegen.search import Algorithm
 
 PAPER = "paper"
-"""What ``--objective`` calls the paper's objective, and its rule of what is critical."""
+"""The name in ``--objective`` of the paper's objective and criticality rule."""
 
 BESIDE_HARM = "d_min"
 """The second objective of a search of many whose only term is harm."""
 
 
 def columns_of(method: type[Algorithm], objectives: str | None) -> Objectives:
-    """Return how many objectives are searched: what the user says, or the algorithm is for."""
+    """Return whether one objective or many are searched: the user's choice, or the algorithm's."""
     if objectives is None:
         return "many" if method.objectives == "many" else "one"
     for known in get_args(Objectives):
@@ -30,7 +30,7 @@ def columns_of(method: type[Algorithm], objectives: str | None) -> Objectives:
 
 
 def counted(count: str | None) -> Count | None:
-    """Return whose conflicts the user says are harm.
+    """Return whose conflicts count as harm, by the user's choice.
 
     Raises:
         UnknownNameError: no such choice.
@@ -44,11 +44,11 @@ def counted(count: str | None) -> Count | None:
 
 
 def as_judged(scenario: SearchedScenario, rule: str | None) -> SearchedScenario:
-    """Return a scenario as the rule of what is critical wants it.
+    """Return a scenario adapted to the criticality rule.
 
-    Traffic that stops dead where its road ends could not happen, and would not count as harm: with
-    the rule "harm" everybody drives on and leaves there, whatever the scenario says for the paper's
-    evaluation. What a scenario file says stays.
+    Vehicles that stop dead at the end of a road are implausible and would not count as harm: with
+    the rule "harm" they drive on and leave there, whatever the scenario says for the paper's
+    evaluation. A scenario file stays as it is.
     """
     if rule == "harm" and isinstance(scenario, LogicalScenario):
         return replace(scenario, road_end="leave")
@@ -58,16 +58,16 @@ def as_judged(scenario: SearchedScenario, rule: str | None) -> SearchedScenario:
 def chosen_objective(
     spec: ObjectiveSpec, options: CommonOptions, columns: Objectives
 ) -> ObjectiveSpec:
-    """Return the scenario's objective with what the user wants instead.
+    """Return the scenario's objective with the user's choices applied.
 
     Args:
         spec: the scenario's.
-        options: what the user wants; the objective ``{"harm": None}`` or ``{"paper": None}``
-            chooses the rule of what is critical, too.
+        options: the user's; the objective ``{"harm": None}`` or ``{"paper": None}`` chooses the
+            criticality rule, too.
         columns: one or many objectives.
 
     Raises:
-        InputError: weights where they have no part; ``paper`` among others.
+        InputError: weights that nothing uses; ``paper`` among other metrics.
         UnknownNameError: no such choice of whose conflicts count.
     """
     metrics, weights, scale = options.objective, options.weights, options.scale

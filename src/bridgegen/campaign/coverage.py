@@ -1,4 +1,4 @@
-"""What a run on disk has covered of its search space."""
+"""The coverage of the search space by a run on disk."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ from bridgegen.odd.coverage import MAX_STRENGTH, Coverage, coverage
 def coverage_of(
     folder: Path | str, *, bins: int = 5, strength: int = MAX_STRENGTH
 ) -> tuple[Settings, Coverage]:
-    """Return how a run was made, and the bins and t-way combinations that it evaluated.
+    """Return a run's settings, and the bins and t-way combinations that it evaluated.
 
-    A row whose simulation failed has shown nothing and covers nothing.
+    A row whose simulation failed covers nothing.
 
     Args:
         folder: of a run, finished or not.
-        bins: equal bins per parameter; whole numbers have one each.
+        bins: equal bins per parameter; an integer has one for each value.
         strength: the largest t.
 
     Raises:

@@ -1,8 +1,8 @@
-"""What a user's driver must keep, tried on it: ``bridgegen check-driver module:Class``.
+"""The contract of a user's driver, tested: ``bridgegen check-driver module:Class``.
 
-A search is only worth something if a scenario's result depends on that scenario alone. So a driver
-must answer for each scenario the same, whoever else is in the batch, in whatever order, and however
-often it is asked; and it must forget when it is reset.
+A scenario's result must depend on that scenario alone. So a driver must give the same answers for a
+scenario whatever else is in the batch, in any order and at each repetition, and must forget its
+state when it is reset.
 """
 
 import time
@@ -21,23 +21,23 @@ SCENARIOS = ("crossroads-s1", "cut-in", "red-light-runner", "pedestrian-behind-p
 """Crossing traffic, a motorway, a traffic light, a pedestrian between parked cars."""
 
 ROWS = 16
-"""Rows per scenario: a few, for every one is driven several times."""
+"""Rows per scenario: few, since each is driven several times."""
 
 MANY = 512
-"""Rows in the batch that tells the driver's speed."""
+"""Rows in the batch that measures the driver's speed."""
 
 _STATES = ("x", "y", "h", "v", "a", "n_steps", "status")
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was tried.
+    """The result of one check.
 
     Attributes:
-        scenario: in which.
-        rule: what must hold.
-        problem: how it does not; empty if it does.
-        figure: what was measured, or empty.
+        scenario: in which the driver was checked.
+        rule: that must hold.
+        problem: how the driver breaks it; empty if it does not.
+        figure: a measurement, or empty.
     """
 
     scenario: str
@@ -49,7 +49,7 @@ class Check:
 def check_driver(
     spec: str, scenarios: Sequence[str] = SCENARIOS, *, time_limit: float | None = None
 ) -> Iterator[Check]:
-    """Yield what was tried on a driver, one after the other.
+    """Yield the results of the checks of a driver, one after the other.
 
     Args:
         spec: ``package.module:Class``, ``file.py:Class``, a compiled driver's function, or
@@ -58,7 +58,7 @@ def check_driver(
         time_limit: [s] that one call may take.
 
     Raises:
-        InputError: the driver cannot be made, or no such scenario.
+        InputError: the driver cannot be created, or no such scenario.
     """
     for name in scenarios:
         logical = load(name)
@@ -94,7 +94,7 @@ def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -
     for rule, run, rows in tries:
         yield Check(name, rule, _difference(whole, run(), rows))
     if failures:
-        return  # a failed row is looked for among the others: that would be the time measured
+        return  # isolating failed rows takes time, which would be measured
     many = np.tile(X, (MANY // len(X), 1))
     start = time.perf_counter()
     pipeline.rollout(many)
@@ -117,7 +117,7 @@ def _failures(rollout: Rollout) -> str:
 
 
 def _difference(whole: Rollout, other: Rollout, rows: Sequence[int]) -> str:
-    """Say where rows of a rollout are not what they are in another one."""
+    """Return the first difference between rows of two rollouts in words, or an empty text."""
     at = np.asarray(rows)
     for name in _STATES:
         one, two = getattr(whole, name)[at], getattr(other, name)

@@ -1,4 +1,4 @@
-"""Scenarios of a run, run again here and in another simulator, and compared one by one."""
+"""Scenarios of a run, simulated here and in another simulator, and compared one by one."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,13 +23,13 @@ from bridgegen.store import Rows
 from bridgegen.workers import Lost
 
 AT_A_TIME = 32
-"""Scenarios that are run before what became of them is handed on, at most."""
+"""Scenarios that are simulated before their results are yielded, at most."""
 
 FOUND = ("conflict", "conflict_type", "responsible", "partner")
-"""What a record says of the decisive conflict."""
+"""The fields of a record on the decisive conflict."""
 
 SECONDS = 0.5
-"""Fewer are run together where they take longer: what is handed on is safe [s]."""
+"""Batches grow while one takes less than this [s], so that little is lost at an interruption."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ class _Ran:
 def run_elsewhere(
     here: Pipeline, there: Pipeline, every: Rows, evaluations: Sequence[int]
 ) -> Iterator[Scenario]:
-    """Run evaluations here and there, and return what became of each.
+    """Simulate evaluations here and there, and yield the comparison of each.
 
     Args:
-        here: what evaluated them.
+        here: the run's pipeline.
         there: the same with another simulator.
         every: all rows of the run.
         evaluations: some of these, which succeeded.
@@ -71,19 +71,19 @@ def run_elsewhere(
         for row, (k, ran) in enumerate(zip(some, found, strict=True)):
             yield _scenario(here, every, k, motion, row, ran)
         done += len(some)
-        if time.monotonic() - began < SECONDS:  # no result depends on how many go together
+        if time.monotonic() - began < SECONDS:  # no result depends on the batch
             size = min(most, 2 * size)
 
 
 def _elsewhere(there: Pipeline, X: Float, count: Count) -> Iterator[_Ran | str]:
-    """Return what became of each row, or why nothing did."""
+    """Yield each row's result, or the reason of its failure."""
     try:
         found = there.rollouts(X)
     except InputError as error:
         if len(X) == 1:
             yield "; ".join(error.problems)
             return
-        for x in X:  # which of them is it?
+        for x in X:  # isolate the row that fails
             yield from _elsewhere(there, x[np.newaxis], count)
         return
     for one in found:
@@ -103,7 +103,7 @@ def _findings(rollout: Rollout, count: Count) -> Findings:
 def _scenario(
     here: Pipeline, every: Rows, k: int, motion: Rollout, row: int, ran: _Ran | str
 ) -> Scenario:
-    """Return what became of evaluation k, whose motion here is a row of a rollout."""
+    """Return the comparison of evaluation k, whose motion here is a row of a rollout."""
     objective = here.objective
     known = _outcome(here, every.metrics[k], every.F[k], every.findings.row(k))
     digest = digest_of(every.X[k], every.metrics[k])
@@ -161,5 +161,5 @@ def _failure(ran: _Ran) -> str:
 
 
 def _legal(text: str) -> str:
-    """Return another program's words without what a terminal would obey."""
+    """Return another program's text without control characters."""
     return "".join(one if one.isprintable() else " " for one in text).strip()

@@ -11,18 +11,18 @@ from enum import StrEnum
 import numpy as np
 
 from bridgegen.arrays import Float, as_float
-from bridgegen.campaign.met import Met
+from bridgegen.campaign.known_rows import KnownRows
 from bridgegen.campaign.result_log import ResultLog
 from bridgegen.errors import InputError, StorageError
 from bridgegen.search import Algorithm, Restorable, TakesNotes
 from bridgegen.store import Checkpoint, Evaluated, Rows, Store
 
 PATIENCE = 100
-"""Batches in a row without a new row, after which a search has nothing left to say."""
+"""Batches in a row without a new row, after which a search has converged."""
 
 
 class Reason(StrEnum):
-    """Why a loop ended. The first three finish the run; after the others it can go on."""
+    """Why a loop ended. The first three finish the run; after the others it can be resumed."""
 
     BUDGET = "budget"
     CONVERGED = "converged"
@@ -38,13 +38,13 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True)
 class Progress:
-    """What ``on_batch`` is told.
+    """The progress of a loop after a batch.
 
     Attributes:
-        evaluations: recorded and told so far, in the order of the store.
-        budget: what the loop goes up to.
+        evaluations: recorded so far, in the order of the store.
+        budget: of evaluations.
         seconds: [s] since the start of the run.
-        result: the evaluations that came with this batch, at least one.
+        result: the new evaluations of this batch, at least one.
         metrics: the names of the result's metrics.
         replayed: whether they were read from the store instead of simulated.
     """
@@ -59,15 +59,15 @@ class Progress:
 
 @dataclass(frozen=True)
 class LoopResult:
-    """How a loop ended.
+    """The end of a loop.
 
     Attributes:
-        reason: why.
+        reason: why it ended.
         evaluations: rows in the store.
         simulated: of these, rows that this call evaluated.
         batches: batches that this call asked for, replayed ones included.
-        repeated: asked rows that were known already and cost nothing.
-        seconds: [s] the run has taken, earlier sessions included.
+        repeated: rows that were asked for again and cost nothing.
+        seconds: duration of the run [s], earlier sessions included.
     """
 
     reason: Reason
@@ -89,32 +89,32 @@ def run_loop(
 ) -> LoopResult:
     """Search until the budget is spent: exactly ``budget`` evaluations, never one more.
 
-    A row whose decoded X is known, to the last bit, is not evaluated again: the algorithm is
-    told the recorded result, and the budget is not charged. A batch that the budget cuts short is
-    recorded as far as it goes; the algorithm, which is not needed any more, is not told, unless
-    it takes notes: then the rows without a place in the budget are told as failed.
+    A row whose decoded X is known, to the last bit, is not evaluated again: the algorithm gets the
+    recorded result, and the budget is not charged. A batch that exceeds the budget is recorded up
+    to it; the algorithm then gets no results, unless it takes notes: to it, rows beyond the budget
+    are failed ones.
 
-    A store that holds evaluations is gone on with: a fresh algorithm asks again, is told what is
-    recorded, and must ask for exactly those rows. So a run that was killed, or ended with a
-    smaller budget, becomes the run that it would have been undisturbed.
+    A store that holds evaluations is resumed: a new algorithm asks again, gets the recorded
+    results, and must ask for exactly those rows. So a run that was killed, or ended with a smaller
+    budget, becomes the run that it would have been undisturbed.
 
-    An algorithm that is `Restorable` is saved after each batch. It is gone on with from there, and
-    asks again only for what was recorded since: at most the batch that was recorded, but not yet
-    told, when the run was killed.
+    An algorithm that is `Restorable` is saved after each batch. It resumes from there, and asks
+    again only for the rows recorded since: at most the batch whose results it had not yet got when
+    the run was killed.
 
     Args:
         algorithm: new, made with the run's seed and settings.
         decode: ``(n, n_var)`` unit-cube rows → X ``(n, len(store.parameters))``; each row's
             result depends on that row alone.
-        evaluate: X → metrics, F, critical and status of its rows; NaN and ±inf are recorded.
+        evaluate: X → metrics, F, critical and status of its rows; may contain NaN and ±inf.
         store: open for writing.
         budget: evaluations in the store at the end.
-        on_batch: called after each batch that brought evaluations, recorded or replayed; those that
-            a restored algorithm knows come a few thousand at a time.
-        stop: asked before each batch; True ends the loop.
+        on_batch: called after each batch with new evaluations, recorded or replayed; those that a
+            restored algorithm knows come a few thousand at a time.
+        stop: called before each batch; True ends the loop.
 
     Returns:
-        How it ended. Ctrl-C ends it too; finished batches are in the store by then.
+        The end of the loop. Ctrl-C ends it, too; finished batches are in the store by then.
 
     Raises:
         StorageError: the store cannot be written, or was made by another version or other inputs.
@@ -143,7 +143,7 @@ def run_loop(
 
 
 class _Session:
-    """One call of the loop: which rows are known, and how far it is."""
+    """One call of the loop: the known rows, and its progress."""
 
     def __init__(
         self,
@@ -159,25 +159,25 @@ class _Session:
         self._store, self._budget, self._on_batch = store, budget, on_batch
         self._recorded, self._seconds_before = len(store), store.seconds
         self._began: float | None = None
-        self._known = Met()
+        self._known = KnownRows()
         self._log = ResultLog(store.n_obj, len(store.metrics))
         self._idle = 0
 
     @property
     def seconds(self) -> float:
-        """[s] of the run; the replay takes none."""
+        """Duration of the run [s]; the replay does not count."""
         running = 0.0 if self._began is None else time.perf_counter() - self._began
         return self._seconds_before + running
 
     def restore(self) -> None:
-        """Bring the algorithm to where it was saved, if it was; the other rows are replayed."""
+        """Restore the algorithm's saved state, if there is one; later rows are replayed."""
         algorithm, saved = self._algorithm, self._store.checkpoint()
         if saved is None or not isinstance(algorithm, Restorable):
             return
         for rows in self._store.rows(0, saved.evaluations):
             X = as_float("X", self._decode(rows.U), rows.X.shape) + 0.0
             self._compare("X", X, rows.X, int(rows.id[0]))
-            self._known.meet(X, self._budget)
+            self._known.add(X, self._budget)
             self._log.add(rows)
             self._report(int(rows.id[-1]) + 1, rows, replayed=True)
         self._idle = saved.idle
@@ -185,21 +185,21 @@ class _Session:
             algorithm.restore(saved.state)
         except ValueError as error:
             raise StorageError(
-                f"{self._store.folder}: the saved state of the search cannot be gone on with: "
+                f"{self._store.folder}: the saved state of the search cannot be restored: "
                 f"{error}; its results can still be read"
             ) from error
 
     def batch(self) -> Reason | None:
-        """Go through one batch; return why it was the last one, if it was."""
+        """Do one batch; return the reason if it was the last one."""
         done = len(self._known)
         if done >= self._recorded:
             self._start_clock()
         U = self._ask()
         if len(U) == 0:
             return self._nothing_new(Reason.EXHAUSTED)
-        # No −0.0: SQLite would not keep its sign, and what is simulated is what is recorded.
+        # No −0.0: SQLite would lose its sign, and a row is simulated as it is recorded.
         X = as_float("X", self._decode(U), (len(U), len(self._store.parameters))) + 0.0
-        ids, fresh = self._known.meet(X, self._budget)
+        ids, fresh = self._known.add(X, self._budget)
         old = fresh[: max(0, self._recorded - done)]
         for rows, take in ((old, self._replay), (fresh[len(old) :], self._simulate)):
             if rows:
@@ -207,7 +207,7 @@ class _Session:
         self.batches += 1
         self.repeated += int(np.count_nonzero(ids >= 0)) - len(fresh)
         if len(self._known) >= self._budget:
-            # The budget may have cut this batch short, and nobody will ask again.
+            # The budget may have cut this batch short, and it is the last one.
             if isinstance(self._algorithm, TakesNotes):
                 self._algorithm.tell(U, self._log.results(ids))
             return Reason.BUDGET
@@ -219,7 +219,7 @@ class _Session:
         return self._nothing_new(Reason.CONVERGED) if self._idle >= PATIENCE else None
 
     def keep_notes(self) -> None:
-        """Record what the algorithm has learnt, once it is as far as the store is."""
+        """Record the algorithm's notes, once it has got all results of the store."""
         if (
             isinstance(self._algorithm, TakesNotes)
             and self.batches
@@ -234,7 +234,7 @@ class _Session:
     def _ask(self) -> Float:
         name, n_var = self._algorithm.name, self._store.columns.n_var
         try:
-            # A copy: the rows stay ours whatever the algorithm does with its array.
+            # A copy: the algorithm may reuse its array.
             U = as_float("its rows", self._algorithm.ask(), (None, n_var)).copy()
         except ValueError as error:
             raise InputError(f"algorithm '{name}': {error}") from error
@@ -244,7 +244,7 @@ class _Session:
         return U
 
     def _replay(self, U: Float, X: Float, start: int) -> Rows:
-        """Return what is recorded for rows that must be those asked at the time."""
+        """Return the recorded results of rows, which must be those that were asked for."""
         rows = self._store.read(start, start + len(U))
         self._compare("U", U, rows.U, start)
         self._compare("X", X, rows.X, start)
@@ -252,7 +252,7 @@ class _Session:
         return rows
 
     def _compare(self, name: str, now: Float, then: Float, start: int) -> None:
-        """Refuse to go on where rows are not those that were recorded."""
+        """Check that rows are those that were recorded."""
         differ = np.argwhere(now != then)
         if len(differ):
             k, j = (int(i) for i in differ[0])
@@ -282,9 +282,9 @@ class _Session:
     def _other(self, detail: str) -> StorageError:
         store = self._store
         return StorageError(
-            f"{store.folder}: cannot go on with this run: asked again from its seed, the search "
+            f"{store.folder}: this run cannot be resumed: from its seed, the search "
             f"must repeat the {self._recorded} recorded evaluations bit for bit; {detail}. It was "
-            f"made by another version of BridgeGen ({store.version}) or of what it runs on, "
+            f"made by another version of BridgeGen ({store.version}) or of a library, "
             "or from another scenario; its results can still be read"
         )
 

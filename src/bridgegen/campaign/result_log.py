@@ -1,4 +1,4 @@
-"""The results that an algorithm gets for the rows that it asked for."""
+"""The results of all evaluated rows, as an algorithm gets them."""
 
 from array import array
 
@@ -19,7 +19,7 @@ class ResultLog:
         self._ok, self._critical, self._cause = array("b"), array("b"), array("b")
 
     def add(self, result: Evaluated) -> None:
-        """Keep the results of the next rows."""
+        """Append the results of the next rows."""
         # SQLite keeps neither the sign of zero nor the bits of NaN.
         F = np.asarray(result.F, np.float64) + 0.0
         metrics = np.asarray(result.metrics, np.float64) + 0.0
@@ -37,7 +37,7 @@ class ResultLog:
             kept.frombytes(values.tobytes())
 
     def results(self, ids: Int) -> Results:
-        """Return those of some rows; the id −1 is of a row that was not evaluated."""
+        """Return the results of some rows; id −1 stands for a row that was not evaluated."""
         there = ids >= 0
         return Results(
             F=np.frombuffer(self._F).reshape(-1, self._n_obj)[ids],

@@ -1,4 +1,4 @@
-"""What a run was made with: all that it takes to make it again, as JSON in its store."""
+"""The settings of a run: all that repeating it needs, as JSON in its store."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from bridgegen.simulation.choice import SimulatorChoice, Value
 DEFAULTS_BEFORE_FIELD: Mapping[str, Any] = {
     one.name: one.before for one in options_of(SearchOptions) if one.before is not ALWAYS
 }
-"""What a run was made with that is older than an option, and so does not record it."""
+"""The values that apply to a run recorded before an option existed."""
 
 CHOSEN = ("objective", "weights", "scale", "objectives", "count", "metrics")
 """The options that are recorded together, under the key ``chosen``."""
@@ -37,15 +37,15 @@ Part = Value | None | list[Value] | Mapping[str, Value]
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(SearchOptions):
-    """The settings of a run: its options, nothing left open, and what was read for it.
+    """The settings of a run: its options, all of them resolved, and digests of its files.
 
-    Paths are absolute, and what the user left to the scenario, to the algorithm or to the map is
+    Paths are absolute. The options that default to the scenario, the algorithm or the map are
     resolved: ``settings``, ``budget``, ``seed``, ``ego``, ``ideal``, ``axes``, ``junction`` and
-    ``adversary``. What the user chose of the objective is as it was given.
+    ``adversary``. The options of the objective are as given.
 
     Attributes:
         scenario: a name of the catalogue, or the path of a file.
-        fingerprint: digest of what the scenario and its distribution said when the run began.
+        fingerprint: digest of the scenario and its distribution when the run began.
         map_digest: SHA-256 of the map's file, where there is one.
         optimised: the objective with its weights, as ``Objective.to_dict`` gives it.
     """
@@ -101,7 +101,7 @@ class Settings(SearchOptions):
         return found  # as recorded: an integer stays one
 
     def command(self, folder: Path) -> str:
-        """Return the command line that makes the same run."""
+        """Return the command line that repeats the run."""
         words = ["bridgegen", "search", self.scenario]
         for one in options_of(type(self)):
             if one.name != "ego" or self.ego != STORYBOARD.name:
@@ -116,12 +116,12 @@ def _plain(value: Any) -> Any:
 
 
 def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is recorded by the names of fields, those that an old run lacks among them.
+    """Return recorded values by the names of fields, with those that an old run lacks.
 
-    An unknown key stays, and cannot be taken for a field that is recorded elsewhere.
+    An unknown key stays, and is not mistaken for a field that is recorded under another key.
 
     Raises:
-        ValueError: the options under ``chosen`` are no object.
+        ValueError: the value of ``chosen`` is not an object.
     """
     chosen = data.get("chosen")
     if not isinstance(chosen, dict):

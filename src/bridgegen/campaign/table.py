@@ -1,7 +1,7 @@
-"""The evaluations of many runs for other tools: a Parquet file for each run, whole or a sample.
+"""The evaluations of runs for other tools: a Parquet file for each run, whole or a sample.
 
-A folder of such files is one table to DuckDB, Polars, pandas or Spark. A run of any length is
-written a few thousand rows at a time.
+DuckDB, Polars, pandas and Spark read a folder of such files as one table. A run of any length is
+written in row groups.
 """
 
 import json
@@ -29,10 +29,10 @@ CHUNK = 65_536
 """Rows that are written at a time: a row group of the file."""
 
 RUN = ("run", "scenario", "algorithm", "seed", "ego", "simulator")
-"""Columns that say whose a row is: the run's folder, and how it was made."""
+"""Columns of the run: the name of its folder, and its settings."""
 
 WEIGHT = "weight"
-"""The column that says how many of the run's rows a row stands for."""
+"""The column with the number of the run's rows that a row represents."""
 
 
 def write_tables(
@@ -40,13 +40,13 @@ def write_tables(
 ) -> tuple[Path, ...]:
     """Write the evaluations of runs, finished or not; a file that is there is replaced.
 
-    Of a sample, what is critical and what failed is kept whole; the others by chance, which is the
-    same whenever the same row is asked for, whoever found it.
+    A sample contains all critical and all failed rows, and others by a pseudo-random choice that
+    depends on the row alone.
 
     Args:
-        runs: their folders, whose names differ.
+        runs: folders with distinct names.
         out: a folder; ``out/NAME.parquet`` is written for each.
-        sample: the share of the other rows that is kept, in (0, 1].
+        sample: the share of the other rows, in (0, 1].
 
     Returns:
         The files.
@@ -85,13 +85,13 @@ def _write(name: str, folder: Path, path: Path, sample: float) -> Path:
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with Store.open(folder) as store:
         settings = Run.of(store).settings
-        said = dict(zip(RUN, _said(name, settings), strict=True))
-        schema = _schema(store, said, settings, sample)
+        of_run = dict(zip(RUN, _run_values(name, settings), strict=True))
+        schema = _schema(store, of_run, settings, sample)
         try:
             with parquet.ParquetWriter(part, schema, compression="zstd") as writer:
                 for rows in store.rows(chunk=CHUNK):
                     kept, weight = _kept(rows, sample)
-                    columns = _columns(store, said, rows.take(kept), weight)
+                    columns = _columns(store, of_run, rows.take(kept), weight)
                     writer.write_table(pa.table(columns, schema=schema))
             part.replace(path)
         except OSError as error:
@@ -102,17 +102,17 @@ def _write(name: str, folder: Path, path: Path, sample: float) -> Path:
     return path
 
 
-def _said(name: str, settings: Settings) -> tuple[str | int, ...]:
+def _run_values(name: str, settings: Settings) -> tuple[str | int, ...]:
     scenario = Path(settings.scenario).stem
     simulator = settings.simulator.name
     return name, scenario, settings.algorithm, settings.seed, settings.ego, simulator
 
 
-def _schema(store: Store, said: dict[str, Any], settings: Settings, sample: float) -> "pa.Schema":
+def _schema(store: Store, of_run: dict[str, Any], settings: Settings, sample: float) -> "pa.Schema":
     import pyarrow as pa
 
     columns, text = store.columns, pa.dictionary(pa.int32(), pa.string())
-    fields = [(name, pa.int64() if isinstance(one, int) else text) for name, one in said.items()]
+    fields = [(name, pa.int64() if isinstance(one, int) else text) for name, one in of_run.items()]
     fields += [("id", pa.int64()), ("batch", pa.int64()), ("seconds", pa.float64())]
     named = {name for name, one in _labels(store) if "words" in one}
     fields += [(name, text if name in named else pa.float64()) for name in columns.X]
@@ -160,9 +160,9 @@ def _chances(X: Float) -> Float:
     return (np.frombuffer(digests, "<u8") >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
 
-def _columns(store: Store, said: dict[str, Any], rows: Rows, weight: Float) -> dict[str, Any]:
+def _columns(store: Store, of_run: dict[str, Any], rows: Rows, weight: Float) -> dict[str, Any]:
     n, columns = len(rows), store.columns
-    found: dict[str, Any] = {name: [one] * n for name, one in said.items()}
+    found: dict[str, Any] = {name: [one] * n for name, one in of_run.items()}
     found |= {"id": rows.id, "batch": rows.batch, "seconds": rows.seconds}
     for names, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
                           (columns.F, rows.F)):  # fmt: skip

@@ -1,8 +1,8 @@
-"""Is a file as it should be? Every reason why not, at once."""
+"""Validation of a file: all of its problems at once."""
 
 from pathlib import Path
 
-from bridgegen.campaign.beforehand import CHECKED_BY_VALIDATE, refuse_beforehand
+from bridgegen.campaign.exportable import CHECKED_BY_VALIDATE, require_exportable
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.ontology import reasoner
@@ -21,19 +21,19 @@ from bridgegen.pipeline import Pipeline
 
 
 def validate_file(path: Path, *, reason: bool = False) -> list[str]:
-    """Return what is wrong with an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
+    """Return the problems of an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
 
-    An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints. An
+    An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
     ``.yaml`` is read; it is built, checked and simulated at its defaults and at the corners of its
     ranges, with its effects.
 
     Args:
         path: the file.
-        reason: ask the reasoner about an ``.owl``, too: can the individuals be at all?
+        reason: run the reasoner on an ``.owl``, too, for consistency.
 
     Raises:
-        InputError: a file of another kind, or a reasoner is asked for that is not installed.
+        InputError: a file of another kind, or the reasoner is not installed.
     """
     if reason:
         reasoner.require()
@@ -63,12 +63,12 @@ def _ontology(path: Path) -> list[str]:
     individuals = load(path)
     if _is_map(individuals):
         return [str(one) for one in check(individuals)]
-    individuals.text(individuals.one("Scenario"), "has_name")  # a file without is none of ours
+    individuals.text(individuals.one("Scenario"), "has_name")  # all of ours have one
     return [str(one) for one in check(individuals, scenario_of(individuals))]
 
 
 def _is_map(individuals: Individuals) -> bool:
-    """Say whether these are a map and no scenario: what `import_file` writes."""
+    """Return whether these are a map without a scenario, as `import_file` writes."""
     return not individuals.of_class("Scenario") and any(
         individuals.optional_text(network, "has_map_file") is not None
         for network in individuals.of_class("RoadNetwork")
@@ -91,5 +91,5 @@ def _storyboard(path: Path) -> list[str]:
 def _logical(path: Path) -> list[str]:
     scenario = load_scenario(path)
     pipeline = Pipeline(scenario, scenario.space())  # builds and compiles it at the defaults
-    refuse_beforehand(pipeline, CHECKED_BY_VALIDATE)
+    require_exportable(pipeline, CHECKED_BY_VALIDATE)
     return []

@@ -153,7 +153,8 @@ def _analyse(rollout: Rollout) -> Conflicts:
         np.ascontiguousarray(friction),
         np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
-        np.ascontiguousarray(lights), _is_routed(rollout), np.empty((e, t)), whole, real,
+        np.ascontiguousarray(lights, dtype=np.int8), _is_routed(rollout), np.empty((e, t)), whole,
+        real,
     )  # fmt: skip
     ok = np.asarray(rollout.status) == 0
     whole[~ok], real[~ok] = 0, 0.0

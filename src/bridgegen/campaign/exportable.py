@@ -1,9 +1,8 @@
-"""Would what a search finds be refused when it is exported? Tried before the search, at once.
+"""Checks, before a search, that its scenarios can be exported.
 
-A scenario's individuals keep its constraints by construction, but not what the ontology says of
-roads, lanes and participants: a bus that starts on a shoulder and drives. Such a file is refused at
-export, so that it is built, checked and simulated here as it would be then: at the defaults and at
-the corners of the ranges.
+A scenario's individuals satisfy its constraints by construction, but not the ontology's rules on
+roads, lanes and participants: a bus may start on a shoulder. The export refuses such a scenario. So
+the defaults and the corners of the ranges are built, checked and simulated as at export.
 """
 
 from collections.abc import Iterator
@@ -18,21 +17,21 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 CHECKED, CHECKED_BY_VALIDATE = 3, 6
-"""Rows that are held against the ontology (SHACL), which takes some 80 ms each: the defaults, the
-lowest and the highest values; and some ends of single parameters."""
+"""Rows that are validated against the ontology (SHACL), some 80 ms each: the defaults, the lowest
+and the highest values; and some ends of single parameters."""
 
 MOST_CORNERS = 64
-"""Searched parameters of which the two ends are tried."""
+"""Searched parameters whose two ends are simulated, at most."""
 
-ITS_OWN_FAULT = range(2, 7)
-"""Statuses of a row that are the scenario's fault: places and ways that are not there."""
+FAULTS_OF_THE_SCENARIO = range(2, 7)
+"""Statuses of a row whose places or ways do not exist."""
 
 
 def corners(pipeline: Pipeline) -> tuple[Float, tuple[str, ...]]:
-    """Return the rows that are tried, ``(N, len(space.names))``, and what each is in words.
+    """Return the rows to check, ``(N, len(space.names))``, and a description of each.
 
     The defaults, all parameters at their lowest and highest values, and each parameter at these
-    with the others at their defaults. Constraints move them as they move what a search tries.
+    with the others at their defaults. Constraints move them as they move any row of a search.
     """
     space = pipeline.space
     nominal = space.row({})
@@ -54,31 +53,31 @@ def corners(pipeline: Pipeline) -> tuple[Float, tuple[str, ...]]:
     return np.array(rows), tuple(words)
 
 
-def refuse_beforehand(pipeline: Pipeline, checked: int = CHECKED) -> None:
-    """Build, check and simulate a scenario's corners; refuse what could not be exported.
+def require_exportable(pipeline: Pipeline, checked: int = CHECKED) -> None:
+    """Build, check and simulate the corners of a scenario's ranges.
 
     Args:
-        pipeline: of the search; its kernels are compiled by now.
-        checked: rows that are held against the ontology, 3 or more.
+        pipeline: of the search, its kernels compiled.
+        checked: rows that are validated against the ontology, 3 or more.
 
     Raises:
         OntologyError: individuals break a rule, in the words of the export.
-        InputError: the scenario cannot be built, or not be simulated with its defaults.
+        InputError: the scenario cannot be built, or not simulated with its defaults.
     """
     X, words = corners(pipeline)
     if problems := list(dict.fromkeys(_export_problems(pipeline, X, words, checked))):
         raise OntologyError(*problems)
     if pipeline.simulator is not pipeline.simulator.embedded or pipeline.driver.is_own:
-        return  # others take seconds a row
+        return  # other simulators and drivers take seconds a row
     status = pipeline.rollout(X).status
-    if status[0] in ITS_OWN_FAULT:
+    if status[0] in FAULTS_OF_THE_SCENARIO:
         raise InputError(f"{pipeline.scenario.place}: {words[0]}: {STATUS_MESSAGES[status[0]]}")
 
 
 def _export_problems(
     pipeline: Pipeline, X: Float, words: tuple[str, ...], checked: int
 ) -> Iterator[str]:
-    """Yield what would keep some of the rows from being exported."""
+    """Yield the problems for which the export would refuse some of the rows."""
     place, seen = pipeline.scenario.place, set[str]()
     first = min(3, len(X))
     more = np.linspace(first, len(X) - 1, checked - first).astype(int) if len(X) > first else ()

@@ -8,7 +8,7 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.campaign import critical
-from bridgegen.campaign.beforehand import corners
+from bridgegen.campaign.exportable import corners
 from bridgegen.campaign.exported import NOT_EXPORTED, Refused, not_exported
 from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.validate import validate_file

@@ -1,4 +1,4 @@
-"""Which rows a search has met: 24 to 32 bytes of memory for each."""
+"""The rows that a search has asked for: 24 to 32 bytes of memory for each."""
 
 from array import array
 from hashlib import blake2b
@@ -10,12 +10,11 @@ from bridgegen.arrays import Float, Int
 FIRST_SLOTS = 1 << 12
 
 
-class Met:
-    """The rows of X that a search has met; a row's id is how many had been met before it.
+class KnownRows:
+    """The distinct rows of X that a search has asked for; ids number them from 0, in their order.
 
-    Rows are told apart by digests of 16 bytes, held in the order of ids. They are found by an
-    open-addressing hash table of ids, of which at most half is taken. (A dict takes 200 bytes a
-    row.)
+    Rows are distinguished by digests of 16 bytes, held in the order of ids. An open-addressing hash
+    table of ids, at most half full, finds them. (A dict takes 200 bytes a row.)
     """
 
     def __init__(self) -> None:
@@ -25,12 +24,12 @@ class Met:
     def __len__(self) -> int:
         return len(self._digests) // 2
 
-    def meet(self, X: Float, most: int) -> tuple[Int, list[int]]:
+    def add(self, X: Float, most: int) -> tuple[Int, list[int]]:
         """Return the id of each row, ``(n,)``, and the positions of those that are new.
 
         Args:
             X: ``(n, k)`` float64, without −0.0.
-            most: so many rows are met at most; the id of a further new one is −1.
+            most: at most so many rows are known; the id of a further new one is −1.
         """
         whole = b"".join([blake2b(row.tobytes(), digest_size=16).digest() for row in X])
         keys = np.frombuffer(whole, np.uint64).reshape(-1, 2).tolist()
@@ -56,13 +55,13 @@ class Met:
         return np.array(ids, dtype=np.int64), fresh
 
     def _resize(self, size: int) -> None:
-        """Make a table of so many slots, a power of two, of the digests that there are."""
+        """Rebuild the table with so many slots, a power of two."""
         slots = np.full(size, -1, np.int32)
         low = np.frombuffer(self._digests, np.uint64)[::2]
         at, left = (low & np.uint64(size - 1)).astype(np.int64), np.arange(len(low))
         while len(left):
             free = slots[at] < 0
-            slots[at[free]] = left[free]  # of several that want the same slot one gets it
+            slots[at[free]] = left[free]  # one of several rows gets a slot
             out = slots[at] != left
             at, left = (at[out] + 1) & (size - 1), left[out]
         self._slots = array("i", slots.tobytes())
