@@ -345,3 +345,16 @@ def test_an_object_that_moves_gives_way_and_one_that_stands_does_not(track, meet
     car = one(meeting(track(v=20.0), track(x=60.0)))
     assert car.delta_v_ego == pytest.approx(10.0)  # a standing car of equal mass
     assert barrier.severity > car.severity > 0.0
+
+
+def test_a_simulator_s_lights_of_another_integer_type_do_not_compile_the_analysis_again(
+    track, meeting
+):
+    """It takes half a minute."""
+    from bridgegen.conflict._conflict_kernels import analyse_rows
+
+    rollout = meeting(track(v=20.0), track(x=60.0))
+    lights = np.ones((1, 1, rollout.shape[2]), np.int64)
+    found = analyse(replace(rollout, light_names=("light",), lights=lights))
+    assert found.kind[0, 1] == analyse(rollout).kind[0, 1]
+    assert len(analyse_rows.signatures) == 1
