@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int, Numbers
+from bridgegen.arrays import Bool, Float, Numbers
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.pipeline import Pipeline
+from bridgegen.store import Recorded, Rows
 from bridgegen.triage.bound import UNBIASED, bound, estimate, least_margins
 from bridgegen.triage.distinct import distinct
 from bridgegen.triage.minimal import Minimiser
@@ -48,45 +49,6 @@ MOST_TESTED, MOST_MINIMAL = 20, 10
 _SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
 
 
-class Evaluations(Protocol):
-    """The rows of a run; `bridgegen.store.Rows` is one."""
-
-    @property
-    def id(self) -> Int:
-        """``(N,)``."""
-
-    @property
-    def U(self) -> Numbers:
-        """``(N, n_var)``."""
-
-    @property
-    def X(self) -> Numbers:
-        """``(N, len(space.names))``."""
-
-    @property
-    def metrics(self) -> Numbers:
-        """``(N, M)``."""
-
-    @property
-    def status(self) -> Int:
-        """``(N,)``, 0 is success."""
-
-    @property
-    def critical(self) -> Bool:
-        """``(N,)``."""
-
-    @property
-    def cause(self) -> npt.NDArray[np.int8]:
-        """``(N,)``, a `Cause` each."""
-
-    @property
-    def findings(self) -> Findings:
-        """Of N rows."""
-
-    def digest(self) -> str:
-        """Return a digest that identifies them."""
-
-
 @dataclass(frozen=True, eq=False)
 class Triaged:
     """The result of the triage of a run.
@@ -101,7 +63,7 @@ class Triaged:
 
 
 def triage(
-    pipeline: Pipeline, rows: Evaluations, *, algorithm: str, seed: int, keep: int
+    pipeline: Pipeline, rows: Rows | Recorded, *, algorithm: str, seed: int, keep: int
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
@@ -143,7 +105,7 @@ class _Triage:
     """One call of `triage`; positions are those among all rows unless stated otherwise."""
 
     def __init__(
-        self, pipeline: Pipeline, rows: Evaluations, algorithm: str, seed: int, keep: int
+        self, pipeline: Pipeline, rows: Rows | Recorded, algorithm: str, seed: int, keep: int
     ) -> None:
         self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
         self._algorithm, self._seed, self._keep = algorithm, seed, keep
@@ -407,6 +369,6 @@ class _Triage:
         return f"{text}, {names[k]} {parameter.kind.span_text(low, high, '{:.3g}'.format, unit)}"
 
 
-def _implausible(rows: Evaluations) -> Bool:
+def _implausible(rows: Rows | Recorded) -> Bool:
     marked: Bool = np.array(rows.findings.implausible != "", dtype=np.bool_).reshape(len(rows.id))
     return marked
