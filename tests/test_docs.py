@@ -2,15 +2,21 @@
 
 import importlib.util
 import re
+import sys
+import threading
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
+import bridgegen
+from bridgegen.cli import main
 from bridgegen.odd.reader import load, names
 
 DOCS = Path(__file__).parents[1] / "docs"
+SOURCES = Path(bridgegen.__file__).parent
+MAIN_JOB = "## The main job, file by file"
 
 
 @pytest.fixture(scope="module")
@@ -146,10 +152,48 @@ def test_the_architecture_has_a_paragraph_for_each_folder():
     project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text("utf-8"))
     contract, _ = project["tool"]["importlinter"]["contracts"]  # the other is of one folder
     layers = [name for layer in contract["layers"] for name in re.split(r" [|:] ", layer)]
-    text = (DOCS / "architecture.md").read_text("utf-8")
+    text, _, _ = (DOCS / "architecture.md").read_text("utf-8").partition(MAIN_JOB)
     rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
     told = [re.sub(r"/$|\.py$", "", name) for row in rows for name in re.findall("`([^`]+)`", row)]
     assert sorted(told) == sorted(layers)
+
+
+def test_the_main_job_goes_through_the_files_of_the_architecture_page_in_that_order(
+    tmp_path, monkeypatch
+):
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    _, _, table = text.partition(MAIN_JOB)
+    path = re.findall(r"^\| `([\w/]+\.py)` \| `([\w.]+)` \|", table, re.M)
+    assert len({file for file, _ in path}) == len(path) <= 30
+    calls: dict[tuple[str, str], None] = {}
+
+    def note(frame, event, _):
+        if event == "call":
+            code = frame.f_code
+            calls.setdefault((code.co_filename, code.co_qualname))
+
+    words = [
+        "bridgegen",
+        "search",
+        "crossroads-s3",
+        "--budget",
+        "20",
+        "--out",
+        str(tmp_path / "run"),
+    ]
+    monkeypatch.setattr(sys, "argv", words)
+    threading.setprofile(note)
+    sys.setprofile(note)
+    try:
+        with pytest.raises(SystemExit) as end:
+            main()
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
+    assert not end.value.code
+    order = list(calls)
+    at = [order.index((str(SOURCES / file), function)) for file, function in path]
+    assert at == sorted(at)
 
 
 def test_ci_names_every_figure_and_status():
