@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import references, walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import FileResult
 
 SCHEMAS = {
     "1.2": "1.2.0",
@@ -44,6 +46,12 @@ def catalogue(tmp_path_factory) -> dict[str, Path]:
     return paths
 
 
+@cache
+def simulated(path: Path) -> FileResult:
+    """The simulation of a file of the catalogue, which every flavour is compared with."""
+    return bg.simulate_file(path)
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> bg.Run:
     return bg.run_search(
@@ -61,7 +69,7 @@ every = pytest.mark.parametrize(
 def test_the_same_motion_bit_for_bit(catalogue, tmp_path, name, flavour):
     path, _ = export(catalogue[name], flavour, out=tmp_path)
     assert validate_file(path) == []
-    before, after = bg.simulate_file(catalogue[name]), bg.simulate_file(path)
+    before, after = simulated(catalogue[name]), bg.simulate_file(path)
     assert before.metrics == after.metrics
     assert before.driver == after.driver
     for field in ("x", "y", "h", "v", "a", "offset", "n_steps", "lights"):
@@ -72,7 +80,7 @@ def test_the_same_motion_bit_for_bit(catalogue, tmp_path, name, flavour):
 def test_recorded_files_play_what_was_recorded(catalogue, tmp_path, name):
     path, _ = export(catalogue[name], "recorded", out=tmp_path)
     assert validate_file(path) == []
-    before, after = bg.simulate_file(catalogue[name]), bg.simulate_file(path)
+    before, after = simulated(catalogue[name]), bg.simulate_file(path)
     n = before.rollout.n_steps[0]
     assert after.rollout.n_steps[0] == n
     there = before.rollout.present[0, :, :n] if before.rollout.present.size else np.True_

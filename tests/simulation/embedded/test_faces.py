@@ -1,6 +1,7 @@
 """The folders of the embedded simulator: what one may call of another, and its drivers' table."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ WITH_A_FACE = ("conditions", "drivers", "motion", "own_drivers", "storyboard", "
 """Folders whose ``__init__`` names all that others may call."""
 
 
+@cache
 def imports(file: Path) -> list[str]:
     """The modules that a file imports from."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
