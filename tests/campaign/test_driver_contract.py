@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bridgegen.campaign import driver_contract
 from bridgegen.campaign.driver_contract import check_driver
 from bridgegen.cli import app
 
@@ -21,6 +22,13 @@ def broken(name, file=DRIVERS):
 @pytest.mark.parametrize("name", ["Cruises", "LooksAhead"])
 def test_a_good_driver_keeps_everything(name):
     assert broken(name) == {}
+
+
+def test_a_slow_driver_is_timed_in_a_small_batch(monkeypatch):
+    monkeypatch.setattr(driver_contract, "SECONDS", 0.0)
+    *_, speed = driver_contract.check_driver(f"{DRIVERS}:Cruises", ["cut-in"])
+    assert speed.rule == "speed"
+    assert speed.figure.endswith("scenarios/s in a batch of 16")
 
 
 def test_a_compiled_driver_keeps_everything_or_is_found_out():

@@ -23,8 +23,9 @@ SCENARIOS = ("crossroads-s1", "cut-in", "red-light-runner", "pedestrian-behind-p
 ROWS = 16
 """Rows per scenario: few, since each is driven several times."""
 
-MANY = 512
-"""Rows in the batch that measures the driver's speed."""
+MANY, SECONDS = 512, 1.0
+"""Rows in the batch that measures the driver's speed, at most; fewer if they would take longer than
+so many seconds."""
 
 _STATES = ("x", "y", "h", "v", "a", "n_steps", "status")
 
@@ -72,7 +73,9 @@ def check_driver(
 
 
 def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -> Iterator[Check]:
+    start = time.perf_counter()
     whole = pipeline.rollout(X)
+    took = time.perf_counter() - start
     failures = _failures(whole)
     yield Check(name, "every row is driven to its end", failures)
     order = rng.permutation(len(X)).tolist()
@@ -95,7 +98,7 @@ def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -
         yield Check(name, rule, _difference(whole, run(), rows))
     if failures:
         return  # isolating failed rows takes time, which would be measured
-    many = np.tile(X, (MANY // len(X), 1))
+    many = np.tile(X, (int(np.clip(SECONDS / took, 1, MANY // len(X))), 1))
     start = time.perf_counter()
     pipeline.rollout(many)
     rate = len(many) / (time.perf_counter() - start)
