@@ -1,9 +1,13 @@
 """The limits of the conflict analysis, each with its unit and source: the one place where they are.
 
+Those that other stages share come from ``bridgegen.physics``.
+
 "Ours" marks what no source gives. Private for the reason that ``_codes`` tells.
 """
 
 import math
+
+from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 # --- Collision course and near miss -------------------------------------------------------------
 
@@ -57,11 +61,11 @@ PUSHES = 0.3
 
 # --- The careful driver -------------------------------------------------------------------------
 
-REACTION = 0.75
+REACTION = CAREFUL_REACTION
 """[s] From the risk until braking begins. Source: UN R157, Annex 3, performance model."""
-BRAKING = 0.774 * 9.81
+BRAKING = CAREFUL_BRAKING
 """[m/s²] Source: UN R157, Annex 3, performance model: 0.774 g."""
-JERK = 12.65
+JERK = CAREFUL_JERK
 """[m/s³] 0.774 g in 0.6 s. Source: UN R157, Annex 3, performance model."""
 COMFORT = 3.0
 """[m/s²] Braking that one may ask of others. Source: UN R79, 5.6.4.7: a lane change must not force

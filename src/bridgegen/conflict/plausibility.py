@@ -11,10 +11,8 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import OTHER
 from bridgegen.metrics.metric import distance, recorded, steps
 from bridgegen.participants import OBJECT_CLASSES
+from bridgegen.physics import GRAVITY
 from bridgegen.simulation.rollout import Rollout
-
-GRAVITY = 9.81
-"""[m/s²]"""
 
 SLIP = float(np.tan(np.radians(10.0)))
 """Motion across a wheeled body, as a share of its speed: tyres slide beyond 10° of slip.

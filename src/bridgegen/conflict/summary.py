@@ -10,8 +10,9 @@ from bridgegen.conflict.findings import KINDS
 from bridgegen.conflict.harm import Count, decisive, harm_of_pairs
 from bridgegen.conflict.sentences import sentence
 from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
+from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
-CAREFUL_DRIVER = "the careful driver of UN R157 (0.75 s, 0.774 g)"
+CAREFUL_DRIVER = f"the careful driver of UN R157 ({CAREFUL_REACTION:g} s, {CAREFUL_BRAKING_G:g} g)"
 """Whose braking says whether a contact was preventable."""
 
 UNITS: Mapping[str, str] = {

@@ -8,6 +8,7 @@ shows a picture of each.
 from enum import IntEnum
 
 from bridgegen.conflict import _codes
+from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
 
 class ConflictType(IntEnum):
@@ -214,7 +215,7 @@ RULES = {
     ),
     Rule.UNSAFE_START: (
         "from the start on, or from where a body appears, there was less time than it takes",
-        "UN R157, Annex 3: reaction 0.75 s, 0.774 g",
+        f"UN R157, Annex 3: reaction {CAREFUL_REACTION:g} s, {CAREFUL_BRAKING_G:g} g",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",

@@ -9,8 +9,8 @@ exceeds that speed. It goes slower
 - to stop at a red light and at a stop sign (`_lights_kernels`).
 
 Whatever takes no more than `EMERGENCY_FROM` is anticipated, as drivers do, and done at once. What
-takes more is an emergency: the driver reacts `REACTION` after it begins, and then brakes as hard as
-the careful driver of UN Regulation 157 until the danger is over.
+takes more is an emergency: the driver reacts `CAREFUL_REACTION` after it begins, and then brakes as
+hard as the careful driver of UN Regulation 157 until the danger is over.
 
 Participants on foot, animals and bicycles heed only what is ahead of them.
 
@@ -29,12 +29,7 @@ Sources: UN Regulation 157, 01 series of amendments, annex 3 (reaction, braking,
 import math
 
 from bridgegen.compiled import inlined_kernel, kernel
-from bridgegen.ego._careful_kernels import (
-    BRAKING,
-    EASY_TO_STOP,
-    JERK,
-    REACTION,
-)
+from bridgegen.ego._careful_kernels import EASY_TO_STOP
 from bridgegen.ego._control_kernels import EMERGENCY_FROM
 from bridgegen.ego._following_kernels import (
     COMFORT_ACCELERATION,
@@ -56,6 +51,7 @@ from bridgegen.ego._kind_tables import IS_ON_FOOT, IS_PEDESTRIAN, IS_VEHICLE, NE
 from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._path_kernels import COS, SIN, H, X, Y, locate, project
 from bridgegen.ego._yielding_kernels import COMMITTED, HORIZON, give_way
+from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 MIND = 8
 RISK, GIVEN, BRAKES, STOPS_FOR, HALTED, ASKED, STRAIGHT_TO, STRAIGHT_ON = range(MIND)
@@ -249,9 +245,9 @@ def react(k, dt, asked, mind):
         if mind[RISK] == 0.0:
             mind[RISK] = k + 1.0
         given = min(mind[GIVEN], 0.0)  # until it reacts, it does what it did, without gas
-        if (k + 1.0 - mind[RISK]) * dt + 1e-9 >= REACTION:
+        if (k + 1.0 - mind[RISK]) * dt + 1e-9 >= CAREFUL_REACTION:
             mind[BRAKES] = 1.0
-            given = max(given - JERK * dt, -BRAKING)
+            given = max(given - CAREFUL_JERK * dt, -CAREFUL_BRAKING)
     else:
         mind[RISK] = 0.0
     mind[GIVEN] = given if given < math.inf else 0.0

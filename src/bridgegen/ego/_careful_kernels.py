@@ -42,13 +42,11 @@ from bridgegen.ego._conflict_kernels import (
 from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
+from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 EVALUATION = 0.4  # s, until the risk is perceived
 BRAKES_HARD = 5.0  # m/s², of who drives ahead
 CRITICAL_TTC = 2.0  # s
-REACTION = 0.75  # s, from the risk until braking begins
-BRAKING = 0.774 * 9.81  # m/s²
-JERK = 12.65  # m/s³
 
 HARD_TO_STOP = 3.0  # m/s² that it takes, after the reaction, not to meet somebody: a risk …
 EASY_TO_STOP = 1.0  # … and up to which it has ceased to be one
@@ -73,7 +71,7 @@ def drive_careful(
     """
     v, own = speed[0, k], on[0]
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
-    reach = 15.0 + (EVALUATION + REACTION) * v + v * v / (2.0 * COMFORT_DECELERATION)
+    reach = 15.0 + (EVALUATION + CAREFUL_REACTION) * v + v * v / (2.0 * COMFORT_DECELERATION)
     risk, brakes = False, attention[0, BRAKES] > 0.0
     limit, hard = (CLEAR, EASY_TO_STOP) if brakes else (CRITICAL_TTC, HARD_TO_STOP)
     for e in range(1, len(speed)):
@@ -97,11 +95,11 @@ def drive_careful(
         if known_for < EVALUATION:
             continue
         risk = risk or ttc < limit or (what == LEADER and slowing > BRAKES_HARD)
-        if what == CROSSING or known_for >= EVALUATION + REACTION:
+        if what == CROSSING or known_for >= EVALUATION + CAREFUL_REACTION:
             closing = max(v - along, 0.0)
-            left = max(gap - (0.0 if brakes else closing * REACTION), 0.1)
+            left = max(gap - (0.0 if brakes else closing * CAREFUL_REACTION), 0.1)
             risk = risk or closing * closing / (2.0 * left) > hard
-        if what == LEADER and known_for >= EVALUATION + REACTION:
+        if what == LEADER and known_for >= EVALUATION + CAREFUL_REACTION:
             wanted = min(wanted, max(idm(gap, v, along), -COMFORT_DECELERATION))
     if not risk:
         attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
@@ -109,9 +107,9 @@ def drive_careful(
     if attention[0, RISK] == 0.0:
         attention[0, RISK] = k + 1.0
     asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
-    if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
+    if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= CAREFUL_REACTION:
         attention[0, BRAKES] = 1.0
-        asked = max(asked - JERK * dt, -BRAKING)
+        asked = max(asked - CAREFUL_JERK * dt, -CAREFUL_BRAKING)
     attention[0, ASKED] = asked
     return asked
 

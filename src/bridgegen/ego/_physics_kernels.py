@@ -1,4 +1,4 @@
-"""The laws that weather and sensors obey, and every constant of them: with unit and source.
+"""The laws that weather and sensors obey, and the constants of them alone: with unit and source.
 
 Where no source is named the figure is ours, chosen to give the ranges that its comment says.
 Lengths in metres, angles in radians, extinctions in 1/m, luminances in cd/m², illuminances in lx.
@@ -27,10 +27,6 @@ Astronomical Almanac, 1992; the last from the RCA Electro-Optics Handbook, 1974.
 CLOUD_SHADE, CLOUD_POWER = 0.75, 3.4  # 1 − 0.75·n^3.4; Kasten, Czeplak, Sol. Energy 24 (1980)
 GROUND_ALBEDO = 0.2  # of the scene behind a target: grey asphalt, walls, trees
 GLARE, GLARE_FROM = 10.0, 1.0  # Stiles–Holladay, L = 10·E/θ² with θ in degrees, from 1° on
-
-# The road.
-GRAVITY = 9.81  # m/s²
-DRY_FRICTION = 0.85  # tyre on dry asphalt, peak; source: Wong, Theory of Ground Vehicles, table 1.3
 
 # The camera: a ring of them, 1920 pixels over 77° each.
 FOCAL_LENGTH = 1207.0  # pixels

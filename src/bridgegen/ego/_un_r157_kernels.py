@@ -41,15 +41,13 @@ from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
 from bridgegen.ego._kind_tables import USES_LANES
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
+from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 CRITICAL_TTC = 2.0  # s, up to which a cut-in is dangerous
 CRITICAL_HEADWAY = 2.0 + 1e-6  # s, up to which a cut-out or a deceleration is; and rounding
 WANDERING = 0.375  # m, from the middle of the way, that are no change of lane
 BRAKES_HARD = 5.0  # m/s², of the vehicle ahead
-REACTION = 0.75  # s, from the risk until braking begins
 RELEASE = 0.4  # m/s², with the foot off the accelerator; source: JRC-FSM
-BRAKING = 0.774 * 9.81  # m/s²
-JERK = 12.65  # m/s³: full braking after 0.6 s
 SPARE = 1.0  # m, left to the vehicle ahead where following takes more than comfort
 
 SEES = 100.0  # m beyond the distance that it takes to stop, up to which it looks at anybody
@@ -69,7 +67,7 @@ def follow(gap, v, w, slowing):
     if slowing > 0.0:
         needed = max(needed, 0.5 * v * v / (room + 0.5 * w * w / slowing))
     asked = max(idm(gap, v, w), -COMFORT_DECELERATION)
-    return asked if needed <= COMFORT_DECELERATION else min(asked, -min(needed, BRAKING))
+    return asked if needed <= COMFORT_DECELERATION else min(asked, -min(needed, CAREFUL_BRAKING))
 
 
 @kernel
@@ -136,8 +134,8 @@ def drive_un_r157(
         attention[0, ASKED] = wanted
         return wanted
     asked = min(attention[0, ASKED], -RELEASE)
-    if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
-        asked = max(asked - JERK * dt, -BRAKING)
+    if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= CAREFUL_REACTION:
+        asked = max(asked - CAREFUL_JERK * dt, -CAREFUL_BRAKING)
     asked = min(asked, wanted)
     attention[0, ASKED] = asked
     return asked

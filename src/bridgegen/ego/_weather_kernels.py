@@ -18,8 +18,6 @@ from bridgegen.ego._physics_kernels import (
     CLEAR_NORMAL,
     CLOUD_POWER,
     CLOUD_SHADE,
-    DRY_FRICTION,
-    GRAVITY,
     GROUND_ALBEDO,
     KOSCHMIEDER,
     RAIN_EXTINCTION,
@@ -48,6 +46,7 @@ from bridgegen.ego._weather_columns import (
     SUN_Y,
     VISUAL_RANGE,
 )
+from bridgegen.physics import GRIP
 
 CLEAR_DAY = (10_000.0, 0.0, 0.0, math.pi, math.radians(45.0), -1.0, 0.0, 1.0)
 """What is stated where a file states nothing: WMO's clear air, the sun in the south at 45°."""
@@ -87,7 +86,7 @@ def derive(weather):
     weather[EXTINCTION] = KOSCHMIEDER / max(weather[VISUAL_RANGE], 1.0) + rain + snow
     weather[ATTENUATION] = weather[EXTINCTION]
     weather[GLASS] = 1.0 / (1.0 + RAIN_ON_GLASS * max(weather[RAIN], 0.0))
-    weather[FRICTION] = DRY_FRICTION * GRAVITY * weather[FRICTION_SCALE]
+    weather[FRICTION] = GRIP * weather[FRICTION_SCALE]
     cosine, sine = math.cos(weather[SUN_ELEVATION]), math.sin(weather[SUN_ELEVATION])
     weather[SUN_X] = cosine * math.sin(weather[SUN_AZIMUTH])
     weather[SUN_Y] = cosine * math.cos(weather[SUN_AZIMUTH])

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Self
 
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
 STAGES = ("perception", "prediction", "control")
 """What of a driver can be made ideal, in the order of the work; planning is what is left."""
@@ -34,7 +35,8 @@ SCRIPTED, ATTENTIVE = 0, 1
 
 OTHERS = {
     "attentive": "Does what its script says unless somebody is in its way: keeps its distance, "
-    "gives way, brakes after 0.75 s by up to 0.774 g, waits for a gap to change lane.",
+    f"gives way, brakes after {CAREFUL_REACTION:g} s by up to {CAREFUL_BRAKING_G:g} g, waits for a "
+    "gap to change lane.",
     "scripted": "Does what its script says, whatever happens.",
 }
 """The drivers of participants other than the ego: name and description."""
@@ -109,12 +111,13 @@ REFERENCE = Driver(
 UN_R157 = Driver(
     "un-r157",
     "The competent and careful human driver of UN Regulation 157, exact in its three disturbances "
-    "(cut-in, cut-out, deceleration): brakes after 0.75 s, by up to 0.774 g; follows otherwise.",
+    f"(cut-in, cut-out, deceleration): brakes after {CAREFUL_REACTION:g} s, by up to "
+    f"{CAREFUL_BRAKING_G:g} g; follows otherwise.",
 )
 CAREFUL = Driver(
     "careful",
     "UN R157's driver extended to any road: reacts to who crosses, walks or stands in its way as "
-    "well, after 0.4 s of perception and 0.75 s; sees everybody.",
+    f"well, after 0.4 s of perception and {CAREFUL_REACTION:g} s; sees everybody.",
 )
 FSM = Driver(
     "fsm",

@@ -36,8 +36,9 @@ from bridgegen.ego._fsm_kernels import (
     SLACK,
     STANDSTILL,
 )
-from bridgegen.ego._un_r157_kernels import BRAKING, CRITICAL_TTC, JERK, REACTION, RELEASE
+from bridgegen.ego._un_r157_kernels import CRITICAL_TTC, RELEASE
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 RATE = 10.0
 """Hz, at which the driver decides; that of the Commission's code."""
@@ -230,7 +231,7 @@ def _avoids(
         raise UnknownNameError("model of a careful driver", driver, MODELS)
     half, both = 0.5 * (ego_length + other_length), ego_length + other_length
     x = v / RATE if cut_in else np.zeros_like(v)
-    waits, brake, before = np.full_like(v, REACTION), np.zeros_like(v), v.copy()
+    waits, brake, before = np.full_like(v, CAREFUL_REACTION), np.zeros_like(v), v.copy()
     collided, over = np.zeros(len(v), dtype=np.bool_), np.zeros(len(v), dtype=np.bool_)
     reacts = np.zeros(len(v), dtype=np.bool_)
     for i in range(round(LONGEST * RATE)):
@@ -240,14 +241,14 @@ def _avoids(
         if driver == "un-r157":
             risk, ended = _un_r157_risk(ahead, gap, closing, other.side, cut_in)
             over |= ended
-            wanted = np.full_like(v, BRAKING)
+            wanted = np.full_like(v, CAREFUL_BRAKING)
         else:
             risk, wanted = _fsm_risk(v, (v - before) * RATE, ahead, gap, both, other)
         reacts |= risk
         waiting = waits > 0.0
         if driver == "un-r157":
             brake = np.where(risk & waiting, RELEASE, brake)
-        pressed = np.minimum(brake + JERK / RATE, wanted)
+        pressed = np.minimum(brake + CAREFUL_JERK / RATE, wanted)
         brake = np.where(risk & ~waiting, pressed, brake)
         released = RELEASE if driver == "un-r157" else 0.0
         change = np.where(risk, np.where(waiting, released, brake), 0.0)
@@ -284,11 +285,11 @@ def _fsm_risk(
         comes = np.where(other.inward > 0.0, other.side / other.inward, np.inf)
     counts = (ahead >= 0.0) & ((other.side <= 0.0) | ((comes <= past + SLACK) & (comes < np.inf)))
     stops = w * w / (2.0 * LEADER_BRAKING)
-    safe = v * REACTION + v * v / (2.0 * COMFORT_BRAKING) - stops + SAFE_MARGIN
-    unsafe = v * REACTION + v * v / (2.0 * FSM_BRAKING) - stops
+    safe = v * CAREFUL_REACTION + v * v / (2.0 * COMFORT_BRAKING) - stops + SAFE_MARGIN
+    unsafe = v * CAREFUL_REACTION + v * v / (2.0 * FSM_BRAKING) - stops
     proactive = _share(gap - STANDSTILL, safe, unsafe)
-    after = v + np.maximum(a, -COMFORT_BRAKING) * REACTION
-    lost, rest = (0.5 * (v + after) - w) * REACTION, (after - w) ** 2
+    after = v + np.maximum(a, -COMFORT_BRAKING) * CAREFUL_REACTION
+    lost, rest = (0.5 * (v + after) - w) * CAREFUL_REACTION, (after - w) ** 2
     goes_on = _share(gap, lost + rest / (2.0 * COMFORT_BRAKING), lost + rest / (2.0 * FSM_BRAKING))
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         held = gap < closing**2 / np.abs(2.0 * a)

@@ -6,13 +6,11 @@ from bridgegen.arrays import Float
 from bridgegen.metrics.drac import MOST
 from bridgegen.metrics.metric import Metric, recorded, without_failed
 from bridgegen.metrics.motion import motion
+from bridgegen.physics import GRIP
 from bridgegen.simulation.rollout import Rollout
 
-AVAILABLE = 0.85 * 9.81
-"""[m/s²] What brakes and tyres give on dry asphalt (Wong, Theory of Ground Vehicles, table 1.3)."""
 
-
-def btn(rollout: Rollout, available: float = AVAILABLE) -> Float:
+def btn(rollout: Rollout, available: float = GRIP) -> Float:
     """Return the ego's largest brake threat number.
 
     It is the required longitudinal acceleration over the available one. Required is the least
@@ -26,7 +24,7 @@ def btn(rollout: Rollout, available: float = AVAILABLE) -> Float:
 
     Args:
         rollout: N scenarios.
-        available: [m/s²] deceleration that is at most available, > 0.
+        available: [m/s²] deceleration that is at most available, > 0; on dry asphalt by default.
 
     Returns:
         ``(N,)`` float64, ≥ 0; from 1 on braking alone did not suffice; a required deceleration of

@@ -6,10 +6,11 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.metrics.metric import Metric, recorded, steps, without_failed
+from bridgegen.physics import HARD_BRAKING
 from bridgegen.simulation.rollout import Rollout
 
 
-def n_brake(rollout: Rollout, threshold: float = 4.9) -> Float:
+def n_brake(rollout: Rollout, threshold: float = HARD_BRAKING) -> Float:
     """Return how often the ego's deceleration rose to the threshold.
 
     Args:
@@ -37,7 +38,7 @@ def n_brake(rollout: Rollout, threshold: float = 4.9) -> Float:
 METRIC = Metric(
     name="n_brake",
     unit="count",
-    description="rising edges of the ego's deceleration through 4.9 m/s²",
+    description=f"rising edges of the ego's deceleration through {HARD_BRAKING:g} m/s²",
     sense="larger",
     cap=0.0,
     compute=n_brake,

@@ -18,15 +18,13 @@ from bridgegen.odd.rules import speeds_of
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.story import Adversary, EventSpec, Participant, SpeedChange, Story
 from bridgegen.participants import PARTICIPANTS
+from bridgegen.physics import GRIP
 
 PERIOD = 0.5
 """Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
 
 MARGIN = 0.1
 """Metres that its body keeps to the edges of its lane: it overshoots by a centimetre at times."""
-
-GRIP = 0.85 * 9.81
-"""What tyres hold on a dry road [m/s²]; see `bridgegen.odd.rules`."""
 
 
 def first_speed(adversary: Adversary, values: Mapping[str, float]) -> float:

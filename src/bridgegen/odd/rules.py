@@ -10,12 +10,10 @@ from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Bound, Parameter
 from bridgegen.odd.roads import Quantity, RoadsSpec
 from bridgegen.odd.story import Participant, SpeedChange, Story
+from bridgegen.physics import DRY_FRICTION, GRAVITY
 
-GRIP = "0.85*9.81"
-"""Greatest lateral acceleration of a tyre on a dry road [m/s²].
-
-Source: peak friction of a tyre on dry asphalt, 0.8 to 0.9: Wong, Theory of Ground Vehicles, 1.3.
-"""
+GRIP_FORMULA = f"{DRY_FRICTION}*{GRAVITY}"
+"""Greatest lateral acceleration of a tyre on a dry road [m/s²], as a part of a formula."""
 
 STRAIGHT = 45.0
 """A route that turns by less goes straight on [deg]."""
@@ -28,7 +26,7 @@ _SPEED_SOURCE = (
 _BEND_WHY = "Nobody drives through a bend faster than the tyres hold."
 _BEND_SOURCE = (
     "Paper, Section III-B (the road constrains participants' speed and path); v² <= μ·g·R with "
-    "0.85 on a dry road, Wong, Theory of Ground Vehicles, table 1.3."
+    f"{DRY_FRICTION} on a dry road, Wong, Theory of Ground Vehicles, table 1.3."
 )
 _CLOSED_WHY = "The road that the scenario takes place on is closed in such weather."
 _CLOSED_SOURCE = "Paper, Section III-B (heavy fog or rain restricts roads); the road's own limit."
@@ -59,7 +57,7 @@ def bounds_between_layers(
         if radius is None:
             continue
         friction = _least([f"{prefix}friction" for prefix in weathers])
-        hi = parse(f"sqrt({GRIP} * {friction} * ({radius}))")
+        hi = parse(f"sqrt({GRIP_FORMULA} * {friction} * ({radius}))")
         for name in sorted(_speeds_of(one, story) & parameters.keys()):
             yield Bound(name, None, hi, _BEND_WHY, _BEND_SOURCE, place)
     for name, limit in roads.closes.items():

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 
 from bridgegen.odd.expression import parse
 from bridgegen.odd.kinds import TOLERANCE
-from bridgegen.odd.rules import GRIP, STRAIGHT
+from bridgegen.odd.rules import STRAIGHT
 from bridgegen.ontology.rule import Rule, about, called, is_a, shown, slack, with_unit
 from bridgegen.ontology.sparql import binds, literal
+from bridgegen.physics import DRY_FRICTION, GRAVITY, GRIP
 
 _PAPER = "BridgeGen paper, Section III-B"
 _SLACK = literal(TOLERANCE)
-_GRIP = literal(float(parse(GRIP).evaluate({})))
+_GRIP = literal(GRIP)
 _PARTICIPANT = "$this bg:has_participant ?value ."
 _DOES = "(bg:has_init_action|^bg:has_who/bg:has_what)"
 _ROUTE = "bg:has_route/(bg:has_start|bg:has_destination)"
@@ -193,11 +194,11 @@ def _bend(key: str, curvature: str, needs: tuple[str, ...]) -> Rule:
     slower = "(?speed - (1.0e0 + ?speed) * " + _SLACK + ")"
     return about(
         key, "Scenario", "has_target_speed",
-        "must keep v² <= 0.85·9.81·friction·R in a bend of R = {?radius} m with friction = {?mu}, "
-        "got {?got}",
+        f"must keep v² <= {DRY_FRICTION}·{GRAVITY}·friction·R in a bend of R = {{?radius}} m with "
+        "friction = {?mu}, got {?got}",
         "Nobody drives through a bend faster than the tyres hold.",
-        f"{_PAPER} (the road constrains participants' speed and path); 0.85 on a dry road, Wong, "
-        "Theory of Ground Vehicles, table 1.3",
+        f"{_PAPER} (the road constrains participants' speed and path); {DRY_FRICTION} on a dry "
+        "road, Wong, Theory of Ground Vehicles, table 1.3",
         f"SELECT $this ?value ({shown('MAX(?speed)')} AS ?got) "
         f"({shown('1.0e0 / MAX(?sharp)')} AS ?radius) "
         f"({shown('COALESCE(MIN(?friction), 1.0e0)')} AS ?mu) "

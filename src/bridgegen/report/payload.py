@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Bool
+from bridgegen.physics import HARD_BRAKING
 from bridgegen.report import convergence, sentences
 from bridgegen.report.data import Column, Evaluations, ReportData
 from bridgegen.report.findings_payload import findings_payload, implausible_payload
@@ -125,6 +126,7 @@ def _summary(data: ReportData) -> dict[str, Any]:
         "command": s.command,
         "view": s.view,
         "critical_distance": _number(s.critical_distance),
+        "hard_braking": HARD_BRAKING,
         "harm": s.harm,
     }
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridgegen import weather as laws
 from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.odd.expression import parse
 from bridgegen.odd.reader import load
@@ -206,13 +207,13 @@ def at(formula, x):
 @pytest.mark.parametrize(
     ("formula", "x", "value"),
     [
-        (weather.RAIN, 0.0, 0.0),
-        (weather.RAIN, 50.0, 0.1 * math.sqrt(500)),
-        (weather.RAIN, 100.0, 50.0),
-        (weather.VISIBILITY, 0.0, 10_000.0),
-        (weather.VISIBILITY, 100.0, 50.0),
-        (weather.WIND, 0.0, 0.0),
-        (weather.WIND, 100.0, 20.0),  # Beaufort 8, a gale: 17.2 to 20.7 m/s
+        (laws.RAIN.formula, 0.0, 0.0),
+        (laws.RAIN.formula, 50.0, 0.1 * math.sqrt(500)),
+        (laws.RAIN.formula, 100.0, 50.0),
+        (laws.VISIBILITY.formula, 0.0, 10_000.0),
+        (laws.VISIBILITY.formula, 100.0, 50.0),
+        (laws.WIND.formula, 0.0, 0.0),
+        (laws.WIND.formula, 100.0, 20.0),  # Beaufort 8, a gale: 17.2 to 20.7 m/s
         (weather.ELEVATION, -90.0, -math.pi / 2),
         (weather.AZIMUTH, 90.0, math.pi / 2),
         (weather.AZIMUTH, -31.25, 2 * math.pi - math.radians(31.25)),

@@ -12,7 +12,6 @@ import { FONT, fitCanvas } from "./view.js";
 const FAR = 20; // m
 const LATE = 10; // s
 const CURVE_FONT = FONT.replace("600 12px", "11.5px");
-const HARD = 4.9; // m/s², what the metric n_brake counts
 
 export function roundStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
@@ -43,7 +42,7 @@ export class Curves {
     this.still = null;
     this.strip = new Strip(kept);
     this.canvas.style.setProperty("--strip", `${this.strip.height}px`);
-    const players = playersOf(kept), critical = data.summary.critical_distance;
+    const players = playersOf(kept), { critical_distance: critical, hard_braking: hard } = data.summary;
     const line = (values, e = null) => ({
       values, colour: () => (e === null ? palette.ink : colourOf(kept, e)), dashes: e === null ? [] : DASHES[players.indexOf(e) % DASHES.length],
       name: e === null ? "" : kept.entities[e].name,
@@ -68,7 +67,7 @@ export class Curves {
       const low = Math.min(-1, ...all) * 1.1, high = Math.max(1, ...all) * 1.1;
       panels.push({
         title: "acceleration", unit: "m/s²", lines: players.map((e) => line(kept.a[e], e)), low, high, steps: true,
-        mark: low < -HARD ? [-HARD, `hard braking below −${HARD} m/s²`] : null,
+        mark: low < -hard ? [-hard, `hard braking below −${hard} m/s²`] : null,
       });
     }
     this.panels = panels;

@@ -1,8 +1,8 @@
 """CARLA's fourteen weather parameters, from the storyboard.
 
 Exported files contain eleven of them as properties of their road condition, from the ontology with
-the paper's couplings. In other files, they are computed from the physical quantities by the inverse
-of ``openx.openscenario.from_owl.weather``; quantities that OpenSCENARIO does not have (puddles,
+the paper's couplings. In other files, they are computed from the physical quantities by the laws of
+``bridgegen.weather``; quantities that OpenSCENARIO does not have (puddles,
 fog distance) follow from the same couplings. Three that the paper does not have, on the scattering
 of light, are those of CARLA's presets; there is no dust.
 """
@@ -36,6 +36,8 @@ from bridgegen.simulation.embedded._codes import (
     WEATHER_CHANGE,
 )
 from bridgegen.simulation.embedded.program import Program
+from bridgegen.weather import RAIN as RAINFALL
+from bridgegen.weather import VISIBILITY
 
 if TYPE_CHECKING:
     import carla
@@ -63,9 +65,6 @@ PRESET = {
     "rayleigh_scattering_scale": 0.0331, "dust_storm": 0.0, "wind_intensity": 10.0,
 }  # fmt: skip
 """Of CARLA's ClearNoon, the default."""
-
-_CLEAR, _THICK = 1e4, 200.0  # m: visibility without fog; and how many times less at 100 %
-_DRIZZLE, _CLOUDBURST = 0.1, 500.0  # mm/h: just above 0 %; and how many times more at 100 %
 
 
 @dataclass(frozen=True)
@@ -154,11 +153,8 @@ def of_quantities(physical: Float) -> dict[str, float]:
     Args:
         physical: ``(STATED,)`` or more, see ``bridgegen.ego._weather_columns``.
     """
-    sees, rain = float(physical[VISUAL_RANGE]), float(physical[RAIN])
-    fog = 100.0 * math.log(_CLEAR / max(sees, 1e-3)) / math.log(_THICK)
-    precipitation = 0.0
-    if rain > 0.0:
-        precipitation = 100.0 * math.log(rain / _DRIZZLE) / math.log(_CLOUDBURST)
+    fog = 100.0 * VISIBILITY.share(float(physical[VISUAL_RANGE]))
+    precipitation = 100.0 * RAINFALL.share(float(physical[RAIN]))
     fog, precipitation = (min(max(one, 0.0), 100.0) for one in (fog, precipitation))
     deposits = max(min(5 / 3 * precipitation, 50 + 4 / 7 * (precipitation - 30)), 0.0)
     return {

@@ -2,8 +2,7 @@
 
 The ontology keeps the paper's weather parameters (percent and degrees, as CARLA has them); the
 standard wants physical quantities. A bound parameter is converted by an expression in the file, so
-it stays searchable. OpenSCENARIO 1.2 knows ``+ - * /``, ``round floor ceil sqrt pow`` and nothing
-more (no sine, no maximum, no comparison), hence the shape of the formulas. What has no expression
+it stays searchable; `bridgegen.weather.Law` says what expressions know. What has no expression
 (classes, a time of day) is declared as a parameter of text, made from the present values.
 
 The originals are kept too, as properties of the road condition, for readers that know them.
@@ -17,17 +16,7 @@ from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
 from bridgegen.openx.openscenario.values import format_double
-
-RAIN = "0.1*pow(500,x/100)*ceil(x/100)"
-"""Intensity [mm/h] of precipitation [%]: 0.1·500^(p/100), from drizzle to a cloudburst of 50 mm/h;
-none at 0. CARLA publishes no unit; ours, log-linear as rain rates are distributed."""
-
-VISIBILITY = "10000/pow(200,x/100)"
-"""Meteorological optical range [m] of fog density [%]: 10⁴·200^(−f/100), from clear (10 km) to
-thick fog (50 m). CARLA publishes no unit; ours, in the steps of WMO's visibility code."""
-
-WIND = "0.2*x"
-"""Speed [m/s] of wind intensity [%]: 20 m/s, a gale, at 100 %. CARLA publishes no unit; ours."""
+from bridgegen.weather import RAIN, VISIBILITY, WIND
 
 ELEVATION = "x*0.017453292519943295"
 """Elevation [rad] of the sun's altitude angle [deg]."""
@@ -136,13 +125,15 @@ def _weather(
             illuminance=apply(ILLUMINANCE, altitude),
         )
     if "fog_density" in found:
-        fog = osc.Fog(apply(VISIBILITY, found["fog_density"]))
+        fog = osc.Fog(apply(VISIBILITY.formula, found["fog_density"]))
     if "precipitation" in found:
-        rain = osc.Precipitation(osc.PrecipitationType.RAIN, apply(RAIN, found["precipitation"]))
+        rain = osc.Precipitation(
+            osc.PrecipitationType.RAIN, apply(RAIN.formula, found["precipitation"])
+        )
     if "snowfall" in found:
         rain = osc.Precipitation(osc.PrecipitationType.SNOW, found["snowfall"])
     if "wind_intensity" in found:
-        wind = osc.Wind(direction=0.0, speed=apply(WIND, found["wind_intensity"]))
+        wind = osc.Wind(direction=0.0, speed=apply(WIND.formula, found["wind_intensity"]))
     return osc.Weather(cover, sun=sun, fog=fog, precipitation=rain, wind=wind)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from bridgegen.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.weather import RAIN
 
 CLEAR = osc.Environment(
     "environment",
@@ -137,8 +138,8 @@ def _precipitation(
     rate: Any = new.precipitation_intensity
     if share is not None:
         share /= 100.0
-    elif rate is not None:  # [mm/h], by the formula of `from_owl.weather.RAIN`
-        share = min(max(math.log(rate / 0.1, 500), 0.0), 1.0) if rate > 0.0 else 0.0
+    elif rate is not None:  # [mm/h]
+        share = min(max(RAIN.share(rate), 0.0), 1.0)
     else:
         share = new.intensity or 0.0
     if kind is osc.PrecipitationType.DRY or share <= 0.0:

@@ -1,8 +1,8 @@
 """OpenSCENARIO2OWL, its weather: from the standard's units to CARLA's percentages and degrees.
 
 Our files keep the originals as properties of the road condition; where these are, they count. From
-other people's files the formulas of `bridgegen.openx.openscenario.from_owl.weather` are solved for
-the percentage; what lies beyond its 0 to 100 the comparison of the whole finds.
+other people's files the laws of `bridgegen.weather` are solved for the percentage; what lies beyond
+its 0 to 100 the comparison of the whole finds.
 """
 
 import math
@@ -14,6 +14,7 @@ import pyoxigraph as ox
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.weather import PROPERTIES
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, shortest
+from bridgegen.weather import RAIN, VISIBILITY, WIND
 
 CLASSES = {
     "has_rain": "Rain",
@@ -121,12 +122,12 @@ def _solved(builder: StoryBuilder, environment: osc.Environment) -> dict[str, di
         if state in _CLOUDS:
             found["has_cloud"] = {"has_cloudiness": _CLOUDS[state]}
     if weather.fog is not None:
-        sight = max(now(weather.fog.visual_range, weather.fog), 1.0)
-        found["has_fog"] = {"has_fog_density": _percent(math.log(1e4 / sight, 200))}
+        sight = now(weather.fog.visual_range, weather.fog)
+        found["has_fog"] = {"has_fog_density": _percent(VISIBILITY.share(sight))}
     found |= _falling(builder, weather.precipitation)
     if weather.wind is not None:
         speed = now(weather.wind.speed, weather.wind)
-        found["has_wind"] = {"has_wind_intensity": _percent(speed / 20.0)}
+        found["has_wind"] = {"has_wind_intensity": _percent(WIND.share(speed))}
     if weather.sun is not None:
         angles = (
             ("altitude", weather.sun.elevation),
@@ -154,7 +155,7 @@ def _falling(builder: StoryBuilder, one: osc.Precipitation | None) -> dict[str, 
     rate = builder.now(one.precipitation_intensity, one)
     if kind is osc.PrecipitationType.DRY or rate <= 0.0:
         return {"has_rain": {"has_precipitation": 0.0}} if kind is not kind.DRY else {}
-    return {"has_rain": {"has_precipitation": _percent(math.log(rate / 0.1, 500))}}
+    return {"has_rain": {"has_precipitation": _percent(RAIN.share(rate))}}
 
 
 def _percent(share: float) -> float:

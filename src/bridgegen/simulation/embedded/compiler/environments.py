@@ -22,6 +22,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.embedded.program import UNSAID
+from bridgegen.weather import rain_formula
 
 _CLOUDINESS = (
     "cloudiness"  # property of our files' road condition: percent, where classes are coarse
@@ -88,7 +89,7 @@ class Environments:
             rate = falling.precipitation_intensity
         elif falling.intensity is not None:  # 1.0's share of the most: as a percentage is to us
             share = f"({_bare(falling.intensity)})"
-            rate = Expr(f"${{0.1*pow(500,{share})*ceil({share})}}")
+            rate = Expr(f"${{{rain_formula(share)}}}")
         kind = self._tables.choice(osc.PrecipitationType, falling.precipitation_type)
         none = self._tables.slot(0.0)
         row[RAIN] = row[SNOW] = none

@@ -1,0 +1,34 @@
+"""Physical constants that several stages share, each stated once, with its unit and source.
+
+Kernels freeze them; ``kernel_cache`` counts this module as a source of theirs.
+"""
+
+GRAVITY = 9.81
+"""[m/s²]"""
+
+DRY_FRICTION = 0.85
+"""[1] Peak friction of a tyre on dry asphalt, 0.8 to 0.9.
+
+Source: Wong, Theory of Ground Vehicles, table 1.3."""
+
+GRIP = DRY_FRICTION * GRAVITY
+"""[m/s²] What a tyre gives on a dry road, in any direction."""
+
+HARD_BRAKING = 4.9
+"""[m/s²] Deceleration from which on braking is hard. Source: paper, Table I."""
+
+CAREFUL_REACTION = 0.75
+"""[s] From the risk until a careful driver begins to brake.
+
+Source: UN R157, Annex 3, performance model."""
+
+CAREFUL_BRAKING_G = 0.774
+"""[g] What a careful driver brakes by at most. Source: as for ``CAREFUL_REACTION``."""
+
+CAREFUL_BRAKING = CAREFUL_BRAKING_G * GRAVITY
+"""[m/s²] The same."""
+
+CAREFUL_JERK = 12.65
+"""[m/s³] How fast a careful driver's deceleration rises: to its most in 0.6 s.
+
+Source: as for ``CAREFUL_REACTION``."""
