@@ -86,9 +86,10 @@ def test_a_constant_that_kernels_take_from_elsewhere_counts(tmp_path):
     shutil.copytree(Path(bridgegen.__file__).parent, tmp_path / "bridgegen")
     environment = {"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)}
     named = result(begin(SOURCES, **environment)).split()
-    assert {"_rollout_kernels.py", "_codes.py", "kinds.py", "physics.py"} <= set(named)
+    assert {"_rollout_kernels.py", "_codes.py", "kinds.py"} <= set(named)
+    assert {"detections.py", "physics.py", "weather.py"} <= set(named)
     before = folder(**environment)
-    for name in ("ego/detections.py", "physics.py"):
+    for name in ("ego/detections.py", "physics.py", "weather.py"):
         source = tmp_path / "bridgegen" / name
         source.write_text(source.read_text("utf-8") + "\nANOTHER = 1.0\n", "utf-8")
         after = folder(**environment)

@@ -29,6 +29,7 @@ from bridgegen.ego._physics_kernels import (
 from bridgegen.ego._weather_columns import (
     ATTENUATION,
     BACKGROUND,
+    CLEAR_DAY,
     CLOUD,
     EXTINCTION,
     FRICTION,
@@ -47,9 +48,6 @@ from bridgegen.ego._weather_columns import (
     VISUAL_RANGE,
 )
 from bridgegen.physics import GRIP
-
-CLEAR_DAY = (10_000.0, 0.0, 0.0, math.pi, math.radians(45.0), -1.0, 0.0, 1.0)
-"""What is stated where a file states nothing: WMO's clear air, the sun in the south at 45°."""
 
 
 @kernel

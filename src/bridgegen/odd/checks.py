@@ -17,24 +17,15 @@ from bridgegen.odd.rules import cap, speeds_of
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import probes
 from bridgegen.participants import PARTICIPANTS
+from bridgegen.weather import PARAMETERS
 
 MAX_STEPS = 100_000
 
-# What the weather is made of: every scenario has these, in these units.
-NEEDED = {
-    "precipitation": "%",
-    "precipitation_deposits": "%",
-    "cloudiness": "%",
-    "wind_intensity": "%",
-    "fog_density": "%",
-    "fog_distance": "m",
-    "fog_falloff": "1",
-    "sun_altitude_angle": "deg",
-    "sun_azimuth_angle": "deg",
-    "wetness": "%",
-    "friction": "1",
-    "speed_factor": "1",
+NEEDED = {one.name: one.unit for one in PARAMETERS.values() if one.is_declared} | {
+    "speed_factor": "1"
 }
+"""What the weather is made of, and its effect on speeds: every scenario has these, in these units.
+"""
 
 _CLEARANCE = 0.4
 """Between the boxes of two that start in one lane [m]."""

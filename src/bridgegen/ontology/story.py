@@ -22,16 +22,14 @@ from bridgegen.ontology.builder import Builder
 from bridgegen.ontology.roads import lane_name, road_name
 from bridgegen.ontology.site import Site
 from bridgegen.participants import PARTICIPANTS
+from bridgegen.weather import PARTS
 
-WEATHER = (
-    ("has_rain", "Rain", ("precipitation", "precipitation_deposits")),
-    ("has_cloud", "Cloud", ("cloudiness",)),
-    ("has_wind", "Wind", ("wind_intensity",)),
-    ("has_fog", "Fog", ("fog_density", "fog_distance", "fog_falloff")),
-    ("hasSun", "Sun", ("sun_altitude_angle", "sun_azimuth_angle")),
-    ("has_road_state", "RoadState", ("wetness", "friction")),
+WEATHER = tuple(
+    (part.link, part.owl_class, names)
+    for part, parameters in PARTS.items()
+    if (names := tuple(one.name for one in parameters if one.is_declared))
 )
-"""The parts of the weather; each parameter's data property is ``has_`` and its name."""
+"""The parts of the weather that scenario files describe: link, class, parameters."""
 
 CONDITIONS = {
     "time": "SimulationTimeCondition",

@@ -13,13 +13,14 @@ from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.carla.weather import RANGES, Weather, clamped, of_quantities
+from bridgegen.simulation.carla.weather import Weather, clamped, of_quantities
 from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.weather import CARLA_FIELDS
 
 from ..embedded.storyboards import crossroads, lane, scenario, start
 from ..embedded.test_weathers import raining, weather_event
 
-FIELDS = [name for name in dir(carla.WeatherParameters()) if name in RANGES]
+FIELDS = [name for name in dir(carla.WeatherParameters()) if name in CARLA_FIELDS]
 FROM_ONTOLOGY = (
     "cloudiness", "precipitation", "precipitation_deposits", "wind_intensity", "fog_density",
     "fog_distance", "fog_falloff", "wetness", "sun_altitude_angle", "sun_azimuth_angle",
@@ -45,8 +46,8 @@ def row(pipeline):
 
 
 def test_all_fourteen_fields_are_carlas():
-    assert len(RANGES) == 14
-    assert sorted(FIELDS) == sorted(RANGES)
+    assert len(CARLA_FIELDS) == 14
+    assert sorted(FIELDS) == sorted(CARLA_FIELDS)
 
 
 @given(u=st.lists(st.floats(0.0, 1.0), min_size=30, max_size=30))
@@ -54,8 +55,8 @@ def test_every_field_is_in_its_range_and_what_the_ontology_says(pipeline, u):
     space = pipeline.space
     values = space.values(space.decode(np.array([u[: space.n_var]]))[0])
     sky = sky_of(pipeline, values)
-    for name, (low, high) in RANGES.items():
-        assert low <= sky.fields[name] <= high, name
+    for name, field in CARLA_FIELDS.items():
+        assert field.low <= sky.fields[name] <= field.high, name
     for name in FROM_ONTOLOGY:
         expected = values[name] % 360.0 if name == "sun_azimuth_angle" else values[name]
         assert sky.fields[name] == pytest.approx(expected, abs=1e-9), name
@@ -97,9 +98,9 @@ def without_properties(storyboard):
 
 def test_what_is_out_of_range_is_brought_into_it():
     fields = of_quantities(np.array([1.0, 200.0, 0.0, -3.0, 2.0, -1.0, 1.5, 1.0]))
-    for one in (clamped(fields), clamped(dict.fromkeys(RANGES, 1000000.0))):
-        for name, (low, high) in RANGES.items():
-            assert low <= one[name] <= high
+    for one in (clamped(fields), clamped(dict.fromkeys(CARLA_FIELDS, 1e6))):
+        for name, field in CARLA_FIELDS.items():
+            assert field.low <= one[name] <= field.high
     assert clamped(fields)["sun_azimuth_angle"] == pytest.approx(360 - np.degrees(3.0))
 
 

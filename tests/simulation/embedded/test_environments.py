@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from bridgegen.ego import _weather_columns as column
-from bridgegen.ego._weather_kernels import CLEAR_DAY
 from bridgegen.errors import UnsupportedError
 from bridgegen.odd.reader import load
 from bridgegen.openx.openscenario.from_owl.weather import time_of_day
@@ -37,7 +36,7 @@ def felt(environment: str, parameters: str = "", **values: list[float]) -> np.nd
 
 
 def test_a_file_without_weather_has_a_clear_day():
-    assert felt("")[0, : column.STATED].tolist() == list(CLEAR_DAY)
+    assert felt("")[0, : column.STATED].tolist() == list(column.CLEAR_DAY)
 
 
 def test_the_standard_s_own_elements_are_read():
@@ -89,6 +88,15 @@ frictionScaleFactor="0.7"><Properties><Property name="cloudiness" value="{}"/></
     found = felt(action(inner.format("$c")), declared, c=[37.0, 80.0])
     assert found[:, column.CLOUD].tolist() == [0.37, 0.8]
     assert (found[:, column.FRICTION] == 0.85 * 9.81 * 0.7).all()
+
+
+def test_the_last_environment_of_the_start_counts():
+    said = """<RoadCondition frictionScaleFactor="0.7"><Properties>
+<Property name="cloudiness" value="61"/></Properties></RoadCondition>"""
+    classes = action('<Weather fractionalCloudCover="twoOktas"/>')
+    first, last = (felt(text)[0] for text in (action(said) + classes, classes + action(said)))
+    assert (first[column.CLOUD], last[column.CLOUD]) == (0.25, 0.61)
+    assert first[column.FRICTION_SCALE] == last[column.FRICTION_SCALE] == 0.7
 
 
 def test_rows_vary_the_weather():

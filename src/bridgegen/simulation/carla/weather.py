@@ -7,21 +7,12 @@ fog distance) follow from the same couplings. Three that the paper does not have
 of light, are those of CARLA's presets; there is no dust.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bridgegen.arrays import Float, Int
-from bridgegen.ego._weather_columns import (
-    CLOUD,
-    FRICTION_SCALE,
-    RAIN,
-    STATED,
-    SUN_AZIMUTH,
-    SUN_ELEVATION,
-    VISUAL_RANGE,
-)
+from bridgegen.ego._weather_columns import FRICTION_SCALE, STATED
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.openx.openscenario.values import Expr
@@ -36,35 +27,10 @@ from bridgegen.simulation.embedded._codes import (
     WEATHER_CHANGE,
 )
 from bridgegen.simulation.embedded.program import Program
-from bridgegen.weather import RAIN as RAINFALL
-from bridgegen.weather import VISIBILITY
+from bridgegen.weather import CARLA_FIELDS, CARLA_NAMES, COLUMNS, STATED_BY
 
 if TYPE_CHECKING:
     import carla
-
-RANGES: Mapping[str, tuple[float, float]] = {
-    "cloudiness": (0.0, 100.0),
-    "precipitation": (0.0, 100.0),
-    "precipitation_deposits": (0.0, 100.0),
-    "wind_intensity": (0.0, 100.0),
-    "sun_azimuth_angle": (0.0, 360.0),
-    "sun_altitude_angle": (-90.0, 90.0),
-    "fog_density": (0.0, 100.0),
-    "fog_distance": (0.0, math.inf),
-    "fog_falloff": (0.0, math.inf),
-    "wetness": (0.0, 100.0),
-    "scattering_intensity": (0.0, 100.0),
-    "mie_scattering_scale": (0.0, 5.0),
-    "rayleigh_scattering_scale": (0.0, 2.0),
-    "dust_storm": (0.0, 100.0),
-}
-"""What each may be. CARLA's client passes on whatever it is given."""
-
-PRESET = {
-    "scattering_intensity": 1.0, "mie_scattering_scale": 0.03,
-    "rayleigh_scattering_scale": 0.0331, "dust_storm": 0.0, "wind_intensity": 10.0,
-}  # fmt: skip
-"""Of CARLA's ClearNoon, the default."""
 
 
 @dataclass(frozen=True)
@@ -135,9 +101,9 @@ class Weather:
         for environment in environments:
             road = environment.road_condition
             for one in road.properties.properties if road and road.properties else ():
-                name = str(one.name)
-                if name in RANGES and (value := self._number(one.value)) is not None:
-                    said[name] = value
+                field = CARLA_NAMES.get(str(one.name))
+                if field is not None and (value := self._number(one.value)) is not None:
+                    said[field] = value
         return said
 
     def _number(self, value: object) -> float | None:
@@ -153,32 +119,34 @@ def of_quantities(physical: Float) -> dict[str, float]:
     Args:
         physical: ``(STATED,)`` or more, see ``bridgegen.ego._weather_columns``.
     """
-    fog = 100.0 * VISIBILITY.share(float(physical[VISUAL_RANGE]))
-    precipitation = 100.0 * RAINFALL.share(float(physical[RAIN]))
-    fog, precipitation = (min(max(one, 0.0), 100.0) for one in (fog, precipitation))
+    found = {name: one.preset for name, one in CARLA_FIELDS.items() if one.preset is not None}
+    for index, column in enumerate(COLUMNS):
+        parameter = STATED_BY.get(column.name)
+        if parameter is None or not parameter.carla:
+            continue
+        value = parameter.law.inverse(float(physical[index]))
+        if parameter.unit == "%":
+            value = min(max(value, 0.0), 100.0)
+        found[parameter.carla] = value
+    fog, precipitation = found["fog_density"], found["precipitation"]
     deposits = max(min(5 / 3 * precipitation, 50 + 4 / 7 * (precipitation - 30)), 0.0)
     return {
-        **PRESET,
-        "cloudiness": 100.0 * float(physical[CLOUD]),
-        "precipitation": precipitation,
+        **found,
         "precipitation_deposits": deposits,
         "wetness": 100.0 * (1.0 - (1.0 - deposits / 100.0) ** 2),
-        "fog_density": fog,
         "fog_distance": 100.0 - fog,
         "fog_falloff": 0.05 * fog,
-        "sun_altitude_angle": math.degrees(float(physical[SUN_ELEVATION])),
-        "sun_azimuth_angle": math.degrees(float(physical[SUN_AZIMUTH])),
     }
 
 
 def clamped(fields: Mapping[str, float]) -> dict[str, float]:
     """Return parameters within their ranges; an azimuth goes round."""
     result = {}
-    for name, (low, high) in RANGES.items():
+    for name, field in CARLA_FIELDS.items():
         value = fields[name]
         if name == "sun_azimuth_angle":
             value %= 360.0
-        result[name] = float(min(max(value, low), high))
+        result[name] = float(min(max(value, field.low), field.high))
     return result
 
 

@@ -9,6 +9,9 @@ The originals are kept too, as properties of the road condition, for readers tha
 """
 
 import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
 from bridgegen.errors import OntologyError
 from bridgegen.ontology.graph import Individuals
@@ -16,34 +19,15 @@ from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
 from bridgegen.openx.openscenario.values import format_double
-from bridgegen.weather import RAIN, VISIBILITY, WIND
+from bridgegen.weather import PARAMETERS, PARTS, PHYSICAL, SAME
 
-ELEVATION = "x*0.017453292519943295"
-"""Elevation [rad] of the sun's altitude angle [deg]."""
-
-AZIMUTH = "(x/360-floor(x/360))*6.283185307179586"
-"""Azimuth [rad], 0 to 2π, of an angle [deg]."""
-
-ILLUMINANCE = "ceil(x/91)*400000*x*(180-x)/(40500-x*(180-x))"
-"""Illuminance on the ground [lx] of the sun's altitude angle [deg], without clouds: 100,000 lx (the
-standard's figure of direct sunlight) times the sine of the altitude, none below the horizon.
-The sine is Bhaskara I's, exact to 0.0017."""
-
-PROPERTIES = (
-    ("has_rain", ("has_precipitation", "has_precipitation_deposits")),
-    ("has_cloud", ("has_cloudiness",)),
-    ("has_wind", ("has_wind_intensity",)),
-    ("has_fog", ("has_fog_density", "has_fog_distance", "has_fog_falloff")),
-    ("hasSun", ("has_sun_altitude_angle", "has_sun_azimuth_angle")),
-    ("has_road_state", ("has_wetness", "has_friction")),
-    ("has_snow", ("has_snowfall",)),
-)
-"""The data properties of each part of the weather; a property's name loses its ``has_``."""
-
-_OPTIONAL = frozenset(
-    {"has_precipitation_deposits", "has_fog_distance", "has_fog_falloff", "has_wetness"}
-)
-"""What the standard's own elements do not say, so that a file of others may leave it open."""
+_ELEMENTS: Mapping[str, Callable[..., Any]] = {
+    "sun": osc.Sun,
+    "fog": osc.Fog,
+    "precipitation": osc.Precipitation,
+    "wind": partial(osc.Wind, direction=0.0),
+}
+"""Of the standard's Weather, made of their attributes; the ontology knows no direction of wind."""
 
 CLOUD_COVER = "fractional_cloud_cover"
 ROAD_WETNESS = "road_wetness"
@@ -66,15 +50,15 @@ def environment(
         OntologyError: a part of the weather lacks a property, or it rains and snows at once.
     """
     found: dict[str, Quantity] = {}
-    for link, names in PROPERTIES:
-        part = individuals.optional_link(weather, link)
-        if part is not None:
-            said = [
-                one
-                for one in names
-                if one not in _OPTIONAL or individuals.optional_number(part, one) is not None
-            ]
-            found |= {one.removeprefix("has_"): quantities.get(part, one) for one in said}
+    for part, parameters in PARTS.items():
+        node = individuals.optional_link(weather, part.link)
+        if node is not None:
+            found |= {
+                one.name: quantities.get(node, one.owl_property)
+                for one in parameters
+                if one.is_required
+                or individuals.optional_number(node, one.owl_property) is not None
+            }
     if "precipitation" in found and "snowfall" in found:
         raise OntologyError(
             f"{individuals.describe(weather)} must have has_rain or has_snow, not both"
@@ -115,26 +99,19 @@ def environment(
 def _weather(
     found: dict[str, Quantity], cover: osc.ParameterRef | None, quantities: Quantities
 ) -> osc.Weather:
-    apply = quantities.apply
-    sun = fog = rain = wind = None
-    if "sun_altitude_angle" in found:
-        altitude = found["sun_altitude_angle"]
-        sun = osc.Sun(
-            azimuth=apply(AZIMUTH, found["sun_azimuth_angle"]),
-            elevation=apply(ELEVATION, altitude),
-            illuminance=apply(ILLUMINANCE, altitude),
-        )
-    if "fog_density" in found:
-        fog = osc.Fog(apply(VISIBILITY.formula, found["fog_density"]))
-    if "precipitation" in found:
-        rain = osc.Precipitation(
-            osc.PrecipitationType.RAIN, apply(RAIN.formula, found["precipitation"])
-        )
-    if "snowfall" in found:
-        rain = osc.Precipitation(osc.PrecipitationType.SNOW, found["snowfall"])
-    if "wind_intensity" in found:
-        wind = osc.Wind(direction=0.0, speed=apply(WIND.formula, found["wind_intensity"]))
-    return osc.Weather(cover, sun=sun, fog=fog, precipitation=rain, wind=wind)
+    elements: dict[str, dict[str, Any]] = {}
+    for name, quantity in found.items():
+        for of, formula in PARAMETERS[name].formulas:
+            physical = PHYSICAL[of]
+            if physical.element not in _ELEMENTS:
+                continue
+            element = elements.setdefault(physical.element, {})
+            value = quantity if formula == SAME.formula else quantities.apply(formula, quantity)
+            element[physical.attribute] = value
+            if physical.element == "precipitation":
+                element["precipitation_type"] = osc.PrecipitationType(of)
+    made = {name: _ELEMENTS[name](**attributes) for name, attributes in elements.items()}
+    return osc.Weather(cover, **made)
 
 
 def cloud_cover(percent: float) -> osc.FractionalCloudCover:

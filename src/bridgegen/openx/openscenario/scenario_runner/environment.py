@@ -13,8 +13,9 @@ import math
 from typing import Any
 
 from bridgegen.errors import UnsupportedError
+from bridgegen.openx.openscenario import cloudiness as cloud_classes
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.weather import RAIN
+from bridgegen.weather import CARLA_FIELDS, CARLA_NAMES, rain_share
 
 CLEAR = osc.Environment(
     "environment",
@@ -29,20 +30,7 @@ CLEAR = osc.Environment(
 )
 """A clear noon, for what a scenario leaves open."""
 
-FIELDS = (
-    "cloudiness", "precipitation", "precipitation_deposits", "wind_intensity", "fog_density",
-    "fog_distance", "fog_falloff", "wetness", "sun_azimuth_angle", "sun_altitude_angle",
-    "scattering_intensity", "mie_scattering_scale", "rayleigh_scattering_scale", "dust_storm",
-)  # fmt: skip
-"""Of ``carla.WeatherParameters``; our files keep them as properties of the road condition."""
-
 _SECONDS = len("2025-06-21T12:00:00")
-_CLOUDS = {
-    osc.CloudState.FREE: 0.0,
-    osc.CloudState.CLOUDY: 50.0,
-    osc.CloudState.OVERCAST: 100.0,
-    osc.CloudState.RAINY: 100.0,
-}
 _FREE, _OVERCAST = 12.5, 87.5  # [%], an eighth, and all but one
 
 
@@ -79,8 +67,12 @@ def environment(new: osc.Environment, before: osc.Environment) -> osc.Environmen
 
 def carla_fields(environment: osc.Environment) -> dict[str, float]:
     """Return what an environment says of CARLA's own weather fields, by their names."""
-    said = _originals(environment)
-    found = {name: said[name] for name in FIELDS if name in said}
+    said = {
+        CARLA_NAMES[name]: value
+        for name, value in _originals(environment).items()
+        if name in CARLA_NAMES
+    }
+    found = {name: said[name] for name in CARLA_FIELDS if name in said}
     if "sun_azimuth_angle" in found:
         found["sun_azimuth_angle"] %= 360.0
     return found
@@ -104,9 +96,9 @@ def _cloudiness(weather: osc.Weather, new: osc.Environment) -> float | None:
         return said
     cover: Any = weather.fractional_cloud_cover
     if cover is not None:
-        return 12.5 * min(list(osc.FractionalCloudCover).index(cover), 8)
+        return cloud_classes.of_cover(cover)
     state: Any = weather.cloud_state
-    return _CLOUDS.get(state)
+    return cloud_classes.OF_STATE.get(state)
 
 
 def _cloud_state(cloudiness: float | None, raining: bool) -> osc.CloudState | None:
@@ -139,7 +131,7 @@ def _precipitation(
     if share is not None:
         share /= 100.0
     elif rate is not None:  # [mm/h]
-        share = min(max(RAIN.share(rate), 0.0), 1.0)
+        share = min(max(rain_share(rate), 0.0), 1.0)
     else:
         share = new.intensity or 0.0
     if kind is osc.PrecipitationType.DRY or share <= 0.0:

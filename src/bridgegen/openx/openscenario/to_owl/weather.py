@@ -11,28 +11,25 @@ from typing import Any
 
 import pyoxigraph as ox
 
+from bridgegen.openx.openscenario import cloudiness
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.from_owl.weather import PROPERTIES
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, shortest
-from bridgegen.weather import RAIN, VISIBILITY, WIND
+from bridgegen.weather import PARAMETERS, PARTS, PHYSICAL, Parameter
 
-CLASSES = {
-    "has_rain": "Rain",
-    "has_cloud": "Cloud",
-    "has_wind": "Wind",
-    "has_fog": "Fog",
-    "hasSun": "Sun",
-    "has_road_state": "RoadState",
-    "has_snow": "Snow",
-}
+CLASSES = {part.link: part.owl_class for part in PARTS}
 """The class of each part of the weather."""
 
-_CLOUDS = {
-    osc.CloudState.FREE: 0.0,
-    osc.CloudState.CLOUDY: 50.0,
-    osc.CloudState.OVERCAST: 100.0,
-    osc.CloudState.RAINY: 100.0,
+_STATED = {
+    element: [
+        one
+        for one in PARAMETERS.values()
+        if one.stands_for and PHYSICAL[one.stands_for].element == element
+    ]
+    for element in dict.fromkeys(one.element for one in PHYSICAL.values())
+    if element not in ("", "road_condition")
 }
+"""By element of the standard's Weather, the parameters that stand for its attributes."""
+
 _WETNESS = {
     osc.Wetness.DRY: 0.0,
     osc.Wetness.MOIST: 20.0,
@@ -58,10 +55,10 @@ def add_weather(
     """
     own = _originals(builder, environment.road_condition)
     found: dict[str, dict[str, Any]] = {}
-    for link, names in PROPERTIES:
-        said = {name: own[key] for name in names if (key := name.removeprefix("has_")) in own}
+    for part, parameters in PARTS.items():
+        said = {one.owl_property: own[one.name] for one in parameters if one.name in own}
         if said:
-            found[link] = said
+            found[part.link] = said
     for link, values in _solved(builder, environment).items():
         known = {"has_rain", "has_snow"} if link in ("has_rain", "has_snow") else {link}
         if not known & found.keys():
@@ -72,10 +69,10 @@ def add_weather(
     prefix = f"{event}_" if prefix is None else prefix
     node = builder.node(f"{prefix}weather", "Weather")
     for link, values in found.items():
-        part = builder.node(f"{prefix}weather_{CLASSES[link].lower()}", CLASSES[link])
-        builder.put(node, link, part)
+        individual = builder.node(f"{prefix}weather_{CLASSES[link].lower()}", CLASSES[link])
+        builder.put(node, link, individual)
         for name, value in values.items():
-            builder.number(part, name, value, environment)
+            builder.number(individual, name, value, environment)
     return node
 
 
@@ -93,11 +90,10 @@ def _prefix(found: Mapping[str, Mapping[str, Any]]) -> str | None:
 def _originals(builder: StoryBuilder, road: osc.RoadCondition | None) -> dict[str, Any]:
     if road is None or road.properties is None:
         return {}
-    known = {name.removeprefix("has_") for _, names in PROPERTIES for name in names}
     found: dict[str, Any] = {}
     for one in road.properties.properties:
         name = builder.text(one.name)
-        if name not in known:
+        if name not in PARAMETERS:
             continue
         if isinstance(one.value, osc.ParameterRef) and one.value.name in builder.numbers:
             found[name] = one.value
@@ -115,27 +111,19 @@ def _solved(builder: StoryBuilder, environment: osc.Environment) -> dict[str, di
     now, weather = builder.now, environment.weather or osc.Weather()
     if weather.fractional_cloud_cover is not None:
         cover = builder.choice(osc.FractionalCloudCover, weather.fractional_cloud_cover)
-        eighths = min(list(osc.FractionalCloudCover).index(cover), 8)
-        found["has_cloud"] = {"has_cloudiness": eighths * 12.5}
+        found["has_cloud"] = {"has_cloudiness": cloudiness.of_cover(cover)}
     elif weather.cloud_state is not None:
         state = builder.choice(osc.CloudState, weather.cloud_state)
-        if state in _CLOUDS:
-            found["has_cloud"] = {"has_cloudiness": _CLOUDS[state]}
-    if weather.fog is not None:
-        sight = now(weather.fog.visual_range, weather.fog)
-        found["has_fog"] = {"has_fog_density": _percent(VISIBILITY.share(sight))}
-    found |= _falling(builder, weather.precipitation)
-    if weather.wind is not None:
-        speed = now(weather.wind.speed, weather.wind)
-        found["has_wind"] = {"has_wind_intensity": _percent(WIND.share(speed))}
-    if weather.sun is not None:
-        angles = (
-            ("altitude", weather.sun.elevation),
-            ("azimuth", weather.sun.azimuth),
-        )
-        found["hasSun"] = {
-            f"has_sun_{name}_angle": _degrees(now(angle, weather.sun)) for name, angle in angles
-        }
+        if state in cloudiness.OF_STATE:
+            found["has_cloud"] = {"has_cloudiness": cloudiness.OF_STATE[state]}
+    for name, parameters in _STATED.items():
+        element = getattr(weather, name)
+        if name == "precipitation":
+            found |= _falling(builder, element)
+        elif element is not None:
+            for one in parameters:
+                value = now(getattr(element, PHYSICAL[one.stands_for].attribute), element)
+                found.setdefault(one.part.link, {})[one.owl_property] = _inverse(one, value)
     road = environment.road_condition
     if road is not None and (road.wetness is not None or road.friction_scale_factor != 1.0):
         state_of_road: dict[str, Any] = {"has_friction": road.friction_scale_factor}
@@ -155,12 +143,12 @@ def _falling(builder: StoryBuilder, one: osc.Precipitation | None) -> dict[str, 
     rate = builder.now(one.precipitation_intensity, one)
     if kind is osc.PrecipitationType.DRY or rate <= 0.0:
         return {"has_rain": {"has_precipitation": 0.0}} if kind is not kind.DRY else {}
-    return {"has_rain": {"has_precipitation": _percent(RAIN.share(rate))}}
+    return {"has_rain": {"has_precipitation": _inverse(PARAMETERS["precipitation"], rate)}}
 
 
-def _percent(share: float) -> float:
-    return min(max(share, 0.0), 1.0) * _MOST
-
-
-def _degrees(angle: float) -> float:
-    return shortest(math.degrees(angle), angle, math.radians)
+def _inverse(parameter: Parameter, value: float) -> float:
+    """Return the parameter that stands for a physical quantity, within what it can say."""
+    found = parameter.law.inverse(value)
+    if parameter.unit == "deg":
+        return shortest(found, value, math.radians)
+    return min(max(found, 0.0), _MOST)

@@ -5,32 +5,26 @@ What they do to sensors and tyres: ``bridgegen.ego._weather_kernels``.
 
 import math
 import re
+from typing import Any
 
 from bridgegen.arrays import Int
 from bridgegen.ego._weather_columns import (
     CLOUD,
-    FRICTION_SCALE,
     ILLUMINANCE,
     RAIN,
     SNOW,
     STATED,
     SUN_AZIMUTH,
     SUN_ELEVATION,
-    VISUAL_RANGE,
 )
+from bridgegen.odd.expression import parse
+from bridgegen.openx.openscenario import cloudiness
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.embedded.program import UNSAID
-from bridgegen.weather import rain_formula
+from bridgegen.weather import COLUMNS, STATED_BY, Parameter, Physical, rain_formula
 
-_CLOUDINESS = (
-    "cloudiness"  # property of our files' road condition: percent, where classes are coarse
-)
-_CLOUDS = {
-    osc.CloudState.FREE: 0.0, osc.CloudState.CLOUDY: 0.5,
-    osc.CloudState.OVERCAST: 1.0, osc.CloudState.RAINY: 1.0,
-}  # fmt: skip
 _TIME = re.compile(r"T(\d\d):(\d\d):(\d\d)")
 
 
@@ -62,26 +56,46 @@ class Environments:
 
     def _fill(self, row: list[int], environment: osc.Environment) -> None:
         sky = environment.weather or osc.Weather()
-        if sky.fog is not None:
-            if sky.fog.bounding_box is not None:
-                self._tables.unsupported(sky.fog.bounding_box, "the BoundingBox of a Fog")
-            row[VISUAL_RANGE] = self._tables.slot(sky.fog.visual_range)
+        if sky.fog is not None and sky.fog.bounding_box is not None:
+            self._tables.unsupported(sky.fog.bounding_box, "the BoundingBox of a Fog")
+        for index, column in enumerate(COLUMNS):
+            if column.element == "precipitation":
+                continue
+            value = self._stated(column, environment)
+            if value is None and index == CLOUD:
+                value = self._cover(sky)
+            if value is not None:
+                row[index] = self._tables.slot(value)
         if sky.precipitation is not None:
             self._fall(row, sky.precipitation)
-        if sky.sun is not None:
-            row[SUN_AZIMUTH] = self._tables.slot(sky.sun.azimuth)
-            row[SUN_ELEVATION] = self._tables.slot(sky.sun.elevation)
-            # ``intensity`` is lux in 1.0 and W/m² later, and a share in many files: not used.
-            stated = sky.sun.illuminance
-            row[ILLUMINANCE] = self._tables.slot(-1.0 if stated is None else stated)
-        elif environment.time_of_day is not None:
+        if sky.sun is None and environment.time_of_day is not None:
             self._time(row, environment.time_of_day)
-        cover = self._cover(sky, environment.road_condition)
-        if cover is not None:
-            row[CLOUD] = self._tables.slot(cover)
-        if environment.road_condition is not None:
-            scale = environment.road_condition.friction_scale_factor
-            row[FRICTION_SCALE] = self._tables.slot(scale)
+
+    def _stated(self, column: Physical, environment: osc.Environment) -> Value | None:
+        """Return what an environment states of a physical quantity; None if it states nothing."""
+        if not column.element:
+            return self._of_property(STATED_BY[column.name], environment.road_condition)
+        of_road = column.element == "road_condition"
+        holder = environment if of_road else environment.weather
+        element: Any = getattr(holder, column.element, None)
+        if element is None:
+            return None
+        # ``intensity`` of a Sun is lux in 1.0 and W/m² later, and a share in many files: not used.
+        value: Value | None = getattr(element, column.attribute)
+        return column.clear if value is None else value
+
+    def _of_property(self, one: Parameter, road: osc.RoadCondition | None) -> Value | None:
+        """Return the quantity of a parameter that our files say as a property, in percent."""
+        said = road.properties.get(one.name) if road and road.properties else None
+        if isinstance(said, osc.ParameterRef) and said.name in self._tables.parameters:
+            return Expr("${" + re.sub(r"\bx\b", said.text, one.law.formula) + "}")
+        if isinstance(said, str):
+            try:
+                percent = min(max(float(said), 0.0), 100.0)
+            except ValueError:
+                return None  # somebody else's property of that name
+            return float(parse(one.law.formula).evaluate({"x": percent}))
+        return None
 
     def _fall(self, row: list[int], falling: osc.Precipitation) -> None:
         rate: Value = 0.0
@@ -109,21 +123,15 @@ class Environments:
         row[SUN_AZIMUTH] = self._tables.slot(azimuth)
         row[ILLUMINANCE] = self._tables.slot(-1.0)
 
-    def _cover(self, sky: osc.Weather, road: osc.RoadCondition | None) -> Value | None:
-        """Return the share of the sky that clouds cover; None where nothing is said."""
-        percent = road.properties.get(_CLOUDINESS) if road and road.properties else None
-        if isinstance(percent, osc.ParameterRef) and percent.name in self._tables.parameters:
-            return Expr(f"${{{percent.text}/100}}")
-        if isinstance(percent, str):
-            try:
-                return min(max(float(percent) / 100.0, 0.0), 1.0)
-            except ValueError:
-                pass  # somebody else's property of that name
+    def _cover(self, sky: osc.Weather) -> Value | None:
+        """Return the share of the sky that clouds cover by classes; None where none is said."""
         if sky.fractional_cloud_cover is not None:
             cover = self._tables.choice(osc.FractionalCloudCover, sky.fractional_cloud_cover)
-            return min(list(osc.FractionalCloudCover).index(cover), 8) / 8
+            return cloudiness.of_cover(cover) / 100.0
         if sky.cloud_state is not None:
-            return _CLOUDS.get(self._tables.choice(osc.CloudState, sky.cloud_state))
+            state = self._tables.choice(osc.CloudState, sky.cloud_state)
+            if state in cloudiness.OF_STATE:
+                return cloudiness.OF_STATE[state] / 100.0
         return None
 
 
