@@ -257,8 +257,8 @@ def test_the_weather_is_the_simulator_s(show, fog):
     ((_, felt), *_) = weathers(fog.pipeline.simulator.program, columns, fog.rollout, 0)
     shown = state(page)["weather"]
     assert shown["visual_range"] == pytest.approx(felt[column.VISUAL_RANGE], rel=1e-3)
-    assert shown["sun"] == pytest.approx(math.radians(-30.0), rel=1e-3)
-    assert shown["friction"] == pytest.approx(felt[column.FRICTION_SCALE], rel=1e-3)
+    assert shown["sun_elevation"] == pytest.approx(math.radians(-30.0), rel=1e-3)
+    assert shown["friction_scale"] == pytest.approx(felt[column.FRICTION_SCALE], rel=1e-3)
     assert page.inner_text("#weather").startswith("night, fog, visibility")
     with_fog = page.evaluate(PIXELS)
     page.click("#legend [data-layer='weather'] button")

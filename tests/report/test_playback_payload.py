@@ -13,6 +13,7 @@ from bridgegen.participants import PARTICIPANTS
 from bridgegen.report.playback import Course, Sensed, Weather
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
 from bridgegen.report.series import unpacked
+from bridgegen.weather import COLUMNS
 
 KINDS = ("car", "truck")
 ANYWHERE = st.floats(-5000.0, 5000.0)
@@ -111,6 +112,10 @@ def test_a_course_comes_back_as_changes(report):
 
 def test_weather_that_would_begin_after_the_end_is_left_out(report):
     p = report.kept[0]
-    now = Weather(0, 10_000.0, 9_000.0, 0.0, 0.0, 0.7, 0.0, 3000.0, 1.0)
-    later = replace(now, step=p.n_steps, rain=5.0)
-    assert [one["step"] for one in sent(replace(p, weather=(now, later)))["weather"]] == [0]
+    clear = {one.name: one.clear for one in COLUMNS}
+    now = Weather(0, clear, 9_000.0, 3000.0)
+    later = replace(now, step=p.n_steps, stated=clear | {"rain": 5.0})
+    (told,) = sent(replace(p, weather=(now, later)))["weather"]
+    rounded = {"sun_azimuth": 3.142, "sun_elevation": 0.7854}
+    around = {"sight": 9_000.0, "background": 3000.0}
+    assert told == {"step": 0, "words": "day", **clear, **rounded, **around}

@@ -94,25 +94,15 @@ class Weather:
 
     Attributes:
         step: the instant.
-        visual_range: in the fog, meteorological optical range [m].
-        sight: the same with what rain and snow take of it [m].
-        rain: [mm/h].
-        snow: of water [mm/h].
-        sun: altitude above the horizon [rad].
-        cloud: share of the sky, 0 to 1.
+        stated: the physical quantities of `bridgegen.weather.COLUMNS`, by name.
+        sight: how far one sees: meteorological optical range in fog, rain and snow [m].
         background: luminance of the ground [cd/m²].
-        friction: of what a dry road's friction is, 0 to 1 or more.
     """
 
     step: int
-    visual_range: float
+    stated: Mapping[str, float]
     sight: float
-    rain: float
-    snow: float
-    sun: float
-    cloud: float
     background: float
-    friction: float
 
 
 @dataclass(frozen=True)

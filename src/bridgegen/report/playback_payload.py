@@ -15,6 +15,7 @@ from bridgegen.participants import drawing_of
 from bridgegen.report.findings_payload import conflict_payload
 from bridgegen.report.playback import Course, Lamp, Playback, Sensed, Weather
 from bridgegen.report.series import packed
+from bridgegen.weather import in_words
 
 SCALE = {
     "x": 1000, "y": 1000, "h": 10_000, "v": 1000, "a": 100, "distance": 1000, "ttc": 100,
@@ -119,15 +120,12 @@ def _lamp(lamp: Lamp, n_steps: int) -> dict[str, Any]:
 
 
 def _weather(one: Weather) -> dict[str, Any]:
+    numbers = {**one.stated, "sight": one.sight, "background": one.background}
     return {
         "step": one.step,
-        **{
-            name: number(_digits(getattr(one, name), 4))
-            for name in (
-                "visual_range", "sight", "rain", "snow", "sun", "cloud", "background", "friction",
-            )
-        },
-    }  # fmt: skip
+        "words": in_words(one.stated),
+        **{name: number(_digits(value, 4)) for name, value in numbers.items()},
+    }
 
 
 def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.report.sensing import sensed
 from bridgegen.store import Recorded, Rows
 from bridgegen.triage.record import Minimal
+from bridgegen.weather import COLUMNS
 
 THIN = 0.01
 """How far a way's line may be off where its points lie nearly straight [m]."""
@@ -219,12 +220,7 @@ def _weather(step: int, felt: Float) -> Weather:
 
     return Weather(
         step=step,
-        visual_range=float(felt[column.VISUAL_RANGE]),
+        stated={one.name: float(felt[i]) for i, one in enumerate(COLUMNS)},
         sight=float(KOSCHMIEDER / felt[column.EXTINCTION]),
-        rain=float(felt[column.RAIN]),
-        snow=float(felt[column.SNOW]),
-        sun=float(felt[column.SUN_ELEVATION]),
-        cloud=float(felt[column.CLOUD]),
         background=float(felt[column.BACKGROUND]),
-        friction=float(felt[column.FRICTION_SCALE]),
     )

@@ -17,7 +17,7 @@ function darkness({ background }) {
   return Math.min(1, Math.max(0, (2 - Math.log10(Math.max(background, 1e-3))) / 4));
 }
 
-function isWet({ friction, rain }) {
+function isWet({ friction_scale: friction, rain }) {
   return rain > 0 || friction < 0.95;
 }
 
@@ -29,7 +29,7 @@ export class Atmosphere {
   // In metres: what lies on the road. Then, in pixels: `over`.
   drawRoadState(c, weather, outlines) {
     if (!isWet(weather)) return;
-    c.fillStyle = `rgba(70, 130, 190, ${(0.1 + 0.12 * Math.min(1, Math.max(0, 1 - weather.friction) / 0.4)).toFixed(3)})`;
+    c.fillStyle = `rgba(70, 130, 190, ${(0.1 + 0.12 * Math.min(1, Math.max(0, 1 - weather.friction_scale) / 0.4)).toFixed(3)})`;
     for (const { kind, path } of outlines) if (kind === "driving" || kind === "junction") c.fill(path);
   }
 

@@ -10,7 +10,7 @@ import { boxCentre, isPlaced, stateAt } from "./geometry.js";
 import { ghostsAt, ghostsOf } from "./ghosts.js";
 import { Scene } from "./scene.js";
 import { detectionAt, lightAt, unpack, weatherAt } from "./unpack.js";
-import { stateWords, weatherWords } from "./words.js";
+import { stateWords } from "./words.js";
 
 const PLAY_ICON = "M4 2v12l10-6z";
 const PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
@@ -174,7 +174,7 @@ export class Player {
     $("now").textContent = now;
     $("scrub").setAttribute("aria-valuetext", now);
     $("weather").hidden = !weather;
-    if (weather) $("weather").textContent = weatherWords(weather);
+    if (weather) $("weather").textContent = weather.words;
   }
 
   drawFlag(state) {

@@ -3,20 +3,7 @@
 import { intentionAt } from "./course.js";
 import { isPlaced, playersOf } from "./geometry.js";
 import { elsewhereWords } from "./ghosts.js";
-import { number } from "./numbers.js";
 import { SIGNALS, detectionAt, lightAt, weatherAt } from "./unpack.js";
-
-export function weatherWords(weather) {
-  const { sun, visual_range: range, rain, snow, friction } = weather, words = [];
-  const degrees = (sun * 180) / Math.PI;
-  words.push(degrees < -6 ? "night" : degrees < 0 ? "dusk" : "day");
-  if (range < 1000) words.push(`fog, visibility ${number(range, 2)} m`);
-  else if (range < 5000) words.push(`haze, visibility ${number(range / 1000, 2)} km`);
-  if (rain > 0) words.push(`rain ${number(rain, 2)} mm/h`);
-  if (snow > 0) words.push(`snow ${number(snow, 2)} mm/h`);
-  if (friction < 0.95) words.push(`friction ${Math.round(friction * 100)} % of dry`);
-  return words.join(", ");
-}
 
 export function detectionWords(found) {
   if (!found) return "";
@@ -56,6 +43,6 @@ export function stateWords(kept, state) {
   });
   for (const lamp of kept.lamps) told.push(`light ${lamp.name} ${SIGNALS[lightAt(lamp, state.index)] ?? "other"}`);
   const weather = weatherAt(kept, state.index);
-  if (weather) told.push(weatherWords(weather));
+  if (weather) told.push(weather.words);
   return `${told.join("; ")}.`;
 }
