@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from bridgegen.errors import StorageError
-from bridgegen.store import Store
+from bridgegen.store import Recorded, Store
 
 HEAD = """
 import os, sys
 from types import SimpleNamespace
 import numpy as np
 from bridgegen.errors import StorageError
-from bridgegen.store import Store
+from bridgegen.store import Recorded, Store
 
 def append(store, n=40, n_x=50):
     result = SimpleNamespace(messages={}, cause=None, findings=None,
@@ -167,6 +167,8 @@ def test_a_damaged_run(sql, values, message, tmp_path):
     [
         ("DELETE FROM evaluations WHERE id = 1", "evaluations between 0 and 2 are missing"),
         ("UPDATE evaluations SET a = 'text' WHERE id = 1", "could not convert string"),
+        ("UPDATE evaluations SET a = NULL WHERE id = 1", "damaged: a parameter is not finite"),
+        ("UPDATE evaluations SET a = 9e999 WHERE id = 1", "damaged: a parameter is not finite"),
         ("UPDATE evaluations SET u = x'00' WHERE id = 1", "damaged"),
         ("UPDATE evaluations SET u = 'text' WHERE id = 1", "damaged"),
     ],
@@ -177,6 +179,9 @@ def test_damaged_evaluations(sql, message, tmp_path):
     change(tmp_path / "run", sql)
     with Store.open(tmp_path / "run") as store, pytest.raises(StorageError, match=message):
         store.read()
+    if "SET a" in sql:  # the column alone, too
+        with Store.open(tmp_path / "run") as store, pytest.raises(StorageError, match=message):
+            Recorded(store).X[:]
 
 
 def test_a_damaged_file(tmp_path):

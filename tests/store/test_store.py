@@ -66,16 +66,17 @@ def test_what_is_recorded_is_read_back(tmp_path):
 
 
 numbers = hnp.arrays(np.float64, (3, 2), elements=st.floats(width=64))
+finite = hnp.arrays(np.float64, (3, 2), elements=st.floats(allow_nan=False, allow_infinity=False))
 
 
-@given(X=numbers, F=numbers, U=hnp.arrays(np.float64, (3, 3), elements=st.floats(0, 1)))
+@given(X=finite, M=numbers, F=numbers, U=hnp.arrays(np.float64, (3, 3), elements=st.floats(0, 1)))
 @settings(max_examples=40)
-def test_every_float_comes_back_bit_for_bit(X, F, U, tmp_path_factory):
+def test_every_float_comes_back_bit_for_bit(X, M, F, U, tmp_path_factory):
     result = SimpleNamespace(
         messages={},
         cause=None,
         findings=None,
-        metrics=np.hstack([X, F[:, :1]]),
+        metrics=np.hstack([M, F[:, :1]]),
         F=F,
         critical=np.zeros(3, bool),
         status=np.zeros(3, int),
@@ -337,6 +338,7 @@ def test_names_that_cannot_be(parameters, message, tmp_path):
     [
         ({"X": np.zeros((4, 3))}, r"X must have shape \(4, 2\)"),
         ({"U": np.full((4, 3), np.nan)}, "U must be finite"),
+        ({"X": np.full((4, 2), np.inf)}, "X must be finite"),
         ({"metrics": np.zeros((4, 2))}, r"metrics must have shape \(4, 3\)"),
         ({"F": np.zeros(4)}, r"F must have shape \(4, 2\)"),
         ({"status": np.zeros(3)}, r"status must have shape \(4,\)"),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings, unpacked
-from bridgegen.store.rows import Rows, column, digest_of, unit_rows
+from bridgegen.store.rows import Rows, column, digest_of, finite, unit_rows
 
 if TYPE_CHECKING:
     from bridgegen.store.store import Store
@@ -73,7 +73,7 @@ class Recorded:
         self.U = OnDisk(
             store, n, ("u",), lambda found: unit_rows(found, 0, columns.n_var), width=columns.n_var
         )
-        self.X = OnDisk(store, n, columns.X)
+        self.X = OnDisk(store, n, columns.X, lambda found: finite("a parameter", _floats(found)))
         self.metrics = OnDisk(store, n, columns.metrics, kept=self._metric)
 
     def __len__(self) -> int:

@@ -194,14 +194,14 @@ class Columns:
         """Return a batch as the values to insert.
 
         Raises:
-            ValueError: an array has the wrong shape, or U is not finite.
+            ValueError: an array has the wrong shape, or U or X is not finite.
         """
         n = len(U)
         U = as_float("U", U, (n, self.n_var))
         blobs = [row.tobytes() for row in U.astype("<f8")]
         numbers = np.hstack(
             [
-                as_float("X", X, (n, len(self.X)), finite=False),
+                as_float("X", X, (n, len(self.X))),
                 as_float("metrics", result.metrics, (n, len(self.metrics)), finite=False),
                 as_float("F", result.F, (n, len(self.F)), finite=False),
             ]
@@ -243,6 +243,7 @@ class Columns:
         X, metrics, F = np.split(
             numbers, np.cumsum([len(self.X), len(self.metrics)]).tolist(), axis=1
         )
+        finite("a parameter", X)
         last = first + n_float
         causes = [row[last + 2] if len(self.last) > 2 else None for row in rows]
         return Rows(
@@ -305,6 +306,21 @@ def unit_rows(rows: Sequence[tuple[Any, ...]], at: int, n_var: int) -> Float:
     if not np.isfinite(U).all():
         raise ValueError("a row of the unit cube is not finite")
     return U.astype(np.float64)
+
+
+def finite(what: str, values: Float) -> Float:
+    """Return values that must be finite.
+
+    Args:
+        what: they are, for the message.
+        values: of any shape.
+
+    Raises:
+        ValueError: one is NaN or infinite.
+    """
+    if not np.isfinite(values).all():
+        raise ValueError(f"{what} is not finite")
+    return values
 
 
 def digest_of(rows: Any) -> str:
