@@ -2,8 +2,8 @@
 
 import glob
 import os
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -25,19 +25,34 @@ def write_whole(path: Path, chunks: Iterable[bytes]) -> None:
     Raises:
         StorageError: it cannot be written (no such folder, read-only, disk full).
     """
+    with writing_whole(path) as file:
+        file.writelines(chunks)
+
+
+@contextmanager
+def writing_whole(path: Path) -> Iterator[IO[bytes]]:
+    """Yield a file that replaces ``path`` once all is written; see `write_whole`.
+
+    Args:
+        path: of the file; an existing file is replaced.
+
+    Raises:
+        StorageError: it cannot be written (no such folder, read-only, disk full).
+    """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         if path.exists() and not path.is_file():
             with path.open("wb") as file:
-                file.writelines(chunks)
+                yield file
             return
         _remove_left_over(path)
         with part.open("wb") as file:
             _lock(file)
-            file.writelines(chunks)
+            yield file
         part.replace(path)
     except OSError as error:
-        raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
+        why = error.strerror or error
+        raise StorageError(f"{path}: cannot be written: {why}") from None
     finally:
         with suppress(OSError):  # already renamed, or an error is being raised
             part.unlink()

@@ -5,9 +5,7 @@ written in row groups.
 """
 
 import json
-import os
 from collections.abc import Sequence
-from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +17,7 @@ from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import COLUMNS
+from bridgegen.disk import writing_whole
 from bridgegen.errors import InputError, StorageError
 from bridgegen.store import Rows, Store
 
@@ -82,23 +81,18 @@ def _write(name: str, folder: Path, path: Path, sample: float) -> Path:
     import pyarrow as pa
     import pyarrow.parquet as parquet
 
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with Store.open(folder) as store:
         settings = Run.of(store).settings
         of_run = dict(zip(RUN, _run_values(name, settings), strict=True))
         schema = _schema(store, of_run, settings, sample)
-        try:
-            with parquet.ParquetWriter(part, schema, compression="zstd") as writer:
-                for rows in store.rows(chunk=CHUNK):
-                    kept, weight = _kept(rows, sample)
-                    columns = _columns(store, of_run, rows.take(kept), weight)
-                    writer.write_table(pa.table(columns, schema=schema))
-            part.replace(path)
-        except OSError as error:
-            raise StorageError(f"{path}: cannot be written: {error.strerror or error}") from None
-        finally:
-            with suppress(OSError):
-                part.unlink()
+        with (
+            writing_whole(path) as file,
+            parquet.ParquetWriter(file, schema, compression="zstd") as writer,
+        ):
+            for rows in store.rows(chunk=CHUNK):
+                kept, weight = _kept(rows, sample)
+                columns = _columns(store, of_run, rows.take(kept), weight)
+                writer.write_table(pa.table(columns, schema=schema))
     return path
 
 
