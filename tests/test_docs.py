@@ -150,12 +150,14 @@ def test_links_lead_somewhere(path):
 
 def test_the_architecture_has_a_paragraph_for_each_folder():
     project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text("utf-8"))
-    contract, _ = project["tool"]["importlinter"]["contracts"]  # the other is of one folder
+    contract, *_ = project["tool"]["importlinter"]["contracts"]
     layers = [name for layer in contract["layers"] for name in re.split(r" [|:] ", layer)]
     text, _, _ = (DOCS / "architecture.md").read_text("utf-8").partition(MAIN_JOB)
     rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
     told = [re.sub(r"/$|\.py$", "", name) for row in rows for name in re.findall("`([^`]+)`", row)]
     assert sorted(told) == sorted(layers)
+    beside = project["tool"]["pytest"]["ini_options"]["pythonpath"]
+    assert [path for path in beside if f"`{path.removesuffix('src')}`" not in text] == []
 
 
 def test_the_main_job_goes_through_the_files_of_the_architecture_page_in_that_order(

@@ -12,19 +12,16 @@ if TYPE_CHECKING:
     from bridgegen.campaign.confirm import confirm
     from bridgegen.comparison import Comparison, compare
     from bridgegen.odd.reader import load
-    from bridgegen.reproduction import Reproduction, reproduce
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.choice import SimulatorChoice
 
 __all__ = [
     "Comparison",
-    "Reproduction",
     "Run",
     "SimulatorChoice",
     "compare",
     "confirm",
     "load",
-    "reproduce",
     "resume",
     "run_search",
     "simulate_file",
@@ -34,8 +31,6 @@ _HOMES = {
     "Comparison": "bridgegen.comparison",
     "compare": "bridgegen.comparison",
     "confirm": "bridgegen.campaign.confirm",
-    "Reproduction": "bridgegen.reproduction",
-    "reproduce": "bridgegen.reproduction",
     "Run": "bridgegen.campaign",
     "load": "bridgegen.odd.reader",
     "resume": "bridgegen.campaign",

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-import bridgegen as bg
-from bridgegen.reproduction import protocol
+from bridgegen_reproduction import Reproduction, protocol, reproduce
 
 TINY: dict[str, Any] = {
     "seeds": 2,
@@ -30,11 +29,11 @@ def without_ppo(monkeypatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def done(tmp_path_factory) -> tuple[Path, "bg.Reproduction"]:
+def done(tmp_path_factory) -> tuple[Path, Reproduction]:
     """Its folder, and what it came to."""
     home = tmp_path_factory.mktemp("reproduction")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(protocol, "NEEDED_BY_PPO", NOT_THERE)
         patch.chdir(home)
-        result = bg.reproduce(**TINY, workers=1)
+        result = reproduce(**TINY, workers=1)
     return home / "reproduction", result

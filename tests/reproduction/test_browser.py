@@ -3,9 +3,9 @@
 import pytest
 
 from bridgegen.comparison.drawing import DARK, LIGHT, blank, png
-from bridgegen.reproduction.document import Document, Folded, Picture, Points, Section, Shown
-from bridgegen.reproduction.page import html
-from bridgegen.reproduction.table import Table
+from bridgegen_reproduction.document import Document, Folded, Picture, Points, Section, Shown
+from bridgegen_reproduction.page import html
+from bridgegen_reproduction.table import Table
 
 pytestmark = pytest.mark.browser
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bridgegen.reproduction.claims import CLAIMS, can_show, judge, table_claims
-from bridgegen.reproduction.paper import GROUPS, SCENARIOS
-from bridgegen.reproduction.results import Results
+from bridgegen_reproduction.claims import CLAIMS, can_show, judge, table_claims
+from bridgegen_reproduction.paper import GROUPS, SCENARIOS
+from bridgegen_reproduction.results import Results
 
 
 def made(seeds: int, ahead: float) -> Results:

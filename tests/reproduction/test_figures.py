@@ -9,11 +9,11 @@ from matplotlib.patches import FancyBboxPatch
 from bridgegen.comparison.drawing import DARK, LIGHT, blank, pdf, png
 from bridgegen.odd.reader import load
 from bridgegen.ontology.layers import LAYERS
-from bridgegen.reproduction.figures.causes import causes
-from bridgegen.reproduction.figures.distributions import Violin, by_iteration, iterations, violins
-from bridgegen.reproduction.figures.ontology import blocks, ontology, picture_of
-from bridgegen.reproduction.perception import Causes
-from bridgegen.reproduction.runs import Run
+from bridgegen_reproduction.figures.causes import causes
+from bridgegen_reproduction.figures.distributions import Violin, by_iteration, iterations, violins
+from bridgegen_reproduction.figures.ontology import blocks, ontology, picture_of
+from bridgegen_reproduction.perception import Causes
+from bridgegen_reproduction.runs import Run
 
 
 def run(seed: int) -> Run:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.printed import table_2, table_3
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.printed import table_2, table_3
 
 
 @pytest.mark.parametrize(("algorithm", "agrees"), [("random", True), ("ppo", True), ("pso", False)])

@@ -7,6 +7,7 @@ import re
 import shlex
 import sqlite3
 import sys
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -22,13 +23,20 @@ from bridgegen.campaign.restored import pipeline_of
 from bridgegen.cli import main
 from bridgegen.comparison.drawing import DARK
 from bridgegen.errors import InputError, Interrupted, StorageError
-from bridgegen.reproduction import ReproductionCallbacks, paper, pictures, protocol, reproduction
-from bridgegen.reproduction.figures.crossroads import collision_points, crossing_of
-from bridgegen.reproduction.figures.fronts import spread_curve
-from bridgegen.reproduction.protocol import PRINTED
-from bridgegen.reproduction.runs import of
 from bridgegen.search.pso import PSO
 from bridgegen.store import Store
+from bridgegen_reproduction import (
+    ReproductionCallbacks,
+    paper,
+    pictures,
+    protocol,
+    reproduce,
+    reproduction,
+)
+from bridgegen_reproduction.figures.crossroads import collision_points, crossing_of
+from bridgegen_reproduction.figures.fronts import spread_curve
+from bridgegen_reproduction.protocol import PRINTED
+from bridgegen_reproduction.runs import of
 
 COUNT = 3 * 2 * 2 + 3 * 2 * 2 + 2 * 2
 """Three methods without PPO, two scenarios, two seeds; again with perception; RS again, ideal."""
@@ -197,7 +205,7 @@ def test_interrupted_and_gone_on_with_it_is_the_same(
 
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Interrupted) as caught:
-        bg.reproduce(**tiny, workers=1, callbacks=ReproductionCallbacks(batch=stop))
+        reproduce(**tiny, workers=1, callbacks=ReproductionCallbacks(batch=stop))
     told = str(caught.value)
     stopped, _, command = told.partition("; resume with ")
     assert re.fullmatch(rf"stopped after 1\d of {COUNT} runs", stopped)
@@ -380,7 +388,7 @@ def test_ppo_is_run_where_its_packages_are(monkeypatch):
 )
 def test_mistakes_are_told_before_anything_is_run(tmp_path, arguments, told):
     with pytest.raises(InputError, match=re.escape(told)):
-        bg.reproduce(**{"out": tmp_path / "r", **arguments})
+        reproduce(**{"out": tmp_path / "r", **arguments})
     assert not [*tmp_path.rglob("run.sqlite")]
 
 
@@ -408,7 +416,7 @@ def test_what_is_asked_for_is_run_or_refused(scenarios, seeds, iterations):
 def test_a_folder_of_something_else_is_left_alone(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(StorageError, match="holds no reproduction, so it is left alone"):
-        bg.reproduce(out=tmp_path)
+        reproduce(out=tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["mine.txt"]
 
 
@@ -418,6 +426,25 @@ def test_quick_is_one_seed(monkeypatch, capsys):
         main()
     assert end.value.code == 2
     assert "--quick is one seed" in capsys.readouterr().err
+
+
+def test_without_its_package_the_command_says_how_to_install_it(cli, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "bridgegen_reproduction", None)
+    status, out, err = cli("reproduce", "--quick", "--out", tmp_path / "r")
+    assert (status, out) == (2, "")
+    (line,) = err.splitlines()
+    assert "pip install ./paper" in line
+    assert not (tmp_path / "r").exists()
+
+
+def test_its_distribution_goes_with_this_version_of_bridgegen():
+    root = Path(__file__).parents[2]
+    house, beside = (
+        tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"]
+        for folder in (root, root / "paper")
+    )
+    assert beside["version"] == house["version"]
+    assert beside["dependencies"] == [f"{house['name']}=={house['version']}"]
 
 
 def test_the_default_is_the_paper_s():

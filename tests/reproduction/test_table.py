@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.reproduction.document import Command, Document, Folded, Points, Section, Shown, Text
-from bridgegen.reproduction.numbers import number, spread
-from bridgegen.reproduction.page import html
-from bridgegen.reproduction.table import Table, latex, to_csv, to_html, to_latex, to_markdown
+from bridgegen_reproduction.document import Command, Document, Folded, Points, Section, Shown, Text
+from bridgegen_reproduction.numbers import number, spread
+from bridgegen_reproduction.page import html
+from bridgegen_reproduction.table import Table, latex, to_csv, to_html, to_latex, to_markdown
 
 texts = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")))
 cells = texts.map(lambda text: " ".join(text.split()))

@@ -1,5 +1,7 @@
-"""The command that reproduces the paper's evaluation."""
+"""The command that reproduces the paper's evaluation, with a package that is installed apart."""
 
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +11,8 @@ from bridgegen.cli import options
 from bridgegen.cli.app import SEARCH, app
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_names
+
+PACKAGE = "bridgegen_reproduction"
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -39,25 +43,25 @@ def reproduce(
 ) -> None:
     """Reproduce the paper's evaluation, Section V.
 
-    Writes its tables, figures and a page.
+    Writes its tables, figures and a page. Needs the package bridgegen-reproduction.
     """
     if quick and seeds is not None:
         raise InputError(f"--quick is one seed; leave out --seeds {seeds}, or --quick")
-    from bridgegen import reproduction
-    from bridgegen.screen.reproduction import ReproductionScreen, print_reproduction
-
-    chosen = {} if scenarios is None else {"scenarios": read_names(scenarios)}
-    with ReproductionScreen() as screen:
-        result = reproduction.reproduce(
-            seeds=1 if quick else 10 if seeds is None else seeds,
-            iterations=iterations,
-            **chosen,
-            workers=workers,
-            road_map=road_map,
-            junction=junction,
-            out=out,
-            callbacks=screen.callbacks,
+    if find_spec(PACKAGE) is None:
+        raise InputError(
+            "the paper's evaluation is a package of its own, which is not installed: "
+            "pip install ./paper in a clone of BridgeGen"
         )
-    print_reproduction(result, screen.seconds)
+    screen = import_module(f"{PACKAGE}.screen")
+    chosen = {} if scenarios is None else {"scenarios": read_names(scenarios)}
+    result = screen.reproduce_and_print(
+        seeds=1 if quick else 10 if seeds is None else seeds,
+        iterations=iterations,
+        **chosen,
+        workers=workers,
+        road_map=road_map,
+        junction=junction,
+        out=out,
+    )
     if result.gaps:
         raise typer.Exit(1)

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from bridgegen.comparison.plan import Cell
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.claims import CLAIMS, Verdict, table_claims
-from bridgegen.reproduction.document import (
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.claims import CLAIMS, Verdict, table_claims
+from bridgegen_reproduction.document import (
     Block,
     Command,
     Document,
@@ -18,10 +18,10 @@ from bridgegen.reproduction.document import (
     Shown,
     Text,
 )
-from bridgegen.reproduction.limits import limits
-from bridgegen.reproduction.numbers import number, share
-from bridgegen.reproduction.perception import Causes, Paired, table_causes, table_paired
-from bridgegen.reproduction.printed import (
+from bridgegen_reproduction.limits import limits
+from bridgegen_reproduction.numbers import number, share
+from bridgegen_reproduction.perception import Causes, Paired, table_causes, table_paired
+from bridgegen_reproduction.printed import (
     table_2,
     table_3,
     table_4,
@@ -30,10 +30,10 @@ from bridgegen.reproduction.printed import (
     table_6_others,
     table_6_runtime,
 )
-from bridgegen.reproduction.protocol import PARTS, Protocol
-from bridgegen.reproduction.results import Results
-from bridgegen.reproduction.runs import Runs
-from bridgegen.reproduction.table import Table
+from bridgegen_reproduction.protocol import PARTS, Protocol
+from bridgegen_reproduction.results import Results
+from bridgegen_reproduction.runs import Runs
+from bridgegen_reproduction.table import Table
 
 RUNS_FILE = "runs.csv"
 

@@ -6,7 +6,7 @@ from html import escape
 from importlib.metadata import version
 from importlib.resources import files
 
-from bridgegen.reproduction.document import (
+from bridgegen_reproduction.document import (
     FIGURES,
     TABLES,
     Block,
@@ -19,12 +19,12 @@ from bridgegen.reproduction.document import (
     Shown,
     Text,
 )
-from bridgegen.reproduction.table import to_html
+from bridgegen_reproduction.table import to_html
 
 
 def html(document: Document) -> str:
     """Return the page; text is data in it, never markup."""
-    css = _own("bridgegen.comparison", "page.css") + _own("bridgegen.reproduction", "page.css")
+    css = _own("bridgegen.comparison", "page.css") + _own("bridgegen_reproduction", "page.css")
     fill = {
         "title": escape(document.title),
         "css": css,
@@ -35,7 +35,7 @@ def html(document: Document) -> str:
         "sections": "\n".join(_section(one) for one in document.sections),
         "version": escape(version("bridgegen")),
     }
-    parts = re.split(r"\{\{(\w+)\}\}", _own("bridgegen.reproduction", "page.html"))
+    parts = re.split(r"\{\{(\w+)\}\}", _own("bridgegen_reproduction", "page.html"))
     return "".join(fill[part] if i % 2 else part for i, part in enumerate(parts))
 
 

@@ -14,10 +14,10 @@ from bridgegen.comparison.drawing import Theme, blank
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.report.playback import AREA_KINDS, Outline
 from bridgegen.report.scenery import Scenery
-from bridgegen.reproduction.figures.look import SIZE, WIDE, legend
-from bridgegen.reproduction.paper import DESIGNS, POINTS
-from bridgegen.reproduction.runs import Run
 from bridgegen.simulation.accidents import accidents
+from bridgegen_reproduction.figures.look import SIZE, WIDE, legend
+from bridgegen_reproduction.paper import DESIGNS, POINTS
+from bridgegen_reproduction.runs import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

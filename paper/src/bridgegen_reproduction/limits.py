@@ -1,8 +1,8 @@
 """What of Section V cannot be reproduced, and why."""
 
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.numbers import number
-from bridgegen.reproduction.protocol import Protocol
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.numbers import number
+from bridgegen_reproduction.protocol import Protocol
 
 
 def limits(protocol: Protocol) -> tuple[tuple[str, str], ...]:

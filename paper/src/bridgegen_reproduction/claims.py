@@ -9,10 +9,10 @@ from bridgegen.arrays import Float
 from bridgegen.comparison.measures import Measured
 from bridgegen.comparison.statistics import a12, holm, mann_whitney, quartiles
 from bridgegen.comparison.words import SURE, p_value
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.numbers import number
-from bridgegen.reproduction.results import Results
-from bridgegen.reproduction.table import Table
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.numbers import number
+from bridgegen_reproduction.results import Results
+from bridgegen_reproduction.table import Table
 
 
 @dataclass(frozen=True)

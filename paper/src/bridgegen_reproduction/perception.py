@@ -11,11 +11,11 @@ import numpy as np
 
 from bridgegen.cause import CAUSES, Cause
 from bridgegen.comparison.statistics import quartiles
-from bridgegen.reproduction.numbers import number, share, spread
-from bridgegen.reproduction.paper import METHODS, RS, TITLES
-from bridgegen.reproduction.protocol import IDEAL, PERCEIVING, Protocol
-from bridgegen.reproduction.runs import Runs, of
-from bridgegen.reproduction.table import Table
+from bridgegen_reproduction.numbers import number, share, spread
+from bridgegen_reproduction.paper import METHODS, RS, TITLES
+from bridgegen_reproduction.protocol import IDEAL, PERCEIVING, Protocol
+from bridgegen_reproduction.runs import Runs, of
+from bridgegen_reproduction.table import Table
 
 
 @dataclass(frozen=True)

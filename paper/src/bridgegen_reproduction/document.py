@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass
 
-from bridgegen.reproduction.table import Table, to_markdown
+from bridgegen_reproduction.table import Table, to_markdown
 
 TABLES, FIGURES = "tables", "figures"
 """Folders of the files."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from bridgegen.comparison.plan import MAX_SEEDS, RUNS, Cell
 from bridgegen.errors import InputError
-from bridgegen.reproduction.paper import ITERATIONS, MAIN, METHODS, POPULATION, PPO, RS, SCENARIOS
+from bridgegen_reproduction.paper import ITERATIONS, MAIN, METHODS, POPULATION, PPO, RS, SCENARIOS
 
 NEEDED_BY_PPO = ("torch", "stable_baselines3", "gymnasium")
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bridgegen.comparison.drawing import Theme, blank, dress
-from bridgegen.reproduction.paper import METHODS, TITLES
+from bridgegen_reproduction.paper import METHODS, TITLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.comparison.drawing import Theme
 from bridgegen.comparison.statistics import Quartiles, quartiles
-from bridgegen.reproduction.figures.look import SIZE, legend, looks, panels, title_of
-from bridgegen.reproduction.paper import POPULATION
-from bridgegen.reproduction.runs import Run
+from bridgegen_reproduction.figures.look import SIZE, legend, looks, panels, title_of
+from bridgegen_reproduction.paper import POPULATION
+from bridgegen_reproduction.runs import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from bridgegen.comparison.measures import Measured
 from bridgegen.comparison.plan import Cell
 from bridgegen.comparison.record import Record
 from bridgegen.comparison.statistics import quartiles
-from bridgegen.reproduction.figures.look import legend, looks, panels, title_of
+from bridgegen_reproduction.figures.look import legend, looks, panels, title_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

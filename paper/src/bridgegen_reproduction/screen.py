@@ -1,36 +1,44 @@
-"""A reproduction: one bar for all its runs, then what it came to."""
+"""A reproduction in the terminal: one bar for all its runs, then what was found."""
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rich.console import Console
 
 from bridgegen.screen.comparison import RunsScreen
-
-if TYPE_CHECKING:
-    from bridgegen.reproduction import Reproduction, ReproductionCallbacks
-    from bridgegen.reproduction.protocol import Protocol
+from bridgegen_reproduction.protocol import Protocol
+from bridgegen_reproduction.reproduction import Reproduction, ReproductionCallbacks, reproduce
 
 _STAGES = {"read": "reading the runs", "draw": "drawing"}
+
+
+def reproduce_and_print(**arguments: Any) -> Reproduction:
+    """Reproduce the evaluation with its progress on the screen, and print what was found.
+
+    Args:
+        arguments: of ``reproduce``, but for ``callbacks``.
+    """
+    with ReproductionScreen() as screen:
+        result = reproduce(**arguments, callbacks=screen.callbacks)
+    print_reproduction(result, screen.seconds)
+    return result
 
 
 class ReproductionScreen(RunsScreen):
     """A reproduction's live progress: evaluations of all runs, runs that have ended."""
 
     @property
-    def callbacks(self) -> "ReproductionCallbacks":
+    def callbacks(self) -> ReproductionCallbacks:
         """The callbacks for a reproduction."""
-        from bridgegen.reproduction import ReproductionCallbacks
-
         return ReproductionCallbacks(
             begun=self._begin, compile=self.say_compiling, batch=self.batch, ended=self.end,
             stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
         )  # fmt: skip
 
-    def _begin(self, protocol: "Protocol", ended: int, made: int) -> None:
+    def _begin(self, protocol: Protocol, ended: int, made: int) -> None:
         self.begin(sum(1 for _ in protocol.cells()), protocol.budget, ended, made)
 
 
-def print_reproduction(result: "Reproduction", seconds: float) -> None:
+def print_reproduction(result: Reproduction, seconds: float) -> None:
     """Print what was found in sentences, and where the files are."""
     console = Console(markup=False, emoji=False, highlight=False)
     for title, text in result.in_short:

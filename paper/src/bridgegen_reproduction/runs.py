@@ -12,9 +12,9 @@ from bridgegen import campaign
 from bridgegen.arrays import Bool, Float
 from bridgegen.comparison.plan import Cell
 from bridgegen.objective import PAPER_FACTOR, Objective
-from bridgegen.reproduction.paper import WEIGHTS
-from bridgegen.reproduction.protocol import Part
 from bridgegen.store import Store
+from bridgegen_reproduction.paper import WEIGHTS
+from bridgegen_reproduction.protocol import Part
 
 FITNESS = Objective.build(tuple(WEIGHTS.items()))
 """The paper's, whatever a run minimised: F = −fitness."""

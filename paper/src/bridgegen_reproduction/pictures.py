@@ -12,16 +12,16 @@ from bridgegen.comparison.result import Comparison
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.layers import LAYERS
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.document import Picture
-from bridgegen.reproduction.figures.causes import causes
-from bridgegen.reproduction.figures.crossroads import collision_points, crossing_of
-from bridgegen.reproduction.figures.distributions import Violin, iterations, violins
-from bridgegen.reproduction.figures.fronts import curves_of, hypervolume_and_spread
-from bridgegen.reproduction.figures.ontology import ontology, picture_of
-from bridgegen.reproduction.protocol import PRINTED
-from bridgegen.reproduction.runs import Run, of
-from bridgegen.reproduction.story import Found
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.document import Picture
+from bridgegen_reproduction.figures.causes import causes
+from bridgegen_reproduction.figures.crossroads import collision_points, crossing_of
+from bridgegen_reproduction.figures.distributions import Violin, iterations, violins
+from bridgegen_reproduction.figures.fronts import curves_of, hypervolume_and_spread
+from bridgegen_reproduction.figures.ontology import ontology, picture_of
+from bridgegen_reproduction.protocol import PRINTED
+from bridgegen_reproduction.runs import Run, of
+from bridgegen_reproduction.story import Found
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

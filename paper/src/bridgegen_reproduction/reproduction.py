@@ -14,18 +14,18 @@ from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.runs import evaluations_of
 from bridgegen.disk import write_whole
 from bridgegen.errors import Interrupted, StorageError
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.claims import judge, of_fronts
-from bridgegen.reproduction.document import FIGURES, TABLES, Document, Picture, markdown
-from bridgegen.reproduction.page import html
-from bridgegen.reproduction.perception import causes_of, paired_of
-from bridgegen.reproduction.pictures import pictures
-from bridgegen.reproduction.protocol import PARTS, PRINTED, Part, Protocol, make_protocol
-from bridgegen.reproduction.results import of_run, results_of
-from bridgegen.reproduction.runs import Run, read_run
-from bridgegen.reproduction.story import RUNS_FILE, Found, in_short, tell
-from bridgegen.reproduction.table import to_csv, to_latex, to_markdown
 from bridgegen.workers import read_choice
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.claims import judge, of_fronts
+from bridgegen_reproduction.document import FIGURES, TABLES, Document, Picture, markdown
+from bridgegen_reproduction.page import html
+from bridgegen_reproduction.perception import causes_of, paired_of
+from bridgegen_reproduction.pictures import pictures
+from bridgegen_reproduction.protocol import PARTS, PRINTED, Part, Protocol, make_protocol
+from bridgegen_reproduction.results import of_run, results_of
+from bridgegen_reproduction.runs import Run, read_run
+from bridgegen_reproduction.story import RUNS_FILE, Found, in_short, tell
+from bridgegen_reproduction.table import to_csv, to_latex, to_markdown
 
 MARK, PAGE, README, TIMES_FILE = "reproduction.json", "index.html", "README.md", "times.csv"
 

@@ -8,12 +8,12 @@ from bridgegen import search as toolkit
 from bridgegen.objective import Objective
 from bridgegen.odd.reader import load
 from bridgegen.odd.story import Participant
-from bridgegen.reproduction import paper
-from bridgegen.reproduction.numbers import number, spread
-from bridgegen.reproduction.protocol import PRINTED, Protocol
-from bridgegen.reproduction.results import QUANTITIES, TIMED, Quantity, Results
-from bridgegen.reproduction.runs import Runs, of
-from bridgegen.reproduction.table import Table
+from bridgegen_reproduction import paper
+from bridgegen_reproduction.numbers import number, spread
+from bridgegen_reproduction.protocol import PRINTED, Protocol
+from bridgegen_reproduction.results import QUANTITIES, TIMED, Quantity, Results
+from bridgegen_reproduction.runs import Runs, of
+from bridgegen_reproduction.table import Table
 
 TERMS = tuple(paper.WEIGHTS)
 

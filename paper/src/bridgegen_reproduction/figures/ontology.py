@@ -11,7 +11,7 @@ from bridgegen.openx.source import source_of
 from bridgegen.report.painter import paint
 from bridgegen.report.picture import Picture
 from bridgegen.report.picture_payload import pictures_payload
-from bridgegen.reproduction.figures.look import WIDE
+from bridgegen_reproduction.figures.look import WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,9 +8,9 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.comparison.measures import waited_for
 from bridgegen.comparison.statistics import Quartiles, quartiles
-from bridgegen.reproduction.paper import GROUPS
-from bridgegen.reproduction.protocol import PRINTED, Protocol
-from bridgegen.reproduction.runs import Run, Runs, of
+from bridgegen_reproduction.paper import GROUPS
+from bridgegen_reproduction.protocol import PRINTED, Protocol
+from bridgegen_reproduction.runs import Run, Runs, of
 
 
 @dataclass(frozen=True)
