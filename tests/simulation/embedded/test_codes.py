@@ -36,7 +36,7 @@ def test_the_names_of_a_line_have_different_numbers():
 @pytest.mark.parametrize(
     "modules",
     [
-        ("_action", "_global", "_pursuit", "_presence"),  # Program.actions
+        ("_action", "_begin", "_global", "_pursuit", "_presence"),  # Program.actions
         ("_probe", "_relation", "_distance"),  # Program.probes
     ],
 )

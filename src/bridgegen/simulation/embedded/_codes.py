@@ -21,9 +21,15 @@ WHOM, DOES, SHAPE, DIMENSION, TARGET, LASTS, ROW, SELECTS = range(8)
 STEERS, SETS_SPEED = 2, 3  # of a control: whether the driver does, -1 as before
 DETAIL = 3  # of a route, its position; of a trajectory, whether its times are relative
 PASSES = 2  # of a date: whether time passes
-SPEED_CHANGE, LANE_CHANGE, WEATHER_CHANGE, LIGHT, LANE_OFFSET = range(5)
+# What they do, by groups: of one entity from FIRST_MOTION on, of these along its path by
+# Program.courses after SPEED_CHANGE, and across it; of all, whose first column is a light, a
+# controller, a value.
+FIRST_MOTION, FIRST_ALONG, FIRST_ACROSS, FIRST_GLOBAL = 20, 40, 50, 100
+WEATHER_CHANGE, LIGHT = 2, 3
 ADD_ENTITY, DELETE_ENTITY, CONTROL = 20, 21, 22
-FIRST_GLOBAL = 100  # whose first column is a light, a controller, a value, not an entity
+TELEPORT, ASSIGN_ROUTE, FOLLOW, ACQUIRE = range(30, 34)
+SPEED_CHANGE, RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE = range(40, 45)
+LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE = range(50, 53)
 TIME_CHANGE, PHASE_CHANGE, VALUE_SET, VALUE_ADD, VALUE_MULTIPLY = range(100, 105)
 
 # State.drives: what of the ego its driver does.
@@ -54,9 +60,6 @@ ENTITY_SYSTEM, PATH_SYSTEM, WORLD_SYSTEM, ROAD_SYSTEM = range(4)
 # entity whether it counts.
 RANGES, RANGES_END, OPPOSITE, COUNTS = range(4)
 
-# Program.actions: the kinds that move along the road by Program.courses.
-RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE = range(40, 44)
-
 # Program.courses: the entity that it goes by, -1 if none; then by kind, slots where not said else.
 REF = 0
 IS_FACTOR, CONTINUOUS = 1, 2  # of a relative speed; also of a distance, CONTINUOUS
@@ -81,6 +84,3 @@ COURSE_MEMORY = 6
 # absolute, its slot, whether ahead and left are those of the lane's traffic, not of the road.
 PLACE_KIND, WHOSE, LANES_LEFT, ALONG, ACROSS, ABSOLUTE, HEADING, BY_LANE = range(8)
 ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_OBJECT, BY_WORLD = range(7)
-
-# Program.actions: kinds of those that say where an entity is, and where it goes.
-TELEPORT, ASSIGN_ROUTE, FOLLOW, ACQUIRE, KEEP_ASIDE = range(30, 35)

@@ -22,6 +22,7 @@ from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded._codes import (
     ANGLE,
     CLEARANCE,
+    DOES,
     EVENT,
     EVENT_NUMBER,
     FIRST,
@@ -33,6 +34,7 @@ from bridgegen.simulation.embedded._codes import (
     PROBE,
     RELATIVE_ANGLE,
     ROAD_SYSTEM,
+    ROW,
     SYSTEM,
     WHOM,
 )
@@ -226,7 +228,7 @@ class Program:
         initial: ``(·,)`` actions that begin at the start.
         actions: ``(·, 8)`` entity, kind, shape, dimension, slot of the target, slot of its
             dynamics, row of ``laterals``, ``weathers`` or ``courses``, whether the entity is
-            selected by the trigger; see ``_action_kernels`` and ``_motion_kernels``. ``_codes``
+            selected by the trigger; see ``_begin_kernels`` and ``_motion_kernels``. ``_codes``
             names the columns.
         laterals: ``(·, 3)``, see ``_across_kernels``.
         values: slots of the first values of parameters and variables that change.
@@ -323,7 +325,7 @@ class Program:
         for element in self.elements:
             if element[KIND] == EVENT:
                 for action in self.actions[element[FIRST] : element[LAST]]:
-                    if action[1] < FIRST_GLOBAL:
+                    if action[DOES] < FIRST_GLOBAL:
                         found[element[EVENT_NUMBER]].add(int(action[WHOM]))
         return [frozenset(one) for one in found]
 
@@ -347,8 +349,8 @@ class Program:
 
     def trajectory_of(self, name: str) -> int:
         """Return the number of the one trajectory that an event has an entity follow."""
-        mine = (self.actions[:, 0] == self.names.index(name)) & (self.actions[:, 1] == FOLLOW)
-        (number,) = self.actions[mine, 6].tolist()
+        mine = (self.actions[:, WHOM] == self.names.index(name)) & (self.actions[:, DOES] == FOLLOW)
+        (number,) = self.actions[mine, ROW].tolist()
         return int(number)
 
     def on_course(self, courses: Mapping[str, Float]) -> "Program":

@@ -8,18 +8,17 @@ import numpy.typing as npt
 from bridgegen.arrays import Float
 from bridgegen.ego._weather_columns import WEATHER
 from bridgegen.simulation.embedded._codes import (
+    DOES,
     EVENT,
     EVENT_NUMBER,
     FIRST,
     KIND,
     LAST,
+    ROW,
     WEATHER_CHANGE,
 )
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
-
-ACTION_KIND, WEATHER_ROW = 1, 6
-"""Columns of ``Program.actions``."""
 
 
 def weathers(
@@ -41,15 +40,15 @@ def weathers(
     slots = program.fill(values, rollout.shape[0])[row]
     changes = [(0, 0)]
     for j in program.initial.tolist():
-        if program.actions[j, ACTION_KIND] == WEATHER_CHANGE:
-            changes.append((0, int(program.actions[j, WEATHER_ROW])))
+        if program.actions[j, DOES] == WEATHER_CHANGE:
+            changes.append((0, int(program.actions[j, ROW])))
     for element in program.elements.tolist():
         if element[KIND] != EVENT:
             continue
         began = int(rollout.began[row, element[EVENT_NUMBER]])
         for j in range(element[FIRST], element[LAST]) if began >= 0 else ():
-            if program.actions[j, ACTION_KIND] == WEATHER_CHANGE:
-                changes.append((began, int(program.actions[j, WEATHER_ROW])))
+            if program.actions[j, DOES] == WEATHER_CHANGE:
+                changes.append((began, int(program.actions[j, ROW])))
     now = np.zeros(WEATHER)
     set_clear(now)
     found: list[tuple[int, Float]] = []

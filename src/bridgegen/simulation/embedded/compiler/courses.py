@@ -9,8 +9,6 @@ from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 
-SPEED_CHANGE = 0
-
 SHAPES = {
     osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
     osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
@@ -117,7 +115,7 @@ class Courses:
         slot = self._tables.slot(target.value)
         if isinstance(target, osc.AbsoluteTargetSpeed):
             self._forward(target, "value", target.value)
-            return entity, SPEED_CHANGE, shape, dimension, slot, value, 0
+            return entity, codes.SPEED_CHANGE, shape, dimension, slot, value, 0
         continuous = self._flag(target, "continuous", target.continuous)
         if continuous and dimension != 0 and shape != 0:
             dimension_ = action.dynamics.dynamics_dimension

@@ -17,11 +17,10 @@ from bridgegen.simulation.embedded._codes import (
     COLLISION,
     DISTANCE,
     DOES,
+    FIRST_ACROSS,
     FIRST_BY_ENTITY,
     FIRST_GLOBAL,
     KEEP_ASIDE,
-    LANE_CHANGE,
-    LANE_OFFSET,
     OTHER,
     PROBE,
     PROBES,
@@ -46,9 +45,9 @@ from bridgegen.simulation.embedded.places._place_kernels import body_pose, end_f
 def goes_by(j, plan):
     """Return the entity by which action j moves its own, -1 if none."""
     kind = plan.actions[j, DOES]
-    if RELATIVE_SPEED <= kind < FIRST_GLOBAL or kind == KEEP_ASIDE:
+    if RELATIVE_SPEED <= kind < FIRST_ACROSS or kind == KEEP_ASIDE:
         return plan.courses[plan.actions[j, ROW], REF]
-    if kind in (LANE_CHANGE, LANE_OFFSET):
+    if FIRST_ACROSS <= kind < FIRST_GLOBAL:
         return plan.laterals[plan.actions[j, ROW], OF]
     return -1
 

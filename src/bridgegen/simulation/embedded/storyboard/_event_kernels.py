@@ -31,7 +31,8 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._memory_kernels import TICKS
 from bridgegen.simulation.embedded.conditions import select
-from bridgegen.simulation.embedded.storyboard._action_kernels import begin, stop
+from bridgegen.simulation.embedded.motion import stop_motion
+from bridgegen.simulation.embedded.storyboard._action_kernels import begin
 
 
 @inlined_kernel
@@ -87,7 +88,7 @@ def stop_element(x, k, plan, roads, state, record):
         if plan.elements[y, KIND] == ACTION:
             for j in range(plan.elements[y, FIRST], plan.elements[y, LAST]):
                 if not state.action_ended[j]:
-                    stop(j, k, plan, roads, state, record)
+                    stop_motion(j, k, plan, roads, state, record)
                     state.action_ended[j] = True
         state.phase[y] = COMPLETE
         enter(y, STOPPED, state)
