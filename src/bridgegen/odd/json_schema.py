@@ -19,6 +19,7 @@ from bridgegen.odd.reader import names
 from bridgegen.odd.roads import KNOBS, Template
 from bridgegen.odd.schema import FragmentFile, ScenarioFile
 from bridgegen.odd.story import CONDITIONS
+from bridgegen.odd.story_schema import ACTIONS
 
 FILE = "bridgegen.schema.json"
 """What `bridgegen new` calls it."""
@@ -131,7 +132,7 @@ def _between_keys(sections: dict[str, Any]) -> None:
     sections["LaneChangeSection"]["anyOf"] = [{"required": ["time"]}, {"required": ["distance"]}]
     sections["LaneChangeSection"]["properties"]["lanes"]["not"] = {"const": 0}
     sections["EventSection"] |= {
-        "anyOf": [{"required": [key]} for key in ("speed", "lane_change", "weather")],
+        "anyOf": [{"required": [key]} for key in ACTIONS],
         "allOf": [
             {"anyOf": [{"required": ["participant"]}, {"required": ["weather"]}]},
             _if_there("weather", {"participant": _NULL}),

@@ -13,6 +13,11 @@ STRIPS = ("sidewalk", "shoulder")
 """What a waypoint may lie on besides driving lanes."""
 
 
+def in_words(value: Quantity, unit: str) -> str:
+    """Return a parameter's name as it is, a number with its unit."""
+    return value if isinstance(value, str) else f"{value:g} {unit}"
+
+
 @dataclass(frozen=True)
 class Waypoint:
     """A place on a leg.
@@ -88,6 +93,17 @@ class Change:
     distance: Quantity | None = None
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
 
+    def __str__(self) -> str:
+        """Return how long it takes, to be said after what changes."""
+        for value, unit, word in (
+            (self.rate, "m/s²", "at"),
+            (self.time, "s", "within"),
+            (self.distance, "m", "over"),
+        ):
+            if value is not None:
+                return f"{word} {in_words(value, unit)}"
+        return "at once"
+
 
 @dataclass(frozen=True)
 class SpeedChange:
@@ -96,6 +112,10 @@ class SpeedChange:
     speed: Quantity
     change: Change
 
+    def __str__(self) -> str:
+        """Return what the participant does, to be said after its name."""
+        return f"takes up {in_words(self.speed, 'm/s')} {self.change}"
+
 
 @dataclass(frozen=True)
 class LaneChange:
@@ -103,6 +123,12 @@ class LaneChange:
 
     lanes: int
     change: Change
+
+    def __str__(self) -> str:
+        """Return what the participant does, to be said after its name."""
+        count, side = abs(self.lanes), "left" if self.lanes > 0 else "right"
+        lanes = "a lane" if count == 1 else f"{count} lanes"
+        return f"changes {lanes} to the {side} {self.change}"
 
 
 @dataclass(frozen=True)
@@ -114,6 +140,10 @@ class WeatherChange:
     """
 
     prefix: str
+
+    def __str__(self) -> str:
+        """Return what happens to the weather, to be said after it."""
+        return f"becomes that of {self.prefix}…"
 
 
 Action = SpeedChange | LaneChange | WeatherChange

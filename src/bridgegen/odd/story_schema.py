@@ -81,6 +81,10 @@ class LaneChangeSection(ShapedSection):
     """Of the way aside over time, or distance."""
 
 
+ACTIONS = ("speed", "lane_change", "weather")
+"""The keys of an event that are actions; it has one of them at least."""
+
+
 class EventSection(ShapedSection):
     """Something that happens."""
 

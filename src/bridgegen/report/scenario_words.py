@@ -2,20 +2,16 @@
 
 from collections.abc import Iterator
 
-from bridgegen.odd.roads import Quantity
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.story import (
     CONDITIONS,
-    Action,
-    Change,
     ConditionSpec,
     EventSpec,
     Jam,
-    LaneChange,
     Participant,
     RoadWorks,
-    SpeedChange,
     Waypoint,
+    in_words,
 )
 
 
@@ -33,8 +29,10 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
 def _participant(one: Participant) -> str:
     if one.path:
         way = " to ".join(_place(point) for point in one.path)
-        return f"{one.name}, a {one.type}, goes from {way} at {_number(one.speed, 'm/s')}."
-    line = f"{one.name}, a {one.type}, starts at {_place(one.start)} at {_number(one.speed, 'm/s')}"
+        return f"{one.name}, a {one.type}, goes from {way} at {in_words(one.speed, 'm/s')}."
+    line = (
+        f"{one.name}, a {one.type}, starts at {_place(one.start)} at {in_words(one.speed, 'm/s')}"
+    )
     if one.conduct == "obstacle" or (one.speed == 0.0 and one.end is None):
         return f"{one.name}, a {one.type}, stands at {_place(one.start)}."
     return f"{line}{'' if one.end is None else f' and goes to {_place(one.end)}'}."
@@ -53,32 +51,11 @@ def _works(works: RoadWorks) -> str:
 
 
 def _event(event: EventSpec) -> str:
-    what = " and ".join(_action(action) for action in event.actions)
+    what = " and ".join(map(str, event.actions))
     when = ", or ".join(
         " and ".join(_condition(one, event) for one in alternative) for alternative in event.when
     )
     return f"{event.name}: {event.participant or 'the weather'} {what} when {when}."
-
-
-def _action(action: Action) -> str:
-    if isinstance(action, SpeedChange):
-        return f"takes up {_number(action.speed, 'm/s')}{_change(action.change)}"
-    if isinstance(action, LaneChange):
-        count, side = abs(action.lanes), "left" if action.lanes > 0 else "right"
-        lanes = "a lane" if count == 1 else f"{count} lanes"
-        return f"changes {lanes} to the {side}{_change(action.change)}"
-    return f"becomes that of {action.prefix}…"
-
-
-def _change(change: Change) -> str:
-    for value, unit, word in (
-        (change.rate, "m/s²", "at"),
-        (change.time, "s", "within"),
-        (change.distance, "m", "over"),
-    ):
-        if value is not None:
-            return f" {word} {_number(value, unit)}"
-    return " at once"
 
 
 def _condition(one: ConditionSpec, event: EventSpec) -> str:
@@ -89,15 +66,11 @@ def _condition(one: ConditionSpec, event: EventSpec) -> str:
         subject = f"the time since {one.event} ended"
     if one.to is not None:
         subject = f"the {one.kind} ({kind.meaning}) from {whose} to {one.to}"
-    return f"{subject} is {kind.rule} {_number(one.value, kind.unit)}"
+    return f"{subject} is {kind.rule} {in_words(one.value, kind.unit)}"
 
 
 def _place(at: Waypoint) -> str:
     lane = f"lane {at.lane}" if isinstance(at.lane, int) else f"the {at.lane}"
     where = "" if at.leg == "main" and at.way == "out" else f" of leg {at.leg} {at.way}"
-    aside = "" if at.offset == 0.0 else f", {_number(at.offset, 'm')} left of its centre"
-    return f"{_number(at.distance, 'm')} on {lane}{where}{aside}"
-
-
-def _number(value: Quantity, unit: str) -> str:
-    return value if isinstance(value, str) else f"{value:g} {unit}"
+    aside = "" if at.offset == 0.0 else f", {in_words(at.offset, 'm')} left of its centre"
+    return f"{in_words(at.distance, 'm')} on {lane}{where}{aside}"
