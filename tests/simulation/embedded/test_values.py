@@ -237,3 +237,14 @@ def test_the_start_s_state_of_a_light_goes_before_its_phase_s():
         ("e", MOVE, after(9.0)), network=signals(MAIN), environment=light("1", GREEN)
     )
     assert rollout.lights[0, 0, [0, 39, 40, 100]].tolist() == [4, 4, 4, 1]
+
+
+def test_a_light_changes_after_an_entity_is_deleted_that_has_its_number():
+    """The light, the first, and the ego have number 0."""
+    gone = everywhere('<EntityAction entityRef="ego"><DeleteEntityAction/></EntityAction>')
+    at, rollout = began(
+        ("gone", gone, after(1.0)), ("set", light("1", GREEN), after(1.5)),
+        network=signals(MAIN), ego=None,
+    )  # fmt: skip
+    assert at == {"gone": 20, "set": 30}
+    assert rollout.lights[0, 0, [29, 30, 39]].tolist() == [1, 4, 4]
