@@ -1,4 +1,4 @@
-"""A comparison from start to finish: run what is missing, measure, test, draw, write."""
+"""A comparison from start to finish: make the missing runs, measure, test, draw, write."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -26,11 +26,11 @@ LOCK = "compare.lock"
 
 @dataclass(frozen=True)
 class Watch(Watcher):
-    """Who wants to know how a comparison is getting on.
+    """Callbacks for the progress of a comparison.
 
     Attributes:
-        begun: told the plan, how many of its runs have ended already, and their evaluations.
-        stage: told what begins when the runs are done: "read", "draw".
+        begun: gets the plan, the number of its runs that have ended, and their evaluations.
+        stage: gets the stage that begins after the runs: "read", "draw".
     """
 
     begun: Callable[[Plan, int, int], None] = lambda plan, ended, made: None
@@ -39,7 +39,7 @@ class Watch(Watcher):
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonArguments(CommonOptions):
-    """The arguments of ``compare``: the options that all runs share, and what is the grid's."""
+    """The arguments of ``compare``: the options that all runs share, and those of the grid."""
 
     scenarios: str | Path | Sequence[str | Path] = field(
         kw_only=False, metadata={"help": "One or several, each as for ``run_search``."}
@@ -50,9 +50,7 @@ class ComparisonArguments(CommonOptions):
     )
     settings: Mapping[str, Mapping[str, Value]] | None = field(
         default=None,
-        metadata={
-            "help": "Settings of algorithms, by their names, that are not to be their defaults."
-        },
+        metadata={"help": "Settings of algorithms, by their names, that differ from the defaults."},
     )
     seeds: int = field(
         default=10,
@@ -87,29 +85,29 @@ class ComparisonArguments(CommonOptions):
         metadata={"help": "Whether to write tables, figures and page; a later call can do it."},
     )
     watch: Watch | None = field(
-        default=None, metadata={"help": "Told how the comparison is getting on."}
+        default=None, metadata={"help": "Callbacks for the progress of the comparison."}
     )
 
 
 @called_with(ComparisonArguments)
 def compare(given: ComparisonArguments) -> Comparison:
-    """Run algorithms on scenarios with several seeds, and say which is better at what.
+    """Run algorithms on scenarios with several seeds, and test which is better in which measure.
 
     A grid of runs, each an ordinary run's folder under ``OUT/runs`` (``resume`` exports its
     critical scenarios); then ``runs.csv``, ``summary.csv``, ``times.csv``, figures and a page.
     Killed at any moment and called again, it resumes; called with more scenarios, algorithms or
-    seeds, it makes those runs besides.
+    seeds, it adds their runs.
 
     Returns:
         The comparison. A run that failed is a gap in it.
 
     Raises:
-        InputError: anything that the arguments or files say wrongly.
-        StorageError: the folder holds something else, is being written, or cannot be.
+        InputError: an invalid argument or file.
+        StorageError: the folder holds something else, is in use, or cannot be written.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
     watch, scenarios, algorithms = given.watch or Watch(), given.scenarios, given.algorithms
-    who = read_choice(given.workers)
+    executor = read_choice(given.workers)
     plan = make_plan(
         [scenarios] if isinstance(scenarios, str | Path) else scenarios,
         [algorithms] if isinstance(algorithms, str) else algorithms,
@@ -130,7 +128,7 @@ def compare(given: ComparisonArguments) -> Comparison:
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:
-        failures = _run(plan, who, watch, done)
+        failures = _run(plan, executor, watch, done)
         return _conclude(plan, failures, watch, deliver=given.deliver)
     except KeyboardInterrupt:
         raise Interrupted(
@@ -140,14 +138,14 @@ def compare(given: ComparisonArguments) -> Comparison:
         lock.release()
 
 
-def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> dict[Cell, str]:
+def _run(plan: Plan, executor: int | str | None, watch: Watch, done: list[str]) -> dict[Cell, str]:
     """Make the runs that are missing; return why some failed.
 
     Args:
         plan: the runs.
-        who: makes them, as ``read_choice`` returns it.
-        watch: told how it is getting on.
-        done: is given the name of each run that has ended, this time or earlier.
+        executor: of the runs, as ``read_choice`` returns it.
+        watch: callbacks for the progress.
+        done: gets the name of each run that has ended, this time or earlier.
     """
     failures, tasks, made = {}, [], 0
     for cell in plan.cells:
@@ -168,7 +166,7 @@ def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> di
         done.append(name)
         watch.ended(name, failure)
 
-    at_once, cluster = (who, None) if isinstance(who, int) else (_cores(), who)
+    at_once, cluster = (executor, None) if isinstance(executor, int) else (_cores(), executor)
     failed = run_all(tasks, at_once, Watcher(watch.compile, watch.batch, ended), cluster)
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
 
@@ -176,7 +174,7 @@ def _run(plan: Plan, who: int | str | None, watch: Watch, done: list[str]) -> di
 def _conclude(
     plan: Plan, failures: Mapping[Cell, str], watch: Watch, *, deliver: bool
 ) -> Comparison:
-    """Read the runs, measure and test them, and write it all if that is wanted."""
+    """Read the runs, measure and test them, and write the results if requested."""
     watch.stage("read")
     gaps, records = dict(failures), {}
     spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
@@ -218,7 +216,7 @@ def _absolute(path: Path | str | None) -> str | None:
 
 
 def _cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""One run of a comparison: begun, or gone on with; and what became of it."""
+"""One run of a comparison: started or resumed, and its result."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from bridgegen.workers import Threads
 
 @dataclass(frozen=True)
 class Task:
-    """A run that is to be made.
+    """A run to make.
 
     Attributes:
-        name: what people call it.
-        folder: its own.
-        scenario: that is searched, as ``run_search`` takes it.
+        name: of the run.
+        folder: of the run.
+        scenario: to search, as ``run_search`` takes it.
         options: of the run.
     """
 
@@ -33,12 +33,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Watcher:
-    """Who wants to know how the runs are getting on; each is called from the same thread.
+    """Callbacks for the progress of the runs, all called from the same thread.
 
     Attributes:
-        compile: told that the simulator is being compiled, maybe.
-        batch: told a run's name and its evaluations so far.
-        ended: told a run's name, and why it failed if it did.
+        compile: called when the simulator may be compiling.
+        batch: gets a run's name and its evaluations so far.
+        ended: gets a run's name, and the reason if it failed.
     """
 
     compile: Callable[[], None] = lambda: None
@@ -47,7 +47,7 @@ class Watcher:
 
 
 def evaluations_of(folder: Path) -> tuple[int, bool]:
-    """Return how many evaluations a run's folder holds, and whether the run has ended.
+    """Return the number of evaluations in a run's folder, and whether the run has ended.
 
     Raises:
         StorageError: it is damaged.
@@ -64,26 +64,26 @@ def attempt(
     batch: Callable[[int], None],
     stage: Callable[[str], None],
 ) -> str | None:
-    """Make a run, or go on with it, without hand-over and report.
+    """Make or resume a run, without export and report.
 
     Args:
         task: the run.
-        cluster: where its scenarios are simulated; None is here, in one thread.
-        batch: told the evaluations so far.
-        stage: told what begins, "compile" or "search".
+        cluster: where its scenarios are simulated; None is this process, in one thread.
+        batch: gets the evaluations so far.
+        stage: gets the stage that begins, "compile" or "search".
 
     Returns:
         Why it failed, or None.
 
     Raises:
-        InputError: what the user asked for breaks a rule; nothing of the run exists.
-        KeyboardInterrupt: Ctrl-C; what is done is kept.
+        InputError: an argument breaks a rule; nothing of the run exists.
+        KeyboardInterrupt: Ctrl-C; finished evaluations are kept.
     """
 
-    def told(progress: Progress) -> None:
+    def on_batch(progress: Progress) -> None:
         batch(progress.evaluations)
 
-    watch = Watch(stage=stage, batch=told)
+    watch = Watch(stage=stage, batch=on_batch)
     how: dict[str, Any] = {"deliver": False, "workers": cluster or Threads(1), "watch": watch}
     begun = (task.folder / FILE).exists()
     try:
@@ -99,6 +99,6 @@ def attempt(
         return str(error)
     except BridgeGenError as error:
         return str(error)
-    except Exception as error:  # whatever an algorithm or a driver of the user's raises
+    except Exception as error:  # a user's algorithm or driver may raise anything
         return f"{type(error).__name__}: {error}"
     return None

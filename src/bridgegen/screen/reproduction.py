@@ -1,4 +1,4 @@
-"""A reproduction: one bar for all its runs, then what it came to."""
+"""A reproduction: one bar for all its runs, then its results."""
 
 from typing import TYPE_CHECKING
 
@@ -31,7 +31,7 @@ class ReproductionScreen(RunsScreen):
 
 
 def print_reproduction(result: "Reproduction", seconds: float) -> None:
-    """Print what was found in sentences, and where the files are."""
+    """Print the findings in sentences, and the files' paths."""
     console = Console(markup=False, emoji=False, highlight=False)
     for title, text in result.in_short:
         console.print(f"{title}: {text}\n")
