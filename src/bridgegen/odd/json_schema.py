@@ -54,7 +54,7 @@ def refuse_other_schema(path: Path) -> None:
     """Refuse a place where something else is than an earlier schema of ours.
 
     Raises:
-        StorageError: there is, or nobody can tell.
+        StorageError: there is one, or the folder cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -156,7 +156,7 @@ def _of_kind(kind: str) -> dict[str, Any]:
 
 
 def _if_there(key: str, then: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the rule that some keys are so where another one says something."""
+    """Return the rule for some keys that depends on another one's value."""
     there = {"properties": {key: {"not": _NULL}}, "required": [key]}
     return {"if": there, "then": {"properties": dict(then)}}
 
