@@ -1,6 +1,6 @@
 """Does a scenario keep its rules? Answers in sentences that a person understands.
 
-SHACL decides (`shapes`, run by pyshacl over a ``pyoxigraph.Store``) and `words` says it in words.
+SHACL decides (`shapes`, run by pyshacl over a ``pyoxigraph.Store``) and `words` phrases the result.
 pyshacl is imported at the first check, as that takes half a second.
 """
 

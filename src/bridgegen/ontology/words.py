@@ -51,7 +51,7 @@ class Finding:
         focus: the individual that was asked.
         value: the value at fault, if there is one.
         literal: whether it is a literal.
-        message: what the shape says of it.
+        message: of the shape.
     """
 
     shape: str
@@ -186,7 +186,7 @@ def _at(places: list[tuple[Subject, str]], who: str, parameter: str, message: st
 
 
 def _limit(individuals: Individuals, rule: Rule) -> str:
-    """Return what the limit comes to, and from what: " (= 60 with precipitation = 60)"."""
+    """Return the value of the limit, and its inputs: " (= 60 with precipitation = 60)"."""
     if rule.limit is None:
         return ""
     given: dict[str, float] = {}

@@ -29,7 +29,7 @@ def convert_file(owl: Path, folder: Path | None = None) -> tuple[list[Path], lis
     """Write the ``.xodr`` and ``.xosc`` of a scenario's ontology.
 
     Args:
-        owl: the ontology with its individuals, as written or as somebody edited it.
+        owl: the ontology with its individuals, as written or edited.
         folder: where to write; beside the ontology by default.
 
     Returns:

@@ -20,7 +20,7 @@ class RoadMap:
 
     Attributes:
         path: of the file.
-        data: its bytes, handed over unchanged.
+        data: its bytes, exported unchanged.
         model: what it says.
         site: the intersection.
     """

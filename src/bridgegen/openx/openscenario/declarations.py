@@ -31,7 +31,7 @@ CONFLICT_TYPE = "conflict_type"
 """The header's property for the type of a critical scenario's decisive conflict."""
 
 RESPONSIBLE = "responsible"
-"""The header's property for who is responsible for it: ego, other, shared or none."""
+"""The header's property for the responsible party: ego, other, shared or none."""
 
 SEVERITY = "severity"
 """The header's property for its severity, the probability of a MAIS3+ injury."""
@@ -97,7 +97,7 @@ class License(Element):
 
 @dataclass(frozen=True)
 class FileHeader(Element):
-    """Who wrote the file, when, what for, and in which version of the standard."""
+    """The file's author, date, purpose, and version of the standard."""
 
     rev_major: UnsignedShort
     rev_minor: UnsignedShort

@@ -208,7 +208,7 @@ class DistributionFile(Element):
 
 
 def is_distribution(path: Path) -> bool:
-    """Say whether a file holds a distribution.
+    """Return whether a file holds a distribution.
 
     Raises:
         FileFormatError: missing, unreadable, not well-formed, or hostile.

@@ -345,7 +345,7 @@ class _Builder:
 
     @contextmanager
     def _saying(self, element: Element) -> Iterator[None]:
-        """Take down why something is refused, with its line."""
+        """Record a problem with its line."""
         try:
             yield
         except InputError as error:

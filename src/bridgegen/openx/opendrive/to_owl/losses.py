@@ -12,7 +12,7 @@ from bridgegen.openx.opendrive.to_owl.furniture import class_of
 def losses(model: OpenDrive) -> Iterator[str]:
     """Yield a sentence for each kind of thing of a map that its individuals do not say in full.
 
-    Left out of every import, and not told here: elevations and lateral profiles, lane offsets,
+    Left out of every import, and not reported here: elevations and lateral profiles, lane offsets,
     widths but at the start and the middle of a lane section, where along a lane its lines begin,
     the shapes and heights of objects, and lane speed limits.
 

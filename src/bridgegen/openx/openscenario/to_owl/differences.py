@@ -141,7 +141,7 @@ def _about(child: Element) -> str:
 
 
 def _is_nothing(one: Element) -> bool:
-    """Say whether an element says nothing by being there."""
+    """Return whether an element says nothing by being there."""
     if isinstance(one, osc.Precipitation):
         return one.precipitation_type == osc.PrecipitationType.DRY
     silent = (

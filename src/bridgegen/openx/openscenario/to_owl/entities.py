@@ -1,4 +1,4 @@
-"""OpenSCENARIO2OWL, its entities: bodies, who drives them, and how they start."""
+"""OpenSCENARIO2OWL, its entities: bodies, drivers, and starts."""
 
 import pyoxigraph as ox
 

@@ -127,7 +127,7 @@ def _add_parameter(
     builder.put(node, "has_name", name)
     if formula:
         builder.put(node, "has_expression", builder.text(formula[0].value))
-    if not bound:  # nobody carries its value, so it does so itself
+    if not bound:  # no other individual carries its value, so it does
         builder.put(node, "has_value", value)
         builder.put(node, "has_parameter", node)
     names = sorted(bound) or ["has_value"]
@@ -187,7 +187,7 @@ def _check_clear(
     bound: dict[str, list[ox.NamedNode]],
     free: Iterable[tuple[ox.NamedNode, str]],
 ) -> None:
-    """Make sure that nobody takes a number of somebody's own for the parameter's.
+    """Make sure that an individual's own number is not taken for the parameter's.
 
     The ontology binds an individual to a parameter and the parameter to properties.
 

@@ -41,7 +41,7 @@ from bridgegen.openx.openscenario.to_owl.events import (
     add_events,
     happenings,
 )
-from bridgegen.openx.openscenario.to_owl.legs import stretches, told
+from bridgegen.openx.openscenario.to_owl.legs import stretches, with_legs
 from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
@@ -115,7 +115,7 @@ class _Importer:
             controllers=signals is None or not signals.controllers,
         )
         nodes = {one: self.builder.iri(road_name(one)) for one in self.builder.legs}
-        self.static = tuple(told(self.builder.legs, nodes, whole.quads))
+        self.static = tuple(with_legs(self.builder.legs, nodes, whole.quads))
         self.derived: dict[str, osc.Event] = {}
         self.stated: set[str] = set()
         self.happenings: list[Happening] = []
