@@ -12,7 +12,7 @@ from bridgegen.conflict.sentences import sentence
 from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
 
 CAREFUL_DRIVER = "the careful driver of UN R157 (0.75 s, 0.774 g)"
-"""Whose braking says whether a contact was preventable."""
+"""The driver whose braking decides whether a contact was preventable."""
 
 UNITS: Mapping[str, str] = {
     "time": "s", "decided": "s", "ttc": "s", "needed_deceleration": "m/s²", "left": "s",

@@ -108,7 +108,7 @@ def evaluate(rollout: Rollout, names: Sequence[str]) -> Float:
 
     Returns:
         ``(N, M)`` float64, a column per name, in the metric's unit; NaN throughout a row exactly
-        where the scenario failed (``rollout.status`` says why).
+        where the scenario failed (the reason is in ``rollout.status``).
 
     Raises:
         UnknownNameError: a name is not a metric's.

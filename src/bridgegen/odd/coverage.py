@@ -176,7 +176,7 @@ def coverage_map(
     strength: int = MAX_STRENGTH,
     sample: int = SAMPLE,
 ) -> CoverageMap:
-    """Count as `coverage` does, and say in which pairs of bins the rows are.
+    """Count as `coverage` does, and return the pairs of bins of the rows.
 
     Args:
         space: what was searched.

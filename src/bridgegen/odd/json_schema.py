@@ -99,7 +99,7 @@ def _plain(one: Any) -> Any:
 
 
 def _between_keys(sections: dict[str, Any]) -> None:
-    """Add what holds between the keys of a section, as far as a schema can say it."""
+    """Add rules between the keys of a section, as far as a schema can express them."""
     for name in ("ParameterSection", "DerivedSection"):
         unit = sections[name]["properties"]["unit"]
         unit.pop("anyOf", None)

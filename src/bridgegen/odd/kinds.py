@@ -232,7 +232,7 @@ class Kind(ABC):
         return f"{self.text(low, number)} to {self.text(high, number)}{unit}"
 
     def need_text(self, sign: str, limit: float, low: float, high: float, number: Show) -> str:
-        """Return what harm needs of a parameter, where sign and limit do not say it; else "".
+        """Return what harm needs of a parameter besides sign and limit; else "".
 
         Args:
             sign: ">=" or "<=".

@@ -84,7 +84,7 @@ class Places:
         return (one.low, one.high) if one else (-math.inf, math.inf)
 
     def check_crossing(self, name: str, points: tuple[Waypoint, ...], path: Path) -> None:
-        """Say where a pedestrian leaves the sidewalks and crosswalks (paper, Section III-B)."""
+        """Report where a pedestrian leaves the sidewalks and crosswalks (paper, Section III-B)."""
         roads = self._roads
         half = roads.knobs["crosswalk_width"]
         reach = 0.5 * (half if isinstance(half, float) else 0.0)

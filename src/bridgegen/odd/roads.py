@@ -197,7 +197,7 @@ class RoadsSpec:
         return {name: limit for name, limit in found.items() if limit != 100.0}
 
     def length(self, leg: str) -> Quantity | None:
-        """Return how long a leg is [m]; None where only its segments say so."""
+        """Return the length of a leg [m]; None if only its segments define it."""
         if self.template == "road":
             return None if self.segments else self.knobs["length"]
         return self.knobs["after_length" if leg == "after" else "arm_length"]

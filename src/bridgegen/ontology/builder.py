@@ -1,6 +1,6 @@
 """Collecting statements: individuals, their values, and the parameters that give these.
 
-What the individuals of a scenario are, the files beside this one say, one per layer.
+The files beside this one define the individuals of a scenario, one per layer.
 """
 
 from collections.abc import Mapping

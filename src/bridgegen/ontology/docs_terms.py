@@ -11,7 +11,7 @@ _Properties = Callable[[str], Iterable[str]]
 
 
 class Terms:
-    """Says terms as markup, each as an article with the term's local name as its anchor."""
+    """Renders terms as markup, each as an article with the term's local name as its anchor."""
 
     def __init__(self, ontology: TBox) -> None:
         self.ontology = ontology

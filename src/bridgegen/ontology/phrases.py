@@ -43,7 +43,7 @@ class Phrase:
 
 
 class Phrases:
-    """Says the individuals of a file in words."""
+    """Describes the individuals of a file in words."""
 
     def __init__(self, members: Members) -> None:
         self.members = members
@@ -65,7 +65,7 @@ class Phrases:
 
 
 class _Speaker:
-    """Says one phrase, and writes down what it is taken from."""
+    """Builds one phrase, and records its sources."""
 
     def __init__(self, members: Members, phrase: Phrase) -> None:
         self.members, self.phrase = members, phrase
@@ -133,7 +133,7 @@ def _anything(speaker: _Speaker, node: Subject) -> str:
 
 
 def _change(speaker: _Speaker, node: Subject) -> str:
-    """Say how something changes: at a rate, within a time, over a distance; else at once."""
+    """Describe a change's dynamics: at a rate, within a time, over a distance; else at once."""
     text = "".join(
         f" {word} {speaker.value(node, name)}"
         for name, word in (

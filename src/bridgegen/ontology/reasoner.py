@@ -46,7 +46,7 @@ class Reasoned:
     """A reasoner's result for a scenario.
 
     Attributes:
-        consistent: whether any world can be as the statements say.
+        consistent: whether the statements have a model.
         contradiction: where none can, a smallest set of statements that cannot be true together
             with the ontology, in words; empty if it was not found in time.
         unsatisfiable: local names of the classes that can have no individual; empty where the
@@ -246,7 +246,7 @@ _ASSERTION = re.compile(r"(Class|ObjectProperty|DataProperty)Assertion\((\S+) (\
 
 
 def _sentence(axiom: Any) -> str:
-    """Return a statement as people say it: 'bv is a Car', 'bv has_box_length 4.6'."""
+    """Return a statement in words: 'bv is a Car', 'bv has_box_length 4.6'."""
     text = re.sub(r"<([^<>]*)>", lambda found: local_name(found[1]), str(axiom))
     found = _ASSERTION.fullmatch(text)
     match found and found.groups():

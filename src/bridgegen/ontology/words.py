@@ -68,7 +68,7 @@ def violations_of(
     rules: Mapping[str, Rule],
     finding: Finding,
 ) -> Iterator[Violation]:
-    """Say a finding in words."""
+    """Return a finding in words."""
     key = local_name(finding.shape)
     focus = individuals.find(finding.focus) or ox.NamedNode(finding.focus)
     if key not in rules:

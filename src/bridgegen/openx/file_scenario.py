@@ -45,7 +45,7 @@ class RoadFile:
         name: of the file.
         digest: SHA-256 of it, in hexadecimal.
         data: its bytes.
-        model: what it says.
+        model: its contents.
     """
 
     name: str
@@ -207,7 +207,7 @@ class ConcreteFile:
 
     @cached_property
     def individuals(self) -> Individuals | None:
-        """See `ConcreteScenario`: all that the file says, or nothing."""
+        """See `ConcreteScenario`: all contents of the file, or nothing."""
         try:
             renamed = rename_entity(self.storyboard, ego_of(self.storyboard), EGO)
             return individuals_from_openscenario(renamed, self.roads, self.road_file, "")[0]

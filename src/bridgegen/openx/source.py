@@ -112,7 +112,7 @@ def source_of(
 
 
 def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
-    """Return a scenario whose static parameters are what a map says.
+    """Return a scenario with its static parameters from a map.
 
     A start that is searched stays on the road that touches the junction: a position in an
     OpenSCENARIO file is on one road, whatever its parameter's value. The map's lowest speed limit

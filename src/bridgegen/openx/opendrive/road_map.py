@@ -21,7 +21,7 @@ class RoadMap:
     Attributes:
         path: of the file.
         data: its bytes, exported unchanged.
-        model: what it says.
+        model: its contents.
         site: the intersection.
     """
 

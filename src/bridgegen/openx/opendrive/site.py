@@ -260,7 +260,7 @@ def _continuation(
     mapped: dict[int, int] = {}
     for lane_id in ids:
         lane = road.section_at(far).lane(lane_id)
-        assert lane is not None  # as `_steady` said
+        assert lane is not None  # checked by `_steady`
         links = lane.successors if far == "end" else lane.predecessors
         if len(links) != 1:
             return None

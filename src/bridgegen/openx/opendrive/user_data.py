@@ -1,4 +1,4 @@
-"""What the ontology says and OpenDRIVE has no words for: our own ``<userData>`` elements.
+"""Statements of the ontology that OpenDRIVE cannot express: own ``<userData>`` elements.
 
 The standard allows them at any element, and other tools pass over them. A code is ours where it
 begins with `PREFIX`; after that comes the local name of a property of the ontology (or
@@ -55,7 +55,7 @@ def exact(data: Sequence[UserData], name: str, measured: float, slack: float = 1
     Args:
         data: of the element.
         name: of the property.
-        measured: what the geometry says, to rounding.
+        measured: the geometry's value, with rounding.
         slack: by how much the two may differ, in the property's unit.
     """
     found = number(data, name)

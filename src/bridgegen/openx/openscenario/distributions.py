@@ -1,4 +1,4 @@
-"""A file that says how a scenario's parameters are distributed, and how it is read.
+"""Parameter distributions of a scenario, and their reader.
 
 Source: ASAM OpenSCENARIO XML 1.1 to 1.3, ``ParameterValueDistribution``.
 """
@@ -251,7 +251,7 @@ def distribution_of(
     | PoissonDistribution
     | Histogram,
 ) -> Distribution:
-    """Return what an element says.
+    """Return the contents of an element.
 
     Raises:
         InputError: it is no distribution.

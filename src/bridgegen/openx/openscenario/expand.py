@@ -7,7 +7,7 @@ All of it happens in this one place, when a file is read, so that users of a sce
   (see ``scopes``), but where an action or a condition names one it is made one of the scenario's;
 - no ``EntitySelection``: its members stand wherever there may be several entities.
 
-Elements that come from a catalogue say so in their lines (`catalogs.CatalogLine`).
+Elements from a catalogue are marked in their lines (`catalogs.CatalogLine`).
 """
 
 from dataclasses import replace

@@ -53,7 +53,7 @@ class Arm:
         road_type: OpenDRIVE's.
         objects: what lies on it.
         signals: what stands beside it.
-        user_data: what else is said of it.
+        user_data: its further values.
     """
 
     name: str
@@ -159,7 +159,7 @@ def road_of(
 
 
 def _with_turns(arm: Arm, sections: tuple[LaneSection, ...]) -> tuple[LaneSection, ...]:
-    """Return the section of a leg whose inbound lanes say which turns they allow."""
+    """Return the section of a leg whose inbound lanes state their allowed turns."""
     if not any(arm.turns):
         return sections
     (section,) = sections

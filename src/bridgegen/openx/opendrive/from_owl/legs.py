@@ -190,7 +190,7 @@ class _Lanes:
         return tuple(lanes[k][:2] for k in sorted(lanes) if lanes[k][0] != "driving")
 
     def turns(self) -> tuple[frozenset[str], ...]:
-        """Return where each inbound lane may lead, innermost first; empty where none says so."""
+        """Return each inbound lane's allowed turns, innermost first; empty if none are stated."""
         lanes = self._lanes["in"]
         found = tuple(lanes[k][2] for k in sorted(lanes) if lanes[k][0] == "driving")
         return found if any(found) else ()

@@ -48,7 +48,7 @@ def build(
         radius: of the ring lane's centre [m].
         ring_width: of the ring lane [m].
         arms: three to five, one lane in and one out each.
-        user_data: what else is said of it; the first junction carries it, the others name that.
+        user_data: its further values; the first junction carries them, the others name that.
 
     Raises:
         OntologyError: a leg with other lanes, or curves too tight for a car.

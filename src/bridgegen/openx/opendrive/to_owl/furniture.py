@@ -222,7 +222,7 @@ def _sign(signal: Signal) -> tuple[str, float | None]:
 
 
 def _valid(road: Road, s: float, validity: Sequence[Validity]) -> list[int]:
-    """Return the ids of the driving lanes at ``s`` that something says it is for."""
+    """Return the ids of the driving lanes at ``s`` that an element is valid for."""
     return [
         lane.id for lane in road.sections[section_index(road, s)].lanes
         if lane.drivable and any(one.from_lane <= lane.id <= one.to_lane for one in validity)
@@ -248,7 +248,7 @@ def _between(road: Road, s: float, right: float, left: float) -> list[int]:
 
 
 def _box(item: Object) -> Box:
-    """Return how far an object reaches; its own place, where it says nothing of its size."""
+    """Return an object's extent; its position only, if it states no size."""
     outline = item.outline or next(iter(item.outlines), None)
     hdg = item.hdg or 0.0
     length, width = item.length, item.width

@@ -21,7 +21,7 @@ USUAL_RULES = {
     "TimeToCollisionCondition": _MOST,
     "TimeHeadwayCondition": _MOST,
 }
-"""How a condition compares where its individual says nothing (has_rule)."""
+"""The comparison of a condition whose individual states none (has_rule)."""
 
 
 class Conditions:

@@ -79,7 +79,7 @@ def _body(individuals: Individuals, node: Subject) -> osc.Vehicle | osc.Pedestri
 
 
 def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
-    """Return the property that names a kind of which the category does not say all."""
+    """Return the property that names a kind that the category alone does not identify."""
     return () if kind.written.is_exact else (osc.Property(KIND, kind.name),)
 
 

@@ -5,7 +5,7 @@ where they were when, by a controller of ours that lies beside the file (`CONTRO
 ScenarioRunner's own, that for vehicles drives along lanes' centres, and that for pedestrians has no
 clock.
 
-Source: ScenarioRunner 0.9.15 and 0.9.16; what each part relies on is said where it is.
+Source: ScenarioRunner 0.9.15 and 0.9.16; each part documents what it relies on.
 """
 
 import re
@@ -157,7 +157,7 @@ def _weather(scenario: osc.OpenScenario) -> osc.Environment:
 
 
 def _ground(scenario: osc.OpenScenario, name: str, roads: OpenDrive) -> float:
-    """Return how high the road is where an entity starts [m], as far as its start says so."""
+    """Return the road's height where an entity starts [m], as far as its start states it."""
     for private in scenario.storyboard.init.actions.privates:
         for one in walk(private) if private.entity_ref == name else ():
             place: Any = one.position.position if isinstance(one, osc.TeleportAction) else None
@@ -210,7 +210,7 @@ def _controller(name: str, properties: Mapping[str, str | float]) -> osc.Control
 def _arrival(
     scenario: osc.OpenScenario, ego: str, body: Any, roads: OpenDrive
 ) -> osc.ReachPositionCondition | None:
-    """Return where the scenario ends when the ego gets there; None if it does not say so."""
+    """Return the position at which the ego ends the scenario; None if there is none."""
     stop = scenario.storyboard.stop_trigger
     for group in stop.condition_groups if stop else ():
         reached = [one for one in walk(group) if isinstance(one, osc.ReachPositionCondition)]

@@ -88,7 +88,7 @@ def _begins_at_once(builder: StoryBuilder, trigger: osc.Trigger | None) -> bool:
 
 
 def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happening]) -> set[str]:
-    """Add the events; one that waits for an event that cannot be said cannot be said either.
+    """Add the events; one that waits for an event that cannot be expressed is left out, too.
 
     Returns:
         The names of those that are stated.

@@ -1,4 +1,4 @@
-"""OpenSCENARIO2OWL, its parameters: their ranges, and what the header's properties say of them.
+"""OpenSCENARIO2OWL, its parameters: their ranges, and the header's properties on them.
 
 A parameter's value is already on the individuals that it gives; one that gives nothing carries its
 value itself. What a file of others does not say: the axis is ``weather`` of what gives nothing but
@@ -26,13 +26,13 @@ Facts = dict[str, dict[str, list[osc.Property]]]
 
 
 class Notes:
-    """What the header's properties say (`bridgegen.openx.openscenario.from_owl.notes`).
+    """The header's properties (`bridgegen.openx.openscenario.from_owl.notes`).
 
     Attributes:
         time_step: the property of it, if there is one.
         road_end: likewise.
         severity: likewise.
-        findings: by name, the properties that say why it is critical.
+        findings: by name, the properties on why it is critical.
         of: per kind (``parameter``, ``event``, ``signals``) and name, what is said, by its name.
     """
 
@@ -89,7 +89,7 @@ def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) 
 
 
 def _categories(notes: Notes, declared: Mapping[str, osc.ParameterDeclaration]) -> Iterator[str]:
-    """Yield the parameters that are categories: texts of which the header says an axis."""
+    """Yield the parameters that are categories: texts with an axis in the header."""
     for name in notes.of[PARAMETER]:
         one = declared.get(name)
         if one is not None and one.parameter_type is osc.ParameterType.STRING:
@@ -147,7 +147,7 @@ def _constrain(
     facts: dict[str, list[osc.Property]],
     names: Iterable[str],
 ) -> None:
-    """State the rules that the header says a parameter obeys."""
+    """State a parameter's rules in the header."""
     for rule in facts.get("constraint", ()):
         text = builder.text(rule.value)
         builder.put(node, "constraint", text)
