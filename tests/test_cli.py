@@ -75,7 +75,7 @@ def test_compare_prints_tables_and_words(cli, tmp_path):
     refused(
         cli(*words[:-1], tmp_path / "d", "--set", "w=3"), "--set must read ALGORITHM.NAME=VALUE"
     )
-    refused(cli(*words, "--ego", "reference"), "made otherwise", "ego was null")
+    refused(cli(*words, "--ego", "reference"), "with other settings", "ego was null")
 
 
 def test_simulate_prints_what_the_store_holds(cli, finished):

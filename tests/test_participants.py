@@ -8,7 +8,7 @@ import pytest
 
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.plausibility import plausibility
-from bridgegen.ego.detections import NOBODY, SEEN_BY
+from bridgegen.ego.detections import MISSED, SEEN_BY
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import ScenarioError
 from bridgegen.metrics.perceived import CLASSES
@@ -212,7 +212,7 @@ def test_it_is_simulated(kind, pipeline, rollout, entity):
 
 
 def test_it_is_perceived(rollout, entity):
-    assert (rollout.detections[0, entity, :, SEEN_BY] > NOBODY).any()
+    assert (rollout.detections[0, entity, :, SEEN_BY] > MISSED).any()
 
 
 def test_a_collision_with_it_is_analysed(kind, rollout, entity):

@@ -246,7 +246,7 @@ def test_a_run_that_fails_is_a_gap_and_is_tried_again(tmp_path, monkeypatch):
     assert row.loc["r_critic"]["value"] == rows.critical.sum() / len(rows)
     assert row.loc["to_50"]["value"] == math.inf
     assert set(row["ended"]) == {"exhausted"}
-    assert "pairwise had no more to ask after" in text
+    assert "pairwise had no more rows to propose after" in text
 
     monkeypatch.setattr(Failing, "broken", False)
     whole = bg.compare("crossroads-s4", **{**grid, "algorithms": ["failing"]}, workers=1)

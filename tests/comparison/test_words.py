@@ -64,7 +64,7 @@ def told(shares: dict[str, list[float]], critical: int = 1) -> list[str]:
         for name, row in shares.items()
         for seed, share in enumerate(row)
     }
-    kinds = [MEASURES[name] for name in words.TOLD]
+    kinds = [MEASURES[name] for name in words.SENTENCE_STARTS]
     plan = SimpleNamespace(algorithms=list(shares), baseline="a", budget=1000)
     lines = summarise(values, ["s"], plan.algorithms, "a", kinds)
 
@@ -99,7 +99,7 @@ def test_sentences_name_the_best_and_how_sure_that_is():
 def test_too_few_runs_are_said_to_be_too_few():
     """2 / C(6, 3) = 0.1, and twice that for two tests."""
     sentences = told({"a": [0.1, 0.2, 0.3], "b": [0.5, 0.6, 0.7], "c": [0.5, 0.6, 0.7]})
-    assert "p would still be 0.20. Ask for more seeds." in sentences[-1]
+    assert "p would still be 0.20. Use more seeds." in sentences[-1]
     assert not any("no difference" in one.lower() for one in sentences)
 
 

@@ -15,7 +15,7 @@ from bridgegen.ego.right_of_way import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMIN
 DT = 0.05
 RIGHT_ANGLE = np.pi / 2
 MAN = (0.5, 0.5, 0.0)
-EGO, BV, NOBODY, SHARED = Responsible.EGO, Responsible.OTHER, Responsible.NONE, Responsible.SHARED
+EGO, BV, NEITHER, SHARED = Responsible.EGO, Responsible.OTHER, Responsible.NONE, Responsible.SHARED
 
 
 def verdict(rollout, e=1):
@@ -51,7 +51,7 @@ def test_a_standing_obstacle_is_the_egos_from_the_stopping_distance_on(track, me
     assert verdict(enough) == (EGO, Rule.STANDING_AHEAD)
     assert analyse(enough).preventable[0, 1]
     short = meeting(track(v=v), track(x=4.0 + stopping_distance(v) - 0.3))
-    assert verdict(short) == (NOBODY, Rule.UNSAFE_START)
+    assert verdict(short) == (NEITHER, Rule.UNSAFE_START)
     assert not at_fault(short)
 
 
@@ -63,7 +63,7 @@ def test_the_careful_driver_brakes_no_harder_than_the_tyres_allow(track, meeting
     short = meeting(track(v=20.0), track(x=4.0 + distance - 0.3))
     assert verdict(short) == (EGO, Rule.STANDING_AHEAD)
     slippery = replace(short, friction=np.array([grip]))
-    assert verdict(slippery) == (NOBODY, Rule.UNSAFE_START)
+    assert verdict(slippery) == (NEITHER, Rule.UNSAFE_START)
     assert not at_fault(slippery)
 
 
@@ -101,7 +101,7 @@ def test_an_obstacle_that_is_revealed_too_late_is_nobodys(track, meeting, course
     aside = course((0.0, 0.0), (2.95, 0.0), (3.0, 8.0), (3.5, 8.0), (3.55, 0.0), (6.0, 0.0))
     van = track(x=15.0, v=20.0, slide=aside)
     late = meeting(track(v=20.0), track(x=100.0), van)
-    assert verdict(late) == (NOBODY, Rule.REVEALED_LATE)
+    assert verdict(late) == (NEITHER, Rule.REVEALED_LATE)
     early = meeting(track(v=20.0), track(x=100.0), {**van, "y": np.full(121, 8.0)})
     assert verdict(early) == (EGO, Rule.STANDING_AHEAD)
 
@@ -124,7 +124,7 @@ def test_who_had_no_time_to_open_the_gap_is_not_blamed(track, meeting, course):
     time = DT * np.arange(241)
     at_once = np.interp(time, [0.0, 0.2, 3.075], [23.0, 23.0, 0.0])
     found = meeting(track(v=23.0, t=12.0), track(x=16.0, v=at_once, t=12.0))
-    assert verdict(found) == (NOBODY, Rule.UNSAFE_START)
+    assert verdict(found) == (NEITHER, Rule.UNSAFE_START)
     assert not analyse(found).preventable[0, 1]
     assert not at_fault(found)
     later = np.interp(time, [0.0, 7.0, 9.875], [23.0, 23.0, 0.0])
@@ -428,7 +428,7 @@ def test_a_crosswalk_obliges_from_where_it_is_entered(track, meeting):
     assert verdict(elsewhere) == (BV, Rule.STEPPED_OUT)
     quick = walks_out(track, meeting, 20.0, 3.0, crosswalks=walk)
     assert stopping_distance(20.0) > 7.0 / 3.0 * 20.0
-    assert verdict(quick) == (NOBODY, Rule.STEPPED_OUT)
+    assert verdict(quick) == (NEITHER, Rule.STEPPED_OUT)
 
 
 def test_a_pedestrian_behind_a_parked_van_is_seen_late(track, meeting):

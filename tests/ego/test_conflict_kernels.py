@@ -13,7 +13,7 @@ from bridgegen.ego._conflict_kernels import (
     CROSSING,
     END_MARGIN,
     LEADER,
-    NOBODY,
+    NO_CONFLICT,
     SIDE_MARGIN,
     boxes_meet,
     foot_on_way,
@@ -76,9 +76,9 @@ def test_who_comes_from_the_side_will_be_a_leader():
 
 
 def test_a_neighbour_on_its_lane_is_nobody():
-    assert seen(110.0, 3.5, 0.0, 10.0, beside=np.array([3.5, 3.5, 0.0]))[0] == NOBODY
-    assert seen(120.0, 3.5, math.pi, 10.0)[0] == NOBODY  # nor is one that comes the other way
-    assert seen(80.0, 0.0, 0.0, 20.0)[0] == NOBODY  # nor who is behind
+    assert seen(110.0, 3.5, 0.0, 10.0, beside=np.array([3.5, 3.5, 0.0]))[0] == NO_CONFLICT
+    assert seen(120.0, 3.5, math.pi, 10.0)[0] == NO_CONFLICT  # nor is one that comes the other way
+    assert seen(80.0, 0.0, 0.0, 20.0)[0] == NO_CONFLICT  # nor who is behind
 
 
 def test_who_crosses_in_time_is_met_and_who_does_not_is_not():
@@ -89,18 +89,18 @@ def test_who_crosses_in_time_is_met_and_who_does_not_is_not():
     assert 3.0 - (2.3 + 0.95 + END_MARGIN + SIDE_MARGIN) / 10.0 - 0.2 <= ttc <= 3.0
     # Its strip of the ego's way begins half its width and the ego's half length before there.
     assert room == pytest.approx(30.0 - 2.3 - 0.95, abs=0.01)
-    assert seen(131.4, -55.0, math.pi / 2, 10.0)[0] == NOBODY  # far too late
-    assert seen(131.4, -12.0, math.pi / 2, 10.0)[0] == NOBODY  # long gone
+    assert seen(131.4, -55.0, math.pi / 2, 10.0)[0] == NO_CONFLICT  # far too late
+    assert seen(131.4, -12.0, math.pi / 2, 10.0)[0] == NO_CONFLICT  # long gone
 
 
 def test_who_would_run_into_its_rear_half_is_let_do_so():
     # The other reaches the ego's way one second after the ego's front has passed.
-    assert seen(101.0, -6.0, math.pi / 2, 6.0, v=5.0, s=100.5)[0] == NOBODY
+    assert seen(101.0, -6.0, math.pi / 2, 6.0, v=5.0, s=100.5)[0] == NO_CONFLICT
 
 
 def test_one_that_changes_lane_counts_once_it_has_come_nearer():
     args = (112.0, 6.0, -1.2, 5.0)
-    for nearer, expected in ((0.3, NOBODY), (0.4, CROSSING)):
+    for nearer, expected in ((0.3, NO_CONFLICT), (0.4, CROSSING)):
         cy = 6.0 + 1.4 * math.sin(-1.2)
         beside = np.array([cy, cy + nearer, 0.0])
         assert seen(*args, known=False, beside=beside)[0] == expected

@@ -16,8 +16,8 @@ from bridgegen.ego.detections import (
     HEADING,
     KIND,
     LIDAR,
+    MISSED,
     NO_FRAME,
-    NOBODY,
     SEEN_BY,
     X,
     Y,
@@ -101,9 +101,9 @@ def test_who_is_hidden_is_never_detected(distance, where, side, key):
     scene.y[2] -= scene.bodies[2, 2]  # … and the car's middle on the line of sight
     scene.bodies[2, 7] = 2.5
     detections, tracks = scene.perceive(weather(), key)
-    assert (detections[1, ::2, SEEN_BY] == NOBODY).all()
+    assert (detections[1, ::2, SEEN_BY] == MISSED).all()
     assert (tracks[:, 1] == 0.0).all()
-    assert (detections[2, ::2, SEEN_BY] != NOBODY).any()
+    assert (detections[2, ::2, SEEN_BY] != MISSED).any()
 
 
 @settings(max_examples=20)

@@ -10,7 +10,7 @@ from bridgegen.ego.right_of_way import (
     BY_MAP,
     BY_SIGNS,
     FROM_THE_RIGHT,
-    NOBODY_SAYS,
+    NO_RULE,
     ONCOMING,
     THEY_WAIT,
     WE_WAIT,
@@ -88,13 +88,13 @@ def catalogue(name: str) -> tuple[OpenDrive, list[Route]]:
             "crossroads-s1",
             WE_WAIT,
         ),  # it comes from the west, the ego from the north: from the right
-        ("crossroads-s2", NOBODY_SAYS),  # it turns left towards the ego, and ought to wait
+        ("crossroads-s2", NO_RULE),  # it turns left towards the ego, and ought to wait
         ("crossroads-s3", WE_WAIT),  # from the east, the ego from the south
         ("crossroads-s4", WE_WAIT),
         ("left-across-path", WE_WAIT),  # the ego turns left
         ("roundabout-entry", WE_WAIT),  # a sign at each entry
-        ("red-light-runner", NOBODY_SAYS),  # lights tell
-        ("lead-brakes", NOBODY_SAYS),
+        ("red-light-runner", NO_RULE),  # lights tell
+        ("lead-brakes", NO_RULE),
     ],
 )
 def test_of_the_catalogue(name: str, rank: int) -> None:
@@ -106,7 +106,7 @@ def test_of_two_routes_one_waits_at_most(tmp_path: Path) -> None:
     for signs in ({}, {"A": "yield"}, {"D": "stop"}, {"A": "stop", "D": "yield"}):
         model, (own, other) = routes(crossing(tmp_path, "D", "B", **signs))
         ranks = right_of_way(model, own, other), right_of_way(model, other, own)
-        assert ranks in {(WE_WAIT, THEY_WAIT), (THEY_WAIT, WE_WAIT), (WE_WAIT, NOBODY_SAYS)}
+        assert ranks in {(WE_WAIT, THEY_WAIT), (THEY_WAIT, WE_WAIT), (WE_WAIT, NO_RULE)}
 
 
 @pytest.mark.parametrize(
@@ -116,8 +116,8 @@ def test_of_two_routes_one_waits_at_most(tmp_path: Path) -> None:
         ("D", "B", {"D": "yield"}, THEY_WAIT),
         ("D", "B", {"D": "stop", "B": "stop"}, THEY_WAIT),
         ("D", "B", {"A": "stop", "D": "stop"}, WE_WAIT),  # both wait: from the right
-        ("B", "D", {}, NOBODY_SAYS),
-        ("C", "A", {}, NOBODY_SAYS),  # oncoming
+        ("B", "D", {}, NO_RULE),
+        ("C", "A", {}, NO_RULE),  # oncoming
     ],
 )
 def test_of_signs(tmp_path: Path, leg: str, to: str, signs: dict[str, str], rank: int) -> None:

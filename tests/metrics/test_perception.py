@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.ego import kinds
-from bridgegen.ego.detections import BOTH, NO_FRAME, NOBODY
+from bridgegen.ego.detections import BOTH, MISSED, NO_FRAME
 from bridgegen.metrics import perceived
 from bridgegen.metrics.e_position import e_position
 from bridgegen.metrics.iou import iou
@@ -113,7 +113,7 @@ def seen(rollout_of, *frames, other=20.0, kinds_=(0, 0)):
 
 
 EXACT = (BOTH, 20.0, 0.0, 0.0, 4.0, 2.0, 0.9, 0)
-MISSED = (NOBODY, *(0.0,) * 7)
+MISSED_DETECTION = (MISSED, *(0.0,) * 7)
 
 
 def off_by(dx, dy=0.0, **more):
@@ -132,13 +132,13 @@ def test_iou_by_hand(rollout_of):
     assert iou(seen(rollout_of, off_by(0.0, h=pi))) == pytest.approx([1.0])
     assert iou(seen(rollout_of, off_by(9.0))) == [0.0]
     assert iou(seen(rollout_of, off_by(4.0))) == [0.0]  # edge to edge
-    assert iou(seen(rollout_of, EXACT, None, MISSED, None)) == [0.5]
+    assert iou(seen(rollout_of, EXACT, None, MISSED_DETECTION, None)) == [0.5]
     assert iou(seen(rollout_of, None, None)) == [np.inf]
 
 
 def test_e_position_by_hand(rollout_of):
-    assert e_position(seen(rollout_of, off_by(3.0, 4.0), None, EXACT, MISSED)) == [2.5]
-    assert e_position(seen(rollout_of, MISSED)) == [0.0]
+    assert e_position(seen(rollout_of, off_by(3.0, 4.0), None, EXACT, MISSED_DETECTION)) == [2.5]
+    assert e_position(seen(rollout_of, MISSED_DETECTION)) == [0.0]
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_e_position_by_hand(rollout_of):
     ],
 )  # fmt: skip
 def test_what_is_too_far_does_not_count(rollout_of, kind, distance, counts):
-    rollout = seen(rollout_of, MISSED, other=distance, kinds_=(0, kind))
+    rollout = seen(rollout_of, MISSED_DETECTION, other=distance, kinds_=(0, kind))
     expected = 0.0 if counts else np.inf
     assert iou(rollout) == [expected]
     assert mean_average_precision(rollout) == [expected]
@@ -158,7 +158,7 @@ def test_what_is_too_far_does_not_count(rollout_of, kind, distance, counts):
 
 def test_map_by_hand(rollout_of):
     assert mean_average_precision(seen(rollout_of, EXACT, EXACT)) == pytest.approx([1.0])
-    assert mean_average_precision(seen(rollout_of, MISSED, MISSED)) == [0.0]
+    assert mean_average_precision(seen(rollout_of, MISSED_DETECTION, MISSED_DETECTION)) == [0.0]
     # 1.5 m off: a hit by 2 m and 4 m.
     assert mean_average_precision(seen(rollout_of, off_by(1.5))) == pytest.approx([0.5])
     assert mean_average_precision(seen(rollout_of, off_by(0.0, kind=kinds.PEDESTRIAN))) == [0.0]
@@ -169,7 +169,7 @@ def test_map_by_hand(rollout_of):
 
 def test_half_of_the_frames_missed(rollout_of):
     """Precision 1 up to recall 0.5: of the 90 recalls 0.11 … 1, the 40 up to 0.5 count fully."""
-    rollout = seen(rollout_of, EXACT, MISSED)
+    rollout = seen(rollout_of, EXACT, MISSED_DETECTION)
     assert mean_average_precision(rollout) == pytest.approx([40 / 90])
 
 

@@ -64,7 +64,7 @@ def test_a_package_adds_its_own(installed, driven):
     [
         ("gone", "Nothing", "cannot be loaded: AttributeError"),
         ("not_one", "top_speed", "must be a bridgegen.metrics.Metric, got function"),
-        ("other", "TOP", "calls itself 'top_speed'"),
+        ("other", "TOP", "has the name 'top_speed'"),
         ("fails", "FAILS", "fails: ZeroDivisionError"),
         ("wrong_shape", "WRONG_SHAPE", r"must return \d+ numbers.*\(2, 2\)"),
         ("all_nan", "ALL_NAN", "must be NaN exactly where a scenario failed"),

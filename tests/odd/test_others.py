@@ -91,7 +91,7 @@ def test_an_obstacle_has_no_driver(tmp_path):
             "    driver: attentive\nevents:\n",
         ),
     )
-    with pytest.raises(ScenarioError, match="box is an obstacle, which nobody drives"):
+    with pytest.raises(ScenarioError, match="box is an obstacle, which has no driver"):
         load(path)
 
 

@@ -166,7 +166,7 @@ def test_what_road_and_weather_need_has_its_axis_unit_and_kind(write, refuse, s4
     problems = refuse(s4_text.replace("[crossroads,", "[own.yaml,"))
     assert [problem.split(" (")[0] for problem in problems] == [
         "lane_width needs a parameter in m, 'lane_width' is in s",
-        "lanes_per_direction needs a parameter of kind integer, 'lanes_per_direction' is none",
+        "lanes_per_direction needs a parameter of kind integer, 'lanes_per_direction' is not one",
     ]
 
 
@@ -188,7 +188,7 @@ def test_an_ego_is_needed(refuse, s4_text, change):
 
 def test_an_ego_alone_is_refused(refuse, s4_text):
     text = re.sub(r"  bv:\n.*\nevents:", "\nevents:", s4_text, flags=re.DOTALL)
-    assert any("somebody besides the ego" in problem for problem in refuse(text))
+    assert any("another one besides the ego" in problem for problem in refuse(text))
 
 
 @pytest.mark.parametrize("text", ["", "3", "- a\n- b", "just text", "null"])

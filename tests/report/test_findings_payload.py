@@ -12,7 +12,7 @@ from bridgegen.report import payload, sentences
 from bridgegen.report.build import rule_in_words
 from bridgegen.report.data import Column
 from bridgegen.report.findings_payload import (
-    TOLD,
+    FINDING_FIELDS,
     conflict_payload,
     findings_payload,
     implausible_payload,
@@ -83,7 +83,7 @@ def test_findings_are_numbers_of_distinct_keys():
     told = findings(4, conflict=["contact", "", "contact", "contact"], partner=["a", "", "b", "a"])
     found = findings_payload(told, np.array([True, True, True, True]))
     assert len(found["keys"]) == 3
-    back = [dict(zip(TOLD, found["keys"][k], strict=True)) for k in found["at"]]
+    back = [dict(zip(FINDING_FIELDS, found["keys"][k], strict=True)) for k in found["at"]]
     assert [one["partner"] for one in back] == ["a", "", "b", "a"]
     assert findings_payload(told, np.array([False, True, False, True]))["at"] == [0, 1]
 

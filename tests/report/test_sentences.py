@@ -117,7 +117,7 @@ def test_r_critic_has_an_interval_and_what_it_means_is_said(with_summary):
     for data in (chosen, drawn):
         table = {k: v.replace(THIN, " ") for k, v in sentences.summary_table(data)}
         assert table["R_critic, 95 % interval *"] == "5.5 to 17.4 %"  # worked by hand
-    assert "pso chose them by plan or by what earlier ones" in sentences.interval_note(
+    assert "pso chose them by plan or by the results of earlier ones" in sentences.interval_note(
         chosen.summary
     )
     assert "not how likely harm is" in sentences.interval_note(chosen.summary)

@@ -131,7 +131,7 @@ def test_by_default_the_first_two_parameters_tell_kinds_apart():
     ("descriptors", "error", "message"),
     [
         ("d_mim", UnknownNameError, "did you mean 'd_min'"),
-        ("speed,speed", InputError, "each descriptor must come once, got speed, speed"),
+        ("speed,speed", InputError, "descriptors must be unique, got speed, speed"),
         ("gap=1", InputError, "the range of gap must be LOW:HIGH"),
         ("gap=1:0", InputError, "LOW < HIGH, got '1:0'"),
         ("gap=0:inf", InputError, "got '0:inf'"),

@@ -56,7 +56,7 @@ def test_unavoidable_harm_is_not_worth_looking_for():
 
 
 def test_it_needs_somebody_to_drive():
-    with pytest.raises(InputError, match="a participant that it drives, got none"):
+    with pytest.raises(InputError, match="must have an adversary, got none"):
         get("ppo-adversary")(Problem.unnamed(5), 0)
 
 

@@ -62,7 +62,7 @@ def test_a_package_adds_its_own(installed):
         ("gone", f"{__name__}:Nothing", "cannot be loaded: AttributeError"),
         ("wrong", f"{__name__}:Wrong", "lacks description, source, settings, objectives, ask"),
         ("lazy", f"{__name__}:NOT_A_CLASS", "is not a class"),
-        ("idle", f"{__name__}:Lazy", "calls itself 'lazy'"),
+        ("idle", f"{__name__}:Lazy", "has the name 'lazy'"),
         ("random", f"{__name__}:Lazy", "declared more than once: bridgegen, "),
     ],
 )

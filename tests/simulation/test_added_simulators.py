@@ -56,7 +56,7 @@ def test_a_search_runs_in_a_package_s_simulator(installed, tmp_path):
     [
         ("gone", "Nothing", "cannot be loaded: AttributeError"),
         ("not_one", "test_a_package_that_is_wrong_is_named", "must be a .*Kind, got function"),
-        ("other", "OURS", "calls itself 'twin'"),
+        ("other", "OURS", "has the name 'twin'"),
     ],
 )
 def test_a_package_that_is_wrong_is_named(installed, name, value, message):

@@ -1,4 +1,4 @@
-"""A reproduction in the terminal: one bar for all its runs, then what was found."""
+"""A reproduction in the terminal: one bar for all its runs, then its results."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ class ReproductionScreen(RunsScreen):
 
 
 def print_reproduction(result: Reproduction, seconds: float) -> None:
-    """Print what was found in sentences, and where the files are."""
+    """Print the findings in sentences, and the files' paths."""
     console = Console(markup=False, emoji=False, highlight=False)
     for title, text in result.in_short:
         console.print(f"{title}: {text}\n")

@@ -1,4 +1,4 @@
-"""The command line: parse, call, print; no logic. Commands stand in the order of these imports."""
+"""The command line: parse, call, print; no logic. Commands are in the order of these imports."""
 
 # ruff: noqa: I001
 from bridgegen.cli import runs, confirmations, comparisons, reproductions, files, lists

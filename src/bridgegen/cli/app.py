@@ -12,15 +12,15 @@ from typer.core import TyperGroup
 from bridgegen.errors import BridgeGenError, Interrupted
 
 FAILED = 3
-"""The exit status if a criterion of ``--fail-if`` is met: 1 is Python's for a bug, 2 a mistake of
-the user's, 130 Ctrl-C."""
+"""The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,
+130 Ctrl-C."""
 
 SEARCH, RESULTS, FILES, ONTOLOGY = PANELS = ("Search", "Results", "Files", "Ontology")
 """The panels in which ``bridgegen --help`` lists the commands."""
 
 
 class PanelledGroup(TyperGroup):
-    """Commands whose help lists them by panel; typer's own does it with rich's markup only."""
+    """Commands whose help lists them by panel, which typer does with rich's markup only."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the panels, each command with its summary."""
@@ -39,7 +39,7 @@ class PanelledGroup(TyperGroup):
 app = typer.Typer(
     cls=PanelledGroup,
     name="bridgegen",
-    help="Search an operational design domain for the scenarios in which a vehicle comes to harm.",
+    help="Search an operational design domain for scenarios in which a driving stack fails.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -60,12 +60,12 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def main() -> None:
-    """Run the command line; a user's mistake is one message on stderr and exit status 2."""
+    """Run the command line; a user's error is one message on stderr and exit status 2."""
     try:
         try:
             app()
         except SystemExit:
-            sys.stdout.flush()  # else Python says at its end, and in its own words, what fails
+            sys.stdout.flush()  # else Python prints its own message at exit
             raise
     except Interrupted as stop:
         print(f"bridgegen: {stop}", file=sys.stderr)
@@ -86,7 +86,7 @@ def main() -> None:
 
 
 def _drop_output() -> None:
-    """Send what is still to be printed nowhere: where it should go cannot be written to."""
+    """Discard the remaining output, since its target cannot be written."""
     with suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

@@ -27,7 +27,7 @@ def compare(
     budget: Annotated[int, typer.Option(help="Evaluations of each run, exactly.")] = 1000,
     baseline: Annotated[
         str | None,
-        typer.Option(help="What the others are tested against.", show_default="the first"),
+        typer.Option(help="Baseline of the tests.", show_default="the first algorithm"),
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -45,7 +45,7 @@ def compare(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="The comparison's folder; one that was stopped goes on.",
+            help="The comparison's folder; a stopped comparison is resumed.",
             show_default="comparisons/SCENARIOS",
         ),
     ] = None,

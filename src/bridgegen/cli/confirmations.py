@@ -1,4 +1,4 @@
-"""The command that runs what was found in another simulator."""
+"""The command that validates findings in another simulator."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,19 +14,19 @@ from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_
 @with_connection_options
 def confirm(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
-    simulator: Annotated[str, typer.Option(help="The other one: see 'bridgegen list simulators'.")],
+    simulator: Annotated[
+        str, typer.Option(help="The other simulator: see 'bridgegen list simulators'.")
+    ],
     simulator_set: options.SimulatorSettings = None,
     connection: Connection = NO_CONNECTION,
     rows: Annotated[
         int | None,
         typer.Option(
-            help="So many of the run's critical scenarios, the most critical ones.",
-            show_default="those that were handed over",
+            help="Number of the run's critical scenarios, the most critical ones.",
+            show_default="the exported ones",
         ),
     ] = None,
-    again: Annotated[
-        bool, typer.Option("--again", help="Forget what was confirmed before.")
-    ] = False,
+    again: Annotated[bool, typer.Option("--again", help="Discard earlier confirmations.")] = False,
     ego: options.OwnEgo = None,
     workers: options.Workers = None,
     fail_if: options.ConfirmFailIf = None,

@@ -1,4 +1,4 @@
-"""The options of how a simulator is reached on this machine; several commands have them all."""
+"""The options of the connection to a simulator, which several commands share."""
 
 from collections.abc import Callable, Mapping
 from inspect import signature
@@ -11,7 +11,7 @@ from bridgegen.cli.expansion import expand
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Connection = Mapping[str, Value]
-"""How a simulator is reached on this machine: values by the spelling of their options."""
+"""A connection to a simulator: values by the spelling of their options."""
 
 NO_CONNECTION: Connection = {}
 
@@ -34,12 +34,12 @@ OPTIONS: Mapping[str, Any] = {
     "carla_command": Annotated[
         str | None,
         typer.Option(
-            help="Starts a CARLA server, and again when it has ended.", show_default="none"
+            help="Command that starts a CARLA server, also after a crash.", show_default="none"
         ),
     ],
     "carla_timeout": Annotated[
         float | None,
-        typer.Option(help="Seconds that an answer of CARLA's may take.", show_default="20"),
+        typer.Option(help="Time limit of an answer of CARLA [s].", show_default="20"),
     ],
     "record": Annotated[
         Path | None,
@@ -59,9 +59,9 @@ OPTIONS: Mapping[str, Any] = {
 
 
 def with_connection_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command these options, in the place of its parameter ``connection``.
+    """Give a command these options in place of its parameter ``connection``.
 
-    Where it has one of the same name for something else, ours begins with ``--carla-``.
+    Where it has an option of the same name, these begin with ``--carla-``.
     """
     own = signature(command).parameters
     known_as = {f"carla_{name}" if name in own else name: name for name in OPTIONS}

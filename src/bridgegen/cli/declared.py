@@ -1,4 +1,4 @@
-"""Options of the command line that are made of the declarations in `bridgegen.options`."""
+"""Options of the command line from the declarations in `bridgegen.options`."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,7 +25,7 @@ def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def declaration(name: str, *, shown: str | None = None) -> Any:
-    """Return the typer declaration of a search option, for a command that takes it alone.
+    """Return the typer declaration of a search option, for a command that takes only this one.
 
     Args:
         name: of the field of `SearchOptions`.
@@ -49,5 +49,5 @@ def _declaration(one: Option) -> Any:
 
 
 def _default(one: Option) -> Any:
-    """Return the default that the parser knows; None where only the options' class does."""
+    """Return the parser's default; None where only the options' class knows it."""
     return one.default if isinstance(one.default, bool | int | float | str) else None

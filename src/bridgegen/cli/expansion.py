@@ -1,4 +1,4 @@
-"""One parameter of a command's function that is many options on the command line."""
+"""Expands one parameter of a command's function into many options."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -12,13 +12,13 @@ def expand(
     options: Mapping[str, tuple[Any, Any]],
     fold: Callable[[dict[str, Any]], Any],
 ) -> Callable[..., None]:
-    """Return a command with options in the place of one of its parameters.
+    """Return a command with options in place of one of its parameters.
 
     Args:
         command: a function whose signature is read by typer.
         parameter: the name of the one that is replaced.
         options: annotation and default of each option, by the name of its parameter.
-        fold: makes the value of the replaced parameter of those of the options.
+        fold: returns the replaced parameter's value from those of the options.
     """
     signature = inspect.signature(command)
     parameters = []

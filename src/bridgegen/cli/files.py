@@ -20,8 +20,8 @@ def export(
     flavour: Annotated[
         str,
         typer.Option(
-            help="1.2 or 1.3: with parameters; resolved: without; recorded: moves by the clock; "
-            "carla: 1.0 for ScenarioRunner, all but the ego by the clock."
+            help="1.2 or 1.3: with parameters; resolved: without; recorded: timed trajectories; "
+            "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego."
         ),
     ],
     scenario: Annotated[
@@ -61,8 +61,8 @@ def table(
     sample: Annotated[
         float,
         typer.Option(
-            help="Keep this share of what is neither critical nor failed; each row's weight says "
-            "how many it stands for."
+            help="Keep this share of the rows that are neither critical nor failed; a row's weight "
+            "is the number of rows that it represents."
         ),
     ] = 1.0,
 ) -> None:
@@ -103,7 +103,7 @@ def import_(
     ] = None,
     partial: Annotated[
         bool,
-        typer.Option("--partial", help="Leave out what the ontology cannot say, and list it."),
+        typer.Option("--partial", help="Leave out what the ontology cannot express; list it."),
     ] = False,
     ego: Annotated[
         str | None,
@@ -196,7 +196,7 @@ def show(
 def ask(
     file: Annotated[Path, typer.Argument(help="A scenario's ontology (.owl).")],
     question: Annotated[
-        str | None, typer.Argument(help="Its name; without one, the questions are listed.")
+        str | None, typer.Argument(help="Name of the question; without it, all are listed.")
     ] = None,
     sparql: Annotated[
         Path | None, typer.Option(help="A file with a SPARQL SELECT of your own, instead.")
@@ -215,7 +215,7 @@ def ask(
 def metrics(
     file: Annotated[
         Path,
-        typer.Argument(help="A recording: a trace (.csv), or what esmini's --csv_logger writes."),
+        typer.Argument(help="A recording: a trace (.csv), or esmini's --csv_logger output."),
     ],
     ego: Annotated[
         str | None, typer.Option(help="The entity under test; that of the first line by default.")
@@ -232,7 +232,7 @@ def metrics(
 ) -> None:
     """Measure a recording; print its metrics.
 
-    And its decisive conflict. Another simulator, or the road, made the recording.
+    Also prints its decisive conflict. The recording is of another simulator or a real drive.
     """
     from bridgegen.conflict.recorded import measure_recording
     from bridgegen.screen.files import print_measured

@@ -1,4 +1,4 @@
-"""The commands that list what there is."""
+"""The commands that list scenarios, algorithms, drivers, simulators and metrics."""
 
 import json
 from typing import Annotated
@@ -70,7 +70,7 @@ def list_metrics(as_json: options.Json = False) -> None:
     rows = [
         (
             m.name, m.unit, m.sense, m.description, getattr(m, "needs", None),
-            "always" if m.name in (*TABLE_I, *MEASURED) else "if asked for",
+            "always" if m.name in (*TABLE_I, *MEASURED) else "on request",
         )
         for m in QUANTITIES.values()
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The options that several commands have and no run records, and how their texts are read."""
+"""The options that several commands share and no run records, and how they are parsed."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,16 +13,14 @@ from bridgegen.simulation.choice import SimulatorChoice, Value
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
-OwnEgo = Annotated[
-    str | None, typer.Option("--ego", help="The run's driver, where it is one of your own.")
-]
-Ideal = Annotated[str | None, declaration("ideal", shown="what the file says")]
+OwnEgo = Annotated[str | None, typer.Option("--ego", help="The run's driver, if it is your own.")]
+Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
 TimeLimit = Annotated[float | None, declaration("time_limit")]
 OnlyMetrics = Annotated[
     str | None,
-    typer.Option("--metrics", help="Only these, e.g. pet,drac.", show_default="all there are"),
+    typer.Option("--metrics", help="Only these, e.g. pet,drac.", show_default="all"),
 ]
-Others = Annotated[str | None, declaration("others", shown="what the file says")]
+Others = Annotated[str | None, declaration("others", shown="the file's")]
 Simulator = Annotated[
     str | None,
     typer.Option(help="Simulator, see 'bridgegen list simulators'.", show_default="embedded"),
@@ -87,9 +85,9 @@ def read_simulator(
     """Read the choice of a simulator; None if none is named.
 
     Args:
-        name: of it.
+        name: of the simulator.
         settings: ``name=value`` pairs.
-        connection: how it is reached.
+        connection: to the simulator.
 
     Raises:
         InputError: settings or a connection without a name.

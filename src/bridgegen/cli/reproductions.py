@@ -38,7 +38,7 @@ def reproduce(
     road_map: options.RoadMap = None,
     junction: options.Junction = None,
     out: Annotated[
-        Path, typer.Option(help="The reproduction's folder; one that was stopped goes on.")
+        Path, typer.Option(help="The reproduction's folder; a stopped one is resumed.")
     ] = Path("reproduction"),
 ) -> None:
     """Reproduce the paper's evaluation, Section V.

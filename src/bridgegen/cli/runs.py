@@ -1,4 +1,4 @@
-"""The commands that make and look at runs."""
+"""The commands that make and show runs."""
 
 import json
 import sys
@@ -70,7 +70,7 @@ def new(
         typer.Argument(help="Name of the new scenario; writes NAME.yaml and its JSON schema."),
     ],
     like: Annotated[
-        str | None, typer.Option(help="Start from a copy of this one of the catalogue.")
+        str | None, typer.Option(help="Start from a copy of this catalogue scenario.")
     ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
@@ -127,7 +127,7 @@ def view(
 ) -> None:
     """Serve a run's report in the browser.
 
-    It is live while the search goes on, and plays any scenario of the run.
+    It updates while the search runs, and plays any scenario of the run.
     """
     from bridgegen.screen.view import serve
     from bridgegen.view.run_view import RunView
@@ -149,13 +149,13 @@ def coverage(
         int, typer.Option(help="Equal bins per parameter; whole numbers have one each.")
     ] = 5,
     strength: Annotated[
-        int, typer.Option(help="Count combinations of up to so many parameters' bins: 1, 2, 3.")
+        int, typer.Option(help="Maximum number of parameters in a combination of bins: 1, 2, 3.")
     ] = 3,
     as_json: common.Json = False,
 ) -> None:
     """Show which bins of the parameters a run evaluated.
 
-    And which combinations of bins, and where it was critical.
+    Also shows which combinations of bins, and which of them are critical.
     """
     from bridgegen.campaign.coverage import coverage_of
     from bridgegen.screen.coverage import print_coverage
@@ -180,7 +180,7 @@ def regions(
     ] = 0.5,
     seed: Annotated[
         int | None,
-        typer.Option(help="Of the fresh scenarios.", show_default="the run's"),
+        typer.Option(help="Seed of the fresh scenarios.", show_default="the run's"),
     ] = None,
     ego: common.OwnEgo = None,
     connection: Connection = NO_CONNECTION,
@@ -214,14 +214,14 @@ def regions(
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[
-        str | None, typer.Option(help="Who drives; what the file says by default.")
+        str | None, typer.Option(help="Driver of the ego; the file's by default.")
     ] = None,
     ideal: common.Ideal = None,
     others: common.Others = None,
     time_limit: common.TimeLimit = None,
     dt: Annotated[
         float | None,
-        typer.Option(help="Time step [s].", show_default="what the file's header says, or 0.05"),
+        typer.Option(help="Time step [s].", show_default="that of the file's header, or 0.05"),
     ] = None,
     trace: Annotated[
         Path | None,
@@ -240,7 +240,7 @@ def simulate(
 ) -> None:
     """Simulate one scenario file; print its metrics.
 
-    And its decisive conflict.
+    Also prints its decisive conflict.
     """
     from bridgegen.screen.files import conflict_facts, print_file_result
     from bridgegen.simulate import simulate_file
@@ -312,7 +312,7 @@ def check_driver(
 
 
 def _end(outcomes: "Sequence[Outcome]") -> None:
-    """Print what the criteria came to; end with the exit status for it if one failed."""
+    """Print the outcomes of the criteria; exit with their status if one failed."""
     from bridgegen.screen.verdict import print_outcomes
 
     if not print_outcomes(outcomes):

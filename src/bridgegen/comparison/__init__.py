@@ -1,4 +1,4 @@
-"""Comparisons of algorithms: a grid of runs, what is measured of them, and how sure that is."""
+"""Comparisons of algorithms: a grid of runs, measures of each, and statistical tests."""
 
 from bridgegen.comparison.comparison import ComparisonCallbacks, compare
 from bridgegen.comparison.result import Comparison

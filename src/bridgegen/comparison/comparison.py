@@ -1,4 +1,4 @@
-"""A comparison from start to finish: run what is missing, measure, test, draw, write."""
+"""A comparison from start to finish: make the missing runs, measure, test, draw, write."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -39,7 +39,7 @@ class ComparisonCallbacks(RunCallbacks):
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonArguments(CommonOptions):
-    """The arguments of ``compare``: the options that all runs share, and what is the grid's."""
+    """The arguments of ``compare``: the options that all runs share, and those of the grid."""
 
     scenarios: str | Path | Sequence[str | Path] = field(
         kw_only=False, metadata={"help": "One or several, each as for ``run_search``."}
@@ -50,9 +50,7 @@ class ComparisonArguments(CommonOptions):
     )
     settings: Mapping[str, Mapping[str, Value]] | None = field(
         default=None,
-        metadata={
-            "help": "Settings of algorithms, by their names, that are not to be their defaults."
-        },
+        metadata={"help": "Settings of algorithms, by their names, that differ from the defaults."},
     )
     seeds: int = field(
         default=10,
@@ -93,24 +91,24 @@ class ComparisonArguments(CommonOptions):
 
 @called_with(ComparisonArguments)
 def compare(given: ComparisonArguments) -> Comparison:
-    """Run algorithms on scenarios with several seeds, and say which is better at what.
+    """Run algorithms on scenarios with several seeds, and test which is better in which measure.
 
     A grid of runs, each an ordinary run's folder under ``OUT/runs`` (``resume`` exports its
     critical scenarios); then ``runs.csv``, ``summary.csv``, ``times.csv``, figures and a page.
     Killed at any moment and called again, it resumes; called with more scenarios, algorithms or
-    seeds, it makes those runs besides.
+    seeds, it adds their runs.
 
     Returns:
         The comparison. A run that failed is a gap in it.
 
     Raises:
-        InputError: anything that the arguments or files say wrongly.
-        StorageError: the folder holds something else, is being written, or cannot be.
+        InputError: an invalid argument or file.
+        StorageError: the folder holds something else, is in use, or cannot be written.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
     callbacks = given.callbacks or ComparisonCallbacks()
     scenarios, algorithms = given.scenarios, given.algorithms
-    who = read_choice(given.workers)
+    executor = read_choice(given.workers)
     plan = make_plan(
         [scenarios] if isinstance(scenarios, str | Path) else scenarios,
         [algorithms] if isinstance(algorithms, str) else algorithms,
@@ -131,7 +129,7 @@ def compare(given: ComparisonArguments) -> Comparison:
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:
-        failures = _run(plan, who, callbacks, done)
+        failures = _run(plan, executor, callbacks, done)
         return _conclude(plan, failures, callbacks, deliver=given.deliver)
     except KeyboardInterrupt:
         raise Interrupted(
@@ -142,15 +140,15 @@ def compare(given: ComparisonArguments) -> Comparison:
 
 
 def _run(
-    plan: Plan, who: int | str | None, callbacks: ComparisonCallbacks, done: list[str]
+    plan: Plan, executor: int | str | None, callbacks: ComparisonCallbacks, done: list[str]
 ) -> dict[Cell, str]:
     """Make the runs that are missing; return why some failed.
 
     Args:
         plan: the runs.
-        who: makes them, as ``read_choice`` returns it.
+        executor: of the runs, as ``read_choice`` returns it.
         callbacks: called as it progresses.
-        done: is given the name of each run that has ended, this time or earlier.
+        done: gets the name of each run that has ended, this time or earlier.
     """
     failures, tasks, made = {}, [], 0
     for cell in plan.cells:
@@ -171,7 +169,7 @@ def _run(
         done.append(name)
         callbacks.ended(name, failure)
 
-    at_once, cluster = (who, None) if isinstance(who, int) else (_cores(), who)
+    at_once, cluster = (executor, None) if isinstance(executor, int) else (_cores(), executor)
     of_runs = RunCallbacks(callbacks.compile, callbacks.batch, ended)
     failed = run_all(tasks, at_once, of_runs, cluster)
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
@@ -180,7 +178,7 @@ def _run(
 def _conclude(
     plan: Plan, failures: Mapping[Cell, str], callbacks: ComparisonCallbacks, *, deliver: bool
 ) -> Comparison:
-    """Read the runs, measure and test them, and write it all if that is wanted."""
+    """Read the runs, measure and test them, and write the results if requested."""
     callbacks.stage("read")
     gaps, records = dict(failures), {}
     spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
@@ -222,7 +220,7 @@ def _absolute(path: Path | str | None) -> str | None:
 
 
 def _cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""How many of a run's critical scenarios are different ones."""
+"""Number of different critical scenarios of a run."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ APART = 0.1
 more, in root mean square; two random ones differ by 0.41."""
 
 LIMIT = 10_000
-"""No more than so many different scenarios of a run are counted: it bounds the time."""
+"""Maximum number of different scenarios that are counted per run: it bounds the time."""
 
 _CHUNK = 256
 
@@ -18,10 +18,10 @@ _CHUNK = 256
 def normalised(space: SearchSpace, X: Float) -> Float:
     """Return points whose distances are those of the searched parameters.
 
-    A parameter is the share of its declared range, or what its kind makes of it.
+    A parameter becomes its share of the declared range, or what its kind defines.
 
     Args:
-        space: what was searched.
+        space: the search space.
         X: ``(N, len(space.names))``.
 
     Returns:
@@ -39,15 +39,15 @@ def distinct(
 ) -> Bool:
     """Return which points are new: at least ``apart`` from every new one before them.
 
-    A greedy net, in the order of the points. What is new are points that lie apart from one
-    another, and every point is closer than ``apart`` to one of them; so another order may find
-    a few more or fewer. Clusters by single linkage would not depend on the order, but a search
-    that fills the space evenly would be one cluster, and count as having found one scenario.
+    A greedy net, in the order of the points: new points lie apart from one another, and every
+    point is closer than ``apart`` to one of them; so another order may find a few more or fewer.
+    Clusters by single linkage would not depend on the order, but a search that fills the space
+    evenly would be one cluster, and count as one scenario.
 
     Args:
         points: ``(N, d)`` float64, as `normalised` returns them.
         apart: the root mean square of the parameters' differences.
-        limit: that many new ones at most.
+        limit: maximum number of new points.
         n_var: number of parameters; d by default.
 
     Returns:

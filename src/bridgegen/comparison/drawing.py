@@ -1,4 +1,4 @@
-"""What figures are drawn in: two themes, axes that match them, and how they become files."""
+"""Style of the figures: two themes, axes that match them, and output as files."""
 
 import io
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ DPI = 180
 
 @dataclass(frozen=True)
 class Theme:
-    """What a figure is drawn in.
+    """The colours of a figure.
 
     Attributes:
-        paper: behind it.
-        ink: text, and the baseline.
-        muted: axes.
-        grid: behind the data.
+        paper: of the background.
+        ink: of text, and the baseline.
+        muted: of axes.
+        grid: of the grid.
         colours: of the other algorithms.
     """
 
@@ -37,7 +37,7 @@ LIGHT = Theme(
     "#ffffff", "#17202c", "#566273", "#e4e9f0",
     ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
 )  # fmt: skip
-"""Okabe and Ito's colours (2008), without yellow, which white paper swallows, and black."""
+"""Okabe and Ito's colours (2008), without black and yellow, which is invisible on white paper."""
 
 DARK = Theme(
     "#171e27", "#e7ecf3", "#9ba8b8", "#2c3643",
@@ -58,7 +58,7 @@ def blank(width: float, height: float, theme: Theme) -> "Figure":
     """Return an empty figure [inches]."""
     from matplotlib.figure import Figure
 
-    # Not pyplot's: nothing here touches the settings or the figures of whoever calls.
+    # Not pyplot's: this leaves the caller's settings and figures alone.
     return Figure((width, height), dpi=DPI, facecolor=theme.paper, layout="constrained")
 
 
@@ -66,7 +66,7 @@ def dress(axes: "Axes", theme: Theme, *, size: float = 9.0) -> None:
     """Give axes a theme's colours; only their left and lower sides are drawn.
 
     Args:
-        axes: what is dressed.
+        axes: to style.
         theme: its colours.
         size: of the numbers [points].
     """
@@ -98,6 +98,6 @@ def pdf(figure: "Figure") -> bytes:
     FigureCanvasPdf(figure)
     buffer = io.BytesIO()
     unsigned = {"Creator": None, "Producer": None, "CreationDate": None}
-    with rc_context({"pdf.fonttype": 42}):  # TrueType: what publishers ask for
+    with rc_context({"pdf.fonttype": 42}):  # TrueType: publishers require it
         figure.savefig(buffer, format="pdf", metadata=unsigned)
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""The figures of a comparison, drawn by matplotlib in colours that the colour-blind can tell."""
+"""The figures of a comparison, drawn by matplotlib in colours for the colour-blind."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from bridgegen.comparison.drawing import Theme, canvas, png
 from bridgegen.comparison.statistics import quartiles
 
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
-"""Of lines; the next one begins when the colours begin again."""
+"""Line styles; each is used with all colours before the next."""
 
 
 def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme) -> bytes:
@@ -62,7 +62,7 @@ def curves(
         label: of the vertical axis.
         theme: what to draw in.
         from_zero: whether the vertical axis begins at 0; else where the curves are after a tenth of
-            the evaluations, so that ends that differ little can be told apart.
+            the evaluations, so that similar ends are distinguishable.
     """
     names = [name for name in samples if len(samples[name])]
     figure, axes = canvas(3.1 + 0.2 * -(-len(names) // 4), theme)

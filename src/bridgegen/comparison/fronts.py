@@ -1,12 +1,12 @@
-"""Objectives of all algorithms in one space, and what is measured there.
+"""Objectives of all algorithms in one space, and measures there.
 
-Whatever an algorithm minimised, one weighted sum or several objectives, its run recorded the
-metrics that the scenario's objective is made of. They are positivised (larger is more critical, at
-most the metric's cap away) and scaled over all runs of a scenario: 0 is the most critical value
-that any run met, 1 the least critical. All of it is minimised.
+Whether an algorithm minimises a weighted sum or several objectives, its run records the metrics of
+the scenario's objective. They are positivised (larger is more critical, at most the metric's cap
+away) and scaled over all runs of a scenario: 0 is the most critical value of all runs, 1 the least
+critical. All of them are minimised.
 
-So hypervolumes, distances and spreads of one comparison can be held against each other, and those
-of different comparisons cannot.
+So hypervolumes, distances and spreads are comparable within one comparison, not between different
+ones.
 """
 
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ def front(F: Float) -> Float:
         kept: Float = F[np.concatenate([[True], F[1:, 1] < best[:-1]])]
         return kept
     kept_rows: list[int] = []
-    for i, row in enumerate(F):  # whoever dominates a row comes before it
+    for i, row in enumerate(F):  # a row that dominates another comes before it
         if not (F[kept_rows] <= row).all(axis=1).any():
             kept_rows.append(i)
     alone: Float = F[kept_rows]
@@ -106,15 +106,15 @@ def generational_distance(F: Float, reference: Float) -> float:
 def spread(F: Float, reference: Float) -> float:
     """Return how unevenly a front is spread, and how far from the reference's ends; 0 is best.
 
-    Of two objectives Deb's Δ: with d_f and d_l from the reference's two ends to the front's, and
+    For two objectives Deb's Δ: with d_f and d_l from the reference's two ends to the front's, and
     d_i between neighbours of the front, of mean d̄, n − 1 of them:
     Δ = (d_f + d_l + Σ|d_i − d̄|) / (d_f + d_l + (n − 1)·d̄).
-    Of more, its generalisation: d_i from each point to the nearest other one, n of them, and from
+    For more, its generalisation: d_i from each point to the nearest other one, n of them, and from
     each of the reference's extreme points (the worst in one objective) to the front.
 
     Args:
         F: ``(n, m)`` float64, a front; none: NaN.
-        reference: ``(k, m)`` float64. NaN where the front and it are one point: nothing spreads.
+        reference: ``(k, m)`` float64. NaN if it and the front are one point.
 
     Source: Deb et al. (2002), doi:10.1109/4235.996017; the generalisation: Zhou et al. (2006),
     doi:10.1109/CEC.2006.1688406.

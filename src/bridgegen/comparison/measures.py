@@ -1,4 +1,4 @@
-"""What is measured of a run, and which way is better."""
+"""The measures of a run, and which direction is better."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from bridgegen.comparison.record import Record
 from bridgegen.comparison.statistics import quartiles
 
 SHARE = 0.05
-"""T_critic waits for this share of the budget to be critical: 50 of 1000."""
+"""T_critic counts evaluations until this share of the budget is critical: 50 of 1000."""
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,10 @@ class Measure:
     Attributes:
         name: in files.
         title: in tables.
-        text: what it is, one line.
+        text: description, one line.
         larger: whether larger is better; else smaller is.
-        timed: whether it is made of seconds, and so is not the same the next time.
-        digits: after the decimal point, where people read it.
+        timed: whether it depends on wall time, so that it is not repeatable.
+        digits: after the decimal point, in tables.
     """
 
     name: str
@@ -38,12 +38,12 @@ class Measure:
 
 
 def waited_for(budget: int) -> int:
-    """Return k: T_critic is about the k-th critical scenario."""
+    """Return k: T_critic is the time to the k-th critical scenario."""
     return max(1, ceil(SHARE * budget - 1e-9))
 
 
 def counts(budget: int) -> tuple[int, ...]:
-    """Return which critical scenarios are waited for: the first, 10th and 50th, and the k-th."""
+    """Return the k of the time to the k-th critical scenario: 1, 10, 50, and that of T_critic."""
     return tuple(sorted({1, 10, 50, waited_for(budget)}))
 
 
@@ -104,9 +104,9 @@ class Measured:
     """One scenario's runs in figures.
 
     Attributes:
-        values: by run and by measure's name; NaN where it is not defined, +inf where what is
-            waited for never came.
-        curves: by run ``(c,)`` float64, the hypervolume by each point of the run's curve.
+        values: by run and by measure's name; NaN where it is not defined, +inf where the event
+            never occurred.
+        curves: by run ``(c,)`` float64, the hypervolume at each point of the run's curve.
         scale: of the objectives, the same for all these runs.
         reference: ``(k, m)`` float64, the front of all runs together, as objectives in [0, 1].
     """
@@ -120,7 +120,7 @@ class Measured:
 def others(records: Mapping[Cell, Record], baseline: str) -> set[str]:
     """Return the algorithms that did not search the same parameters as the baseline.
 
-    Where the baseline has no run, the first algorithm that has one stands for it.
+    If the baseline has no run, the first algorithm that has one replaces it.
     """
     usual = next(iter(records.values())).parameters
     usual = next((r.parameters for cell, r in records.items() if cell.algorithm == baseline), usual)
@@ -130,8 +130,8 @@ def others(records: Mapping[Cell, Record], baseline: str) -> set[str]:
 def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measured:
     """Measure the runs of one scenario, at least one.
 
-    Bins and differences of parameters are not defined (NaN) for algorithms that search others than
-    the baseline does: an adversary, say.
+    Bins and differences of parameters are not defined (NaN) for algorithms that search other
+    parameters than the baseline, for example an adversary's.
     """
     m = len(next(iter(records.values())).terms)
     ranges = [(one.low, one.high) for one in records.values()]
@@ -174,7 +174,7 @@ def _in_parameters(one: Record) -> dict[str, float]:
 
 
 def _curve(record: Record, scale: Scale) -> Float:
-    """Return the hypervolume by each point; a front that has not changed is not measured again."""
+    """Return the hypervolume at each point; an unchanged front is not measured again."""
     volumes, last = [], None
     for one in record.fronts:
         if last is None or one is not last:
@@ -185,7 +185,7 @@ def _curve(record: Record, scale: Scale) -> Float:
 
 
 def _by_the_best(reached: Mapping[Cell, float]) -> dict[Cell, float]:
-    """Divide by the least median that an algorithm has; NaN where all of them are +inf."""
+    """Divide by the least median of all algorithms; NaN where all of them are +inf."""
     algorithms: dict[str, list[float]] = {}
     for cell, count in reached.items():
         algorithms.setdefault(cell.algorithm, []).append(count)

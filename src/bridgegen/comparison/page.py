@@ -1,4 +1,4 @@
-"""The comparison on one page that needs no network: words, tables, figures, and every run."""
+"""The comparison on one self-contained page: sentences, tables, figures, and every run."""
 
 import base64
 import re
@@ -70,8 +70,8 @@ def _facts(comparison: Comparison) -> Iterable[str]:
 
 
 def _scenario(comparison: Comparison, scenario: str, measures: Sequence[Measure]) -> str:
-    told = "".join(f"<p>{escape(one)}</p>" for one in words.sentences(comparison, scenario))
-    parts = [f"<h2>{escape(scenario)}</h2>", f'<div class="card">{told}</div>']
+    text = "".join(f"<p>{escape(one)}</p>" for one in words.sentences(comparison, scenario))
+    parts = [f"<h2>{escape(scenario)}</h2>", f'<div class="card">{text}</div>']
     if scenario in comparison.measured:
         legend = _legend(comparison.plan.baseline)
         often = [one for one in measures if one.name[:2] in ("r_", "t_", "to")]
@@ -130,10 +130,10 @@ def _best(column: Sequence[Line], one: Measure) -> float:
 
 def _median(line: Line, one: Measure, is_best: bool) -> str:
     mark = {"better": "▲", "worse": "▼", "": ""}[words.verdict(line)]
-    told = {"better": "better", "worse": "worse", "": ""}[words.verdict(line)]
+    title = {"better": "better", "worse": "worse", "": ""}[words.verdict(line)]
     parts = [f"<b>{escape(words.median(line, one))}</b>"]
     if mark:
-        parts.append(f' <span class="mark" title="{told}">{mark}</span>')
+        parts.append(f' <span class="mark" title="{title}">{mark}</span>')
     parts.append(f"<small>{escape(words.span(line, one))}</small>")
     if not np.isnan(line.p_holm):
         parts.append(f"<small>p {escape(words.p_value(line.p_holm))}, A12 {line.a12:.2f}</small>")
@@ -169,7 +169,7 @@ def _figures(comparison: Comparison, scenario: str) -> str:
     captions = (
         "R_critic: the critical share of each run (points), quartiles and median.",
         f"Critical scenarios found. {band}.",
-        f"Hypervolume of what was found. {band}.",
+        f"Hypervolume of the front. {band}.",
     )
     for kind, light in zip(("r_critic", "critical", "hypervolume"), drawn[0], strict=True):
         write_whole(comparison.folder / FIGURES / f"{scenario}-{kind}.png", [light])
@@ -242,27 +242,27 @@ def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
         for name, one in comparison.measured.items()
     )  # fmt: skip
     texts = [
-        f"T_critic waits for {k} critical scenarios, 5 % of the budget, and divides by the least "
-        f"median of all algorithms here. What never came (the {ordinal(10)} critical scenario of a "
-        "run that found nine, say) is a censored value: later than all that came, ranked last, "
-        "tied with its like.",
+        f"T_critic is the number of evaluations until {k} critical scenarios, 5 % of the budget, "
+        "divided by the least median of all algorithms here. If that is never reached (for example "
+        f"the {ordinal(10)} critical scenario of a run that found nine), the value is censored: "
+        "ranked last, tied with the other censored ones.",
         f"Two critical scenarios are different if their searched parameters differ by "
         f"{100 * plan.apart:g} % of their ranges or more, in root mean square; they are counted in "
-        "the order in which the run found them, each against those counted before it, up to "
+        "the order in which the run found them, each compared with those counted before it, up to "
         "10,000.",
-        "Modes are the different conflicts of a run’s critical scenarios: type, who is "
-        "responsible, by which rule, and the other participant. A critical scenario without a near "
-        "miss or a contact, which the paper’s thresholds allow, has none.",
+        "Modes are the different conflicts of a run’s critical scenarios: type, responsible party, "
+        "rule, and the other participant. A critical scenario without a near miss or a contact, "
+        "which the paper’s thresholds allow, has none.",
         "Bins are five a parameter, and pairs of bins those of two parameters, as "
         "“bridgegen coverage” counts them.",
-        "Hypervolume, distance and spread are those of the metrics that the objective is made "
-        "of, whatever the algorithm minimised, scaled by the range that all runs of the scenario "
-        f"met, least to most critical ({boxes}). The reference point is the least critical corner, "
+        "Hypervolume, distance and spread are those of the objective’s metrics, whatever the "
+        "algorithm minimised, scaled by the range over all runs of the scenario, "
+        f"least to most critical ({boxes}). The reference point is the least critical corner, "
         "and the reference front that of all runs together.",
         f"p is that of the two-sided Mann–Whitney U test against {plan.baseline}, with Holm’s "
         f"correction for the {_many(len(plan.algorithms) - 1, 'algorithm')} tested in each measure "
         "and scenario. A12 is Vargha and Delaney’s: how probable it is that a run is better than "
-        f"one of {plan.baseline}, ties counting half, whichever way is better; small from 0.56, "
+        f"one of {plan.baseline}, ties counting half; small from 0.56, "
         "medium from 0.64, large from 0.71.",
     ]
     return f"<dl>{terms}</dl>" + "".join(f"<p>{escape(text)}</p>" for text in texts)

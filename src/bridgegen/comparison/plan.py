@@ -1,4 +1,4 @@
-"""The grid of runs of a comparison: scenarios × algorithms × seeds, and what makes it one."""
+"""The grid of runs of a comparison: scenarios × algorithms × seeds, and its identity."""
 
 import hashlib
 import json
@@ -20,7 +20,7 @@ from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.store.run_file import FILE as RUN_FILE
 
 FILE = "compare.json"
-"""In a comparison's folder: what all of its runs were made with."""
+"""In a comparison's folder: the settings of all its runs."""
 
 RUNS = "runs"
 """In a comparison's folder: the folders of its runs."""
@@ -44,23 +44,23 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Of the run's folder, and of the run where people read of it."""
+        """The name of the run and of its folder."""
         return f"{self.scenario}-{self.algorithm}-{self.seed}"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is compared.
+    """The plan of a comparison.
 
     Attributes:
         out: the comparison's folder.
-        scenarios: as the user names each, by the name that it has itself.
-        fingerprints: digests of what they say, by name.
-        algorithms: the settings that the user gives each, by its name; in the user's order.
+        scenarios: by name, as the user refers to each.
+        fingerprints: digests of their contents, by name.
+        algorithms: the user's settings of each, by its name; in the user's order.
         seeds: runs of each algorithm in each scenario; their seeds are 0, 1, 2 …
         budget: evaluations of each run.
         baseline: the algorithm that the others are tested against.
-        apart: from which distance two critical scenarios are different ones.
+        apart: minimum distance of two different critical scenarios.
         options: of all runs.
     """
 
@@ -76,7 +76,7 @@ class Plan:
 
     @property
     def cells(self) -> tuple[Cell, ...]:
-        """Every run, in the order of running: seed by seed, so that what is done is comparable."""
+        """Every run, in execution order: seed by seed, so that intermediate results compare."""
         return tuple(
             Cell(scenario, algorithm, seed)
             for seed in range(self.seeds)
@@ -86,7 +86,7 @@ class Plan:
 
     @property
     def cells_in_order(self) -> tuple[Cell, ...]:
-        """Every run, in the order of telling: by scenario, algorithm and seed."""
+        """Every run, in display order: by scenario, algorithm and seed."""
         scenarios, algorithms = list(self.scenarios), list(self.algorithms)
 
         def place(cell: Cell) -> tuple[int, int, int]:
@@ -101,8 +101,8 @@ class Plan:
     def options_of(self, cell: Cell) -> SearchOptions:
         """Return the options of a run.
 
-        Weights are for the algorithms that search one sum; one that searches many objectives is
-        not given any, unless the user asks for many of all algorithms.
+        Weights are for algorithms that minimise one sum; a multi-objective one does not get any,
+        unless the user chooses many objectives for all algorithms.
         """
         options = self.options
         of_many = toolkit.get(cell.algorithm).objectives == "many"
@@ -118,7 +118,7 @@ class Plan:
         )
 
     def command(self) -> str:
-        """Return the command line that begins this comparison, or goes on with it."""
+        """Return the command line that starts or resumes this comparison."""
         words = ["bridgegen", "compare", *self.scenarios.values()]
         words += ["--algorithms", ",".join(self.algorithms)]
         words += ["--seeds", str(self.seeds), "--budget", str(self.budget)]
@@ -134,7 +134,7 @@ class Plan:
         return shlex.join([*words, "--out", str(self.out)])
 
     def identity(self) -> dict[str, Any]:
-        """Return what may not differ between the runs of one folder, as JSON's types."""
+        """Return what must be equal in all runs of one folder, as JSON's types."""
         given = asdict(self.options)
         road_map = given.pop("road_map")
         same = {
@@ -165,7 +165,7 @@ def make_plan(
     """Return a plan, its names and numbers checked.
 
     Raises:
-        InputError: what is named twice, not at all, or out of range; a scenario that breaks a rule.
+        InputError: a name twice or missing, a value out of range; a scenario that breaks a rule.
         UnknownNameError: no such scenario, algorithm or setting.
     """
     problems = _twice("scenario", [str(one) for one in scenarios]) + _twice("algorithm", algorithms)
@@ -205,12 +205,12 @@ def make_plan(
 
 
 def begin(plan: Plan) -> None:
-    """Make a comparison's folder, or find that it holds this comparison already.
+    """Create a comparison's folder, or check that it holds this comparison.
 
-    More scenarios, algorithms and seeds may be asked for than before: the grid grows.
+    The plan may have more scenarios, algorithms and seeds than before: the grid grows.
 
     Raises:
-        StorageError: the folder holds something else, or runs that were made otherwise.
+        StorageError: the folder holds something else, or runs with other settings.
     """
     file, mine = plan.out / FILE, plan.identity()
     try:
@@ -228,32 +228,32 @@ def begin(plan: Plan) -> None:
     except ValueError as error:
         raise StorageError(f"{file}: the file is damaged: {error}") from None
     if not any(plan.out.glob(f"{RUNS}/*/{RUN_FILE}")):
-        before = None  # no run has been made: there is nothing to fit to
+        before = None  # there is no run yet that must match
     before = before or {}
     # An option that did not exist then had its default.
     made_with = {**_plain(asdict(CommonOptions())), **before} if before else {}
     differ = [name for name in mine if name in made_with and made_with[name] != mine[name]]
     if differ:
-        told = ", ".join(_difference(name, made_with[name], mine[name]) for name in differ)
+        differences = ", ".join(_difference(name, made_with[name], mine[name]) for name in differ)
         raise StorageError(
-            f"{plan.out}: holds a comparison that was made otherwise, and runs of both cannot be "
-            f"compared: {told}; choose another --out"
+            f"{plan.out}: holds a comparison with other settings, and runs of both cannot be "
+            f"compared: {differences}; choose another --out"
         )
     text = json.dumps({**before, **mine}, indent=1)
     write_whole(file, [text.encode()])
 
 
 def _plain(value: Any) -> dict[str, Any]:
-    """Return an object as JSON has it."""
+    """Return an object as JSON's types."""
     plain: dict[str, Any] = json.loads(json.dumps(value))
     return plain
 
 
 def _difference(name: str, before: Any, now: Any) -> str:
     if name.startswith("scenario "):
-        return f"{name} is not what it was"
+        return f"{name} has changed"
     if name == "map":
-        return "the map is not the same"
+        return "the map has changed"
     if isinstance(before, dict) and isinstance(now, dict):
         keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
         before, now = ({key: one.get(key) for key in keys} for one in (before, now))

@@ -1,4 +1,4 @@
-"""What a comparison needs of one run: little, however long the run was."""
+"""A compact record of one run for a comparison, however long the run is."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,12 +29,12 @@ class Record:
     Attributes:
         terms: the metrics of the scenario's objective.
         parameters: what it searched.
-        command: the command line that makes the same run, into the folder ``replay``.
+        command: the command line that repeats the run, into the folder ``replay``.
         ended: why it ended: "budget", "exhausted" or "converged".
-        evaluations: all that it made.
-        failed: of these, those whose simulation failed.
-        critical: critical ones.
-        reached: by k, the evaluations until the k-th critical one; +inf where it never came.
+        evaluations: number of evaluations.
+        failed: number of those whose simulation failed.
+        critical: number of critical ones.
+        reached: by k, the evaluations until the k-th critical one; +inf if there is none.
         seconds: [s] that it took.
         seconds_reached: [s] by k, likewise.
         distinct: how many different critical scenarios it found.
@@ -43,8 +43,8 @@ class Record:
         critical_bins: bins of parameters that hold a critical scenario.
         critical_pairs: pairs of bins of two parameters that do.
         found: ``(c,)`` int64, critical scenarios by the c points of its curve.
-        fronts: c arrays ``(n, m)`` of positivised terms, larger is more critical: what was not
-            dominated by then.
+        fronts: c arrays ``(n, m)`` of positivised terms, larger is more critical: the front at each
+            point.
         low: ``(m,)`` the least critical value of each term; None where every simulation failed.
         high: ``(m,)`` the most critical one; likewise.
     """
@@ -70,7 +70,7 @@ class Record:
 
 
 MODE = ("conflict_type", "responsible", "rule", "partner")
-"""What makes two critical scenarios different in their conflict."""
+"""The fields in which conflicts of different modes differ."""
 
 
 def points(budget: int) -> Int:
@@ -82,7 +82,7 @@ def space_of(folder: Path) -> SearchSpace:
     """Return the search space of a run, the same for all runs of a scenario.
 
     Raises:
-        StorageError: not a run, or its scenario or map is not what it was.
+        StorageError: not a run, or its scenario or map has changed.
         InputError: the scenario or the map is missing.
     """
     return searched(Run(folder))[1]
@@ -93,10 +93,10 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
 
     Args:
         folder: of the run.
-        space: what it searched.
-        budget: evaluations that it might have made.
-        ks: which critical scenarios to wait for.
-        apart: from which distance two critical scenarios are different ones.
+        space: its search space.
+        budget: its maximum number of evaluations.
+        ks: of the times to the k-th critical scenario.
+        apart: minimum distance of two different critical scenarios.
 
     Raises:
         StorageError: not a run, or damaged.
@@ -147,7 +147,7 @@ def modes_of(findings: Findings) -> set[tuple[str, ...]]:
 
 
 class _Reader:
-    """Goes through a run, chunk by chunk; memory does not grow but with what is critical."""
+    """Reads a run chunk by chunk; memory grows only with the critical rows."""
 
     def __init__(self, terms: Sequence[str], metrics: Sequence[str], points: Int) -> None:
         self._terms, self._metrics, self._points = terms, metrics, points
@@ -163,16 +163,16 @@ class _Reader:
 
     @property
     def found(self) -> list[int]:
-        """Critical scenarios by each point; after the end of the run they stay as many."""
+        """Number of critical scenarios at each point; constant after the end of the run."""
         return self._found + [len(self.hits)] * (len(self._points) - len(self._found))
 
     @property
     def fronts(self) -> list[Float]:
-        """The front by each point, likewise."""
+        """The front at each point, likewise."""
         return self._fronts + [self._front] * (len(self._points) - len(self._fronts))
 
     def take(self, rows: Rows) -> None:
-        """Take the rows that come next."""
+        """Add the next rows."""
         x = positivised(rows.metrics, self._metrics, self._terms)
         ok: Bool = (rows.status == 0) & np.isfinite(x).all(axis=1)
         self.failed += int(np.count_nonzero(rows.status != 0))

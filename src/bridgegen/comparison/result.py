@@ -1,4 +1,4 @@
-"""What a comparison came to, as people and notebooks look at it."""
+"""The results of a comparison, for tables, pages and notebooks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ PAGE = "compare.html"
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison came to.
+    """The results of a comparison.
 
     Attributes:
-        plan: what was compared.
+        plan: of the comparison.
         records: of the runs that have ended.
         measured: by scenario.
-        gaps: why the other runs failed.
+        gaps: reasons why the other runs failed.
         lines: every measure of every algorithm over its runs, tested against the baseline.
-        measures: what is measured.
+        measures: all measures.
     """
 
     plan: Plan
@@ -38,12 +38,12 @@ class Comparison:
 
     @property
     def folder(self) -> Path:
-        """Of the comparison; the runs' folders are in it."""
+        """The comparison's folder, which holds the runs' folders."""
         return self.plan.out
 
     @property
     def page(self) -> Path:
-        """One HTML page with all of it."""
+        """The HTML page with all results."""
         return self.folder / PAGE
 
     def line(self, scenario: str, algorithm: str, measure: str) -> Line:
@@ -71,7 +71,7 @@ class Comparison:
         return pd.read_csv(self.folder / SUMMARY_FILE)
 
     def times(self) -> "pd.DataFrame":
-        """Return how long every run took, which is not the same the next time: ``times.csv``."""
+        """Return the duration of every run, which is not repeatable: ``times.csv``."""
         import pandas as pd
 
         return pd.read_csv(self.folder / TIMES_FILE)

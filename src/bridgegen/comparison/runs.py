@@ -1,4 +1,4 @@
-"""One run of a comparison: begun, or gone on with; and what became of it."""
+"""One run of a comparison: started or resumed, and its result."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from bridgegen.workers import Threads
 
 @dataclass(frozen=True)
 class Task:
-    """A run that is to be made.
+    """A run to make.
 
     Attributes:
-        name: what people call it.
-        folder: its own.
-        scenario: that is searched, as ``run_search`` takes it.
+        name: of the run.
+        folder: of the run.
+        scenario: to search, as ``run_search`` takes it.
         options: of the run.
     """
 
@@ -47,7 +47,7 @@ class RunCallbacks:
 
 
 def evaluations_of(folder: Path) -> tuple[int, bool]:
-    """Return how many evaluations a run's folder holds, and whether the run has ended.
+    """Return the number of evaluations in a run's folder, and whether the run has ended.
 
     Raises:
         StorageError: it is damaged.
@@ -76,8 +76,8 @@ def attempt(
         Why it failed, or None.
 
     Raises:
-        InputError: what the user asked for breaks a rule; nothing of the run exists.
-        KeyboardInterrupt: Ctrl-C; what is done is kept.
+        InputError: an argument breaks a rule; nothing of the run exists.
+        KeyboardInterrupt: Ctrl-C; finished evaluations are kept.
     """
 
     def count(progress: Progress) -> None:
@@ -103,6 +103,6 @@ def attempt(
         return str(error)
     except BridgeGenError as error:
         return str(error)
-    except Exception as error:  # whatever an algorithm or a driver of the user's raises
+    except Exception as error:  # a user's algorithm or driver may raise anything
         return f"{type(error).__name__}: {error}"
     return None

@@ -1,8 +1,8 @@
-"""Are two algorithms different, and by how much: what is told of measures over seeds.
+"""Statistics of measures over seeds: do two algorithms differ, and by how much?
 
-A measure that a run never came to (evaluations to the 50th critical scenario, say) is +inf: a
-censored value, known only to be larger than the run was long. Ranks need no more than that, so
-medians, quartiles, tests and effect sizes all take it, ranked last and tied with its like.
+A measure that a run never reached (for example, evaluations to the 50th critical scenario) is +inf:
+a censored value, known only to exceed the run's length. Ranks need no more than that, so medians,
+quartiles, tests and effect sizes all accept it, ranked last and tied with other censored values.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,12 @@ import numpy as np
 from bridgegen.arrays import Float
 
 EFFECTS = ((0.71, "large"), (0.64, "medium"), (0.56, "small"))
-"""From which A12, or 1 − A12, on a difference is called so (Vargha and Delaney 2000)."""
+"""The least A12, or 1 − A12, of each name of a difference (Vargha and Delaney 2000)."""
 
 
 @dataclass(frozen=True)
 class Quartiles:
-    """The middle half of some values; NaN of none, +inf where the values are.
+    """The quartiles of some values; NaN without values, +inf where the values are.
 
     Attributes:
         low: the first quartile.
@@ -35,7 +35,7 @@ class Quartiles:
 def quartiles(values: Float) -> Quartiles:
     """Return the quartiles of ``(n,)`` values, interpolated linearly; NaN ones do not count.
 
-    NumPy's way, but that halfway to +inf is +inf, where NumPy has NaN.
+    As NumPy does, except that halfway to +inf is +inf, where NumPy returns NaN.
     """
     ordered = np.sort(values[~np.isnan(values)]).tolist()
 
@@ -64,7 +64,7 @@ def mann_whitney(x: Float, y: Float) -> float:
     x, y = x[~np.isnan(x)], y[~np.isnan(y)]
     if not len(x) or not len(y):
         return float("nan")
-    # Ranks say the same, and leave no infinity to be subtracted.
+    # Ranks are equivalent, and avoid subtracting infinities.
     ranks = np.unique(np.concatenate([x, y]), return_inverse=True)[1]
     return float(mannwhitneyu(ranks[: len(x)], ranks[len(x) :]).pvalue)
 
@@ -72,7 +72,7 @@ def mann_whitney(x: Float, y: Float) -> float:
 def holm(p_values: Sequence[float]) -> list[float]:
     """Return p values corrected for their number, by Holm's step-down method.
 
-    NaN, where there was nothing to test, stays and does not count.
+    NaN (no test) stays, and does not count.
 
     Source: Holm (1979), "A simple sequentially rejective multiple test procedure".
     """
@@ -85,14 +85,14 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def a12(x: Float, y: Float, *, larger_is_better: bool) -> float:
-    """Return how probable it is that a value of x is *better* than one of y, ties by half.
+    """Return the probability that a value of x is *better* than one of y, ties by half.
 
     0.5: no difference; 1: each of x is better than each of y. NaN where either is empty.
 
     Args:
         x: ``(n,)``, NaN ones do not count; +inf may be among them.
         y: ``(m,)``, likewise.
-        larger_is_better: which of two values is.
+        larger_is_better: else smaller is.
 
     Source: Vargha and Delaney (2000), doi:10.3102/10769986025002101, Eq. 5.
     """
@@ -105,6 +105,6 @@ def a12(x: Float, y: Float, *, larger_is_better: bool) -> float:
 
 
 def effect(share: float) -> str:
-    """Return what a difference of this A12 is called: negligible, small, medium or large."""
+    """Return the name of a difference of this A12: negligible, small, medium or large."""
     distance = max(share, 1.0 - share)
     return next((word for limit, word in EFFECTS if distance >= limit), "negligible")

@@ -28,12 +28,12 @@ class Line:
         algorithm: name.
         measure: name.
         runs: how many have a value, +inf included.
-        never: how many of these are +inf: what is waited for never came.
+        never: how many of these are +inf: the event never occurred.
         quartiles: over those runs.
-        p: of the Mann–Whitney U test against the baseline, two-sided; NaN of the baseline itself,
-            of what is timed, and where there is nothing to test.
+        p: of the Mann–Whitney U test against the baseline, two-sided; NaN for the baseline itself,
+            for timed measures, and where there is nothing to test.
         p_holm: corrected for the number of algorithms that are tested in this measure and scenario.
-        a12: how probable it is that a run of this algorithm is better than one of the baseline.
+        a12: probability that a run of this algorithm is better than one of the baseline.
     """
 
     scenario: str
@@ -123,8 +123,8 @@ RUNS_HEAD = (
     "scenario", "algorithm", "seed", "measure", "value", "evaluations", "critical", "failed",
     "ended", "folder", "command",
 )  # fmt: skip
-"""``value``: inf where what is waited for never came in so many evaluations (censored), empty where
-the measure is not defined; ``ended``: budget, exhausted or converged, or why the run failed."""
+"""``value``: inf where the event never occurred in so many evaluations (censored), empty where the
+measure is not defined; ``ended``: budget, exhausted or converged, or why the run failed."""
 
 SUMMARY_HEAD = (
     "scenario", "algorithm", "measure", "runs", "never", "q1", "median", "q3", "p", "p_holm", "a12",
@@ -176,7 +176,7 @@ def _write(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) ->
 
 
 def _cell(value: object) -> str:
-    """Return a value as text; a float with every digit that tells it from its neighbours."""
+    """Return a value as text; a float with all digits that identify it."""
     if isinstance(value, float):
         return "" if value != value else repr(value)
     return str(value)

@@ -1,4 +1,4 @@
-"""A comparison in words and in short numbers, for people."""
+"""A comparison in sentences and short numbers."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -14,12 +14,12 @@ from bridgegen.comparison.table import Line
 SURE = 0.05
 """A corrected p below this is called a difference."""
 
-TOLD = {
+SENTENCE_STARTS = {
     "r_critic": "The largest share of critical scenarios, R_critic, is that of",
     "distinct": "The largest number of different critical scenarios is that of",
     "hypervolume": "The largest hypervolume, many bad outcomes at once, is that of",
 }
-"""How the sentence about a measure begins; of each, larger is better."""
+"""The beginning of the sentence about a measure; larger is better in each."""
 
 
 def number(value: float, digits: int) -> str:
@@ -57,18 +57,18 @@ def verdict(line: Line) -> str:
 
 
 def sentences(comparison: Comparison, scenario: str) -> list[str]:
-    """Return what was found in one scenario: who finds most, how sure that is, and what is odd."""
+    """Return the findings in one scenario: the best algorithms, the tests, and peculiarities."""
     measures = {one.name: one for one in comparison.measures}
     few = _too_few(comparison, scenario)
     found = any(one.critical for c, one in comparison.records.items() if c.scenario == scenario)
-    names = list(TOLD) if found else ["hypervolume"]
-    told = [] if found else ["No run found a critical scenario."]
-    told += [_best(comparison, scenario, measures[name], is_open=not few) for name in names]
-    return [text for text in (*told, few, *_short(comparison, scenario)) if text]
+    names = list(SENTENCE_STARTS) if found else ["hypervolume"]
+    texts = [] if found else ["No run found a critical scenario."]
+    texts += [_best(comparison, scenario, measures[name], is_open=not few) for name in names]
+    return [text for text in (*texts, few, *_short(comparison, scenario)) if text]
 
 
 def _too_few(comparison: Comparison, scenario: str) -> str:
-    """Say where so few runs could not be told from luck, even if they differed entirely."""
+    """Return a warning where so few runs cannot be significant, even if they differ entirely."""
     plan = comparison.plan
     runs = {
         name: comparison.line(scenario, name, "r_critic").runs
@@ -86,7 +86,7 @@ def _too_few(comparison: Comparison, scenario: str) -> str:
     return (
         f"So few runs cannot show a difference from {plan.baseline}{against}: were each run of an "
         f"algorithm better than each of {plan.baseline}, p would still be {min(least, 1.0):.2f}. "
-        "Ask for more seeds."
+        "Use more seeds."
     )
 
 
@@ -101,7 +101,7 @@ def _best(comparison: Comparison, scenario: str, one: Measure, *, is_open: bool)
     top = max(line.quartiles.median for line in known)
     best = [line for line in known if line.quartiles.median == top]
     names = _and(line.algorithm for line in best)
-    text = f"{TOLD[one.name]} {names} (median {median(best[0], one)}"
+    text = f"{SENTENCE_STARTS[one.name]} {names} (median {median(best[0], one)}"
     base = next((line for line in known if line.algorithm == comparison.plan.baseline), None)
     if base is None or base in best:
         text += ")."
@@ -136,7 +136,7 @@ def _is(p: float) -> str:
 
 
 def _short(comparison: Comparison, scenario: str) -> Iterable[str]:
-    """Tell of runs that failed, or that ended before their budget."""
+    """Yield notes on runs that failed, or that ended before their budget."""
     budget = comparison.plan.budget
     records = {c: one for c, one in comparison.records.items() if c.scenario == scenario}
     ended = Counter(c.algorithm for c, one in records.items() if one.evaluations < budget)
@@ -144,7 +144,7 @@ def _short(comparison: Comparison, scenario: str) -> Iterable[str]:
         made = [one.evaluations for c, one in records.items() if c.algorithm == name]
         few = f"{min(made):,}" if min(made) == max(made) else f"{min(made):,} to {max(made):,}"
         yield (
-            f"{name} had no more to ask after {few} of {budget:,} evaluations in "
+            f"{name} had no more rows to propose after {few} of {budget:,} evaluations in "
             f"{count} of {len(made)} runs: its shares are of these, and what it had not found "
             "by then counts as never found."
         )

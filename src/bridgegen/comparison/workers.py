@@ -1,6 +1,6 @@
 """Runs on several cores: processes that each make one run at a time, in one thread.
 
-A process that dies (out of memory, a driver that takes it down) costs the run that it was making.
+A process that crashes (out of memory, or by its driver) costs the run that it was making.
 """
 
 import queue
@@ -21,7 +21,7 @@ def run_all(
 
     Args:
         tasks: the runs.
-        at_once: so many at a time, ≥ 1. One is made in this process.
+        at_once: how many at a time, ≥ 1. With 1, they are made in this process.
         cluster: where their scenarios are simulated, "ray" or "ray://HOST:PORT"; by default, a run
             is one thread.
         callbacks: called as they progress.
@@ -30,17 +30,19 @@ def run_all(
         Why runs failed, by name.
 
     Raises:
-        InputError: what the user asked for breaks a rule.
-        KeyboardInterrupt: Ctrl-C; every process has been ended, and what is done is kept.
+        InputError: an argument breaks a rule.
+        KeyboardInterrupt: Ctrl-C; every process has ended, and finished evaluations are kept.
     """
     waiting = deque(tasks)
     at_once = min(at_once, len(waiting))
     if at_once > 1:
         return _Pool(waiting, callbacks, cluster).run(at_once)
-    return _here(waiting, callbacks, cluster)
+    return _run_sequentially(waiting, callbacks, cluster)
 
 
-def _here(tasks: Iterable[Task], callbacks: RunCallbacks, cluster: str | None) -> dict[str, str]:
+def _run_sequentially(
+    tasks: Iterable[Task], callbacks: RunCallbacks, cluster: str | None
+) -> dict[str, str]:
     failures = {}
 
     def stage(name: str) -> None:
@@ -60,7 +62,7 @@ def _here(tasks: Iterable[Task], callbacks: RunCallbacks, cluster: str | None) -
 
 
 class _Pool:
-    """Gives the waiting runs to the processes, one each."""
+    """Assigns the waiting runs to the processes, one each."""
 
     def __init__(self, waiting: deque[Task], callbacks: RunCallbacks, cluster: str | None) -> None:
         self._waiting, self._callbacks, self._cluster = waiting, callbacks, cluster
@@ -70,7 +72,7 @@ class _Pool:
 
     def run(self, at_once: int) -> dict[str, str]:
         try:
-            # What is not compiled yet is compiled once, not by every process.
+            # Compiles once, not in every process.
             self._begin(at_once if is_compiled() else 1)
             while self._making:
                 process, (kind, *rest) = self._said.get()
@@ -84,12 +86,12 @@ class _Pool:
         return self._failures
 
     def _begin(self, at_once: int) -> None:
-        """Start as many processes as are missing and have something to do."""
+        """Start the missing processes, as far as runs wait."""
         while self._waiting and len(self._making) < at_once:
             self._give(Process(self._said))
 
     def _give(self, process: Process) -> None:
-        """Have a process make the next run."""
+        """Assign the next run to a process."""
         self._making[process] = task = self._waiting.popleft()
         process.call(make, task, self._cluster, tells=True)
 
@@ -123,7 +125,7 @@ class _Pool:
 
 
 def make(task: Task, cluster: str | None, say: Callable[..., None]) -> str | None:
-    """Make a run, in a process of its own, and tell of it; return why it failed, or None."""
+    """Make a run in a worker process, and report its progress; return why it failed, or None."""
     return attempt(
         task,
         cluster,

@@ -1,8 +1,8 @@
-"""Compiled: what a careful driver would have achieved, by braking on its own path.
+"""Compiled: the outcome if a careful driver had braked on its own path.
 
-It is the driver of UN Regulation 157, Annex 3, whatever the road. Where the question is whether
-somebody was forced to brake, comfortable braking takes its place, after the same reaction time. Of
-a near miss the careful driver must avoid the near miss, not the contact.
+It is the driver of UN Regulation 157, Annex 3, on any road. Where the question is whether another
+actor was forced to brake, it brakes comfortably, after the same reaction time. In a near miss the
+careful driver must avoid the near miss, not the contact.
 """
 
 # mypy: allow-untyped-defs
@@ -31,24 +31,24 @@ from bridgegen.metrics._pet_kernels import separation
 from bridgegen.metrics._ttc_kernels import STANDSTILL, time_to_contact
 
 CLEAR, COMES_NEAR, COLLIDES = range(3)
-"""What becomes of a body that brakes."""
+"""Outcomes of braking."""
 
 
 @kernel
 def gains(speed, other, ca, sa, cb, sb):
     """Return by how much a body is faster than another, along its own heading [m/s].
 
-    It must lose so much not to meet the other. One that comes across or towards it counts as if it
-    stood: braking ends at standstill.
+    It must lose this much speed to avoid the other. A crossing or oncoming one counts as standing:
+    braking ends at standstill.
     """
     return max(speed - max(other * (cb * ca + sb * sa), 0.0), 0.0)
 
 
 @kernel
 def gives(scene, a, i, speed):
-    """Return how hard body a can brake at instant i of its track at a speed [m/s²].
+    """Return the greatest deceleration of body a at instant i of its track at a speed [m/s²].
 
-    What the tyres need to hold it in the bend is not left to brake (the friction circle).
+    The friction circle applies: grip used in a bend is not available for braking.
     """
     gone = scene.gone[a]
     length = gone[i + 1] - gone[i] if i + 1 < scene.n else 0.0
@@ -62,9 +62,9 @@ def gives(scene, a, i, speed):
 
 @kernel
 def follows(gap, speed, its):
-    """Return by how much a driver slows down who opens the gap to somebody ahead [m/s²].
+    """Return the deceleration by which a driver increases the gap to a vehicle ahead [m/s²].
 
-    It does so while the gap is shorter than UN R157 asks for, and it is not much slower already.
+    It does so while the gap is shorter than UN R157 requires, and it is not much slower already.
     """
     headway = min(HEADWAY + speed * HEADWAY_RISE, MOST_HEADWAY)
     return OPENING if gap < headway * speed and speed > OPENS_TO * its else 0.0
@@ -72,15 +72,15 @@ def follows(gap, speed, its):
 
 @kernel
 def braked(scene, a, b, k, start, braking):
-    """Return what becomes of body a on its own track if it brakes from instant ``start`` on.
+    """Return the outcome for body a on its own track if it brakes from instant ``start`` on.
 
-    From instant k to ``start`` it opens its gap to b as drivers do, see `follows`.
+    From instant k to ``start`` it increases its gap to b as drivers do, see `follows`.
 
-    It goes on as it did for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
+    It keeps its motion for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
     [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
-    speed on its track. A body that stands when b runs into it has done all that braking can do: it
-    counts as clear. One that crosses b's way and is ahead of its recorded place when they meet does
-    not: it has escaped by not braking.
+    speed on its track. A body that stands when b runs into it counts as clear: braking cannot do
+    more. One that crosses b's way and is ahead of its recorded place when they meet does not: it
+    has escaped by not braking.
     """
     half, x, y, c, s, v, gone = (
         scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone
@@ -106,7 +106,7 @@ def braked(scene, a, b, k, start, braking):
         i, xa, ya = pose_on(x[a], y[a], c[a], s[a], gone[a], n, i, at)
         way = gone[b, m] if m <= until else gone[b, until] + v[b, until] * (m - until) * dt
         j, xb, yb = pose_on(x[b], y[b], c[b], s[b], gone[b], n, j, way)
-        if m <= until:  # a body that moves without a way of its own: sideways, or on the spot
+        if m <= until:  # a body that moves without a path: sideways, or on the spot
             j, xb, yb = m, x[b, m], y[b, m]
         dx, dy = xb - xa, yb - ya
         apart = separation(dx, dy, c[a, i], s[a, i], c[b, j], s[b, j], la, wa, lb, wb)

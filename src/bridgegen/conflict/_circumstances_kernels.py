@@ -1,4 +1,4 @@
-"""Compiled: what was the case around a conflict: lights, crosswalks, who slowed down or steered."""
+"""Compiled circumstances of a conflict: lights, crosswalks, braking and steering."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -74,7 +74,7 @@ def ahead_until(scene, k, time):
 
 @kernel
 def stops_at_red(scene, e, k, time):
-    """Say whether body e heads for a red light at instant k and does not pass it afterwards."""
+    """Return whether body e heads for a red light at instant k and does not pass it afterwards."""
     for j in range(len(scene.stop_entities)):
         if scene.stop_entities[j] != e or not math.isfinite(scene.stop_lines[j, 0]):
             continue
@@ -93,7 +93,7 @@ def stops_at_red(scene, e, k, time):
 
 @kernel
 def on_crosswalk(scene, e, k):
-    """Say whether the centre of body e is on a crosswalk of the ego's route at instant k."""
+    """Return whether the centre of body e is on a crosswalk of the ego's route at instant k."""
     walks = scene.crosswalks
     for j in range(len(walks)):
         if not math.isfinite(walks[j, 0]):
@@ -108,7 +108,7 @@ def on_crosswalk(scene, e, k):
 
 @kernel
 def on_crosswalk_since(scene, e, k):
-    """Return since which instant body e has been on a crosswalk; k + 1 if it is not at k."""
+    """Return the instant since which body e is on a crosswalk; k + 1 if it is not at k."""
     while k >= scene.first and on_crosswalk(scene, e, k):
         k -= 1
     return k + 1
@@ -116,7 +116,7 @@ def on_crosswalk_since(scene, e, k):
 
 @kernel
 def slowing_since(v, first, k, dt):
-    """Return when a body began to slow down, the last time before instant k.
+    """Return the last instant before k at which a body began to slow down.
 
     -1 if it has not slowed down within ``JUST_NOW`` before.
     """
@@ -132,7 +132,7 @@ def slowing_since(v, first, k, dt):
 
 @kernel
 def still_since(v, first, k):
-    """Return since which instant a body has been standing up to instant k; k + 1 if it moves."""
+    """Return the instant since which a body stands at instant k; k + 1 if it moves."""
     while k >= first and v[k] <= STANDS:
         k -= 1
     return k + 1
@@ -140,7 +140,7 @@ def still_since(v, first, k):
 
 @kernel
 def ego_moved(scene, k, way):
-    """Say whether the ego has moved across its route just before instant k.
+    """Return whether the ego has moved across its route just before instant k.
 
     Only to the left for ``way`` 1, to the right for -1, to either side for 0. An ego that turns off
     meanwhile has not: its offset may be that from the road that it leaves.
@@ -158,10 +158,10 @@ def ego_moved(scene, k, way):
 
 @kernel
 def ego_came_over(scene, e, k, way):
-    """Say whether it is the ego that has changed its course when it and body e meet at instant k.
+    """Return whether it is the ego that has changed course when it and body e meet at instant k.
 
-    It has moved, see `ego_moved`; and body e has not steered more ``LATELY``: who has arrived on a
-    lane has the right to go straight on there.
+    It has moved, see `ego_moved`; and body e has not steered more ``LATELY``: a vehicle that has
+    arrived on a lane has the right to go straight on there.
     """
     if not ego_moved(scene, k, way):
         return False
@@ -171,11 +171,11 @@ def ego_came_over(scene, e, k, way):
 
 @kernel
 def steering(scene, e, k, within):
-    """Return how much the ego and body e have steered besides what they have in common [m].
+    """Return how much the ego and body e have steered beyond their common bend [m].
 
-    Both are looked at over the same length of way before instant k, that of the slower one within
-    so many seconds. A constant bend over a length L that turns a body by phi moves it aside by
-    L phi / 2. The lesser bend, if both go the same way, is taken for that of the road.
+    Both are compared over the same length of path before instant k, that of the slower one
+    ``within`` so many seconds. A constant bend over a length L that turns a body by phi moves it
+    aside by L phi / 2. The lesser bend, if both go the same way, is taken for that of the road.
     """
     x, y, c, s, gone = scene.x, scene.y, scene.c, scene.s, scene.gone
     begin = max(k - int(within / scene.dt), scene.first)
@@ -210,7 +210,7 @@ def side_of(scene, e, k):
 
 @kernel
 def same_road(scene, e, k):
-    """Say whether both came along one road, in the same or in opposite directions."""
+    """Return whether both were on one road, in the same or in opposite directions."""
     j = max(k - int(TURN_TIME / scene.dt), scene.first)
     c, s = scene.c, scene.s
     return abs(c[0, j] * c[e, j] + s[0, j] * s[e, j]) > ALIKE
@@ -218,7 +218,7 @@ def same_road(scene, e, k):
 
 @kernel
 def has_reason(scene, k):
-    """Say whether the ego has a reason to brake hard at instant k: somebody ahead, or a light."""
+    """Return whether the ego has a reason to brake hard at instant k: an actor ahead or a light."""
     x, y, c, s = scene.x, scene.y, scene.c, scene.s
     reach = AHEAD_TIME * scene.v[0, k] + AHEAD
     for o in range(1, x.shape[0]):

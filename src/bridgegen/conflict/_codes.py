@@ -1,8 +1,8 @@
-"""The numbers of what the conflict analysis tells apart: the one place where they are.
+"""All codes of the conflict analysis.
 
-``types`` gives them names and words, ``analysis`` and the kernels use them. A store keeps them:
-append, never renumber. The module is private because compiled code is built anew when a private
-module changes (``bridgegen.compiled``).
+``types`` gives them names and labels, ``analysis`` and the kernels use them. Stores record them:
+append, never renumber. The module is private because compiled code is rebuilt when a private module
+changes (``bridgegen.compiled``).
 """
 
 NO_CONFLICT, COURSE, NEAR_MISS, CONTACT = range(4)
@@ -19,8 +19,8 @@ NO_CONFLICT, COURSE, NEAR_MISS, CONTACT = range(4)
 ) = range(9)  # fmt: skip
 """Edges and corners of a body, counter-clockwise from its front."""
 
-NOBODY, EGO, OTHER, SHARED = range(4)
-"""Who is responsible."""
+NEITHER, EGO, OTHER, SHARED = range(4)
+"""Responsible parties."""
 
 (
     NO_RULE, STRUCK_STANDING, RED_LIGHT, REAR_DISTANCE, BRAKED_WITHOUT_REASON, CUT_IN,
@@ -36,11 +36,11 @@ NOBODY, EGO, OTHER, SHARED = range(4)
     KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE,
 ) = range(9)  # fmt: skip
 INTEGERS = 9
-"""Columns of a pair's row of whole numbers, and how many."""
+"""Columns of a pair's row of whole numbers, and their number."""
 
 (
     TTC, NEEDED, ACROSS, ALONG, V_EGO, V_OTHER, STOOD_EGO, STOOD_OTHER, OVERLAP, NEARNESS,
     LEFT_TO_ACT,
 ) = range(11)  # fmt: skip
 FLOATS = 11
-"""Columns of a pair's row of floats, and how many."""
+"""Columns of a pair's row of floats, and their number."""

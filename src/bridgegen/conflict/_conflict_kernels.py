@@ -1,7 +1,7 @@
 """Compiled conflict analysis of the ego with each other body; public wrapper: ``analysis.analyse``.
 
-Each pair gets a row of whole numbers and one of floats; ``_codes`` names their columns. Only what
-happens up to the ego's first contact with anybody counts.
+Each pair gets a row of whole numbers and one of floats; ``_codes`` names their columns. Only events
+up to the ego's first contact with any body count.
 """
 
 # mypy: allow-untyped-defs
@@ -65,7 +65,7 @@ from bridgegen.metrics._ttc_kernels import STANDSTILL, time_to_contact
 
 @kernel
 def stood_for(v, first, k, dt):
-    """Return for how long a body has been standing at instant k [s]."""
+    """Return how long a body has been standing at instant k [s]."""
     j = k
     while j >= first and v[j] <= STANDS:
         j -= 1
@@ -74,7 +74,7 @@ def stood_for(v, first, k, dt):
 
 @kernel
 def first_contact(distance, n):
-    """Return the first instant at which the ego touches anybody, n if it never does."""
+    """Return the first instant at which the ego touches a body, n if it never does."""
     first = n
     for e in range(1, distance.shape[0]):
         for k in range(min(n, first)):
@@ -119,8 +119,7 @@ def most_urgent(half, x, y, c, s, v, gone, distance, e, n, end, dt):
 
     Both predictions must lead to contact within ``HORIZON``: constant velocity, and constant speed
     along the tracks. The later of the two times counts. Of all instants before ``end``, that of the
-    greatest `urgency` counts; one that makes a near miss goes before all others. The instant is -1
-    if there is none.
+    greatest `urgency` counts; near misses take precedence. The instant is -1 if there is none.
     """
     la, wa, lb, wb = half[0, 0], half[0, 1], half[e, 0], half[e, 1]
     circles = (math.sqrt(la * la + wa * wa) + math.sqrt(lb * lb + wb * wb)) ** 2 * (1.0 + 1e-9)
@@ -163,7 +162,7 @@ def most_urgent(half, x, y, c, s, v, gone, distance, e, n, end, dt):
                 break
             if prediction == 1:
                 best, best_time, best_needed, at = worth, time, needed, k
-                # more time than this cannot be worth more
+                # more time than this cannot be more urgent
                 if best < 1.0:
                     limit = max(HORIZON * (1.0 - best), SERIOUS_TTC)
                 else:
@@ -174,9 +173,9 @@ def most_urgent(half, x, y, c, s, v, gone, distance, e, n, end, dt):
 
 @kernel
 def is_serious(time, needed, v, k, dt):
-    """Say whether a collision course at instant k is a near miss of an ego with speeds v.
+    """Return whether a collision course at instant k is a near miss of an ego with speeds v.
 
-    It is none where the ego already brakes as much as it needs to.
+    It is not if the ego already brakes as hard as needed.
     """
     if time > SERIOUS_TTC or needed < SERIOUS_DECELERATION or v[k] < MOVES:
         return False
@@ -196,7 +195,7 @@ def analyse_pair(
         if at < 0:
             return
     first, until = presence(distance[e], at, n)
-    # the bodies as they meet: in the step before contact, or by constant velocity
+    # the bodies at contact: in the step before it, or at constant velocity
     steps = contact and at > first
     k = at - 1 if steps else at
     la, wa, lb, wb = half[0, 0], half[0, 1], half[e, 0], half[e, 1]

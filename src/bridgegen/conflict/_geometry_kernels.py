@@ -1,4 +1,4 @@
-"""Compiled geometry of a pair of bodies: how they meet, where, and who is in whose path."""
+"""Compiled geometry of a pair of bodies: contact, its place, and overlap of their paths."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -24,7 +24,7 @@ from bridgegen.metrics._ttc_kernels import sweep
 
 
 class Scene(NamedTuple):
-    """One row as the rules of responsibility read it, while one other participant is present.
+    """One row for the rules of responsibility, while one other participant is present.
 
     Attributes:
         half: ``(E, 2)`` half lengths and widths [m].
@@ -38,7 +38,7 @@ class Scene(NamedTuple):
         gone: ``(E, T)`` lengths of the tracks [m].
         claims: ``(E,)`` of the ego's route against each other's, see `right_of_way.claim`.
         crosswalks: ``(C, 5)``, as in a rollout; so are the next five.
-        friction: [m/s²]; +inf where nobody says.
+        friction: [m/s²]; +inf where unknown.
         stop_entities: ``(L,)``.
         stop_lights: ``(L,)``.
         stop_lines: ``(L, 3)``.
@@ -108,7 +108,7 @@ def meeting(dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, still):
 
 @kernel
 def shallow_axis(dx, dy, ca, sa, cb, sb, la, wa, lb, wb):
-    """Return the axis along which two boxes that overlap are least deep in each other."""
+    """Return the axis of least penetration of two overlapping boxes."""
     c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
     depths = (
         la + (c * lb + s * wb) - abs(dx * ca + dy * sa),
@@ -159,7 +159,7 @@ def corner_towards(nx, ny, c, s):
 
 @kernel
 def zones(axis, nx, ny, ca, sa, cb, sb):
-    """Return which edge or corner of A meets which of B, where the normal leads from A to B."""
+    """Return the edges or corners of A and B that meet, for a normal from A to B."""
     flush = min(abs(ca * sb - sa * cb), abs(ca * cb + sa * sb)) <= FLUSH
     if flush:
         return edge_towards(nx, ny, ca, sa), edge_towards(-nx, -ny, cb, sb)
@@ -176,7 +176,7 @@ def extent(nx, ny, c, s, half_length, half_width):
 
 @kernel
 def overlap(tx, ty, dx, dy, ca, sa, cb, sb, la, wa, lb, wb):
-    """Return how much of A's extent along a direction B covers, 0 to 1."""
+    """Return the share of A's extent along a direction that B covers, 0 to 1."""
     a, b = extent(tx, ty, ca, sa, la, wa), extent(tx, ty, cb, sb, lb, wb)
     middle = dx * tx + dy * ty
     covered = min(a, middle + b) - max(-a, middle - b)
@@ -209,7 +209,7 @@ def pose_on(x, y, c, s, gone, n, j, at):
 def apart_at(half, x, y, c, s, v, gone, e, k, n, until, i, j, t):
     """Return (i, j, gap): how far the ego and e are apart after t seconds at their speeds of k.
 
-    They drive on their own tracks; i and j are instants up to which these are left behind.
+    They drive on their own tracks; i and j are the instants of the tracks that they have reached.
     """
     i, xa, ya = pose_on(x[0], y[0], c[0], s[0], gone[0], n, i, gone[0, k] + v[0, k] * t)
     j, xb, yb = pose_on(x[e], y[e], c[e], s[e], gone[e], until, j, gone[e, k] + v[e, k] * t)
@@ -224,9 +224,9 @@ def apart_at(half, x, y, c, s, v, gone, e, k, n, until, i, j, t):
 def time_along_paths(half, x, y, c, s, v, gone, e, k, n, until, horizon):
     """Return when the ego and e touch if both keep their speeds of instant k on their own tracks.
 
-    A track is what a body drives in the rollout, straight on beyond its end: instant n of the
-    ego's, ``until`` of e's. +inf beyond the horizon [s]. Steps are as long as the gap allows; the
-    last one is halved until it is short.
+    A track is a body's path in the rollout, straight on beyond its end: instant n of the ego's,
+    ``until`` of e's. +inf beyond the horizon [s]. Steps are as long as the gap allows; the last one
+    is halved until it is short.
     """
     speeds = v[0, k] + v[e, k]
     if speeds <= 0.0:
@@ -261,7 +261,7 @@ def presence(distance, k, n):
 
 @kernel
 def displaced(x, y, v, e, k, dt):
-    """Say whether body e is moved to another place from instant k to the next, not driven there."""
+    """Return whether body e is teleported from instant k to the next, not driven."""
     moved = math.hypot(x[e, k + 1] - x[e, k], y[e, k + 1] - y[e, k])
     return moved > (max(v[e, k], v[e, k + 1]) + JUMPS) * dt
 
@@ -294,11 +294,11 @@ def beside(x, y, c, s, first, n, j, px, py):
 
 @kernel
 def entered(scene, a, b, end, margin):
-    """Return since which instant body b has been in the way of body a, up to instant ``end``.
+    """Return the instant since which body b is in the way of body a, up to instant ``end``.
 
     It is in the way where it reaches into the strip that a's body sweeps in the rollout, widened
-    by a margin [m] to each side. ``end`` where it is not there yet; the second number says on
-    which side it was before: 1 left, -1 right, 0 where it has been in the way from the start.
+    by a margin [m] to each side. ``end`` if it is not in the way yet; the second number is the side
+    on which it was before: 1 left, -1 right, 0 if it is in the way from the start.
     """
     x, y, c, s = scene.x, scene.y, scene.c, scene.s
     own_width, length, width = scene.half[a, 1], scene.half[b, 0], scene.half[b, 1]
@@ -316,7 +316,7 @@ def entered(scene, a, b, end, margin):
 
 @kernel
 def hidden(scene, e, k):
-    """Say whether another body stands between the ego's front and the centre of e at instant k."""
+    """Return whether another body is between the ego's front and the centre of e at instant k."""
     half, x, y, c, s = scene.half, scene.x, scene.y, scene.c, scene.s
     ax = x[0, k] + half[0, 0] * c[0, k]
     ay = y[0, k] + half[0, 0] * s[0, k]
@@ -346,6 +346,6 @@ def visible_from(scene, e, since, k):
 
 @kernel
 def turned(c, s, first, k, steps):
-    """Return by how much a heading has changed within some steps up to instant k [rad]."""
+    """Return the change of a heading within some steps up to instant k [rad]."""
     j = max(k - steps, first)
     return math.atan2(s[k] * c[j] - c[k] * s[j], c[k] * c[j] + s[k] * s[j])

@@ -1,8 +1,8 @@
-"""The limits of the conflict analysis, each with its unit and source: the one place where they are.
+"""All limits of the conflict analysis, each with its unit and source.
 
 Those that other stages share come from ``bridgegen.physics``.
 
-"Ours" marks what no source gives. Private for the reason that ``_codes`` tells.
+"Ours" marks values without a source. Private for the reason given in ``_codes``.
 """
 
 import math
@@ -16,15 +16,15 @@ HORIZON = 4.0
 Hogema (1993), Time-to-collision and collision avoidance systems: 4 s separates drivers who find
 themselves in danger from those who are in control."""
 SERIOUS_TTC = 1.5
-"""[s] A near miss has no more time left. Source: van der Horst and Hogema (1993)."""
+"""[s] Largest time to collision of a near miss. Source: van der Horst and Hogema (1993)."""
 SERIOUS_DECELERATION = 3.35
-"""[m/s²] A near miss needs so much deceleration. Source: Archer (2005), Indicators for traffic
+"""[m/s²] Least deceleration that a near miss needs. Source: Archer (2005), Indicators for traffic
 safety assessment and prediction, KTH: deceleration rate to avoid a crash (DRAC) above the
 3.35 m/s² (11 ft/s²) of AASHTO."""
 MOVES = 0.5
-"""[m/s] An ego that is slower has no near miss of its own: others pass it. Ours."""
+"""[m/s] A slower ego has no near miss: others pass it. Ours."""
 GUIDANCE = 6.0
-"""[s] How far ahead the closest encounter at constant velocity is looked for. Ours."""
+"""[s] Horizon of the closest encounter at constant velocity. Ours."""
 GUIDANCE_STEP = 5
 """Every so many instants. Ours."""
 NEAR, SOON = 5.0, 3.0
@@ -34,8 +34,8 @@ FINEST = 0.05
 HALVINGS = 10
 """Times that the last step of a prediction is halved: 0.05 ms. Ours."""
 JUMPS = 5.0
-"""[m/s] A body whose positions imply a motion that is so much faster than its speed was relocated:
-lane changes of scripted bodies reach 3 m/s sideways. Ours."""
+"""[m/s] A body whose positions imply a motion faster than its speed by more was teleported: lane
+changes of scripted bodies reach 3 m/s sideways. Ours."""
 
 # --- Contact and type ---------------------------------------------------------------------------
 
@@ -44,8 +44,7 @@ FLUSH = math.sin(math.radians(8.0))
 STANDS = 0.1
 """[m/s] A slower body stands. Ours: below the resolution of recorded speeds, 0.36 km/h."""
 STOOD = 0.5
-"""[s] A body that has stood for so long has not stopped in the very moment of the conflict. Ours.
-"""
+"""[s] A body that has stood for longer has not stopped because of the conflict. Ours."""
 SAME_WAY = math.cos(math.radians(35.0))
 """[1] Cosine of the angle between headings of bodies that go the same way; its negative: against
 each other. Ours: lane changes reach 25° at walking speed, turns begin at 60°."""
@@ -77,14 +76,14 @@ OPENING = 0.4
 """[m/s²] How a careful driver opens a gap that is too short when a scenario begins, or when the
 other comes: with the foot off the accelerator. Source: European Commission, JRC-FSM."""
 OPENS_TO = 0.8
-"""[1] … until it drives at this share of the speed of who is ahead. Ours."""
+"""[1] … until it drives at this share of the speed of the vehicle ahead. Ours."""
 AHEAD_BY = 0.01
 """[m] A body that brakes and is farther ahead than without braking, by more, has not avoided the
 other by braking. Ours: rounding."""
 BRAKES_FOR = 20.0
-"""[s] A driver that brakes is followed for at most this time: 60 m/s at ``COMFORT``. Ours."""
+"""[s] Longest braking that is computed: from 60 m/s at ``COMFORT``. Ours."""
 
-# --- Who is in whose way ------------------------------------------------------------------------
+# --- Obstruction ---------------------------------------------------------------------------------
 
 MARGIN = 0.5
 """[m] A body that reaches so near to the strip that another sweeps is in its lane. A car of 1.9 m
@@ -92,18 +91,18 @@ on a lane of 3.5 m has 0.8 m to each side, and a cut-in counts from 0.3 m beyond
 Source: UN R157, 5.2.5.2."""
 MARGIN_ON_FOOT = 1.0
 """[m] Likewise of pedestrians, cyclists, animals. Source: StVO § 26, ECE pedestrian test protocols
-brake for who is about to step into the path; the metre is ours."""
+brake for persons about to step into the path; the metre is ours."""
 HARD = 6.0
 """[m/s²] Braking that needs a reason. Source: UN R13-H, Annex 3: 6.43 m/s² is what the service
-brakes must give, so that nobody brakes so hard by the way."""
+brakes must give, so that no driver brakes so hard without a reason."""
 JUST_NOW = 3.0
-"""[s] What a body has done so long before a contact counts as its doing. Ours: lane changes take 3
-to 6 s."""
+"""[s] Actions of a body within this time before a contact count. Ours: lane changes take 3 to 6 s.
+"""
 LATELY = 1.0
-"""[s] Of two that have changed their course, the one who has steered more so long before their
-meeting came into the way of the other. Ours."""
+"""[s] Of two bodies that changed course, the one that steered more in this time before they meet
+came into the way of the other. Ours."""
 ASIDE = 0.7
-"""[m] A body that has moved so far across its route within ``JUST_NOW`` has changed its course.
+"""[m] A body that has moved farther across its route within ``JUST_NOW`` has changed its course.
 Ours: about the room to the marking."""
 ALIKE = 0.7
 """[1] Least cosine, in size, between two approaches of the same road. Ours: 45°."""
@@ -119,11 +118,11 @@ Ours: a lane's width."""
 SIGHT = 60.0
 """[m] A light holds a body that is at most so far before its stop line. Ours."""
 LOOKED_BACK = 10.0
-"""[s] Red lights are looked for so long before a conflict. Ours."""
+"""[s] Time before a conflict in which running a red light counts. Ours."""
 JUNCTION = 40.0
 """[m] A light decides on conflicts up to so far behind its stop line. Ours: the size of a large
 junction."""
 CROSSWALK_MARGIN = 0.5
-"""[m] By so much crosswalks are wider, along the route. Ours."""
+"""[m] Extension of crosswalks along the route. Ours."""
 KERB = 1.0
-"""[m] By so much they are longer, across the route: who stands at the kerb to cross. Ours."""
+"""[m] Extension of crosswalks across the route: pedestrians waiting at the kerb. Ours."""

@@ -1,6 +1,6 @@
-"""Compiled: the first thing that a participant other than the ego cannot do; wrapper beside it.
+"""Compiled: the first implausible motion of a participant other than the ego; wrapper beside it.
 
-One scenario after the other, each from its own numbers alone.
+One scenario after the other; each result depends on its scenario alone.
 """
 
 # mypy: allow-untyped-defs
@@ -19,16 +19,16 @@ CURVATURE, LATERAL_ACCELERATION, JUMP = 6, 7, 8
 SPEEDS_UP, BRAKES, CURVES, CORNERS, SLIPS = range(5)
 IS_PROP = 5
 
-DEPTH = 0.01  # m, boxes that are in each other by less only touch: the rounding of a file
-SLIDE = 0.2  # m/s, of motion across the body: rounding of places, and kinks of a lane's centre
+DEPTH = 0.01  # m, boxes with less penetration only touch: the rounding of a file
+SLIDE = 0.2  # m/s, of motion across the body: rounding of positions, and kinks of a lane's centre
 KINK = 0.05  # rad, by which a lane's centre may turn at once, as maps from surveys do
 SURGE = 0.1  # m/s, of a change of speed: rounding
-LEAP, FASTER = 0.1, 1.2  # m and ratio, by which a place may be farther than the speed allows
+LEAP, FASTER = 0.1, 1.2  # m and ratio, by which a displacement may exceed the speed
 
 
 @kernel
 def overlap_depth(box_a, box_b, dx, dy, cos_a, sin_a, cos_b, sin_b):
-    """Return by how much two boxes are in each other along the axis of least depth [m].
+    """Return the penetration of two boxes along the axis of least depth [m].
 
     Their reference points are (dx, dy) apart; ≤ 0 where they are apart or touch.
     """
@@ -64,8 +64,8 @@ def _motion(i, e, x, y, h, v, c, s, present, limits, last, window, dt, found):
     """Judge the motion of body e of row i up to an instant.
 
     x, y, h, v, c and s are that body's own, ``(T,)``. ``found`` ``(4,)`` is filled with the first
-    thing that is impossible: code (0: none), instant, value, limit. Returns whether the body ever
-    moves, and the longest of its steps [m].
+    implausible motion: code (0: none), instant, value, limit. Returns whether the body ever moves,
+    and the longest of its steps [m].
     """
     span = window * dt
     moves, longest, since = False, 0.0, 0
@@ -118,7 +118,7 @@ def _motion(i, e, x, y, h, v, c, s, present, limits, last, window, dt, found):
 
 @kernel
 def _appears(i, e, present, last):
-    """Return the first instant at which body e of row i is there, ``last + 1`` if at none."""
+    """Return the first instant at which body e of row i is present, ``last + 1`` if never."""
     if present.shape[0] == 0:
         return 0
     for k in range(last + 1):

@@ -1,4 +1,4 @@
-"""Compiled rules of responsibility; ``types.RULES`` has their words and sources.
+"""Compiled rules of responsibility; ``types.RULES`` has their descriptions and sources.
 
 One question recurs: could a careful driver, from some instant on, have avoided the other by braking
 on its own path? See ``_careful_driver_kernels``.
@@ -39,7 +39,7 @@ from bridgegen.conflict._codes import (
     LEFT_ITS_LANE,
     LEFT_TO_ACT,
     MAP_PRIORITY,
-    NOBODY,
+    NEITHER,
     OBJECT,
     OTHER,
     PREVENTABLE,
@@ -83,24 +83,24 @@ from bridgegen.ego._kind_tables import IS_ANIMAL, IS_CYCLE, IS_PEDESTRIAN, IS_VU
 
 @kernel
 def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
-    """Decide who is responsible for the conflict of the ego and body e, which meet after k.
+    """Decide responsibility for the conflict of the ego and body e, which meet after k.
 
     ``at`` is the instant of the contact, or k itself; ``own`` the ego's zone, ``own_part`` [m/s]
-    its share of the closing speed; ``appears``: one of the two is put into the other.
+    its share of the closing speed; ``appears``: one of the two appears inside the other.
     """
     on_foot = IS_VULNERABLE[scene.kinds[e]]
     entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk = visible_from(scene, e, entry, k)
     since = risk
-    if real[STOOD_OTHER] < STOOD:  # who moves is a risk only once the two are near in time
+    if real[STOOD_OTHER] < STOOD:  # a moving body is a risk only once the two are near in time
         since = max(risk, k - int(HORIZON / scene.dt))
     level = braked(scene, 0, e, since, since, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
-    if kind == HEAD_ON and not scene.near and avoidable:  # to stand when the other comes is no help
+    if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
         avoidable = scene.v[e, k] <= STANDS
     whole[DECIDED], whole[PREVENTABLE] = since, avoidable
     if appears:
-        whole[RESPONSIBLE], whole[RULE] = NOBODY, UNSAFE_START
+        whole[RESPONSIBLE], whole[RULE] = NEITHER, UNSAFE_START
     else:
         whole[RESPONSIBLE], whole[RULE] = decide(
             scene,
@@ -124,7 +124,7 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
 def decide(
     scene, e, k, kind, own, own_part, risk, since, side, late, avoidable, whole, real
 ):  # fmt: skip
-    """Return who is responsible, and by which rule."""
+    """Return the responsible party, and the rule."""
     if kind == EGO_STANDING:
         return OTHER, STRUCK_STANDING
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
@@ -166,7 +166,7 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
             since = visible_from(scene, e, since, k)
             could = braked(scene, 0, e, since, since, BRAKING) == CLEAR
             whole[DECIDED], whole[PREVENTABLE] = since, could
-            return (EGO, CROSSWALK) if could else (NOBODY, STEPPED_OUT)
+            return (EGO, CROSSWALK) if could else (NEITHER, STEPPED_OUT)
     if IS_CYCLE[what]:
         claim = scene.claims[e]
         if claim < 0:
@@ -186,10 +186,10 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
     if kind == VRU_INTO_SIDE:
         if not IS_ANIMAL[what] and ego_moved(scene, k, side_of(scene, e, k)):
             return EGO, LEFT_ITS_LANE
-        return (NOBODY if IS_ANIMAL[what] else OTHER), INTO_THE_SIDE
+        return (NEITHER if IS_ANIMAL[what] else OTHER), INTO_THE_SIDE
     if avoidable:
         return EGO, COULD_HAVE_STOPPED
-    return (NOBODY if IS_ANIMAL[what] else OTHER), STEPPED_OUT
+    return (NEITHER if IS_ANIMAL[what] else OTHER), STEPPED_OUT
 
 
 @kernel
@@ -219,7 +219,7 @@ def of_struck(scene, e, k, whole):
 def of_striking(scene, e, k, risk, side, late, avoidable, whole):
     """Decide where the ego drives into the rear of the other, or into an object."""
     if late and not avoidable:
-        return NOBODY, REVEALED_LATE
+        return NEITHER, REVEALED_LATE
     v = scene.v
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
     moved = ego_came_over(scene, e, min(risk + 1, k), 0)
@@ -230,7 +230,7 @@ def of_striking(scene, e, k, risk, side, late, avoidable, whole):
     if stands <= risk + 1 and stands <= k:  # it stood when it came into the way
         if avoidable or moved:
             return EGO, STANDING_AHEAD
-        return NOBODY, UNSAFE_START
+        return NEITHER, UNSAFE_START
     if side != 0 and not moved and not mine:
         begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
         begins = visible_from(scene, e, begins, k)
@@ -246,18 +246,18 @@ def of_striking(scene, e, k, risk, side, late, avoidable, whole):
         return EGO, REAR_DISTANCE
     if level == COMES_NEAR and scene.near and not moved:
         whole[DECIDED], whole[PREVENTABLE] = start, False
-        return NOBODY, BRAKED_HARD_AHEAD
+        return NEITHER, BRAKED_HARD_AHEAD
     # had it time to open the gap before the other braked, since that was ahead of it?
     kept = braked(scene, 0, e, risk, start, BRAKING) == CLEAR
     whole[DECIDED], whole[PREVENTABLE] = start, kept
     if kept or moved:
         return EGO, REAR_DISTANCE
-    return NOBODY, UNSAFE_START
+    return NEITHER, UNSAFE_START
 
 
 @kernel
 def of_leaving(scene, e, k, kind, own, own_part, avoidable):
-    """Decide where two meet side by side, or head on: who has left its lane?"""
+    """Decide where two meet side by side, or head on: which one has left its lane?"""
     v, c, s = scene.v, scene.c, scene.s
     if ego_came_over(scene, e, k, side_of(scene, e, k)):
         return EGO, LEFT_ITS_LANE
@@ -267,7 +267,7 @@ def of_leaving(scene, e, k, kind, own, own_part, avoidable):
     if not scene.routed:
         mine, its = steering(scene, e, k, JUST_NOW)
         if max(mine, its) < ASIDE:
-            return NOBODY, LEFT_ITS_LANE
+            return NEITHER, LEFT_ITS_LANE
         if mine > its:
             return EGO, LEFT_ITS_LANE
     along = v[e, k] * (c[e, k] * c[0, k] + s[e, k] * s[0, k])
@@ -278,7 +278,7 @@ def of_leaving(scene, e, k, kind, own, own_part, avoidable):
 
 @kernel
 def of_crossing(scene, e, k, risk, whole):
-    """Decide where two ways cross, or one turns into the other's."""
+    """Decide where two paths cross, or one turns into the other's."""
     since, _ = entered(scene, e, 0, k, 0.0)
     it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
     ego_could = braked(scene, 0, e, risk, risk, COMFORT) != COLLIDES

@@ -35,13 +35,13 @@ from bridgegen.ego._kind_tables import IS_OBSTACLE, IS_VULNERABLE
 
 @kernel
 def strikes_with_front(own, own_part):
-    """Say whether the ego moves into the other with its front edge or a front corner."""
+    """Return whether the ego moves into the other with its front edge or a front corner."""
     return own in (FRONT, FRONT_LEFT, FRONT_RIGHT) and own_part > PUSHES
 
 
 @kernel
 def turning_of(c, s, first, n, k, dt):
-    """Return by how much a body has turned up to instant k, and by how much until a while later."""
+    """Return a body's change of heading up to instant k, and until a while later."""
     steps = int(TURN_TIME / dt)
     before = turned(c, s, first, k, steps)
     later = min(k + steps // 2, n - 1)
@@ -50,17 +50,17 @@ def turning_of(c, s, first, n, k, dt):
 
 @kernel
 def is_turning(before, later, limit):
-    """Say whether a body turns off: it has turned by more than a limit [rad], or begins to."""
+    """Return whether a body turns off: it has turned by more than a limit [rad], or begins to."""
     begins = abs(before) > TURN_BEGINS and before * later > 0.0 and abs(later) > 2.0 * TURNS
     return abs(before) > limit or (begins and abs(later) > limit)
 
 
 @kernel
 def turns(c, s, e, first, n, k, dt):
-    """Say whether the ego, and whether body e, turns off; bends that both follow are none.
+    """Return whether the ego, and whether body e, turns off; following the same bend is no turn.
 
-    Of two that go the same way all the time, who changes lane does not turn off: it must leave the
-    common direction.
+    Of two bodies with the same direction throughout, one that changes lane does not turn off: it
+    would have to leave the common direction.
     """
     j = max(k - int(TURN_TIME / dt), first)
     mine, my_all = turning_of(c[0], s[0], first, n, k, dt)
@@ -83,7 +83,7 @@ def type_of(e, first, n, k, dt, kinds, c, s, own, its, own_part, stood):
     """Return the type of the conflict of the ego and body e, which meet after instant k.
 
     ``own`` and ``its`` are the zones that meet; ``own_part`` [m/s] is the ego's share of the
-    closing speed; ``stood`` [s] for how long the ego has been standing.
+    closing speed; ``stood`` [s] is how long the ego has been standing.
     """
     cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
     if stood > 0.0:

@@ -1,4 +1,4 @@
-"""The conflict analysis of rollouts: what happened between the ego and each other participant."""
+"""The conflict analysis of rollouts: conflicts of the ego with each other participant."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,7 +21,7 @@ _DIRECTION = np.array(
     [injury.SIDE, injury.FRONT, injury.FRONT, injury.SIDE, injury.REAR, injury.REAR, injury.REAR,
      injury.SIDE, injury.FRONT]
 )  # fmt: skip
-"""The direction of the force by `Zone`; a corner counts as the end that it belongs to."""
+"""The direction of the force by `Zone`; a corner counts as its end."""
 
 
 _FRONT = (Zone.FRONT, Zone.FRONT_LEFT, Zone.FRONT_RIGHT)
@@ -38,13 +38,13 @@ _BY_OTHERS = (
 class Conflicts:
     """The conflicts of N scenarios, pair by pair; the ego is entity 0, whose own column is empty.
 
-    Only what happens up to the ego's first contact counts. Two bodies are on a collision course
-    where two predictions agree that they touch within 4 s: constant velocity, and constant speed
-    along the paths that both drive in the rollout (straight on beyond their ends). Where paths do
-    not meet, passing is no conflict, however near. A near miss is a collision course with at most
-    1.5 s left and a needed deceleration of at least 3.35 m/s². Of all instants of a collision
-    course the most urgent one counts, a near miss first; see ``harm``. Types, zones,
-    responsibility and what belongs to them are found of near misses and contacts.
+    Only events up to the ego's first contact count. Two bodies are on a collision course if two
+    predictions agree that they touch within 4 s: constant velocity, and constant speed along the
+    paths that both drive in the rollout (straight on beyond their ends). Where paths do not meet,
+    passing is no conflict, however near. A near miss is a collision course with at most 1.5 s left
+    and a needed deceleration of at least 3.35 m/s². Of all instants of a collision course the most
+    urgent one counts, near misses first; see ``harm``. Types, zones and responsibility exist for
+    near misses and contacts only.
 
     Attributes:
         names: E participants.
@@ -69,11 +69,11 @@ class Conflicts:
         closing_tangential: ``(N, E)`` [m/s], along them.
         v_ego: ``(N, E)`` [m/s], speed of the ego then; just before a contact.
         v_other: ``(N, E)`` [m/s], of the other.
-        stood_ego: ``(N, E)`` [s], for how long the ego had been standing.
-        stood_other: ``(N, E)`` [s], the other.
+        stood_ego: ``(N, E)`` [s], how long the ego had been standing.
+        stood_other: ``(N, E)`` [s], likewise of the other.
         overlap: ``(N, E)``, share of the ego's extent across the contact's normal that meets.
-        left: ``(N, E)`` [s], from the instant ``decided`` to the contact, or to the one ahead.
-        nearness: ``(N, E)`` in [0, 1], how near they come at constant velocity; see
+        left: ``(N, E)`` [s], from the instant ``decided`` to the contact, or the predicted one.
+        nearness: ``(N, E)`` in [0, 1], closeness at constant velocity; see
             ``_conflict_kernels.nearness``.
         severity: ``(N, E)`` probability of MAIS3+ of the party at the higher risk; 0 unless they
             touch.
@@ -123,9 +123,9 @@ class Conflicts:
 
 
 def analyse(rollout: Rollout) -> Conflicts:
-    """Return the conflicts of a rollout, worked out once.
+    """Return the conflicts of a rollout, computed once.
 
-    Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md tells the rules.
+    Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md describes the rules.
     """
     return shared(rollout, _analyse)
 
@@ -198,12 +198,12 @@ def _analyse(rollout: Rollout) -> Conflicts:
 
 
 def _is_routed(rollout: Rollout) -> bool:
-    """Say whether offsets are known: in a rollout on a map, or where a recording has them."""
+    """Return whether offsets are known: in a rollout on a map, or if a recording has them."""
     return bool(rollout.claims.size) or bool(rollout.offset.any())
 
 
 def _never_moves(rollout: Rollout) -> Bool:
-    """``(N, E)``: which participants stand all the time, as barriers do."""
+    """``(N, E)``: which participants never move, like barriers."""
     still: npt.NDArray[np.bool_] = (rollout.v == 0.0).all(axis=2)
     return still
 

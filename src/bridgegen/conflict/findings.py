@@ -1,4 +1,4 @@
-"""What the conflict analysis says of each row, in words that a table can hold."""
+"""Findings of the conflict analysis for each row, as texts of a table."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -14,7 +14,7 @@ from bridgegen.conflict.harm import Count, decisive
 from bridgegen.conflict.types import ConflictType, Responsible, Rule
 
 KINDS = {COURSE: "collision course", NEAR_MISS: "near miss", CONTACT: "contact"}
-"""What people and files call `Conflicts.kind`."""
+"""Labels of `Conflicts.kind`."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Findings:
 
     @classmethod
     def none(cls, n: int) -> Self:
-        """Return the findings of N rows of which nothing is known."""
+        """Return empty findings of N rows."""
         return cls(*(np.full(n, "", dtype=object) for _ in fields(cls)))
 
     @classmethod
@@ -77,7 +77,7 @@ class Findings:
         return cls(*(np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(cls)))
 
     def take(self, at: Int | Bool | slice) -> Self:
-        """Return those of some rows."""
+        """Return the findings of some rows."""
         return type(self)(*(getattr(self, one.name)[at] for one in fields(self)))
 
     def columns(self) -> dict[str, npt.NDArray[np.object_]]:
@@ -85,7 +85,7 @@ class Findings:
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def row(self, i: int) -> dict[str, str | None]:
-        """Return one row's texts by name; None where there is nothing to say."""
+        """Return one row's texts by name; None instead of empty ones."""
         return {name: texts[i] or None for name, texts in self.columns().items()}
 
 
@@ -103,7 +103,7 @@ def unpacked(rows: Sequence[Sequence[Any]]) -> Findings:
     for name, column in zip(COLUMNS, columns, strict=False):
         if odd := {*map(type, column)} - {str, type(None)}:
             raise TypeError(f"{name} must be a text, got a {odd.pop().__name__}")
-    # Each text once: there are few different ones, and SQL makes a new object of each.
+    # Interns the texts: there are few different ones, and SQL creates an object for each.
     texts = [[intern(one) if one else "" for one in column] for column in columns]
     if not texts:
         return Findings.none(0)

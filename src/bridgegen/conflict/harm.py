@@ -24,10 +24,10 @@ from bridgegen.conflict._limits import HORIZON, SERIOUS_DECELERATION
 from bridgegen.conflict.analysis import Conflicts
 
 Count = Literal["ego", "any"]
-"""Whose conflicts count: those that the ego is responsible for or could prevent, or all."""
+"""Which conflicts count: those that the ego is responsible for or could prevent, or all."""
 
 COURSE, NEAR_MISS, COLLISION = 0.1, 0.3, 0.6
-"""The least harm of each; see the table above. What is critical has ``NEAR_MISS`` or more."""
+"""The least harm of each; see the table above. Critical rows have ``NEAR_MISS`` or more."""
 
 
 def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
@@ -52,10 +52,10 @@ def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
 
 
 def decisive(conflicts: Conflicts, count: Count = "ego") -> tuple[Int, Float]:
-    """Return the other whose conflict decides on each row, ``(N,)``, and the row's harm, ``(N,)``.
+    """Return the participant of each row's decisive conflict, ``(N,)``, and its harm, ``(N,)``.
 
-    The one of the largest harm; where all are below that of a collision course, a contact, then a
-    near miss goes first. The participant is 0 where there is no other.
+    The conflict of the largest harm is decisive; if all are below that of a collision course, a
+    contact takes precedence, then a near miss. The participant is 0 if there is no other.
     """
     harm = harm_of_pairs(conflicts, count)
     happened = harm >= COURSE

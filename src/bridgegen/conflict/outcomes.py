@@ -1,4 +1,4 @@
-"""What a rollout brought about, as individuals of the scenario (layer 4 brings about layer 3)."""
+"""Outcomes of a rollout, as individuals of the scenario (layer 4 causes layer 3)."""
 
 from collections.abc import Mapping
 
@@ -18,18 +18,18 @@ from bridgegen.simulation.rollout import Rollout
 def with_outcomes(
     individuals: Individuals, rollout: Rollout, model: OpenDrive, row: int = 0
 ) -> Individuals:
-    """Return a scenario's individuals with what a rollout of it brought about.
+    """Return a scenario's individuals with the outcomes of a rollout.
 
-    A collision makes a ``TrafficAccident``, a near miss of the ego a ``NearMiss``, a queue a
-    ``TrafficJam``; the scenario has them by ``has_outcome``, and the converters leave them aside.
+    A collision becomes a ``TrafficAccident``, a near miss of the ego a ``NearMiss``, a queue a
+    ``TrafficJam``; the scenario refers to them by ``has_outcome``, and the converters ignore them.
     Near misses and the ego's first collision have the type, the responsible participant and the
     rule of the conflict analysis. A queue that the scenario itself declares is no outcome, unless
-    other participants have joined it. Outcomes that the individuals have already are those of
-    another rollout, and are left out.
+    other participants have joined it. Earlier outcomes among the individuals are those of another
+    rollout, and are removed.
 
     Args:
         individuals: of the scenario.
-        rollout: N scenarios; a failed one brings about nothing.
+        rollout: N scenarios; a failed one has no outcomes.
         model: the road network.
         row: which of them is this one.
     """
@@ -98,7 +98,7 @@ def _without_outcomes(individuals: Individuals, scenario: Subject) -> Individual
 
 
 def _conflict_of(conflicts: Conflicts, row: int, accident: Accident) -> ConflictSummary | None:
-    """Return the conflict that an accident is the contact of; None if it was not analysed."""
+    """Return the conflict of an accident's contact; None if it was not analysed."""
     ego, *_ = conflicts.names
     if ego not in accident.who:
         return None
@@ -149,7 +149,7 @@ class _Writer:
         self.count: dict[str, int] = {}
 
     def node(self, name: str, cls: str) -> ox.NamedNode:
-        """Add an outcome of a class, called ``outcome_name_1`` or as is still free."""
+        """Add an outcome of a class, named ``outcome_name_1`` or with the next free number."""
         while True:
             self.count[name] = number = self.count.get(name, 0) + 1
             node = ox.NamedNode(f"{self.base}outcome_{name}_{number}")

@@ -1,4 +1,4 @@
-"""Where on the ego's route a conflict happens: before, in, between or after its junctions."""
+"""Place of a conflict on the ego's route: before, in, between or after its junctions."""
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +10,7 @@ BETWEEN, AFTER = "between junctions", "after the junction"
 
 
 def place_on_route(way: Float, step: float, junctions: Float, x: Float, y: Float) -> list[str]:
-    """Return where points are, relative to the junctions on a route.
+    """Return the places of points relative to the junctions on a route.
 
     A point counts at the sample of the route that is nearest to it.
 

@@ -1,4 +1,4 @@
-"""Could the traffic of a rollout happen? The first thing in it that bodies and people do not do."""
+"""Plausibility of a rollout's traffic: the first motion in it that bodies cannot do."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -60,7 +60,7 @@ accelerate at 8 m/s² at most over their first steps (Mero, Komi and Gregor, Spo
 
 
 class Implausible(IntEnum):
-    """Why the traffic of a row could not happen."""
+    """Reasons why the traffic of a row is implausible."""
 
     NONE = 0
     OTHERS_COLLIDE = 1
@@ -74,7 +74,7 @@ class Implausible(IntEnum):
 
     @property
     def label(self) -> str:
-        """A few words, "" for none."""
+        """The reason in a few words, "" for none."""
         return _LABELS[self]
 
 
@@ -111,15 +111,15 @@ _MOST = {
 
 @dataclass(frozen=True)
 class Plausibility:
-    """What is the first impossible thing in each of N rows.
+    """The first implausible motion in each of N rows.
 
     Attributes:
         names: of the participants.
         time_step: [s].
         code: ``(N,)`` int8, an `Implausible`; 0: the traffic could happen, or the row failed.
         instant: ``(N,)`` int64, when; -1 where the code is 0, and so are the next two.
-        entity: ``(N,)`` int64, the participant; of two the one that comes first.
-        other: ``(N,)`` int64, the second of two; -1: it is about one alone.
+        entity: ``(N,)`` int64, the participant; of two the lower number.
+        other: ``(N,)`` int64, the second of two; -1 if only one is involved.
         value: ``(N,)`` float64: depth of the overlap [m], speed across the body [m/s],
             acceleration [m/s²], curvature [1/m] (inf: on the spot), or jump [m], by the code;
             NaN where it is 0.
@@ -142,7 +142,7 @@ class Plausibility:
         return [labels[code] for code in self.code.tolist()]
 
     def reason(self, row: int) -> str:
-        """Return in one sentence why a row could not happen; "" if it could."""
+        """Return in one sentence why a row is implausible; "" if it is plausible."""
         code = Implausible(int(self.code[row]))
         if code is Implausible.NONE:
             return ""
@@ -162,13 +162,13 @@ class Plausibility:
 
 
 def plausibility(rollout: Rollout) -> Plausibility:
-    """Return the first thing in each row that bodies and people do not do.
+    """Return the first implausible motion in each row.
 
-    Participants other than the ego are judged up to the ego's first contact: what comes later does
-    not matter. They must not collide with each other, and must move as their kind can: see
-    `LIMITS`. No two bodies, the ego's included, may start or appear in each other. Of two that
-    never move only their start counts, and props (cones, barriers, signs) may stand in each other,
-    as the parts of a barrier do. A rollout without kinds is judged by overlaps and jumps alone.
+    Participants other than the ego are judged up to the ego's first contact: later events do not
+    matter. They must not collide with each other, and must move within the limits of their kind,
+    see `LIMITS`. No two bodies, the ego's included, may overlap where they start or appear. Of two
+    that never move only the start counts, and props (cones, barriers, signs) may overlap, as the
+    parts of a barrier do. A rollout without kinds is judged by overlaps and jumps alone.
 
     Args:
         rollout: N scenarios.

@@ -1,4 +1,4 @@
-"""All quantities of a scenario by name: the metrics, and what the conflict analysis measures."""
+"""All quantities of a scenario by name: metrics, and measures of the conflict analysis."""
 
 from collections import ChainMap
 from collections.abc import Collection, Mapping, Sequence
@@ -38,12 +38,12 @@ _MEASURED = (
 )  # fmt: skip
 
 MEASURED = tuple(one.name for one in _MEASURED)
-"""The names of what the conflict analysis measures; a search records them all."""
+"""The names of the conflict analysis's measures; a search records them all."""
 
 _BY_NAME: dict[str, Quantity] = {one.name: one for one in _MEASURED}
 
 QUANTITIES: Mapping[str, Quantity] = ChainMap(_BY_NAME, cast(dict[str, Quantity], METRICS))
-"""The metrics, then what the conflict analysis measures."""
+"""The metrics, then the measures of the conflict analysis."""
 
 
 def get(name: str) -> Quantity:
@@ -57,14 +57,14 @@ def get(name: str) -> Quantity:
     return QUANTITIES[name]
 
 
-def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str, ...]:
+def require(names: Sequence[str], held: Collection[Need], source: str) -> tuple[str, ...]:
     """Return the names, all of which must exist where rollouts hold ``held``.
 
     See `bridgegen.metrics.require`.
     """
     for name in names:
         get(name)
-    measures.require([name for name in names if name not in _BY_NAME], held, who)
+    measures.require([name for name in names if name not in _BY_NAME], held, source)
     return tuple(names)
 
 

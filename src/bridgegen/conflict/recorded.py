@@ -1,4 +1,4 @@
-"""A recording that somebody else made: its metrics and its conflicts."""
+"""A recording from elsewhere: its metrics and its conflicts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ NO_MAP = (
     "the recording has no map: traffic lights, signs, priorities and crosswalks are not known, "
     "so right before left is assumed where paths cross"
 )
-"""What responsibility rests on without a map."""
+"""The basis of responsibility without a map."""
 NO_KINDS = "the recording does not say what the participants are: all are taken as cars"
 NO_OFFSET = (
     "the recording does not tell the offset from the lane: a change of course is judged by the "
@@ -32,9 +32,9 @@ class Measured:
     Attributes:
         rollout: the motion, N = 1, the ego first.
         metrics: by name, in the metric's unit; the quantities of the conflict analysis too.
-        notes: what the recording does not say, and what was taken instead.
+        notes: what the recording lacks, and what was assumed instead.
         conflicts: the conflict analysis, N = 1.
-        assumptions: what the analysis assumes because the recording does not say it.
+        assumptions: of the analysis, for what the recording lacks.
     """
 
     rollout: Rollout
@@ -45,7 +45,7 @@ class Measured:
 
     @property
     def seconds(self) -> float:
-        """From the first to the last instant [s]."""
+        """Time from the first to the last instant [s]."""
         return (self.rollout.shape[2] - 1) * self.rollout.time_step
 
 
@@ -62,15 +62,15 @@ def measure_recording(
     Args:
         path: the file; see `bridgegen.simulation.recording`.
         ego: its entity under test; the one of the first line by default.
-        boxes: an OpenSCENARIO file whose entities' boxes are taken, instead of the recording's;
-            it also says what the entities are.
-        metrics: names; all that a recording gives rise to by default.
+        boxes: an OpenSCENARIO file whose entities' boxes replace the recording's; it also defines
+            the entities' kinds.
+        metrics: names; by default all that a recording allows.
         time_step: [s] to resample at; the recording's own steps by default.
 
     Raises:
-        FileFormatError: a file that is not as it must be, with the lines.
+        FileFormatError: an invalid file, with the lines.
         UnknownNameError: no such entity or metric.
-        InputError: a metric that a recording gives no rise to, or steps that are not equal.
+        InputError: a metric that a recording does not allow, or unequal time steps.
     """
     sizes = boxes_of(boxes) if boxes is not None else None
     recording = read_recording(path, ego=ego, boxes=sizes, time_step=time_step)

@@ -1,6 +1,6 @@
-"""A conflict in one sentence: what met what, who is responsible and by which rule, what was left.
+"""A conflict in one sentence: the parties, responsibility, its rule, and the time left.
 
-The sentence is built from the numbers of `Conflicts` alone.
+The sentence depends on the numbers of `Conflicts` alone.
 """
 
 from bridgegen.conflict._limits import HORIZON
@@ -11,15 +11,15 @@ _BEARS = {
     Responsible.EGO: "the ego is responsible: it {rule}",
     Responsible.OTHER: "{other} is responsible: it {rule}",
     Responsible.SHARED: "both are responsible: the ego {rule}",
-    Responsible.NONE: "nobody is responsible: {rule}",
+    Responsible.NONE: "neither is responsible: {rule}",
 }
 
-_BY_NOBODY = {
+_BY_NEITHER = {
     Rule.STEPPED_OUT: "{other} came into the path when stopping was no longer possible",
     Rule.LEFT_ITS_LANE: "neither has changed its course",
     Rule.INTO_THE_SIDE: "{other} moved into the side of the ego",
 }
-"""The rule where nobody is responsible, if its words are those of somebody's fault."""
+"""The rule where neither is responsible, if its own description is of a fault."""
 
 _BY_BOTH = {
     Rule.RED_LIGHT: "they crossed their stop lines at red",
@@ -61,7 +61,7 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
 
 
 def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
-    """Return what happened, with which edges and at what speed."""
+    """Return the event, with the edges that meet and the speed."""
     closing = conflicts.closing_normal[row, other]
     own = Zone(int(conflicts.zone_ego[row, other])).label
     its = Zone(int(conflicts.zone_other[row, other])).label
@@ -86,12 +86,12 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
 
 
 def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> str:
-    """Return who is responsible, why, and by which source."""
+    """Return the responsible party, the rule, and its source."""
     who = Responsible(int(conflicts.responsible[row, other]))
     rule = Rule(int(conflicts.rule[row, other]))
     words, source = RULES[rule]
     if who == Responsible.NONE:
-        words = _BY_NOBODY.get(rule, words).format(other=name)
+        words = _BY_NEITHER.get(rule, words).format(other=name)
     elif who == Responsible.SHARED and rule in _BY_BOTH:
         return f"both are responsible: {_BY_BOTH[rule]} ({source})"
     words = words.replace("the other", "the ego" if who == Responsible.OTHER else name)
@@ -99,7 +99,7 @@ def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> st
 
 
 def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
-    """Return how long before the risk arose, and what the careful driver would have achieved."""
+    """Return when the risk arose, and whether a careful driver would have avoided the event."""
     kind = ConflictType(int(conflicts.type[row, other]))
     rule = Rule(int(conflicts.rule[row, other]))
     by_others = (
@@ -109,7 +109,7 @@ def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
     left = conflicts.left[row, other]
     arose = f"the risk arose {left:.1f} s before"
     if rule == Rule.STANDING_AHEAD and left > HORIZON:
-        arose = f"it stood there, hidden by nobody, for {left:.1f} s before"
+        arose = f"it stood there in plain sight for {left:.1f} s before"
     if rule == Rule.UNSAFE_START or kind == ConflictType.EGO_STANDING:
         return ""
     blamed = conflicts.responsible[row, other] == Responsible.EGO

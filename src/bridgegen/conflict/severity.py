@@ -1,4 +1,4 @@
-"""How severe a collision is: the probability of a serious injury, from published curves.
+"""Severity of a collision: the probability of a serious injury, from published curves.
 
 Severity is the probability that the person at the highest risk in either party is injured at
 MAIS 3 or more: the maximum abbreviated injury scale "serious", fatal injuries included. Three steps
@@ -11,9 +11,9 @@ lead to it:
    motorcyclists by the closing speed against a car's front.
 3. The party at the higher risk counts (`severity`).
 
-Only relative velocities count, not which party moves. Trucks and buses have no curve
-of their own: those of car occupants stand in for them. ``docs/severity.md`` has the table of
-constants, what each curve was checked against, and the limits.
+Only relative velocities count, not which party moves. Trucks and buses have no curve of their own:
+those of car occupants are used. ``docs/severity.md`` has the table of constants, the check of each
+curve, and the limits.
 """
 
 import math
@@ -28,13 +28,13 @@ from bridgegen.ego.kinds import CAR, NAMES
 from bridgegen.participants import OBJECT_CLASSES
 
 FRONT, REAR, SIDE = range(3)
-"""Direction of the force on a vehicle: which end or side of it is struck."""
+"""Direction of the force on a vehicle: the end or side that is struck."""
 
 DIRECTIONS = ("front", "rear", "side")
 """In words, by number."""
 
 MASS: Float = np.array([one.mass for one in OBJECT_CLASSES])
-"""Mass [kg] by `bridgegen.ego.kinds`, as the storyboards that we export give them.
+"""Mass [kg] by `bridgegen.ego.kinds`, as in exported storyboards.
 
 Source: car 1,500 (a van is a ``CAR`` too): default of SUMO; mean of new cars in the EU 1,392 (ICCT,
 European Vehicle Market Statistics 2017/18, section 5), plus a passenger. Truck 16,000 and bus
@@ -70,8 +70,8 @@ class Curve:
     Attributes:
         intercept: [1].
         slope: per m/s.
-        variable: what v is: "delta-v" or "closing speed".
-        source: where intercept and slope are from.
+        variable: the quantity v: "delta-v" or "closing speed".
+        source: of intercept and slope.
     """
 
     intercept: float
@@ -80,9 +80,9 @@ class Curve:
     source: str
 
 
-def _lubbe(who: str, table: int, intercept: float, per_kmh: float, per_year: float) -> Curve:
+def _lubbe(injured: str, table: int, intercept: float, per_kmh: float, per_year: float) -> Curve:
     return Curve(
-        intercept + per_year * AGE[who],
+        intercept + per_year * AGE[injured],
         per_kmh * _KMH,
         "closing speed",
         "Lubbe, Wu and Jeppsson (2022), Safe speeds: fatality and injury risks of pedestrians, "
@@ -121,7 +121,7 @@ CURVES = {
         "Wang's frontal curve",
     ),
 }
-"""Curves by who is injured, or by the direction of the force on an occupied vehicle."""
+"""Curves by the injured person, or by the direction of the force on an occupied vehicle."""
 
 FADE = 2.0
 """Speed [m/s] below which a curve fades out, see `p_mais3`. Ours, about a fast walk."""
@@ -174,7 +174,7 @@ def delta_v(
     movable_a: npt.ArrayLike = True,
     movable_b: npt.ArrayLike = True,
 ) -> tuple[Float, Float]:
-    """Return by how much a plastic collision changes the velocity of either party.
+    """Return the change of either party's velocity in a plastic collision.
 
     The impulse is the reduced mass times `effective_speed`; each velocity changes by it over the
     own mass (`MASS`), so that momentum is conserved.
@@ -209,8 +209,8 @@ def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike)
     5.3 m/s (19 km/h) on: published values are kept where the data are.
 
     Args:
-        kind: ``(N,)`` of `bridgegen.ego.kinds`; nobody is injured where
-            `ObjectClass.injury` is None.
+        kind: ``(N,)`` of `bridgegen.ego.kinds`; the probability is 0 where `ObjectClass.injury`
+            is None.
         speed: ``(N,)`` [m/s], ≥ 0: of a car, truck or bus its delta-v; of a pedestrian, bicycle or
             motorcycle the closing speed against a car's front. NaN stays NaN.
         direction: ``(N,)`` of `FRONT`, `REAR`, `SIDE`: of the force on a car, truck or bus; without
@@ -289,7 +289,7 @@ def severity(
     movable_a: npt.ArrayLike = True,
     movable_b: npt.ArrayLike = True,
 ) -> Float:
-    """Return how severe a collision is: the higher of both parties' `injuries`.
+    """Return the severity of a collision: the higher of both parties' `injuries`.
 
     It is 0 at closing speed 0, strictly increasing in the normal closing speed (as far as a float64
     can be: below 1 and above 1e-150 m/s) where a person is involved, increasing in the tangential
@@ -322,7 +322,7 @@ def severity(
 
 
 def _on_curve(kind: Int, share: Float) -> Float:
-    """Return what to multiply `effective_speed` by for the variable of a party's curve."""
+    """Return the factor from `effective_speed` to the variable of a party's curve."""
     against_a_car = MASS[CAR] / (MASS[CAR] + MASS[kind])
     return np.where(_UNPROTECTED[kind], share / against_a_car, share)
 

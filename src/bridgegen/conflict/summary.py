@@ -1,4 +1,4 @@
-"""The decisive conflict of one scenario, with all its figures, for people and files."""
+"""The decisive conflict of one scenario, with all its figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zon
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
 CAREFUL_DRIVER = f"the careful driver of UN R157 ({CAREFUL_REACTION:g} s, {CAREFUL_BRAKING_G:g} g)"
-"""Whose braking says whether a contact was preventable."""
+"""The driver whose braking decides whether a contact was preventable."""
 
 UNITS: Mapping[str, str] = {
     "time": "s", "decided": "s", "ttc": "s", "needed_deceleration": "m/s²", "left": "s",
@@ -32,28 +32,28 @@ class ConflictSummary:
 
     Attributes:
         conflict: "contact", "near miss" or "collision course".
-        sentence: what happened, in one sentence.
+        sentence: the event, in one sentence.
         partner: name of the other participant.
         type: label of its `ConflictType`; empty of a collision course, as are all texts below.
         type_source: the typology's name for the type.
         responsible: label of `Responsible`.
         rule: label of the `Rule` that decides.
-        rule_says: what the rule says of the responsible one.
-        rule_source: where the rule comes from.
+        rule_says: the rule's statement on the responsible party.
+        rule_source: source of the rule.
         zone_ego: edge or corner of the ego that meets the other.
         zone_other: of the other.
         preventable: whether the careful driver of UN R157 would have avoided it.
         time: of contact, or of the least time to collision [s].
         decided: when the risk arose that decides on responsibility [s].
-        left: from then to the contact, or to the one ahead [s].
+        left: from then to the contact, or the predicted one [s].
         ttc: least time to collision [s]; 0 of a contact.
         needed_deceleration: that the ego needed then [m/s²].
         closing_normal: closing speed across the surfaces that meet [m/s].
         closing_tangential: along them [m/s].
         v_ego: speed of the ego then [m/s].
         v_other: speed of the other then [m/s].
-        stood_ego: for how long the ego had been standing [s].
-        stood_other: for how long the other had been standing [s].
+        stood_ego: how long the ego had been standing [s].
+        stood_other: how long the other had been standing [s].
         overlap: share of the ego's extent that meets the other.
         delta_v_ego: change of the ego's velocity in the collision [m/s].
         delta_v_other: change of the other's velocity [m/s].
@@ -98,7 +98,7 @@ class ConflictSummary:
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types: texts, None where there is none; numbers with units.
 
-        What does not exist of a conflict is None.
+        Values that a conflict does not have are None.
         """
         texts: dict[str, Any] = {}
         for name in (

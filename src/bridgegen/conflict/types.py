@@ -1,4 +1,4 @@
-"""The words of a conflict: its type, where bodies touch, who is responsible, and by which rule.
+"""Labels of a conflict: its type, the zones that touch, the responsible party, and the rule.
 
 Sources of the types: Najm, Smith, Yanagisawa, Pre-Crash Scenario Typology for Crash Avoidance
 Research, DOT HS 810 767 (NHTSA, 2007); GIDAS, type of accident (GDV, 2016). docs/conflicts.md
@@ -12,7 +12,7 @@ from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
 
 class ConflictType(IntEnum):
-    """What kind of conflict two participants have; the ego is the first of them."""
+    """The type of conflict of two participants; the ego is the first of them."""
 
     NONE = _codes.NONE
     REAR_END_STRIKING = _codes.REAR_END_STRIKING
@@ -28,7 +28,7 @@ class ConflictType(IntEnum):
 
     @property
     def label(self) -> str:
-        """What people and files call it; empty for NONE."""
+        """Its label in texts and files; empty for NONE."""
         return _TYPE_LABELS[self]
 
     @property
@@ -67,7 +67,7 @@ _TYPE_SOURCES = {
 
 
 class Zone(IntEnum):
-    """Which edge or corner of a body takes part in a contact."""
+    """The edge or corner of a body in a contact."""
 
     NONE = _codes.NO_ZONE
     FRONT = _codes.FRONT
@@ -89,21 +89,21 @@ class Zone(IntEnum):
 
 
 class Responsible(IntEnum):
-    """Who is responsible for a conflict."""
+    """The party responsible for a conflict."""
 
-    NONE = _codes.NOBODY
+    NONE = _codes.NEITHER
     EGO = _codes.EGO
     OTHER = _codes.OTHER
     SHARED = _codes.SHARED
 
     @property
     def label(self) -> str:
-        """What people and files call it."""
+        """Its label in texts and files."""
         return self.name.lower()
 
 
 class Rule(IntEnum):
-    """The rule that decides who is responsible; ``RULES`` has words and sources."""
+    """The rule that decides on responsibility; ``RULES`` has descriptions and sources."""
 
     NONE = _codes.NO_RULE
     STRUCK_STANDING = _codes.STRUCK_STANDING
@@ -131,12 +131,12 @@ class Rule(IntEnum):
 
     @property
     def label(self) -> str:
-        """What people and files call it; empty for NONE."""
+        """Its label in texts and files; empty for NONE."""
         return self.name.lower().replace("_", " ") if self else ""
 
     @property
     def source(self) -> str:
-        """Where the rule comes from."""
+        """The source of the rule."""
         return RULES[self][1]
 
 
@@ -222,4 +222,4 @@ RULES = {
         "UN R157, Annex 3, deceleration; RSS (2017), definition 1",
     ),
 }
-"""What each rule says of the responsible one, or of the event if nobody is, and its source."""
+"""Each rule's statement on the responsible party, or on the event if there is none; its source."""

@@ -1,23 +1,23 @@
-"""The attentive driver of other participants: it goes as its script says, unless somebody is there.
+"""The attentive driver of other participants: it follows its script unless traffic is in its way.
 
 The storyboard gives the path and the speed that the participant is to have. This driver never
 exceeds that speed. It goes slower
 
 - to keep its distance from those ahead of it (`_following_kernels`: the intelligent driver model);
 - to give way where its path meets another one (`_yielding_kernels`), by the map's rules where these
-  decide, else by who comes first; to anybody on foot always;
+  decide, else in order of arrival; always to pedestrians;
 - to stop at a red light and at a stop sign (`_lights_kernels`).
 
-Whatever takes no more than `EMERGENCY_FROM` is anticipated, as drivers do, and done at once. What
-takes more is an emergency: the driver reacts `CAREFUL_REACTION` after it begins, and then brakes as
-hard as the careful driver of UN Regulation 157 until the danger is over.
+A deceleration up to `EMERGENCY_FROM` is anticipated, and applied at once. A stronger one is an
+emergency: the driver reacts `CAREFUL_REACTION` after it begins, and then brakes as hard as the
+careful driver of UN Regulation 157 until the danger is over.
 
-Participants on foot, animals and bicycles heed only what is ahead of them.
+Participants on foot, animals and bicycles react only to what is ahead of them.
 
 A lane change is not begun into an occupied gap, see `gap_is_free`.
 
-The driver sees everybody, and decides by the states at one instant. ``mind`` is a row of `MIND`
-numbers per participant, zeros before the first instant, changed in place.
+The driver sees all participants, and decides by the states at one instant. ``mind`` is a row of
+`MIND` numbers per participant, zeros before the first instant, changed in place.
 
 Sources: UN Regulation 157, 01 series of amendments, annex 3 (reaction, braking, jerk) and 5.2.5.2
 (cut-in); those of the kernels named above.
@@ -62,23 +62,24 @@ up to which station its path is straight [m], and which path that is, counted fr
 
 SEEN = 8
 CX, CY, C, S, W, GAIN, LENGTH, WIDTH = range(SEEN)
-"""Rows of what all see of the bodies: the centre [m], cosine and sine of the heading, the speed
-[m/s], how that changes [m/s²], length and width [m]."""
+"""Rows of ``seen``, the bodies as all drivers see them: the centre [m], cosine and sine of the
+heading, the speed [m/s], its rate of change [m/s²], length and width [m]."""
 
-LOOK = 0.2  # s, between two looks around; what one asked for holds until the next
+LOOK = 0.2  # s, between two looks around; the acceleration of one holds until the next
 CONCERNS = 0.75 * COMFORT_ACCELERATION  # m/s²; a leader that allows more (its gap is twice the
 # desired one) is no concern
 STRAIGHT = 0.002  # rad; a path that turns by less is as good as straight: 0.1 m in 50 m
-STRAIGHT_STEP, STRAIGHT_REACH = 5.0, 400.0  # m, how it is found out
-ON_FOOT_GAP = 0.5  # m, that somebody on foot keeps to what stands before them
+STRAIGHT_STEP, STRAIGHT_REACH = 5.0, 400.0  # m, step and length of that test
+ON_FOOT_GAP = 0.5  # m, that a pedestrian keeps to what stands ahead
 LEAST_REACH = 3.0  # m besides bodies and gaps, for what comes in from the side
 CALM = 2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)  # m/s²
 
-# What the one behind may need at most not to hit who changes lane; UN R157, 5.2.5.2. The German
-# AFGBV, annex 1, has the same form, and scales it where the road allows less deceleration.
+# The most that the vehicle behind may need to avoid the one that changes lane; UN R157, 5.2.5.2.
+# The German AFGBV, annex 1, has the same form, and scales it where the road allows less
+# deceleration.
 CUT_IN_DECELERATION = 6.0  # m/s²
 CUT_IN_DELAY = 0.35  # s
-FARTHEST = 300.0  # m; who is farther along the other lane is no concern: at a closing speed of
+FARTHEST = 300.0  # m; vehicles farther along the other lane are ignored: at a closing speed of
 # 40 m/s over a change of 4 s, 226 m suffice
 LEAST_LANE_GAP = STANDSTILL_GAP  # m, to those ahead and behind on the other lane
 
@@ -111,7 +112,7 @@ def straight_to(path, n, ds, s):
 def keep_to_leaders(
     e, path, n, ds, p, s, v, right, left, present, seen, far, bodies, kinds, mind
 ):  # fmt: skip
-    """Return the acceleration [m/s²] that those ask for who are on its strip ahead; +inf: nobody.
+    """Return the acceleration [m/s²] that traffic ahead on its strip requires; +inf if none does.
 
     The strip is from ``right`` to ``left`` of the path [m], widened by half of its body.
     """
@@ -127,8 +128,8 @@ def keep_to_leaders(
     speeds, lengths, widths = seen[W], seen[LENGTH], seen[WIDTH]
     straight = mind[STRAIGHT_TO] - s
     for o in range(len(far)):  # without a branch, so that it is done for several at a time
-        # Nobody farther away, as the crow flies, is a concern (`CONCERNS`); nor who is behind; nor,
-        # where the path is straight, who is beside the strip and stays there.
+        # Ignored are participants farther away than `CONCERNS` allows, those behind, and, where the
+        # path is straight, those that stay beside the strip.
         dx, dy = cx[o] - px, cy[o] - py
         along, aside = dx * c + dy * t, dy * c - dx * t
         turned = abs(sines[o] * c - cosines[o] * t)
@@ -166,7 +167,7 @@ def keep_to_leaders(
         half_length = 0.5 * (bodies[o, 0] * abs(parallel) + bodies[o, 1] * abs(across))
         gap = q - half_length - s - front
         if gap < -half_length:
-            continue  # beside: braking would not part them
+            continue  # beside: braking would not separate them
         if not walks:
             gain = seen[GAIN, o] if moves and parallel > 0.0 else 0.0
             one = follow(gap, v, w * parallel if moves else 0.0, gain)
@@ -182,13 +183,13 @@ def look(
     e, pace, stop, grip, paths, path_n, path_ds, station, on, aside, target, present, seen, far,
     bodies, kinds, meets, zones, claims, stops, halts, lights, mind,
 ):  # fmt: skip
-    """Return the acceleration [m/s²] that participant e's surroundings ask for; +inf: none.
+    """Return the acceleration [m/s²] that participant e's surroundings require; +inf: none.
 
     It would go at ``pace`` [m/s] and must stop before station ``stop`` of its path anyway (+inf:
     nowhere). Of all participants: the path that each is ``on`` (a row of ``paths``, ``path_n`` and
     ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will be (``target``)
-    [m]; who is ``present``; what is ``seen`` of them; their ``bodies`` ``(E, ·)`` and ``kinds``.
-    ``far`` ``(E,)`` is room to work in. ``zones`` ``(E, ZONE)`` is where its first path meets the
+    [m]; whether it is ``present``; what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
+    ``far`` ``(E,)`` is scratch space. ``zones`` ``(E, ZONE)`` is where its first path meets the
     others' first ones, if it ``meets`` any, ``claims`` ``(E,)`` > 0 where the other waits, < 0
     where it does (``right_of_way.claim``); ``stops`` and ``halts`` are the stations of lights and
     of stop signs on its first path.
@@ -234,9 +235,9 @@ def look(
 
 @kernel
 def react(k, dt, asked, mind):
-    """Return the acceleration [m/s²] that the driver gives at instant k; +inf: as its script says.
+    """Return the driver's acceleration [m/s²] at instant k; +inf: the script's.
 
-    ``asked`` is what its surroundings ask for. See the module for when it reacts.
+    ``asked`` is what its surroundings require. See the module for when it reacts.
     """
     if mind[BRAKES] > 0.0 and asked > -EASY_TO_STOP:
         mind[BRAKES] = mind[RISK] = 0.0
@@ -256,9 +257,9 @@ def react(k, dt, asked, mind):
 
 @kernel
 def is_safe(gap, closing, lasts, grip):
-    """Say whether a gap [m] on the other lane suffices when a change of lane begins.
+    """Return whether a gap [m] on the other lane suffices when a change of lane begins.
 
-    At the end of half of the time that the change ``lasts`` [s], when the line is crossed, who
+    When the line is crossed, after half of the time that the change ``lasts`` [s], the vehicle that
     closes in at ``closing`` [m/s] must still be able to brake (see `CUT_IN_DECELERATION`), on a
     road that allows ``grip`` [m/s²].
     """
@@ -277,11 +278,11 @@ def gap_is_free(
     """Return whether participant e may begin to change lane at instant k.
 
     It is abreast of station ``s`` of the other lane's path and will be ``target`` [m] left of that
-    after ``lasts`` [s]. Whoever is on that lane, in its way lengthwise, must be far enough ahead or
-    behind, see `is_safe`. The tyres give ``grip`` [m/s²].
+    after ``lasts`` [s]. Participants on that lane must be far enough ahead or behind, see
+    `is_safe`. The tyres give ``grip`` [m/s²].
 
     Source: UN Regulation 157, 01 series, 5.2.5.2: the cut-in that an automated vehicle must not
-    collide with; a driver who leaves that much forces nobody to brake harder.
+    collide with; a driver who leaves that much forces no other to brake harder.
     """
     v = speed[e, k]
     front = bodies[e, 2] + 0.5 * bodies[e, 0]

@@ -1,15 +1,15 @@
-"""The fuzzy safety model (FSM) extended to any road: a careful driver that sees everybody.
+"""The fuzzy safety model (FSM) extended to any road: a careful driver that sees all bodies.
 
 It brakes by the model's two measures (``_fsm_kernels``), as that driver does, but it looks through
-the vehicles ahead, keeps more room, and knows who crosses. What holds here:
+the vehicles ahead, keeps more room, and reacts to crossing bodies. What holds here:
 
-- who comes onto the ego's way counts if it will be there before the ego is past it (their lateral
-  check), of who crosses, if the two bodies meet (``_conflict_kernels``): a leader that stands where
-  they do;
-- the critical measure would have it stop when it touches: it counts from 1 m before that;
+- a body that comes onto the ego's way counts if it will be there before the ego is past it (their
+  lateral check), a crossing one if the two bodies meet (``_conflict_kernels``): as a leader that
+  stands where they do;
+- the critical measure would stop the ego at contact: it counts from 1 m before that;
 - without any risk the driver keeps the speed that its path allows.
 
-The driver sees everybody. ``attention`` has a row per body: where it is beside the ego's way
+The driver sees all bodies. ``attention`` has a row per body: where it is beside the ego's way
 (``_conflict_kernels``); row 0 is the ego's: the instant since when there is a risk, counted from 1,
 0 if there is none, and the acceleration asked for [m/s²].
 
@@ -23,7 +23,7 @@ Source: Mattas et al., Accident Analysis & Prevention 148 (2020) 105794 (PFS, CF
 import math
 
 from bridgegen.compiled import kernel
-from bridgegen.ego._conflict_kernels import LEADER, NOBODY, foresee
+from bridgegen.ego._conflict_kernels import LEADER, NO_CONFLICT, foresee
 from bridgegen.ego._cruise_kernels import cruise
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
 from bridgegen.ego._fsm_kernels import (
@@ -47,11 +47,11 @@ def drive_careful_fsm(
     k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
     attention,
 ):  # fmt: skip
-    """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
+    """Return the acceleration [m/s²] that the driver demands at instant k, ``dt`` [s] apart.
 
     The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
     ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
-    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
+    that it changes ``to``, -1 if none; whether it is ``present``; ``x``, ``y``, ``h``, ``speed``
     ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; and ``attention``
     ``(E, 3)``, zeros before the first instant, changed in place.
     """
@@ -71,7 +71,7 @@ def drive_careful_fsm(
             paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
             bodies[e], horizon, reach + 15.0, attention[e],
         )  # fmt: skip
-        if what == NOBODY:
+        if what == NO_CONFLICT:
             continue
         if what == LEADER and lateral > 0.0:
             past = math.inf
@@ -87,7 +87,7 @@ def drive_careful_fsm(
     else:
         if attention[0, RISK] == 0.0:
             attention[0, RISK] = k + 1.0
-        asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
+        asked = min(attention[0, ASKED], 0.0)  # until it reacts, it holds its demand, without gas
         if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
             asked = min(wanted, max(asked - JERK * dt, -needed))
     attention[0, ASKED] = asked

@@ -1,29 +1,29 @@
 """A careful driver: the human driver of UN Regulation 157 (ALKS), annex 3, extended to any road.
 
-The regulation says how a competent and careful human driver reacts to three disturbances on a
-motorway: somebody cuts in, cuts out, or brakes (`_un_r157_kernels` is that driver). This one also
-brakes for who crosses its way, on wheels or on foot, and for who stands on it. The risk is
-perceived 0.4 s after the other has come 0.375 m nearer to the ego's lane, or when it brakes by more
-than 5 m/s² (0.4 s as well); it is reacted to if the time to collision is below 2 s; braking begins
-0.75 s later, and grows by 12.65 m/s³ up to 0.774 g. Who reappears before somebody that cuts out is
-a body like any other here.
+The regulation defines how a competent and careful human driver reacts to three disturbances on a
+motorway: a vehicle cuts in, cuts out, or brakes (`_un_r157_kernels` is that driver). This one also
+brakes for vehicles and pedestrians that cross its way or stand on it. The risk is perceived 0.4 s
+after the other has come 0.375 m nearer to the ego's lane, or when it brakes by more than 5 m/s²
+(0.4 s as well); the driver reacts if the time to collision is below 2 s; braking begins 0.75 s
+later, and grows by 12.65 m/s³ up to 0.774 g. A body that a cut-out reveals is treated as any other.
 
 Its extensions:
 
-- of who crosses, the time to collision is that until the two bodies meet (``_conflict_kernels``);
-- who has been known to lead, or crosses, is a risk, too, once it takes more than comfortable
-  braking not to meet there;
-- the driver brakes until nobody will be met within 4 s;
-- without a risk, it keeps the speed that its path allows, and follows whom it knows of by the
-  intelligent driver model, braking no harder than comfortably.
+- for a crossing body, the time to collision is that until the two bodies meet
+  (``_conflict_kernels``);
+- a known leader, or a crossing body, is a risk, too, once avoiding it takes more than comfortable
+  braking;
+- the driver brakes until no meeting is predicted within 4 s;
+- without a risk, it keeps the speed that its path allows, and follows known leaders by the
+  intelligent driver model, with at most comfortable braking.
 
-The driver sees everybody. ``attention`` has a row of three per body: where it is beside the ego's
+The driver sees all bodies. ``attention`` has a row of three per body: where it is beside the ego's
 way (``_conflict_kernels``), and the instant since when it is known, counted from 1, 0 if it is not;
 row 0 is the ego's: the instant since when there is a risk, likewise, the acceleration asked for
 [m/s²], and 1 while it brakes for the risk.
 
 Source: UN Regulation 157, 01 series of amendments, annex 3; Mattas et al., Accident Analysis &
-Prevention 174 (2022) 106743, who call it the CC human driver.
+Prevention 174 (2022) 106743, where it is called the CC human driver.
 """
 
 # mypy: allow-untyped-defs
@@ -35,7 +35,7 @@ from bridgegen.ego._conflict_kernels import (
     CROSSING,
     FARTHEST,
     LEADER,
-    NOBODY,
+    NO_CONFLICT,
     WANDERING,
     foresee,
 )
@@ -45,13 +45,13 @@ from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
 from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 EVALUATION = 0.4  # s, until the risk is perceived
-BRAKES_HARD = 5.0  # m/s², of who drives ahead
+BRAKES_HARD = 5.0  # m/s², of the vehicle ahead
 CRITICAL_TTC = 2.0  # s
 
-HARD_TO_STOP = 3.0  # m/s² that it takes, after the reaction, not to meet somebody: a risk …
-EASY_TO_STOP = 1.0  # … and up to which it has ceased to be one
-CLEAR = 4.0  # s, within which nobody may be met when the brake is let go
-ALWAYS = -1e9  # the instant since when those are known who were there from the start
+HARD_TO_STOP = 3.0  # m/s² that avoiding a body takes, after the reaction: a risk from here …
+EASY_TO_STOP = 1.0  # … until down to here
+CLEAR = 4.0  # s, within which no meeting may be predicted when the brake is released
+ALWAYS = -1e9  # the instant since when bodies are known that are present from the start
 KNOWN = 2
 RISK, ASKED, BRAKES = 0, 1, 2
 
@@ -61,11 +61,11 @@ def drive_careful(
     k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
     attention,
 ):  # fmt: skip
-    """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
+    """Return the acceleration [m/s²] that the driver demands at instant k, ``dt`` [s] apart.
 
     The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
     ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
-    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
+    that it changes ``to``, -1 if none; whether it is ``present``; ``x``, ``y``, ``h``, ``speed``
     ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; and ``attention``
     ``(E, 3)``, zeros before the first instant, changed in place.
     """
@@ -86,7 +86,7 @@ def drive_careful(
             bodies[e], CLEAR, reach, attention[e],
         )  # fmt: skip
         wanders = lateral > 0.0 and attention[e, FARTHEST] - attention[e, ASIDE] <= WANDERING
-        if what == NOBODY or (what == LEADER and wanders):
+        if what == NO_CONFLICT or (what == LEADER and wanders):
             attention[e, KNOWN] = 0.0
             continue
         if attention[e, KNOWN] == 0.0:
@@ -106,7 +106,7 @@ def drive_careful(
         return wanted
     if attention[0, RISK] == 0.0:
         attention[0, RISK] = k + 1.0
-    asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
+    asked = min(attention[0, ASKED], 0.0)  # until it reacts, it holds its demand, without gas
     if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= CAREFUL_REACTION:
         attention[0, BRAKES] = 1.0
         asked = max(asked - CAREFUL_JERK * dt, -CAREFUL_BRAKING)

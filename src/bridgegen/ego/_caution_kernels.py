@@ -1,8 +1,8 @@
-"""Slowing for those who might step out, and for places where somebody may be hidden.
+"""Slowing for pedestrians who might step out, and for places that may hide one.
 
-Somebody at the side, ``room`` [m] from the strip that the ego sweeps, is there after room/`WALK`
-seconds. Up to the speed from which the ego stops in that time nothing can happen: who steps out
-late finds it past, who steps out early finds it standing.
+A pedestrian at the side, ``room`` [m] from the strip that the ego sweeps, reaches it after
+room/`WALK` seconds. Up to the speed from which the ego stops in that time a collision is
+impossible: if they step out late, it is past; if early, it stands.
 """
 
 # mypy: allow-untyped-defs
@@ -30,20 +30,20 @@ ENTER, LEAVE, RIGHT_END, LEFT_END = 0, 1, 2, 3
 the right (negative) and to the left of the route [m]."""
 
 WALK = 1.5  # m/s; source: Euro NCAP AEB VRU, adult walking 5 km/h, rounded up
-REACTION = 0.4  # s, from seeing somebody move to full braking
-BRAKING_SHARE = 0.7  # of the friction limit that it counts on
+REACTION = 0.4  # s, from seeing a pedestrian move to full braking
+BRAKING_SHARE = 0.7  # of the friction limit that it relies on
 CREEP = 2.0  # m/s, always allowed
-AT_SIDE = 3.5  # m from the ego's strip within which somebody standing may step out
+AT_SIDE = 3.5  # m from the ego's strip within which a standing pedestrian may step out
 BY_CROSSWALK = 3.0  # m before and behind a crosswalk that still count as at it
-HIDES = 25.0  # m before a crosswalk, within which somebody who stands hides an end of it
+HIDES = 25.0  # m before a crosswalk, within which a standing vehicle hides an end of it
 PARKED_SPEED = 8.3  # m/s past parked vehicles; 30 km/h, as in residential streets (StVO § 45)
 PARKED_ROOM = 1.5  # m; parked vehicles farther to the side need no slowing
-STANDS = 0.3  # m/s, who is slower stands, as far as tracking can tell
+STANDS = 0.3  # m/s, below which a track counts as standing
 
 
 @kernel
 def safe_speed(room, friction_limit):
-    """Return the speed [m/s] at which somebody at ``room`` [m] may step out at any moment."""
+    """Return the speed [m/s] that is safe if a pedestrian at ``room`` [m] steps out any time."""
     spare = max(room, 0.0) / WALK - REACTION
     return max(2.0 * BRAKING_SHARE * friction_limit * spare, CREEP)
 
@@ -56,7 +56,7 @@ def slow_to(speed, distance):
 
 @kernel
 def careful_speed(around, tracks, crosswalks, s, front, half_width, shift, in_town, friction_limit):
-    """Return the speed [m/s] that those beside the route and what they hide allow; +inf if any."""
+    """Return the speed [m/s] that actors beside the route and what they hide allow; +inf: any."""
     best = math.inf
     for e in range(1, around.shape[0]):
         if around[e, NEAR] == 0.0 or around[e, AT] + around[e, HALF_LENGTH] < s:
@@ -88,7 +88,7 @@ def at_crosswalk(crosswalks, at):
 
 @kernel
 def hidden_speed(around, e, crosswalks, s, front, half_width, room, friction_limit):
-    """Return the speed [m/s] for who may come from behind a standing vehicle onto a crosswalk."""
+    """Return the speed [m/s] for pedestrians that a standing vehicle hides at a crosswalk."""
     best = math.inf
     end = around[e, AT] + around[e, HALF_LENGTH]
     for i in range(crosswalks.shape[0]):
@@ -97,7 +97,7 @@ def hidden_speed(around, e, crosswalks, s, front, half_width, room, friction_lim
             continue
         if s > crosswalks[i, LEAVE]:
             continue
-        # Past the vehicle's far corner one sees the more of the crosswalk the nearer one is.
+        # The nearer the ego, the more of the crosswalk it sees past the vehicle's far corner.
         opened = (room + half_width) * (enter - s) / max(end - s, 0.5) - half_width
         speed = safe_speed(max(opened, room), friction_limit)
         best = min(best, slow_to(speed, enter - s - front))

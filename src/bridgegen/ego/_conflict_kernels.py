@@ -1,13 +1,13 @@
-"""What a careful driver sees coming: who is on its way, and whose way meets its own, and when.
+"""What a careful driver foresees: which bodies are on its way, which cross it, and when.
 
-Everybody is expected to go on at the present speed: the ego along its path, another along its own
-(as if its indicators told where it turns), and who changes lane on a circle of its turn rate, once
-it has come nearer from the side. A body is one of
+All bodies are expected to keep their speed: the ego along its path, another along its own (as if
+indicators showed where it turns), one that changes lane on a circle of its turn rate, once it has
+come nearer from the side. A body is one of
 
 - a leader: it stands, or goes the ego's way, and is on it or coming onto it from the side;
 - crossing: both bodies will meet if both go on;
-- nobody's concern, as is who would run into the ego's rear half while its front is past: the way
-  out is forward.
+- no conflict; so is a body that would run into the ego's rear half while its front is past: the
+  way out is forward.
 
 Bodies are rows (length, width, centre ahead of the reference point) [m]. ``beside`` is a row that
 the caller keeps of each: how far its centre is to the side of the ego's way now, and the farthest
@@ -22,18 +22,18 @@ import math
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import COS, SIN, X, Y, pose, project
 
-NOBODY, LEADER, CROSSING = 0, 1, 2
+NO_CONFLICT, LEADER, CROSSING = 0, 1, 2
 ASIDE, FARTHEST = 0, 1
 
 WANDERING = 0.375  # m to the side that are no change of lane; UN R157, 01 series, annex 3
 SAME_WAY = 0.7  # cosine of the angle between two headings below which one crosses the other's way
-STANDS = 0.1  # m/s, below which a heading tells nothing
-SIDE_MARGIN = 0.5  # m, nearer to whose side one does not pass …
-END_MARGIN = 2.0  # … or before whom or behind; the FSM's distance at standstill
-LEAST_PACE = 3.0  # m/s, at which somebody slower asks if the way is clear
+STANDS = 0.1  # m/s, below which a heading means nothing
+SIDE_MARGIN = 0.5  # m, kept to the side of a body that is passed …
+END_MARGIN = 2.0  # … and to its front and rear; the FSM's distance at standstill
+LEAST_PACE = 3.0  # m/s, the least speed at which the ego checks whether its way is clear
 STEP = 0.1  # s, between two instants that are foreseen
-AFTER = 3.0  # s after bodies have met in which the other still covers a part of the ego's way
-SAMPLES = 24  # of the ego's way, among which the one nearest to a body is looked for
+AFTER = 3.0  # s after bodies meet, in which the other still covers a part of the ego's way
+SAMPLES = 24  # of the ego's way, among which the one nearest to a body is searched
 BEHIND = 10.0  # m of the ego's way behind it that count as beside it
 
 
@@ -95,10 +95,10 @@ def meet(
 ):  # fmt: skip
     """Return (when two bodies meet, margins included, if both go on [s], the room until there [m]).
 
-    Both +inf if they do not within the horizon. The room is what the ego's front has left until
-    the part of its way that the other's body covers before or after they meet; < 0 where its front
-    is in that already, and the other would meet its rear half. The ego goes along its path at
-    ``pace`` [m/s] from station s; of the other see ``later``.
+    Both +inf if they do not meet within the horizon. The room is the distance from the ego's front
+    to the part of its way that the other's body covers before or after they meet; < 0 where its
+    front is already in that part, and the other would meet its rear half. The ego goes along its
+    path at ``pace`` [m/s] from station s; for the other see ``later``.
     """
     length, width = 0.5 * own[0] + END_MARGIN, 0.5 * own[1] + SIDE_MARGIN
     other_length, other_width = 0.5 * other[0], 0.5 * other[1]
@@ -154,14 +154,14 @@ def foresee(
 
     The ego, body ``own``, is at station ``s`` [m] of its path, ``n`` rows ``ds`` [m] apart, at
     speed ``v`` [m/s]. The other's reference point is at (``x``, ``y``, ``h``) [m, rad]; it goes at
-    speed ``w`` and turns by ``turn`` [rad/s]; it is at station ``q`` of its path, which it keeps to
-    if that is ``known``. Who leads matters up to ``reach`` [m] ahead, who crosses within the next
-    ``horizon`` [s]. Its row ``beside`` is changed in place.
+    speed ``w`` and turns by ``turn`` [rad/s]; it is at station ``q`` of its path, which it follows
+    if that is ``known``. Leaders matter up to ``reach`` [m] ahead, crossing bodies within the next
+    ``horizon`` [s]. The other's row ``beside`` is changed in place.
 
-    Returns (what, ttc, gap, along, lateral): NOBODY, LEADER or CROSSING; time to collision [s];
-    what the ego's front has left until the leader's rear, or until where the other crosses [m]; a
-    leader's speed on the ego's way, 0 of who crosses [m/s]; when a leader will be on the way [s],
-    0 if it is.
+    Returns (what, ttc, gap, along, lateral): NO_CONFLICT, LEADER or CROSSING; time to collision
+    [s]; distance from the ego's front to the leader's rear, or to where the other crosses [m]; a
+    leader's speed along the ego's way, 0 of a crossing body [m/s]; when a leader will be on the way
+    [s], 0 if it is.
     """
     cx, cy = x + other[2] * math.cos(h), y + other[2] * math.sin(h)
     station, offset = foot_on_way(path, n, ds, s, reach, cx, cy)
@@ -189,11 +189,11 @@ def foresee(
                 ttc = gap / (v - speed) if v > speed else math.inf
                 return LEADER, ttc, gap, speed, lateral
     if stands or not (known or beside[FARTHEST] - aside > WANDERING):
-        return NOBODY, math.inf, math.inf, 0.0, math.inf
+        return NO_CONFLICT, math.inf, math.inf, 0.0, math.inf
     t, room = meet(
         path, n, ds, s, max(v, LEAST_PACE), own, known, other_path, other_n, other_ds, q, x, y, h,
         w, turn, other, horizon,
     )  # fmt: skip
     if t == math.inf or room < 0.0:
-        return NOBODY, math.inf, math.inf, 0.0, math.inf
+        return NO_CONFLICT, math.inf, math.inf, 0.0, math.inf
     return CROSSING, t, room, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""From what the planner demands to what the car does: actuators with lag and limited jerk.
+"""Control: from the planner's demand to the car's motion, with lag and limited jerk.
 
 Pure pursuit steers (`_route_follower_kernels`). Brakes and engine answer late: a command may change
 only so fast, and two equal first-order lags stand for dead time and build-up of pressure or torque

@@ -26,7 +26,7 @@ LOOK = 1.6  # s, how far it looks; AEB acts below 1.5 s to collision, UN Regulat
 STEP = 0.2  # s, between two looks
 DELAY = 0.3  # s, until full braking
 MARGIN = 0.2  # m, around the ego's box
-PARALLEL = 0.9  # cosine of the angle to the route below which somebody does not follow its bends
+PARALLEL = 0.9  # cosine of the angle to the route below which an actor does not follow its bends
 
 
 @kernel
@@ -51,9 +51,9 @@ def boxes_meet(dx, dy, h, half_length, half_width, other_h, other_length, other_
 def must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
     """Return whether only full braking is left.
 
-    The ego goes on along its route, or beside it by a ``shift``. Who drives along the road is taken
-    to follow its bends, everybody else to go straight on. A body that meets the ego's rear half
-    does not count: braking would not help.
+    The ego goes on along its route, or beside it by a ``shift``. Actors along the road are taken to
+    follow its bends, all others to go straight on. A body that meets the ego's rear half does not
+    count: braking would not help.
     """
     if v < 0.5:
         return False

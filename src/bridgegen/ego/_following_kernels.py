@@ -2,7 +2,7 @@
 
 Sources: Treiber, Hennecke, Helbing, Phys. Rev. E 62 (2000) 1805 (IDM), with their city values
 rounded; Kesting, Treiber, Helbing, Phil. Trans. R. Soc. A 368 (2010) 4585 (constant-acceleration
-heuristic: a short gap to somebody who is not slower needs no hard braking).
+heuristic: a short gap to a leader that is not slower needs no hard braking).
 """
 
 # mypy: allow-untyped-defs
@@ -33,15 +33,15 @@ STANDSTILL_GAP = 2.0  # m
 COOLNESS = 0.99  # share of the heuristic; source: Kesting et al., table 1
 LEAST_GAP = 0.1  # m, below which the model divides by this
 STOP_MARGIN = 1.5  # m, between the front bumper and a point to stop at
-BRAKE_FROM = 1.5  # m/s², it acts on a point to stop at once stopping needs this much
+BRAKE_FROM = 1.5  # m/s²; it brakes for a point to stop at once stopping needs this much
 
-SIDE_GAP = 0.3  # m; who is nearer to the strip that the ego will sweep is in its way …
+SIDE_GAP = 0.3  # m; an actor nearer to the strip that the ego will sweep is in its way …
 SIDE_GAP_ON_FOOT = 0.8  # m; … nearer than this, if on foot or on a bicycle
-COMING_IN = 1.2  # s; who will be in its way so soon, as it moves to the side now, counts as well …
-DRIFT = 0.3  # m/s; … if it moves faster than this, which tracking does not invent
-SAME_WAY = 0.5  # cosine of the heading difference below which somebody goes another way …
-HEAD_ON = -0.9  # … and below which they come towards the ego
-STANDS = 0.5  # m/s, who is slower stands
+COMING_IN = 1.2  # s; an actor whose lateral motion brings it there so soon counts as well …
+DRIFT = 0.3  # m/s; … if that is faster than this, above the noise of tracking
+SAME_WAY = 0.5  # cosine of the heading difference below which an actor goes another way …
+HEAD_ON = -0.9  # … and below which it is oncoming
+STANDS = 0.5  # m/s, below which an actor stands
 
 
 @kernel
@@ -59,7 +59,7 @@ def idm(gap, v, leader_speed):
 @kernel
 def follow(gap, v, leader_speed, leader_acceleration):
     """Return the acceleration [m/s²] for a leader at a gap [m]; at most `COMFORT_ACCELERATION`."""
-    # What avoids contact if nobody changes what they do, with half of the standstill gap to spare.
+    # Avoids contact if both keep their acceleration, with half of the standstill gap to spare.
     free = max(gap - 0.5 * STANDSTILL_GAP, LEAST_GAP)
     w, slowing = max(leader_speed, 0.0), min(leader_acceleration, 0.0)
     closing = max(v - leader_speed, 0.0)
@@ -85,9 +85,9 @@ def stop_for(distance, v):
 
 @kernel
 def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
-    """Return the acceleration [m/s²] that those ahead on the ego's strip ask for; +inf if none.
+    """Return the acceleration [m/s²] that actors ahead on the ego's strip require; +inf if none.
 
-    The ego's centre line leaves its route by a ``shift``; what counts is where it is by then.
+    The ego's centre line leaves its route by a ``shift``; its future offset counts.
     """
     asked = math.inf
     for e in range(1, around.shape[0]):
@@ -100,12 +100,12 @@ def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
         nearing = -around[e, ACROSS] if beside > 0.0 else around[e, ACROSS]
         moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
         if moves and HEAD_ON < around[e, COSINE] < SAME_WAY:
-            continue  # it is not to be followed; whether both meet is a matter of time
+            continue  # it crosses: a matter of giving way, not of following
         if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
             continue
         gap = rear_end - s - front
         if gap < 0.0 and around[e, AT] < s + front:
-            continue  # beside us: braking would not part us
+            continue  # beside the ego: braking would not separate them
         speed = around[e, ALONG] if moves else 0.0
         asked = min(asked, follow(gap, v, speed, around[e, GAINING]))
     return asked

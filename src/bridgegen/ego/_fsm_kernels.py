@@ -1,29 +1,29 @@
-"""The fuzzy safety model (FSM) of Mattas et al., made to drive.
+"""The fuzzy safety model (FSM) of Mattas et al. as a driver.
 
-Two fuzzy measures say how unsafe the distance to somebody ahead is, 0 not at all, 1 wholly: the
-proactive one (PFS) if that one stopped at once, the critical one (CFS) if both went on as they do.
+Two fuzzy measures rate how unsafe the distance to a body ahead is, from 0 (safe) to 1: the
+proactive one (PFS) if the body stopped at once, the critical one (CFS) if both keep their motion.
 The driver brakes comfortably by the first and up to its full force by the second, after a reaction
-time, and so avoids emergencies that a driver who waits for them would be in.
+time, and so avoids emergencies that a driver without anticipation would get into.
 
 In a cut-in, a cut-out, and behind a vehicle that brakes, it is the driver of the European
 Commission's code (JRC-FSM): a vehicle that comes in from beside counts if it will be on the strip
 that the ego sweeps before the ego is past it (their lateral check); one within 0.375 m of the
 middle of the ego's way hides those beyond it; once it has reacted, the driver waits no more before
-it brakes again, and keeps its speed where it is safe, for as long as it closes on anybody ahead.
+it brakes again, and keeps its speed where it is safe, for as long as it closes on a body ahead.
 
 What the publications leave open, and what holds here:
 
-- of who crosses, it counts if the two bodies meet (``_conflict_kernels``): a leader that stands
-  where they do; so does who stands less than 0.5 m beside the strip;
-- for these, and for a vehicle that has stood in sight from the start, the critical measure counts
+- a crossing body counts if the two bodies meet (``_conflict_kernels``): as a leader that stands
+  where they do; so does a body that stands less than 0.5 m beside the strip;
+- for these, and for a vehicle that stands in sight from the start, the critical measure counts
   from 1 m before it would have the driver stop;
 - without any risk the driver keeps the speed that its path allows.
 
-The driver sees everybody, but those who are hidden so. ``attention`` has a row per body: where it
-is beside the ego's way (``_conflict_kernels``), and 1 once it has driven or been hidden; row 0 is
+The driver sees all bodies but those hidden so. ``attention`` has a row per body: where it is
+beside the ego's way (``_conflict_kernels``), and 1 once it has driven or been hidden; row 0 is
 the ego's: the instant since when there is a risk, counted from 1, 0 if there is none, the
 acceleration asked for [m/s²], and, while it reacts to a vehicle that drives or stands on its way,
-the deceleration that its foot is at [m/s²] plus 1.
+the deceleration at its brake pedal [m/s²] plus 1.
 
 Source: Mattas et al., Accident Analysis & Prevention 148 (2020) 105794 (PFS, CFS) and 174 (2022)
 106743 (the driver); its parameters are those of UN Regulation 157, 01 series, annex 3;
@@ -41,7 +41,7 @@ from bridgegen.ego._conflict_kernels import (
     ASIDE,
     FARTHEST,
     LEADER,
-    NOBODY,
+    NO_CONFLICT,
     STANDS,
     WANDERING,
     foresee,
@@ -54,18 +54,18 @@ from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
 REACTION = 0.75  # s
 COMFORT_BRAKING = 4.0  # m/s²
 BRAKING = 6.0  # m/s²
-LEADER_BRAKING = 7.0  # m/s², the hardest that is expected of somebody ahead
-STANDSTILL = 2.0  # m, kept to who stands
-SAFE_MARGIN = 2.0  # m, more at the distance that is quite safe
+LEADER_BRAKING = 7.0  # m/s², the hardest that is expected of a leader
+STANDSTILL = 2.0  # m, kept at standstill
+SAFE_MARGIN = 2.0  # m, added to the distance that is fully safe
 JERK = 12.65  # m/s³
 SHORT = 1.0  # m before the other, up to which the critical measure lets the gap go, if it may
 SLACK = 0.1  # s, in the lateral check
 ROUNDING = 1e-6  # m/s², what is less is rounding
-FARTHER = 15.0  # m beyond the distance that is safe, up to which anybody is looked at
-HORIZON = 6.0  # s, beyond which nobody's coming from the side is foreseen
+FARTHER = 15.0  # m beyond the safe distance, up to which bodies are considered
+HORIZON = 6.0  # s, up to which entering from the side is foreseen
 
 RISK, ASKED, PRESSED = 0, 1, 2
-MET = 2
+IN_TRAFFIC = 2
 
 
 @kernel
@@ -80,7 +80,7 @@ def share(gap, safe, unsafe):
 
 @kernel
 def proactive(gap, v, w):
-    """Return the PFS of a gap [m] at speed v behind somebody at speed w [m/s]."""
+    """Return the PFS of a gap [m] at speed v behind a body at speed w [m/s]."""
     leader_stops = w * w / (2.0 * LEADER_BRAKING)
     safe = v * REACTION + v * v / (2.0 * COMFORT_BRAKING) - leader_stops + SAFE_MARGIN
     unsafe = v * REACTION + v * v / (2.0 * BRAKING) - leader_stops
@@ -89,7 +89,7 @@ def proactive(gap, v, w):
 
 @kernel
 def critical(gap, v, w, a):
-    """Return the CFS of a gap [m] at speed v and acceleration a [m/s²] behind somebody at w."""
+    """Return the CFS of a gap [m] at speed v and acceleration a [m/s²] behind a body at w."""
     if v <= w:
         return 0.0
     after = v + max(a, -COMFORT_BRAKING) * REACTION
@@ -102,7 +102,7 @@ def critical(gap, v, w, a):
 
 @kernel
 def braking(gap, v, w, a, short):
-    """Return the deceleration [m/s²] that a gap asks for, ``short`` [m] of which must remain."""
+    """Return the deceleration [m/s²] that a gap requires, ``short`` [m] of which must remain."""
     urgent = critical(gap - short, v, w, a)
     if urgent > 0.0:
         return COMFORT_BRAKING + urgent * (BRAKING - COMFORT_BRAKING)
@@ -114,11 +114,11 @@ def drive_fsm(
     k, dt, paths, path_n, path_ds, station, on, to, planned, present, x, y, h, speed, bodies,
     kinds, attention,
 ):  # fmt: skip
-    """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
+    """Return the acceleration [m/s²] that the driver demands at instant k, ``dt`` [s] apart.
 
     The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
     ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, the path
-    that it changes ``to``, -1 if none; who is ``present``; ``x``, ``y``, ``h``, ``speed``
+    that it changes ``to``, -1 if none; whether it is ``present``; ``x``, ``y``, ``h``, ``speed``
     ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; their ``kinds``
     ``(E,)``; and ``attention`` ``(E, 3)``, zeros before the first instant, changed in place.
     """
@@ -149,14 +149,15 @@ def drive_fsm(
                 x[e, k], y[e, k], h[e, k], w, bodies[e],
             )  # fmt: skip
             if w >= STANDS or (ahead > hides and side <= 0.0):
-                attention[e, MET] = 1.0
-            drives = ahead < math.inf and attention[e, MET] > 0.0 and (side <= 0.0 or w >= STANDS)
+                attention[e, IN_TRAFFIC] = 1.0
+            has_driven = attention[e, IN_TRAFFIC] > 0.0
+            drives = ahead < math.inf and has_driven and (side <= 0.0 or w >= STANDS)
             if drives and 0.0 <= ahead <= hides:
                 before, nearing = attention[e, ASIDE], 0.0
                 if k > 0 and before < math.inf:
                     nearing = (before - aside) / dt
                 past = math.inf
-                if v != along:  # < 0 beside who is faster: the ego never is past
+                if v != along:  # < 0 if the other is faster: the ego never passes it
                     past = (gap + bodies[0, 0] + bodies[e, 0]) / (v - along)
                 slows = k > 0 and speed[e, k - 1] > w >= STANDS
                 closing = closing or (side <= 0.0 and (v > along or slows))
@@ -172,7 +173,7 @@ def drive_fsm(
             paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
             bodies[e], horizon, reach + FARTHER, attention[e],
         )  # fmt: skip
-        if what == NOBODY or (what == LEADER and drives and side <= 0.0):
+        if what == NO_CONFLICT or (what == LEADER and drives and side <= 0.0):
             continue
         if what == LEADER and lateral > 0.0:
             past = math.inf
@@ -194,7 +195,7 @@ def drive_fsm(
     else:
         if attention[0, RISK] == 0.0:
             attention[0, RISK] = k + 1.0
-        asked = min(attention[0, ASKED], 0.0)  # until it reacts, it does what it did, without gas
+        asked = min(attention[0, ASKED], 0.0)  # until it reacts, it holds its demand, without gas
         if (k + 1.0 - attention[0, RISK]) * dt + 1e-9 >= REACTION:
             at_foot = min(asked, 1.0 - pressed) if pressed > 0.0 else asked
             asked = min(wanted, max(at_foot - JERK * dt, -needed))

@@ -1,4 +1,4 @@
-"""What compiled code asks of a kind, by the number that `bridgegen.ego.kinds` gives it."""
+"""Properties of each kind for compiled code, by the code that `bridgegen.ego.kinds` gives it."""
 
 from bridgegen.ego.kinds import NAMES
 from bridgegen.participants import OBJECT_CLASSES
@@ -35,4 +35,4 @@ REFLECTANCE = tuple(one.reflectance for one in OBJECT_CLASSES)
 """Of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles more."""
 
 MISTAKEN_FOR = tuple(NAMES.index(one.mistaken_for) for one in OBJECT_CLASSES)
-"""What each kind is taken for where its class is not recognised."""
+"""The class that each kind is mistaken for where its own is not recognised."""

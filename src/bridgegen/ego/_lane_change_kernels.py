@@ -1,12 +1,11 @@
-"""Going round somebody who stands or is much slower, by the lane beside, and coming back.
+"""Passing a standing or much slower actor by the adjacent lane, and returning.
 
-The ego goes round who is in its lane if the lane beside, of its own direction, lasts until it is
-back (so it does not pass a queue before a junction), is free ahead, and if nobody there has to
-brake much for it: nobody that it sees behind, and nobody who may come from beyond its sight. It
-comes back as soon as there is room. A change that has begun is carried out.
+The ego passes an actor in its lane if the adjacent lane of its own direction lasts until it is
+back (so it does not pass a queue before a junction), is free ahead, and if no traffic there has to
+brake much for it: neither vehicles that it sees behind, nor one that may come from beyond its
+sight. It returns as soon as there is room. A change that has begun is completed.
 
-What it keeps in mind is the shift (``_shift_kernels``), and for how long somebody has been in its
-way.
+Its state is the shift (``_shift_kernels``), and for how long it has been held up.
 """
 
 # mypy: allow-untyped-defs
@@ -47,27 +46,27 @@ from bridgegen.ego._yielding_kernels import ACROSS as CROSSES
 
 BEFORE, AFTER, BEGINS, LENGTH, HELD_UP = range(control.SIZE + 3, control.SIZE + 8)
 LAST = control.SIZE + 8
-"""Slots of the mind: the shift, and for how long the ego has been held up [s]."""
+"""Slots of ``mind``: the shift, and for how long the ego has been held up [s]."""
 
-SLOW = 0.5  # of the speed that one could go; who is slower than that, and …
-SLOWER = 3.0  # … by so many m/s, holds one up
-PATIENCE = 0.3  # s, until one goes round who holds one up: not for a track that flickers
-LOOK_AHEAD = 8.0  # s, nearer than that is who counts
-ROOM = 1.0  # m, kept to the side of who is passed, if the lanes are that wide
-TAIL = 5.0  # m, kept to whom one comes before, …
-TAIL_TIME = 0.9  # … and so many seconds of their speed; source: half of what is taught, 1.8 s
-YIELDS = 2.0  # m/s², that one may have to brake because of a change: comfortably
-WAIT_AT = 10.0  # m, before who stands: room to go round, when the lane beside is free
-BRAKES = 1.0  # m/s², who brakes harder than this may be about to stop
+SLOW = 0.5  # of the possible speed; an actor that is slower than that, and …
+SLOWER = 3.0  # … by so many m/s, holds the ego up
+PATIENCE = 0.3  # s, until the ego passes an actor that holds it up: not for a flickering track
+LOOK_AHEAD = 8.0  # s, up to which an actor ahead counts
+ROOM = 1.0  # m, kept to the side of the passed actor, if the lanes are that wide
+TAIL = 5.0  # m, kept to the vehicle behind after a change, …
+TAIL_TIME = 0.9  # … and so many seconds of its speed; source: half of what is taught, 1.8 s
+YIELDS = 2.0  # m/s², the deceleration that a change may impose: comfortable
+WAIT_AT = 10.0  # m, before a standing actor: room to pass it, when the adjacent lane is free
+BRAKES = 1.0  # m/s², an actor that brakes harder than this may be about to stop
 STEADY = 0.3  # m, by which a lane's distance may vary along the way
-STRIDE = 5.0  # m, between the places where it is looked at
-QUEUE = 60.0  # m before a stop line or a crosswalk, in which who stands may wait for it
-FAR_BEHIND = 250.0  # m, how far back one looks before a change: as far as sensors see
+STRIDE = 5.0  # m, between the stations at which that is checked
+QUEUE = 60.0  # m before a stop line or a crosswalk, in which a standing actor may wait for it
+FAR_BEHIND = 250.0  # m, how far back the ego looks before a change: as far as sensors see
 
 
 @kernel
 def shift_of(mind):
-    """Return the shift that it has in mind."""
+    """Return the present shift."""
     return mind[BEFORE], mind[AFTER], mind[BEGINS], mind[LENGTH]
 
 
@@ -86,19 +85,19 @@ def look_back(mind, near):
 
 @kernel
 def pace_of(around, e):
-    """Return how fast somebody goes along the route [m/s]; 0 of who stands."""
+    """Return an actor's speed along the route [m/s], ≥ 0; 0 if it stands."""
     moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
     return max(around[e, ALONG], 0.0) if moves else 0.0
 
 
 @kernel
 def slow_ahead(around, tracks, s, front, half_width, aside, pace):
-    """Return (the next who holds one up, the station of the last one's front) on a strip.
+    """Return (the next actor that holds the ego up, the station of the last one's front).
 
-    The strip is ``aside`` of the route, the pace that one could go at in m/s. -1 if it is nobody,
-    or somebody whom one does not go round, because they will be gone.
+    The strip is ``aside`` of the route, the possible ``pace`` in m/s. The actor is -1 if there is
+    none, or if the ego does not pass it, because it will leave the strip.
     """
-    who, at, last = -1, math.inf, -math.inf
+    slow, at, last = -1, math.inf, -math.inf
     for e in range(1, around.shape[0]):
         if around[e, NEAR] == 0.0 or around[e, AT] < s + front:
             continue
@@ -112,13 +111,13 @@ def slow_ahead(around, tracks, s, front, half_width, aside, pace):
         last = max(last, around[e, AT] + around[e, HALF_LENGTH])
         if rear < at:
             goes = speed > STANDS and around[e, COSINE] < SAME_WAY
-            at, who = rear, -1 if goes or IS_ON_FOOT[int(tracks[e, KIND])] else e
-    return who, last
+            at, slow = rear, -1 if goes or IS_ON_FOOT[int(tracks[e, KIND])] else e
+    return slow, last
 
 
 @kernel
 def lane_lasts(road, n, ds, s, side, aside):
-    """Return the station [m] up to which the lane beside stays where it is now."""
+    """Return the station [m] up to which the adjacent lane keeps its distance."""
     i, stride = int(s / ds), max(int(STRIDE / ds), 1)
     while i < n and abs(road[i, side] - aside) < STEADY:
         i += stride
@@ -127,10 +126,10 @@ def lane_lasts(road, n, ds, s, side, aside):
 
 @kernel
 def is_free(around, tracks, s, v, front, rear, half_width, aside, seen, fastest):
-    """Say whether the ego could drive on the strip ``aside`` of the route now.
+    """Return whether the ego could drive on the strip ``aside`` of the route now.
 
-    Neither it nor anybody there would have to brake much: nobody ahead, beside or behind, nor who
-    is not ``seen`` [m] and comes at ``fastest`` [m/s].
+    Neither it nor an actor ahead, beside or behind on the strip would have to brake much, nor one
+    beyond the ``seen`` distance [m] that comes at ``fastest`` [m/s].
     """
     there = (aside, aside, 0.0, 0.0)
     if keep_distance(around, tracks, s, front, rear, half_width, there, v) < -YIELDS:
@@ -154,7 +153,7 @@ def is_free(around, tracks, s, v, front, rear, half_width, aside, seen, fastest)
 
 @kernel
 def waits_for_something(crosswalks, stop_stations, at):
-    """Say whether who stands at a station may wait for a light, or for somebody on a crosswalk."""
+    """Return whether an actor standing at a station may wait for a light or at a crosswalk."""
     waits = False
     for i in range(stop_stations.shape[0]):
         waits = waits or -TAIL < stop_stations[i] - at < QUEUE
@@ -164,8 +163,8 @@ def waits_for_something(crosswalks, stop_stations, at):
 
 
 @kernel
-def somebody_crosses(passages, n_passages, s, until):
-    """Say whether a passage is expected across the route up to a station."""
+def actor_crosses(passages, n_passages, s, until):
+    """Return whether a passage is expected across the route up to a station."""
     for i in range(n_passages):
         if passages[i, 4] == CROSSES and passages[i, 1] > s and passages[i, 0] < until:
             return True
@@ -173,17 +172,17 @@ def somebody_crosses(passages, n_passages, s, until):
 
 
 @kernel
-def goes_round(around, who, s, v, front, half_width, shift):
-    """Say whether a shift that begins at s leads past somebody, with room to spare.
+def passes_round(around, slow, s, v, front, half_width, shift):
+    """Return whether a shift that begins at s leads past the slow actor, with room to spare.
 
-    Who brakes is expected to stop where it is.
+    A braking actor is expected to stop where it is.
     """
-    w = pace_of(around, who) if around[who, GAINING] > -BRAKES else 0.0
-    rear = around[who, AT] - around[who, HALF_LENGTH] - front
-    wide = abs(around[who, ASIDE] - shift[1]) - around[who, HALF_WIDTH] - half_width
+    w = pace_of(around, slow) if around[slow, GAINING] > -BRAKES else 0.0
+    rear = around[slow, AT] - around[slow, HALF_LENGTH] - front
+    wide = abs(around[slow, ASIDE] - shift[1]) - around[slow, HALF_WIDTH] - half_width
     there = rear + (max(rear - s, 0.0) * w / (v - w) if v > w else math.inf)
-    beside = abs(around[who, ASIDE] - aside_at(shift, there))
-    return beside - around[who, HALF_WIDTH] - half_width > min(ROOM, wide - SIDE_GAP)
+    beside = abs(around[slow, ASIDE] - aside_at(shift, there))
+    return beside - around[slow, HALF_WIDTH] - half_width > min(ROOM, wide - SIDE_GAP)
 
 
 @kernel
@@ -191,10 +190,10 @@ def change_lane(
     road, n, ds, s, v, pace, front, rear, half_width, around, tracks, passages, n_passages,
     crosswalks, stop_stations, seen, friction_limit, elapsed, mind,
 ):  # fmt: skip
-    """Begin a change of lane if it is time; return the acceleration [m/s²] that waiting asks for.
+    """Begin a lane change if it is time; return the acceleration [m/s²] that waiting requires.
 
-    +inf if it asks for nothing. ``pace`` is the speed at which the ego could go [m/s], ``elapsed``
-    the time since it was asked last [s]; the rest as of `bridgegen.ego._reference_kernels.plan`.
+    +inf if none. ``pace`` is the possible speed of the ego [m/s], ``elapsed`` the time since the
+    last call [s]; the rest as for `bridgegen.ego._reference_kernels.plan`.
     ``mind`` is changed in place.
     """
     i, out = min(int(s / ds), n - 1), mind[AFTER]
@@ -204,9 +203,9 @@ def change_lane(
     if out == 0.0 and road[i, LEFT] == 0.0 and road[i, RIGHT] == 0.0:
         mind[HELD_UP] = 0.0
         return math.inf
-    who, last = slow_ahead(around, tracks, s, front, half_width, 0.0, pace)
-    w = pace_of(around, who) if who > 0 else 0.0
-    gap = around[who, AT] - around[who, HALF_LENGTH] - s - front if who > 0 else math.inf
+    slow, last = slow_ahead(around, tracks, s, front, half_width, 0.0, pace)
+    w = pace_of(around, slow) if slow > 0 else 0.0
+    gap = around[slow, AT] - around[slow, HALF_LENGTH] - s - front if slow > 0 else math.inf
     if out != 0.0:
         length = shift_length(out, v, friction_limit)
         clear = gap > length + LOOK_AHEAD * max(v - w, 0.0)
@@ -215,22 +214,22 @@ def change_lane(
             return math.inf
         lasts = lane_lasts(road, n, ds, s, LEFT if out > 0.0 else RIGHT, out)
         return stop_for(lasts - s - front - length, v)
-    if who < 0 or gap > max(LOOK_AHEAD * (v - w), 3.0 * WAIT_AT):
+    if slow < 0 or gap > max(LOOK_AHEAD * (v - w), 3.0 * WAIT_AT):
         mind[HELD_UP] = 0.0
         return math.inf
     if mind[HELD_UP] < PATIENCE or waits_for_something(crosswalks, stop_stations, last):
         return math.inf
-    # It passes the last of the slow ones, and is back before the lane beside ends.
+    # It passes the last of the slow actors, and is back before the adjacent lane ends.
     home = s + (last + rear + TAIL - s) * pace / (pace - w)
     home += shift_length(max(road[i, LEFT], -road[i, RIGHT]), pace, friction_limit)
-    if somebody_crosses(passages, n_passages, s, home):
+    if actor_crosses(passages, n_passages, s, home):
         return math.inf
     fastest = min(road[i, LIMIT], sight_speed(seen, friction_limit))
     past = min(v, PARKED_SPEED) if w == 0.0 and road[i, LIMIT] <= FAST_ROAD else v
     possible = False
     for side in (LEFT, RIGHT):
         aside = road[i, side]
-        # On a fast road one does not pass on the right of who moves.
+        # On a fast road a moving vehicle is not passed on the right.
         if aside == 0.0 or (side == RIGHT and w > 0.0 and road[i, LIMIT] > FAST_ROAD):
             continue
         if lane_lasts(road, n, ds, s, side, aside) < home:
@@ -240,7 +239,7 @@ def change_lane(
         other, _ = slow_ahead(around, tracks, s, front, half_width, aside, pace)
         if (
             (other < 0 or around[other, AT] - around[other, HALF_LENGTH] > home)
-            and goes_round(around, who, s, v, front, half_width, (0.0, aside, s, length))
+            and passes_round(around, slow, s, v, front, half_width, (0.0, aside, s, length))
             and is_free(around, tracks, s, past, front, rear, half_width, aside, seen, fastest)
         ):
             begin(mind, aside, s, length)

@@ -1,4 +1,4 @@
-"""Traffic lights and stop signs: where to stop, or to go on at yellow because one no longer can."""
+"""Traffic lights and stop signs: where to stop, or to pass at yellow if stopping is impossible."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -11,10 +11,10 @@ from bridgegen.ego._following_kernels import STOP_MARGIN, stop_for
 RED, RED_YELLOW, YELLOW = 1, 2, 3
 """As `Rollout.lights` has them."""
 
-YELLOW_DECELERATION = 3.0  # m/s²; who would need more at the onset of yellow goes on; source: ITE,
+YELLOW_DECELERATION = 3.0  # m/s²; a driver that needs more at yellow onset passes; source: ITE,
 # Traffic Signal Timing Manual, 3.0 m/s² (10 ft/s²)
-COMMITTED = 8.0  # m/s²; who would need more than this for a red light is past stopping
-BRAKE_FROM = 1.5  # m/s², it brakes for a light once that needs this much
+COMMITTED = 8.0  # m/s²; a driver that would need more for a red light can no longer stop
+BRAKE_FROM = 1.5  # m/s²; it brakes for a light once stopping needs this much
 
 
 HALTED = 0.3  # m/s, below which it has come to a halt
@@ -22,7 +22,7 @@ HALTED = 0.3  # m/s, below which it has come to a halt
 
 @kernel
 def stop_at_signs(stations, s, front, v, halted):
-    """Return (acceleration [m/s²] that stop signs ask for or +inf, where it has halted last [m]).
+    """Return (acceleration [m/s²] that stop signs require or +inf, where it last halted [m]).
 
     ``stations`` are those of their lines on the ego's route [m]; at ``halted`` and before, it has
     stopped already.
@@ -39,11 +39,11 @@ def stop_at_signs(stations, s, front, v, halted):
 
 @kernel
 def stop_at_lights(stations, states, s, front, v, sight, stopping):
-    """Return (acceleration [m/s²] that the lights ask for or +inf, which one it stops for or -1).
+    """Return (acceleration [m/s²] that the lights require or +inf, the one it stops for or -1).
 
     ``stations`` are those of the stop lines on the ego's route [m], +inf where a light is not on
-    it; ``sight`` is how far a light is seen [m]; ``stopping`` is the light that it stops for since
-    an earlier instant, -1 if none: at yellow that is decided once.
+    it; ``sight`` is how far a light is seen [m]; ``stopping`` is the light for which it decided
+    to stop at an earlier instant, -1 if none: at yellow it decides once.
     """
     asked, chosen = math.inf, -1
     for i in range(stations.shape[0]):

@@ -1,9 +1,9 @@
-"""Who hides whom: rays from the sensors, body by body.
+"""Occlusion: rays from the sensors to each body.
 
 Bodies are boxes that stand on the ground, as high as they are. A ray that another body cuts before
 it reaches its target hides the target up to where the line of sight over that body meets it.
 
-This frame's geometry stands in columns of ``memory`` ``(E, MEMORY)``, relative to the sensors: of
+This frame's geometry is in columns of ``memory`` ``(E, MEMORY)``, relative to the sensors: of
 each body its centre's x, y and distance d [m], bearing, the angles from there to its right and left
 edge [rad], cosine and sine of its heading; and of each ray at it the direction, where it meets the
 body [m], and the share of the body's height that is hidden there.
@@ -84,7 +84,7 @@ def visible_share(e, memory, bodies, height):
 
     Args:
         e: its row.
-        memory: as above; who is too far away has the distance +inf.
+        memory: as above; the distance is +inf for bodies too far away.
         bodies: ``(E, 8)``: length and width first, height last [m].
         height: of the sensors [m].
     """

@@ -61,9 +61,10 @@ def project(path, n, ds, s, x, y):
 
 @kernel
 def shrinks(path, n, ds, s, d):
-    """Return how far one moves so far left of a path for each metre along it: less in left bends.
+    """Return the distance travelled at an offset d to the left [m] per metre of the path.
 
-    At least 0.2, as in ``project``: who is aside beyond a bend's centre does not go backwards.
+    Below 1 in left bends. At least 0.2, as in ``project``: beyond a bend's centre the motion does
+    not reverse.
     """
     i, _ = locate(n, ds, s)
     return max(1.0 - path[i, CURVATURE] * d, 0.2)

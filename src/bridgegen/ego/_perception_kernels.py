@@ -1,7 +1,7 @@
-"""What the ego's sensors make of the others, frame by frame, and the tracks that come of it.
+"""Perception of other participants: sensor frames, detections and tracks.
 
-A camera and a LiDAR look all round from the middle of the ego's box. Every 0.1 s a frame: where the
-others are (`place`), who hides whom, what the sensors detect, and what the tracker makes of it.
+A camera and a LiDAR look all round from the middle of the ego's box. Each frame, every 0.1 s, takes
+the geometry of the bodies (`place`), their occlusion, detections, and updates the tracks.
 """
 
 # mypy: allow-untyped-defs
@@ -39,8 +39,8 @@ from bridgegen.ego.detections import (
     HEADING,
     KIND,
     LENGTH,
+    MISSED,
     NO_FRAME,
-    NOBODY,
     SEEN_BY,
     WIDTH,
     X,
@@ -54,7 +54,7 @@ COLOURED = 10.0  # of variances, for the tracker: errors last (1 + φ)/(1 − φ
 
 @kernel
 def blank(detections, e, k, why):
-    """Write that nobody saw body e at instant k, or that no frame was taken."""
+    """Record that body e was missed at instant k, or that no frame was taken."""
     detections[e, k, SEEN_BY] = why
     for i in range(1, DETECTION):
         detections[e, k, i] = 0.0
@@ -71,7 +71,7 @@ def frame_at(k, dt):
 
 @kernel
 def place(k, present, x, y, h, bodies, memory):
-    """Fill the geometry of all bodies as seen from the ego's box centre; return how many count."""
+    """Fill the geometry of all bodies from the ego's box centre; return how many are in range."""
     cosine, sine = math.cos(h[0, k]), math.sin(h[0, k])
     sx, sy = x[0, k] + bodies[0, 2] * cosine, y[0, k] + bodies[0, 2] * sine
     near = 0
@@ -95,11 +95,11 @@ def place(k, present, x, y, h, bodies, memory):
 
 @kernel
 def know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections):
-    """Ideal perception: the truth goes to the tracks, and to the detections of a frame."""
+    """Ideal perception: copy the truth to the tracks, and to the detections of a frame."""
     frame = frame_at(k, dt) >= 0
     for e in range(1, x.shape[0]):
         if not present[e]:
-            blank(detections, e, k, NOBODY if frame else NO_FRAME)
+            blank(detections, e, k, MISSED if frame else NO_FRAME)
             continue
         cosine, sine = math.cos(h[e, k]), math.sin(h[e, k])
         tracks[e, tracking.STATE] = tracking.CONFIRMED
@@ -122,7 +122,7 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections):
 
 @kernel
 def look(k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tracks, detections):
-    """Take a sensor frame: fill its detections, and tell the tracks."""
+    """Take a sensor frame: fill its detections, and update the tracks."""
     elapsed = max(dt, FRAME)
     renew, keep = 1.0 - math.exp(-elapsed / DROPOUT_TIME), math.exp(-elapsed / ERROR_TIME)
     near = place(k, present, x, y, h, bodies, memory)
@@ -131,7 +131,7 @@ def look(k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tr
     sx = x[0, k] + bodies[0, 2] * heading[0]
     sy = y[0, k] + bodies[0, 2] * heading[1]
     for e in range(1, x.shape[0]):
-        blank(detections, e, k, NOBODY)
+        blank(detections, e, k, MISSED)
         if memory[e, D] == math.inf:
             memory[e, DRAWN] = 0.0
             tracking.miss(tracks, memory, e)
@@ -141,7 +141,7 @@ def look(k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tr
         along, across = observe(
             memory, e, bodies, kinds[e], weather, heading, height, share, detections, k
         )
-        if detections[e, k, SEEN_BY] == NOBODY:
+        if detections[e, k, SEEN_BY] == MISSED:
             tracking.miss(tracks, memory, e)
             continue
         detections[e, k, X] += sx
@@ -169,10 +169,10 @@ def perceive(
         k: the instant.
         dt: between two instants [s].
         key: uint64, of the scenario's random numbers.
-        ideal: whether the truth itself goes to the tracks.
-        present: ``(E,)`` bool, who is there; the caller drops the tracks of who ceases to be
+        ideal: whether the tracks are the truth.
+        present: ``(E,)`` bool; the caller drops the tracks of entities that cease to be present
             (``tracking.forget``).
-        x: ``(E, T)`` [m], reference points; of all that has T, only instant k is read.
+        x: ``(E, T)`` [m], reference points; of all arrays with T, only instant k is read.
         y: ``(E, T)`` [m].
         h: ``(E, T)`` [rad].
         v: ``(E, T)`` [m/s].
@@ -183,7 +183,7 @@ def perceive(
         tracks: ``(E, TRACK)``, zeros before the first instant; see ``_tracking_kernels``.
         detections: ``(E, T, DETECTION)``, of which instant k is written.
     """
-    blank(detections, 0, k, NOBODY)
+    blank(detections, 0, k, MISSED)
     if ideal:
         know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections)
         return

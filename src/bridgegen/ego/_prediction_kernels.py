@@ -1,14 +1,14 @@
-"""Where each track will be: its passages over the ego's route, by the ways that the map offers.
+"""Predictions: each track's passages over the ego's route, by the ways that the map offers.
 
 A passage is a row of `PASSAGE` numbers: a conflict zone (see ``_yielding_kernels``), then the
 track's station on its way [m], its speed along it [m/s], how far its body reaches ahead of and
-behind that station [m], the track, how its speed changes [m/s²], and who waits for whom
-(``right_of_way``). The planner reads passages, whoever predicted them.
+behind that station [m], the track's entity, how its speed changes [m/s²], and which of the two
+gives way (``right_of_way``). The planner reads the passages of either prediction.
 
-- A vehicle is expected on every way that the map offers from where it came, as long as it is on
-  that way, at the speed that was measured, which goes on changing for a while as it did.
-- Who is on no such way (on foot, on a bicycle, off the lanes) is expected straight ahead.
-- The ideal prediction knows everybody's true way, and the one that a lane change leads to.
+- A vehicle is expected on every way that the map offers from its start, as long as it is on that
+  way, at the measured speed, whose measured rate of change continues for a while.
+- A track on no such way (on foot, on a bicycle, off the lanes) is expected straight ahead.
+- The ideal prediction knows the true way of each actor, and the one that a lane change leads to.
 """
 
 # mypy: allow-untyped-defs
@@ -25,6 +25,7 @@ from bridgegen.ego._tracking_kernels import X as TRACK_X
 from bridgegen.ego._tracking_kernels import Y as TRACK_Y
 from bridgegen.ego._yielding_kernels import (
     ACROSS,
+    ENTITY,
     FRONT,
     GAIN,
     RANK,
@@ -33,7 +34,6 @@ from bridgegen.ego._yielding_kernels import (
     SPEED,
     STANDING,
     STATION,
-    WHO,
     ZONE,
 )
 
@@ -41,12 +41,12 @@ PASSAGE = ZONE + 7
 
 OFF_WAY = 2.0  # m beside a way's centre, or …
 TURNED = 0.6  # rad off its heading, a vehicle is not on it
-LOST = -1.0  # a station on a way that is to be looked for; less: that will be, so many plans later
-PATIENCE = 10.0  # plans until a way that somebody is not on is looked at again
+LOST = -1.0  # a station on a way that is to be searched; less: it is searched so many plans later
+PATIENCE = 10.0  # plans until a way that a track is not on is searched again
 SEARCH_STEP = 4.0  # m, between the points of a way at which a track is first looked for
 STRAIGHT_STEP = 2.0  # m, between the points of the ego's route that a straight line may cross
 GRAZING = 0.25  # sine of the angle below which two lines run beside each other, not across
-ON_FOOT_MARGIN = 0.4  # m, kept besides `SIDE_MARGIN` to who has no body of steel
+ON_FOOT_MARGIN = 0.4  # m, kept besides `SIDE_MARGIN` to vulnerable road users
 
 
 @kernel
@@ -73,21 +73,21 @@ def locate_on_way(way, n, ds, guess, x, y, h):
 
 @kernel
 def add_passage(passages, count, zone, q, w, half, e, gain, rank):
-    """Append a passage; return how many there are."""
+    """Append a passage; return their number."""
     if count == passages.shape[0]:
         return count
     for i in range(ZONE):
         passages[count, i] = zone[i]
     passages[count, STATION], passages[count, SPEED] = q, w
     passages[count, FRONT] = passages[count, REAR] = half
-    passages[count, WHO] = e
+    passages[count, ENTITY] = e
     passages[count, GAIN], passages[count, RANK] = gain, rank
     return count + 1
 
 
 @kernel
 def add_straight(path, n, ds, s, ahead, own_width, track, e, gain, passages, count):
-    """Append the passage of a track that goes straight on, if that crosses the ego's route."""
+    """Append the passage of a track straight ahead, if that crosses the ego's route."""
     w = math.hypot(track[VX], track[VY])
     if w < 3.0 * STANDING or count == passages.shape[0]:
         return count
@@ -120,12 +120,12 @@ def add_straight(path, n, ds, s, ahead, own_width, track, e, gain, passages, cou
 @kernel
 def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, counts, steps, zones,
             ranks, first, feet, passages):  # fmt: skip
-    """Fill ``passages`` by the map and the tracks; return how many there are.
+    """Fill ``passages`` by the map and the tracks; return their number.
 
     ``ways`` ``(W, L, 6)`` are those that the map offers, entity e's from ``first[e]`` to
-    ``first[e + 1]``; ``zones`` ``(W, ZONE)`` tells where each meets the ego's route, and ``ranks``
-    ``(W,)`` who waits there; ``feet`` ``(W,)`` remembers the station of the entity on it. On a
-    route that the zones are not for (``known``), everybody is expected straight ahead.
+    ``first[e + 1]``; ``zones`` ``(W, ZONE)`` is where each meets the ego's route, and ``ranks``
+    ``(W,)`` which of the two gives way there; ``feet`` ``(W,)`` keeps the station of the entity on
+    it. Unless the zones are for this route (``known``), all are expected straight ahead.
     """
     count = 0
     for e in range(1, tracks.shape[0]):
@@ -160,11 +160,11 @@ def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, count
 @kernel
 def predict_truly(path, n, ds, s, ahead, own_width, tracks, around, paths, counts, steps, zones,
                   ranks, station, on, to, foot, passages):  # fmt: skip
-    """Fill ``passages`` by everybody's true way; return how many there are.
+    """Fill ``passages`` by the entities' true ways; return their number.
 
     ``station`` and ``foot`` are where the entities are on the paths ``on`` and ``to`` (-1: none);
-    ``ranks`` say who waits for whom, of the first paths. Who is on foot or on a bicycle goes
-    straight on, and is given more room.
+    ``ranks`` are the rights of way of the first paths. Vulnerable road users are also expected
+    straight ahead, with a larger margin.
     """
     count = 0
     for e in range(1, tracks.shape[0]):

@@ -1,7 +1,7 @@
 """The reference ego: sensors → tracks → prediction → planning → control.
 
-Each is a kernel file of its own; here they are joined. The planner sees tracks only, and thinks ten
-times a second; control acts at every instant. What the driver keeps in mind between two instants is
+Each stage is a kernel file of its own; this one joins them. The planner sees tracks only, and plans
+ten times a second; control acts at every instant. The driver's state between two instants is
 ``mind`` ``(MIND,)``, zeros before the first.
 """
 
@@ -44,10 +44,10 @@ from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego._yielding_kernels import yield_to_all
 
 PLANNED, NEXT_PLAN, STOPS_FOR = control.SIZE, control.SIZE + 1, control.SIZE + 2
-"""What it plans to do [m/s²], when it thinks again [s], and 1 + the light that it stops for."""
+"""Planned acceleration [m/s²], time of the next plan [s], 1 + the light that it stops for."""
 
 HALTED = LAST
-"""Where it has halted for a stop sign last [m]."""
+"""Station of the stop sign at which it halted last [m]."""
 
 MIND = LAST + 1
 
@@ -58,7 +58,7 @@ PLANNING_TIME = 6.0  # s, … and how far in time, at the present speed
 
 @kernel
 def reach_of(v):
-    """Return how far ahead on its route [m] the planner minds others."""
+    """Return how far ahead on its route [m] the planner considers other participants."""
     return max(PLANNING_REACH + PLANNING_TIME * v, scan_length(v))
 
 
@@ -70,27 +70,27 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
 
     Args:
         path: the ego's route, ``(n, 6)``.
-        road: what is along it, ``(n, ROAD)``.
+        road: the road along it, ``(n, ROAD)``, see `bridgegen.ego.scene.road_along`.
         n: its samples.
-        road_n: those of ``road``; 0 where the map says nothing along this route.
+        road_n: those of ``road``; 0 where the map has no data along this route.
         ds: between two of them [m].
         s: the ego's station on it [m].
         v: its speed [m/s].
         body: its row of bodies.
         target: the speed that the storyboard asks for [m/s].
         friction_limit: [m/s²].
-        seen: how far it sees somebody [m].
+        seen: how far it sees a pedestrian or vehicle [m].
         light_seen: how far it sees a light [m].
         in_town: whether people may walk here.
-        around: the others, from the route.
-        tracks: the others, in the world.
-        passages: what is predicted of them.
+        around: the other participants, relative to the route.
+        tracks: the other participants, in the world.
+        passages: their predicted passages.
         n_passages: how many passages there are.
         crosswalks: that the route leads over.
         stop_stations: of the stop lines of lights, +inf where not on the route [m].
         halts: stations of the lines of stop signs [m].
         lights: their states.
-        elapsed: since it was asked last [s].
+        elapsed: since the last plan [s].
         mind: see above.
     """
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
@@ -152,7 +152,7 @@ def drive(k, plan_, roads, state, record):
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)
         p = state.on[0]
-        # What the map says is known along the first route; on another one it goes by sight.
+        # The map's data are known along the first route only; on another one it drives on sight.
         known = p == 0
         path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
         road_n = n if known else 0

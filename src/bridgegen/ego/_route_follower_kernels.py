@@ -1,4 +1,4 @@
-"""The paper's baseline ego: holds its target speed on its route and sees nobody (Section V-A)."""
+"""The paper's baseline ego: holds its target speed on its route, ignores traffic (Section V-A)."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -13,7 +13,7 @@ SPEED_TIME = 0.5  # s, time constant of the speed controller
 
 @kernel
 def preview(v):
-    """Return how far ahead [m] of the rear axle the point lies that it steers for."""
+    """Return the preview distance [m] from the rear axle to the point that it steers for."""
     return min(max(PREVIEW * v, PREVIEW_MIN), PREVIEW_MAX)
 
 

@@ -56,7 +56,7 @@ DROPOUTS, ERRORS, OTHERS = 0, 1, 2
 
 @kernel
 def draw(memory, e, key, frame, renew, keep):
-    """Bring a body's random numbers up to a frame.
+    """Advance a body's random numbers to a frame.
 
     Args:
         memory: ``(E, MEMORY)``.
@@ -146,7 +146,7 @@ def observe(memory, e, bodies, kind, weather, heading, height, share, detections
     detections[e, k, SEEN_BY] = BOTH if by_camera and by_lidar else CAMERA if by_camera else LIDAR
     detections[e, k, X] = memory[e, DX] + along * ux - across * uy
     detections[e, k, Y] = memory[e, DY] + along * uy + across * ux
-    coarse = 1.0 if by_lidar else 2.0  # a picture alone tells sizes and headings half as well
+    coarse = 1.0 if by_lidar else 2.0  # an image alone gives sizes and headings half as well
     stretch = max(1.0 + coarse * BOX_ERROR * memory[e, SIZE], 0.5)
     detections[e, k, LENGTH] = bodies[e, 0] * stretch
     detections[e, k, WIDTH] = bodies[e, 1] * stretch

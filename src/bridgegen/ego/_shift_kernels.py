@@ -1,4 +1,4 @@
-"""The ego's course beside its route: by how much, and how it gets from one offset to another.
+"""The ego's course beside its route: its offset, and how that changes.
 
 A shift is four numbers: an offset to the left of the route [m], the one that follows, the station
 where the change begins, and its length [m]. Between them is a quintic whose slope and bend are 0 at

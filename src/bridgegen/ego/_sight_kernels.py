@@ -1,4 +1,4 @@
-"""How far one sees in this weather: the distance at which half of the frames show a thing.
+"""Range of sight in this weather: the distance at which half of the frames show a thing.
 
 `sight` reads it from a table by thing and angle to the sun, which it fills first if the weather is
 new.

@@ -1,4 +1,4 @@
-"""How fast the road lets one drive: limits, bends, and what can be seen in time."""
+"""Speed that the road allows: limits, bends, and sight."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -10,7 +10,7 @@ from bridgegen.ego._following_kernels import COMFORT_DECELERATION
 from bridgegen.ego._path_kernels import CURVATURE
 
 LIMIT = 0  # column of the road ahead: the speed limit [m/s], +inf if none is posted
-LEFT, RIGHT = 1, 2  # m, to the centre of the lane beside that goes the same way; 0: there is none
+LEFT, RIGHT = 1, 2  # m, to the centre of the adjacent lane of the same direction; 0: none
 ROAD = 3
 
 LATERAL_COMFORT = 3.0  # m/s², in bends; drivers keep below 4 (UN R79 annex 3 allows 3)
@@ -19,7 +19,7 @@ SCAN_STEP = 1.0  # m, between the points of its route that it looks at
 REACTION = 0.5  # s, from seeing to braking: perception, confirmation, build-up
 SIGHT_SHARE = 0.7  # of the friction limit with which it could stop within what it sees
 SIGHT_MARGIN = 3.0  # m, left then
-FAST_ROAD = 17.0  # m/s; where more is allowed nobody walks (60 km/h; StVO § 18 Abs. 1)
+FAST_ROAD = 17.0  # m/s; above this limit pedestrians are excluded (60 km/h; StVO § 18 Abs. 1)
 
 
 @kernel

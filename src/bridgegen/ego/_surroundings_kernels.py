@@ -1,6 +1,6 @@
-"""Each track as seen from the ego's route: how far along it, how far beside, and how it moves.
+"""Each track relative to the ego's route: station, offset and motion.
 
-``around`` ``(E, AROUND)`` has a row per track; it is what following, avoidance and caution go by.
+``around`` ``(E, AROUND)`` has a row per track; following, avoidance and caution read it.
 """
 
 # mypy: allow-untyped-defs
@@ -37,7 +37,7 @@ def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
     """Fill ``around``.
 
     ``behind`` and ``ahead`` [m] are how far along its route from s the ego looks; ``elapsed``
-    [s] have passed since this was done last.
+    [s] is the time since the last call.
     """
     share = 1.0 - math.exp(-elapsed / MEMORY_OF_GAIN)
     stride = max(int(COARSE / ds), 1)

@@ -1,9 +1,8 @@
-"""From detections to tracks: what the planner knows of the others.
+"""From detections to tracks: what the planner knows of other participants.
 
-A track is a row of ``tracks`` ``(E, TRACK)``; row e is entity e, for association is taken as
-perfect. Per axis of the world a Kalman filter estimates position and velocity; a track is
-tentative until enough of its last frames have seen it, coasts on at its velocity when they miss
-it, and is dropped when they go on doing so.
+A track is a row of ``tracks`` ``(E, TRACK)``; row e is entity e, since association is perfect. Per
+axis of the world a Kalman filter estimates position and velocity; a track is tentative until enough
+of its last frames have seen it, coasts at its velocity when they miss it, and is then dropped.
 """
 
 # mypy: allow-untyped-defs
@@ -17,14 +16,14 @@ STATE, X, Y, H, VX, VY, LENGTH, WIDTH, KIND, CONFIDENCE, UNSEEN, AGE = range(12)
 TRACK = 12
 NONE, TENTATIVE, CONFIRMED, COASTING = 0, 1, 2, 3
 
-# What it remembers of a track besides, in the first columns of ``memory`` ``(E, MEMORY)``: its last
+# Further state of a track, in the first columns of ``memory`` ``(E, MEMORY)``: its last
 # frames as bits, and the covariance of each axis: of position, of position and velocity, of
 # velocity.
 HISTORY, PX, PY = 0, 1, 4
 MEMORY = 7
 
 CONFIRM, OF = 3, 5  # frames: seen in 3 of the last 5; Blackman, Popoli, Modern Tracking Systems
-COAST = 1.0  # s, a confirmed track lives on unseen
+COAST = 1.0  # s, how long a confirmed track lives unseen
 MANOEUVRE = 4.0  # m²/s³, of white-noise acceleration: ±2 m/s unforeseen in a second
 FASTEST = 15.0  # m/s, standard deviation of the velocity of what has just been seen
 SMOOTHING = 0.3  # of heading, box and confidence, per frame
@@ -116,7 +115,7 @@ def forget(tracks, e):
 
 @kernel
 def miss(tracks, memory, e):
-    """Tell a track that a frame has not seen it."""
+    """Update a track that a frame has missed."""
     if tracks[e, STATE] == NONE:
         return
     memory[e, HISTORY] = float((int(memory[e, HISTORY]) << 1) & (2**OF - 1))

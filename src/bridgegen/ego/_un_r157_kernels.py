@@ -1,4 +1,4 @@
-"""The competent and careful human driver of UN Regulation 157 (ALKS), made to drive.
+"""The competent and careful human driver of UN Regulation 157 (ALKS) as a driver.
 
 The driver reacts to the regulation's three disturbances, and to nothing else in an emergency:
 
@@ -14,7 +14,7 @@ It takes its foot off the accelerator (0.4 m/s²); 0.75 s later it brakes, by 12
 Otherwise it follows its route and, as the regulation takes for granted, the vehicle ahead on its
 way: by the intelligent driver model and, where a comfortable deceleration does not do, as hard as
 needed, up to 0.774 g. It does not look beyond the vehicle ahead. It does not brake for crossing or
-oncoming traffic, nor for anybody on foot; `_careful_kernels` does.
+oncoming traffic, nor for pedestrians; `_careful_kernels` does.
 
 The text of the regulation adds 0.4 s of perception to each disturbance, and lets it begin in a
 cut-in at 0.375 m of lateral movement. The Commission's code, agreed upon with the model's authors,
@@ -50,7 +50,7 @@ BRAKES_HARD = 5.0  # m/s², of the vehicle ahead
 RELEASE = 0.4  # m/s², with the foot off the accelerator; source: JRC-FSM
 SPARE = 1.0  # m, left to the vehicle ahead where following takes more than comfort
 
-SEES = 100.0  # m beyond the distance that it takes to stop, up to which it looks at anybody
+SEES = 100.0  # m beyond its stopping distance, up to which it considers bodies
 
 ASIDE, ON_WAY = 0, 1
 RISK, ASKED, THREAT = 0, 1, 2
@@ -75,13 +75,13 @@ def drive_un_r157(
     k, dt, paths, path_n, path_ds, station, on, planned, present, x, y, h, speed, bodies, kinds,
     attention,
 ):  # fmt: skip
-    """Return the acceleration [m/s²] that the driver asks for at instant k, ``dt`` [s] apart.
+    """Return the acceleration [m/s²] that the driver demands at instant k, ``dt`` [s] apart.
 
     The ego wants to go at ``planned`` [m/s]. Of all bodies, the ego first: the path that each is
     ``on`` (a row of ``paths``, ``path_n`` and ``path_ds``) and its ``station`` [m] there, of both
-    of which the ego's alone is read; who is ``present``; ``x``, ``y``, ``h``, ``speed`` ``(E, T)``,
-    of which nothing after instant k is read; ``bodies`` ``(E, ·)``; their ``kinds`` ``(E,)``; and
-    ``attention`` ``(E, 3)``, zeros before the first instant, changed in place.
+    of which only the ego's is read; whether it is ``present``; ``x``, ``y``, ``h``, ``speed``
+    ``(E, T)``, of which nothing after instant k is read; ``bodies`` ``(E, ·)``; their ``kinds``
+    ``(E,)``; and ``attention`` ``(E, 3)``, zeros before the first instant, changed in place.
     """
     v, own = speed[0, k], on[0]
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)

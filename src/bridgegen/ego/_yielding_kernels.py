@@ -1,17 +1,16 @@
-"""Where two paths conflict, and whether to go first.
+"""Conflict zones of two paths, and whether to go first.
 
 A conflict zone is a row of `ZONE` numbers: where the ego's route enters and leaves it [m], where
-the other's path does [m], whether they are `ACROSS`, merge and go on together (`MERGE`), or go
-together for a while and `PART` again, as in a roundabout; and the `EDGE`: the last station of the
-ego's bumper [m] at which it does not touch a body on the other's path, which is farther on than
-where the zone begins, for that keeps a margin. No zone: infinity. A passage begins with its zone,
-see ``_prediction_kernels``.
+the other's path does [m], whether they cross (`ACROSS`), merge (`MERGE`), or share a stretch and
+`PART` again, as in a roundabout; and the `EDGE`: the last station of the ego's bumper [m] at which
+it does not touch a body on the other's path. The zone itself begins earlier, by a margin. No zone:
+infinity. A passage begins with its zone, see ``_prediction_kernels``.
 
-Whoever comes first goes first, with a margin in time, a larger one where the ego has to wait by the
+The first to arrive goes first, with a margin in time, a larger one where the ego has to wait by the
 rules; the ego gives way wherever that is in doubt, and does not wait where another actor will pass
 (StVO § 11). Where a sign makes the other wait, the ego goes first as long as the other can still
 stop. An ego that stands or creeps with its bumper in the zone waits there until it can pass;
-one that is faster stops again only if both would meet and it can still stop before the edge.
+a faster one stops again only if both would meet and it can still stop before the edge.
 """
 
 # mypy: allow-untyped-defs
@@ -30,31 +29,31 @@ from bridgegen.ego._path_kernels import COS, SIN, X, Y
 from bridgegen.ego._shift_kernels import aside_at
 
 SIDE_MARGIN = 0.6  # m, kept to another body's side
-TIME_MARGIN = 1.0  # s, kept between two bodies' turns at one point, …
+TIME_MARGIN = 1.0  # s, kept between two bodies' passages of one point, …
 WAITING_MARGIN = 1.5  # … where the ego has to wait
-GOES_ON = 2.0  # s, for which others go on speeding up or braking, …
+GOES_ON = 2.0  # s, for which other actors keep accelerating or braking, …
 MOST_GAIN = 3.0  # m/s², … by no more than this, …
-LEAST_GAIN = 1.0  # … if by more than this, which tracking does not invent (95 % within 0.7)
-CAN_STOP = 2.0  # m/s²; who needs less than that to stop before the conflict, can wait
-COMMITTED = 0.8  # of the friction limit; who would need more to stop before a conflict, goes on
+LEAST_GAIN = 1.0  # … if by more than this, above the noise of tracking (95 % within 0.7)
+CAN_STOP = 2.0  # m/s²; an actor that needs less to stop before the conflict can wait
+COMMITTED = 0.8  # of the friction limit; if stopping before a conflict needs more, the ego goes on
 BUILD_UP = 0.3  # s, until the ego's own acceleration has built up
-TAIL_MARGIN = 1.0  # m, kept to the tail of who has passed
+TAIL_MARGIN = 1.0  # m, kept to the rear of an actor that has passed
 KEEP_CLEAR_ROUNDS = 3  # zones that overlap in a row, at most
 HORIZON = 10.0  # s, how far ahead arrivals are compared
 ENTER, LEAVE, OTHER_ENTERS, OTHER_LEAVES, HOW, EDGE = range(6)
 ZONE = 6
 """Columns of a zone, and how many there are."""
-STATION, SPEED, FRONT, REAR, WHO, GAIN, RANK = range(ZONE, ZONE + 7)
+STATION, SPEED, FRONT, REAR, ENTITY, GAIN, RANK = range(ZONE, ZONE + 7)
 """Columns of a passage after its zone."""
 
 ACROSS, MERGE, PART = 0.0, 1.0, 2.0
-TOGETHER = 8.0  # m; ways that lead the same way for less only cross
+TOGETHER = 8.0  # m; ways that run together for less only cross
 
-SCAN_STEP = 0.5  # m, between the points of a way that are looked at
-SAME_WAY = 0.9  # cosine of the heading difference above which two ways go on together
-STANDING = 0.1  # m/s, who is slower stands
+SCAN_STEP = 0.5  # m, between the sampled points of a way
+SAME_WAY = 0.9  # cosine of the heading difference above which two ways run together
+STANDING = 0.1  # m/s, below which an actor stands
 CREEPING = 1.5  # m/s, from which the ego stops within 0.6 m, comfortably
-ELSEWHERE = 1.5  # m beside its route, the ego is not in the way of who joins that
+ELSEWHERE = 1.5  # m beside its route, where the ego does not obstruct actors that join it
 
 
 @kernel
@@ -102,7 +101,7 @@ def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone
 
 @kernel
 def time_to(distance, v, pace):
-    """Return when a distance [m] is covered by who speeds up comfortably from v to a pace [m/s]."""
+    """Return the time [s] to cover a distance [m], accelerating comfortably from v to ``pace``."""
     pace = max(pace, v, 1.0)
     gained = (pace * pace - v * v) / (2.0 * COMFORT_ACCELERATION)
     if distance <= gained:
@@ -112,9 +111,9 @@ def time_to(distance, v, pace):
 
 @kernel
 def place_on_route(zone, q):
-    """Return where on the ego's route [m] somebody is, counted from the common end of both ways.
+    """Return the other's station on the ego's route [m], from the common end of both ways.
 
-    Of two ways that part again, from their common beginning.
+    If the ways part again: from their common beginning.
     """
     if zone[HOW] == PART:
         return zone[ENTER] + q - zone[OTHER_ENTERS]
@@ -123,9 +122,9 @@ def place_on_route(zone, q):
 
 @kernel
 def coming(distance, w, gain):
-    """Return when [s] somebody at speed w > 0 has come so far, if its speed changes for a while.
+    """Return when [s] an actor has covered a distance; ``gain`` changes its speed for `GOES_ON`.
 
-    A ``gain`` < 0 must leave it some speed.
+    Its speed w must be > 0, and stay so.
     """
     if gain == 0.0 or distance <= 0.0:
         return distance / w
@@ -137,20 +136,20 @@ def coming(distance, w, gain):
 
 @kernel
 def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other_rear):
-    """Return what one other body asks for: (an acceleration [m/s²], a station to stop at [m]).
+    """Return what one other body requires: (an acceleration [m/s²], a station to stop at [m]).
 
-    Either is +inf where it asks nothing of the kind. The ego is at station s of its route at speed
-    v, and would go on at ``pace``; the other is at q of its way, at speed w which changes by
-    ``gain``; ``rank`` says who waits (``right_of_way``). Bodies reach ``front`` and ``rear`` [m]
-    ahead of and behind these stations.
+    Each is +inf where it is not required. The ego is at station s of its route at speed v, and
+    would go on at ``pace``; the other is at q of its way, at speed w which changes by ``gain``;
+    ``rank`` is the right of way (``right_of_way``). Bodies reach ``front`` and ``rear`` [m] ahead
+    of and behind these stations.
     """
     together = zone[HOW] != ACROSS
     if s - rear > zone[LEAVE] or (q - other_rear > zone[OTHER_LEAVES] and zone[HOW] != MERGE):
         return math.inf, math.inf
-    to_enter = zone[ENTER] - front - s  # what is left until our bumper is in
+    to_enter = zone[ENTER] - front - s  # from the ego's bumper to the zone
     inside = q + other_front > zone[OTHER_ENTERS]
     if together and inside:
-        # It drives before us, or will: its place on our route.
+        # It is ahead of the ego, or will be: its station on the ego's route.
         ahead = place_on_route(zone, q)
         if ahead >= s:
             return follow(ahead - other_rear - front - s, v, w, min(gain, 0.0)), math.inf
@@ -170,7 +169,7 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
     if is_in and moves:
         margin = 0.0  # it has begun to cross
     elif rank < 0 and together:
-        # Nor must it have to brake much for us, who may be slower.
+        # The other must not have to brake much for a slower ego either.
         gained = v * v + 2.0 * COMFORT_ACCELERATION * max(to_enter, 0.0)
         margin += max(w - math.sqrt(gained), 0.0) / CAN_STOP
     through = front + rear + (0.0 if together else zone[LEAVE] - zone[ENTER])
@@ -187,9 +186,9 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
 
 @kernel
 def keep_clear(s, front, rear, length, zone, q, w, other_rear, stop):
-    """Return where to stop [m] so as not to stand in another one's way while stopping at ``stop``.
+    """Return where to stop [m], if not at ``stop``, so as not to block another actor's way.
 
-    ``length`` is the ego's [m]; the rest as of `give_way`.
+    ``length`` is the ego's [m]; the rest as for `give_way`.
     """
     gone = q - other_rear > zone[OTHER_LEAVES] or w < STANDING
     if gone or zone[ENTER] - front - s <= 0.0 or zone[ENTER] >= stop or stop - length > zone[LEAVE]:
@@ -199,7 +198,7 @@ def keep_clear(s, front, rear, length, zone, q, w, other_rear, stop):
 
 @kernel
 def is_left(shift, s, passage):
-    """Say whether the ego is in another lane where somebody comes, or is, to go its route's way."""
+    """Return whether the ego has left its route's lane where the passage joins the route."""
     if passage[HOW] == ACROSS or shift[0] == shift[1] == 0.0:
         return False
     place = max(s, passage[ENTER], place_on_route(passage, passage[STATION]))
@@ -208,9 +207,9 @@ def is_left(shift, s, passage):
 
 @kernel
 def yield_to_all(s, v, pace, front, rear, shift, friction_limit, passages, count):
-    """Return the acceleration [m/s²] that all predicted passages ask for; +inf if none does.
+    """Return the acceleration [m/s²] that all predicted passages require; +inf if none does.
 
-    Who comes into a lane that the ego's ``shift`` has left, or will have, asks for nothing.
+    Passages into a lane that the ego's ``shift`` has left, or will have left, are ignored.
     """
     asked, stop = math.inf, math.inf
     for i in range(count):

@@ -6,10 +6,9 @@
     def drive(scene, ego, route, tracks, memory):
         return acceleration, curvature
 
-It is written in the Python that numba compiles and called inside the rollout, so that it costs
-what it computes. It is told of one scenario what a class is told of many (`Observation`, `Scene`),
-by the names of ``SCENE``, ``EGO``, ``ROUTE`` and ``TRACK``: ``ego.v``, ``route[3].x``,
-``tracks[0].vx``.
+It is written in the Python that numba compiles, and called inside the rollout without overhead. It
+gets for one scenario what a class gets for many (`Observation`, `Scene`), in records with the
+fields of ``SCENE``, ``EGO``, ``ROUTE`` and ``TRACK``: ``ego.v``, ``route[3].x``, ``tracks[0].vx``.
 """
 
 import inspect
@@ -44,14 +43,14 @@ ROUTE = _record("x", "y", "h", "curvature")
 TRACK = _record(
     "state", "x", "y", "h", "vx", "vy", "length", "width", "kind", "confidence", "unseen", "age"
 )  # fmt: skip
-"""One of the M others as the sensors have them, see `Observation.tracks`."""
+"""One of the M other participants as the sensors track them, see `Observation.tracks`."""
 
-TOLD = (SCENE, EGO, ROUTE, TRACK, np.dtype(np.float64))
-"""What each argument is made of; scene and ego are one record, the others arrays of them."""
+ARGUMENT_TYPES = (SCENE, EGO, ROUTE, TRACK, np.dtype(np.float64))
+"""The record type of each argument; scene and ego are one record, the others arrays of them."""
 
 
 class CompiledDriver:
-    """A driver that `compiled_driver` has made of a function; calling it calls the function.
+    """A driver that `compiled_driver` makes from a function; calling it calls the function.
 
     Attributes:
         memory: how many numbers it keeps between two instants.
@@ -62,16 +61,16 @@ class CompiledDriver:
         self.memory = memory
         self._code: Any = None  # keeps the machine code where it is
 
-    def __call__(self, *told: Any) -> tuple[float, float]:
-        """Call the function in Python, to try it or to look into it."""
-        return self._function(*told)
+    def __call__(self, *arguments: Any) -> tuple[float, float]:
+        """Call the function in Python, to test or debug it."""
+        return self._function(*arguments)
 
     @property
     def address(self) -> int:
-        """Where its machine code lies, compiled if need be; see `compiled.call_at`.
+        """The address of its machine code, compiled if need be; see `compiled.call_at`.
 
-        The arguments are arrays of the types of ``TOLD``, and one for the answer: acceleration,
-        curvature, and a 1 if it has returned and not raised an error.
+        The arguments are arrays of the types of ``ARGUMENT_TYPES``, and one for the answer:
+        acceleration, curvature, and a 1 if it has returned and not raised an error.
 
         Raises:
             InputError: numba cannot compile it, with the reason and the line.
@@ -85,18 +84,18 @@ class CompiledDriver:
 def compiled_driver(
     *, memory: int = 0
 ) -> Callable[[Callable[..., tuple[float, float]]], CompiledDriver]:
-    """Make a driver of a function ``(scene, ego, route, tracks, memory)``.
+    """Make a driver from a function ``(scene, ego, route, tracks, memory)``.
 
     The function returns the acceleration [m/s²] and the curvature [1/m] that it demands, see
-    `Control`. What it is told are copies. Indices are checked; a division by zero is IEEE 754's.
+    `Control`. Its arguments are copies. Indices are checked; division by zero follows IEEE 754.
 
     Args:
         memory: how many numbers it keeps: ``memory`` is ``(memory,)`` float64, zeros at the start
-            of each scenario, and else as the function left it. There is no other place to keep
-            anything: numba takes globals for constants.
+            of each scenario, later as the function left it. No other state persists: numba
+            treats globals as constants.
 
     Raises:
-        InputError: a negative or no whole number.
+        InputError: not a whole number >= 0.
     """
     if not isinstance(memory, int) or memory < 0:
         raise InputError(f"memory must be a whole number >= 0, got {memory!r}")
@@ -109,12 +108,12 @@ def _compile(function: Callable[..., Any]) -> Any:
 
     if numba.config.DISABLE_JIT:
         raise InputError("a compiled driver must be compiled, which NUMBA_DISABLE_JIT forbids")
-    if len(inspect.signature(function).parameters) != len(TOLD):
+    if len(inspect.signature(function).parameters) != len(ARGUMENT_TYPES):
         raise InputError(
             f"{_place(function)}: {function.__name__} must take scene, ego, route, tracks, memory"
         )
     code = numba.njit(nogil=True, error_model="numpy", boundscheck=True)(function)
-    kinds = [numba.from_dtype(kind) for kind in TOLD]
+    kinds = [numba.from_dtype(kind) for kind in ARGUMENT_TYPES]
     arrays = [numba.types.Array(kind, 1, "C", aligned=kind is kinds[-1]) for kind in kinds[2:]]
     try:
         code.compile((*kinds[:2], *arrays))
@@ -129,7 +128,7 @@ def _compile(function: Callable[..., Any]) -> Any:
         return _callback(code)
     except InputError:
         raise
-    except Exception as error:  # numba lets through what its passes happen to raise
+    except Exception as error:  # numba's passes raise exceptions of any type
         raise InputError(_described(function, error)) from None
 
 
@@ -137,7 +136,7 @@ def _callback(code: Any) -> Any:
     import numba
     from numba import carray
 
-    scene_type, ego_type, route_type, track_type, number = TOLD
+    scene_type, ego_type, route_type, track_type, number = ARGUMENT_TYPES
 
     def call(scene, _1, ego, _2, route, n, tracks, m, memory, size, answer, _3):  # type: ignore[no-untyped-def]
         acceleration, curvature = code(
@@ -157,7 +156,7 @@ def _callback(code: Any) -> Any:
 def _described(function: Callable[..., Any], error: Exception) -> str:
     """Return in one line why numba cannot compile a function."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
-    if isinstance(error, KeyError):  # a field that a record has not
+    if isinstance(error, KeyError):  # a field that the record lacks
         text = f"there is no field {text}"
         line = _line_with(function, f".{error.args[0]}")
         return f"{_place(function, line)}: {function.__name__} cannot be compiled: {text}"

@@ -1,4 +1,4 @@
-"""What a detector of the user's own is told, a frame, and what it answers, boxes.
+"""A user's own detector: it gets a frame and returns boxes.
 
 A detector is a class without arguments:
 
@@ -7,8 +7,8 @@ A detector is a class without arguments:
         def detect(self, frame): return Boxes(kinds, confidence, pixels=pixels)
 
 ``reset`` comes before the first frame of every scenario, ``detect`` once per frame. It looks at
-rendered frames, so it needs a simulator that renders (``--simulator carla --detector …``). What it
-answers is measured (iou, e_position, map); the ego's driver does not see it.
+rendered frames, so it needs a simulator that renders (``--simulator carla --detector …``). Its
+boxes are measured (iou, e_position, map); the ego's driver does not get them.
 
 The ego's frame: x ahead, y to the left, z up [m] from its reference point, the rear axle's centre
 on the ground.
@@ -28,7 +28,7 @@ from bridgegen.errors import InputError
 
 @dataclass(frozen=True)
 class Frame:
-    """One instant of one scenario, as sensors have it.
+    """One instant of one scenario, as the sensors record it.
 
     Attributes:
         time: since the scenario's start [s].
@@ -48,16 +48,16 @@ class Frame:
 
 @dataclass(frozen=True)
 class Boxes:
-    """What a detector makes of a frame: n things, as boxes in space or in the image.
+    """A detector's result for a frame: n objects, as boxes in space or in the image.
 
     Attributes:
-        kinds: ``(n,)``, what they are, see ``bridgegen.ego.kinds``.
+        kinds: ``(n,)``, their classes, see ``bridgegen.ego.kinds``.
         confidence: ``(n,)``, 0 to 1.
         boxes: ``(n, 7)``: x, y, z of the middle [m], length, width, height [m], heading [rad], in
             the ego's frame; or None.
-        pixels: ``(n, 4)``: left, top, right, bottom [pixels]; or None. What is in the image alone
-            is placed by its lower edge, which stands on a level road; its size and heading are
-            taken to be the truth's, so that IoU, then, is of the place alone.
+        pixels: ``(n, 4)``: left, top, right, bottom [pixels]; or None. A box of the image is
+            placed by its lower edge, which stands on a level road; its size and heading are
+            taken from the truth, so that IoU then measures the position alone.
     """
 
     kinds: npt.ArrayLike
@@ -70,15 +70,15 @@ class Detector(Protocol):
     """A detector of one scenario at a time."""
 
     def reset(self) -> None:
-        """Begin a scenario; forget all earlier ones."""
+        """Begin a scenario; discard the state of earlier ones."""
 
     def detect(self, frame: Frame) -> Boxes | Any:
-        """Answer one frame."""
+        """Return the boxes of one frame."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """A detector's answer, of sound form.
+    """A detector's valid result.
 
     Attributes:
         kinds: ``(n,)`` int64.
@@ -100,7 +100,7 @@ def load(spec: str) -> Detector:
         spec: ``package.module:Class`` or ``file.py:Class``.
 
     Raises:
-        InputError: there is none, or it lacks a method.
+        InputError: there is no such detector, or it lacks a method.
     """
     where, _, name = spec.rpartition(":")
     if not where:
@@ -122,10 +122,10 @@ def load(spec: str) -> Detector:
 
 
 def checked(answer: Any) -> Checked:
-    """Return a detector's answer as arrays.
+    """Return a detector's result as arrays.
 
     Raises:
-        ValueError: of another form, not finite, or out of range.
+        ValueError: wrong type or shape, not finite, or out of range.
     """
     if not isinstance(answer, Boxes):
         raise ValueError(f"detect must return Boxes, got {type(answer).__name__}")

@@ -1,7 +1,7 @@
-"""A user's driver in a process of its own, so that what it does cannot end a search.
+"""A user's driver in a process of its own, so that it cannot end a search.
 
-A driver that raises, that takes too long or that takes its process down with it costs the row that
-it was driving, and nothing else: the process is ended, and another is begun for the next batch.
+A driver that raises, times out or crashes its process costs only the row that it was driving: the
+process is ended, and another is started for the next batch.
 """
 
 import importlib
@@ -24,11 +24,11 @@ from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
 START_SECONDS = 120.0
-"""A driver may take so long to be imported and made: a network to be loaded, say."""
+"""Time limit [s] to import and construct a driver, which may load a network."""
 
 
 class DriverError(CallError):
-    """A driver did not answer, or answered nonsense.
+    """A driver did not answer, or its answer is invalid.
 
     Attributes:
         kind: "raised", "timed out", "died" or "answered nonsense".
@@ -36,7 +36,7 @@ class DriverError(CallError):
 
 
 class DriverProcess:
-    """A driver that lives in another process; begun when it is first needed.
+    """A driver that runs in another process, which starts when it is first needed.
 
     Args:
         spec: ``package.module:Class``, ``file.py:Class``, the same of a compiled driver's function,
@@ -44,8 +44,8 @@ class DriverProcess:
         time_limit: seconds that a call may take.
 
     Attributes:
-        memory: how many numbers a compiled driver keeps; None of one that is asked in Python. Known
-            when the process has begun.
+        memory: how many numbers a compiled driver keeps; None for one called in Python. Known
+            when the process has started.
     """
 
     memory: int | None
@@ -62,10 +62,10 @@ class DriverProcess:
         self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
-        """Begin the process, if it is not running, and make the driver in it.
+        """Start the process, if it is not running, and construct the driver in it.
 
         Raises:
-            InputError: there is no such module or class, or it cannot be made.
+            InputError: there is no such module or class, or it cannot be constructed.
         """
         if self._process.runs:
             return
@@ -85,11 +85,11 @@ class DriverProcess:
         self._process.ask("reset", n, scene, seconds=self.time_limit)
 
     def act(self, observation: Observation) -> tuple[Float, Float]:
-        """Return what it demands, ``(N,)`` acceleration [m/s²] and curvature [1/m].
+        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m].
 
         Raises:
-            DriverError: it raised, timed out, died, or answered nonsense: another shape, NaN or an
-                infinite value for a scenario that is running.
+            DriverError: it raised, timed out, died, or its answer is invalid: another shape, NaN or
+                an infinite value for a scenario that is running.
         """
         demanded: tuple[Float, Float] = self._process.ask(
             "act", observation, seconds=self.time_limit
@@ -103,12 +103,12 @@ class DriverProcess:
         progress: Callable[[], int] | None = None,
         seconds: float | None = None,
     ) -> Any:
-        """Have a function of ours called in the process, with the compiled driver's address first.
+        """Call a function in the process, with the compiled driver's address first.
 
         Args:
             function: importable by its name.
-            arguments: of the function, besides.
-            progress: what changes while it gets on; the limit is for each change.
+            arguments: its further arguments.
+            progress: returns a number that changes as it proceeds; the limit is for each change.
             seconds: the limit; the driver's by default.
 
         Raises:
@@ -120,11 +120,11 @@ class DriverProcess:
         return self._process.ask("call", function, *arguments, progress=progress, seconds=limit)
 
     def kill(self) -> None:
-        """End the process from another thread: who waits for it gets a `DriverError`."""
+        """End the process from another thread; pending calls raise a `DriverError`."""
         self._process.kill()
 
     def close(self) -> None:
-        """End the process, if it is running; so does this object's end."""
+        """End the process, if it is running; deleting this object does so too."""
         self._process.close()
 
 
@@ -132,11 +132,11 @@ class DriverProcess:
 
 
 def make(spec: str) -> BatchDriver | CompiledDriver:
-    """Make a driver.
+    """Construct a driver.
 
     Raises:
         InputError: no such module, file or class, or the class lacks ``reset`` or ``act``; or a
-            function that is no compiled driver, or that cannot be compiled.
+            function that is not a compiled driver, or that cannot be compiled.
     """
     if spec.endswith(".fmu"):
         from bridgegen.ego.fmu import FmuDriver
@@ -164,7 +164,7 @@ def module_of(where: str) -> ModuleType:
     """Import a module by its name, or a file that ends in .py.
 
     Raises:
-        ImportError: there is none.
+        ImportError: there is no such module or file.
     """
     if not where.endswith(".py"):
         return importlib.import_module(where)
@@ -206,7 +206,7 @@ def checked(control: Any, running: Any) -> tuple[Float, Float]:
 
 
 def answering(spec: str) -> tuple[int | None, Answer]:
-    """Make a driver; return how many numbers it keeps, if it is a compiled one, and its answers."""
+    """Construct a driver; return its memory, if it is compiled, and its answering function."""
     driver = make(spec)
     if isinstance(driver, CompiledDriver):
         address = driver.address
@@ -226,7 +226,7 @@ def answering(spec: str) -> tuple[int | None, Answer]:
 
 
 def _described(error: Exception) -> str:
-    """Return an exception in one line, with the line of the driver's that raised it."""
+    """Return an exception in one line, with the driver's line that raised it."""
     if isinstance(error, InputError):
         return str(error)
     place = traceback.extract_tb(error.__traceback__)[-1]

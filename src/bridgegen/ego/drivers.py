@@ -10,7 +10,7 @@ from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
 STAGES = ("perception", "prediction", "control")
-"""What of a driver can be made ideal, in the order of the work; planning is what is left."""
+"""The stages of a driver that can be idealised, in order of execution; planning is the rest."""
 
 
 class Origin(Enum):
@@ -21,17 +21,17 @@ class Origin(Enum):
     OWN = "own"
     """From the user."""
     STORYBOARD = "storyboard"
-    """There is none: the storyboard moves the ego."""
+    """No driver: the storyboard moves the ego."""
     GUEST = "guest"
-    """From another simulator than the embedded one."""
+    """A simulator other than the embedded one."""
 
 
 TIME_LIMIT = 10.0
-"""Seconds that one call of a user's driver may take, where the user says nothing else."""
+"""Default time limit of one call of a user's driver [s]."""
 
 
 SCRIPTED, ATTENTIVE = 0, 1
-"""Codes of who drives participants other than the ego."""
+"""Codes of the drivers of participants other than the ego."""
 
 OTHERS = {
     "attentive": "Does what its script says unless somebody is in its way: keeps its distance, "
@@ -50,9 +50,9 @@ class Driver:
         name: as given to ``--ego`` and written to the file's Controller.
         description: one sentence.
         stages: those of `STAGES` that it has, and that can be made ideal.
-        ideal: those that are.
-        time_limit: [s] that one call of a user's own may take.
-        home: the only simulator that it drives in; empty: it drives in all.
+        ideal: those that are idealised.
+        time_limit: [s] that one call of a user's own driver may take.
+        home: the only simulator that it drives in; empty: any.
         origin: where its code comes from.
     """
 
@@ -66,7 +66,7 @@ class Driver:
 
     @property
     def is_own(self) -> bool:
-        """Whether it is the user's, in Python or a co-simulation unit."""
+        """Whether it is the user's, in Python or as a co-simulation unit."""
         return self.origin is Origin.OWN
 
     @property
@@ -76,7 +76,7 @@ class Driver:
 
     @property
     def label(self) -> str:
-        """The name, and what is ideal."""
+        """The name, and the idealised stages."""
         return f"{self.name} (ideal {join(self.ideal)})" if self.ideal else self.name
 
     def idealised(self, stages: Iterable[str]) -> Self:
@@ -84,7 +84,7 @@ class Driver:
 
         Raises:
             UnknownNameError: no driver has such a stage.
-            InputError: this one has not.
+            InputError: this driver lacks one of them.
         """
         wanted = frozenset(stages)
         for stage in sorted(wanted):
@@ -100,12 +100,13 @@ class Driver:
 
 
 ROUTE_FOLLOWER = Driver(
-    "route-follower", "Holds its target speed on its route and sees nobody (paper, Section V-A)."
+    "route-follower",
+    "Holds its target speed on its route and ignores traffic (paper, Section V-A).",
 )
 REFERENCE = Driver(
     "reference",
     "Perceives, predicts, plans and controls: follows its route, slows for bends, keeps its "
-    "distance, goes round who stands, stops at red, yields and brakes by predicted conflict.",
+    "distance, passes standing vehicles, stops at red, yields and brakes by predicted conflict.",
     frozenset(STAGES),
 )
 UN_R157 = Driver(
@@ -116,7 +117,7 @@ UN_R157 = Driver(
 )
 CAREFUL = Driver(
     "careful",
-    "UN R157's driver extended to any road: reacts to who crosses, walks or stands in its way as "
+    "UN R157's driver extended to any road: reacts to what crosses, walks or stands in its way as "
     f"well, after 0.4 s of perception and {CAREFUL_REACTION:g} s; sees everybody.",
 )
 FSM = Driver(
@@ -127,12 +128,12 @@ FSM = Driver(
 CAREFUL_FSM = Driver(
     "careful-fsm",
     "The fuzzy safety model extended to any road: sees through the vehicle ahead, and keeps more "
-    "room; sees everybody.",
+    "room; sees all actors.",
 )
 STORYBOARD = Driver(
     "storyboard", "None: the file's own actions move the ego.", origin=Origin.STORYBOARD
 )
-"""What an ego without a driver says it is driven by; not to be chosen."""
+"""The driver of an ego without one; it cannot be chosen."""
 
 DRIVERS = {
     driver.name: driver
@@ -170,13 +171,13 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
 
     Args:
         name: of one that ships, or a user's own: ``package.module:Class``, ``file.py:Class``
-            (or a compiled driver's function), ``file.fmu``. It is not looked at before it drives.
-        ideal: stages.
-        time_limit: [s] that one call of a user's own may take.
+            (or a compiled driver's function), ``file.fmu``. It is loaded only when it drives.
+        ideal: stages to idealise.
+        time_limit: [s] that one call of a user's own driver may take.
 
     Raises:
         UnknownNameError: no such driver, or no such stage.
-        InputError: a stage that this driver has not, or a time limit that is none.
+        InputError: a stage that this driver lacks, or an invalid time limit.
     """
     if time_limit is not None and not (is_spec(name) and 0.0 < time_limit < math.inf):
         raise InputError(
@@ -197,7 +198,7 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
 
 
 def is_spec(name: str) -> bool:
-    """Say whether a name is that of a user's own driver."""
+    """Return whether a name is that of a user's own driver."""
     where, _, cls = name.rpartition(":")
     return name.endswith(".fmu") or bool(where and cls.isidentifier())
 
@@ -208,6 +209,6 @@ def split(text: str) -> tuple[str, ...]:
 
 
 def join(stages: Iterable[str]) -> str:
-    """Return stages as such a text, in the order of the work."""
+    """Return stages as such a text, in order of execution."""
     chosen = frozenset(stages)
     return ",".join(stage for stage in STAGES if stage in chosen)

@@ -1,6 +1,6 @@
-"""A co-simulation unit (FMI 2.0 or 3.0) as a driver, one instance a scenario.
+"""A co-simulation unit (FMI 2.0 or 3.0) as a driver, one instance per scenario.
 
-Needs the extra ``fmi``. The unit's inputs are set by name, those that it has:
+Needs the extra ``fmi``. The inputs that the unit has are set by name:
 
 - ``x y h v a target_speed offset stop_distance light`` as in `Observation`; ``stop_distance`` is
   1e9 where there is no stop line;
@@ -42,7 +42,7 @@ class FmuDriver:
         path: of the ``.fmu`` file. It holds compiled code, which runs with your rights.
 
     Raises:
-        InputError: the extra is missing, or an input's or output's name says nothing.
+        InputError: the extra is missing, or the name of an input or output is unknown.
         FileFormatError: not a co-simulation unit of FMI 2.0 or 3.0.
     """
 
@@ -73,10 +73,10 @@ class FmuDriver:
             if one.causality == "output" and one.name in _OUTPUTS
         }
         self._outputs = outputs
-        strange = [name for name in self._inputs if not _is_known(name)]
+        unknown = [name for name in self._inputs if not _is_known(name)]
         problems = [
             f"{path}: input '{name}' is not one that a driver gets; see bridgegen.ego.fmu"
-            for name in strange
+            for name in unknown
         ]
         if not outputs:
             problems.append(f"{path}: it must have an output named acceleration or curvature")

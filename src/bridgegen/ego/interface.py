@@ -1,4 +1,4 @@
-"""What a driver of the user's own is told, and what it answers: arrays over N scenarios at once.
+"""What a user's own driver gets and returns: arrays over N scenarios at once.
 
 A driver is a class without arguments:
 
@@ -6,8 +6,8 @@ A driver is a class without arguments:
         def reset(self, n, scene): ...
         def act(self, observation): return Control(acceleration, curvature)
 
-``reset`` comes before the first instant of every batch, ``act`` once per instant. Scenario i of a
-batch must not depend on who else is in it: batches are cut as the machine likes.
+``reset`` is called before the first instant of every batch, ``act`` once per instant. Scenario i of
+a batch must not depend on the other ones: how batches are cut depends on the machine.
 """
 
 from dataclasses import dataclass, fields
@@ -62,8 +62,8 @@ class Observation:
 
     Attributes:
         time: since the scenario's start [s].
-        running: ``(N,)`` bool; a scenario that has ended stays in the batch, and what is answered
-            for it is not looked at.
+        running: ``(N,)`` bool; a scenario that has ended stays in the batch, and the control for
+            it is ignored.
         x: ``(N,)`` float64 [m], the ego's reference point.
         y: ``(N,)`` float64 [m].
         h: ``(N,)`` float64 [rad], heading, counter-clockwise from +x.
@@ -74,8 +74,8 @@ class Observation:
         route: ``(N, P, 4)`` float64: x, y [m], heading [rad], curvature [1/m] of the route's points
             ahead, every ``ROUTE_STEP`` metres from the point beside the ego; straight on beyond
             its end.
-        tracks: ``(N, M, 12)`` float64, the other participants as the sensors have them: state (0
-            none, as of who is not there, 1 tentative, 2 confirmed, 3 coasting), x, y of the box's
+        tracks: ``(N, M, 12)`` float64, the other participants as the sensors track them: state (0
+            none or absent, 1 tentative, 2 confirmed, 3 coasting), x, y of the box's
             centre [m], heading [rad], velocity in x and y [m/s], length, width [m], class (see
             ``bridgegen.ego.kinds``), confidence, seconds since last seen, seconds tracked. With
             ``--ideal perception`` they are the truth.
@@ -106,7 +106,7 @@ class Observation:
 
 @dataclass(frozen=True)
 class Control:
-    """What a driver demands of N scenarios; the vehicle gives what its tyres and limits allow.
+    """What a driver demands in N scenarios; tyres and the vehicle's limits bound it.
 
     Attributes:
         acceleration: ``(N,)`` [m/s²], forward; braking is negative.
@@ -121,7 +121,7 @@ class BatchDriver(Protocol):
     """A driver of N scenarios at once."""
 
     def reset(self, n: int, scene: Scene) -> None:
-        """Begin N scenarios; forget all earlier ones."""
+        """Begin N scenarios; discard the state of earlier ones."""
 
     def act(self, observation: Observation) -> Control | Any:
-        """Answer one instant: a `Control`, or a pair (acceleration, curvature)."""
+        """Return the control at one instant: a `Control`, or a pair (acceleration, curvature)."""

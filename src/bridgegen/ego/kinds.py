@@ -9,4 +9,4 @@ CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
     NAMES.index(name)
     for name in ("car", "truck", "bus", "motorcycle", "bicycle", "pedestrian", "animal", "other")
 )
-"""Those that code asks for by name."""
+"""The kinds that code refers to by name."""

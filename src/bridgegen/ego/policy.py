@@ -1,4 +1,4 @@
-"""A learnt policy as a driver: Gymnasium's view of one scenario at a time.
+"""A trained policy as a driver, with Gymnasium's spaces for one scenario.
 
     from stable_baselines3 import PPO
     from bridgegen.ego.policy import PolicyDriver
@@ -9,7 +9,7 @@
 
 A policy is anything with ``predict(observation, state=None, deterministic=True)`` that returns
 (action, state), as Stable-Baselines3's are; the observation is a vector in ``[-1, 1]``, the action
-a pair there. It is asked for all scenarios of a batch at once.
+a pair there. It is called for all scenarios of a batch at once.
 """
 
 from abc import ABC, abstractmethod
@@ -25,24 +25,24 @@ if TYPE_CHECKING:
     import gymnasium
 
 NEAREST = 6
-"""So many other participants are told of, the nearest first."""
+"""Number of other participants in an observation, the nearest first."""
 
 ROUTE_EVERY = 4
-"""Of the route's points, each so-manieth is told."""
+"""Every how-many-th point of the route is in an observation."""
 
 SPEED, ACCELERATION, LENGTH, CURVATURE = 40.0, 10.0, 100.0, 0.2
-"""What counts as 1: m/s, m/s², m, 1/m. What is beyond is told as 1."""
+"""Scales of an observation [m/s, m/s², m, 1/m]; values beyond are clipped to 1."""
 
 SIZE = 6 + 5 + 10 * 3 + NEAREST * 8
-"""Numbers of an observation."""
+"""Length of an observation."""
 
 
 class PolicyDriver(ABC):
-    """Drives by a policy; derive from it and say how the policy is loaded."""
+    """A driver that runs a policy; derive from it and implement ``load``."""
 
     @abstractmethod
     def load(self) -> Any:
-        """Return the policy; called once a process."""
+        """Return the policy; called once per process."""
 
     @staticmethod
     def spaces() -> "tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]":
@@ -71,7 +71,7 @@ class PolicyDriver(ABC):
 
 
 def control(action: Float, scene: Scene) -> Control:
-    """Return the control that actions ``(N, 2)`` in [-1, 1] mean: the vehicle's limits are 1."""
+    """Return the control for actions ``(N, 2)`` in [-1, 1]: 1 is the vehicle's limit."""
     pedal, wheel = np.clip(action[:, 0], -1.0, 1.0), np.clip(action[:, 1], -1.0, 1.0)
     most = np.where(pedal > 0.0, scene.max_acceleration, scene.max_deceleration)
     return Control(pedal * most, wheel * scene.max_curvature)
@@ -80,10 +80,10 @@ def control(action: Float, scene: Scene) -> Control:
 def vectors(observation: Observation) -> npt.NDArray[np.float32]:
     """Return observations as ``(N, SIZE)`` float32 in [-1, 1], seen from the ego.
 
-    First speed, acceleration, speed asked for, offset from the route, distance to the stop line,
+    First speed, acceleration, target speed, offset from the route, distance to the stop line,
     whether there is one; then the light's state, one of five; ten points of the route (ahead, left,
-    heading); ``NEAREST`` others (1, ahead, left, heading's cosine and sine, speed ahead and to the
-    left relative to the ego's, width), zeros where there is nobody.
+    heading); ``NEAREST`` other participants (1, ahead, left, heading's cosine and sine, speed ahead
+    and to the left relative to the ego's, width), zeros where there are fewer.
     """
     o = observation
     n = len(o.x)
@@ -116,7 +116,7 @@ def vectors(observation: Observation) -> npt.NDArray[np.float32]:
     turn = tracks[:, :, 3] - o.h[:, None]
     vx = tracks[:, :, 4] - o.v[:, None] * ahead
     vy = tracks[:, :, 5] - o.v[:, None] * left
-    told = np.stack(
+    features = np.stack(
         [
             np.ones_like(dx),
             (dx * ahead + dy * left) / LENGTH,
@@ -129,7 +129,7 @@ def vectors(observation: Observation) -> npt.NDArray[np.float32]:
         ],
         axis=2,
     )
-    told = np.where(there[:, :, None], told, 0.0)
-    told = np.take_along_axis(told, nearest[:, :, None], axis=1)
-    out[:, at : at + told[0].size] = told.reshape(n, -1)
+    features = np.where(there[:, :, None], features, 0.0)
+    features = np.take_along_axis(features, nearest[:, :, None], axis=1)
+    out[:, at : at + features[0].size] = features.reshape(n, -1)
     return np.clip(out, -1.0, 1.0).astype(np.float32)

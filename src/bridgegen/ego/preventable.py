@@ -43,7 +43,7 @@ from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 RATE = 10.0
 """Hz, at which the driver decides; that of the Commission's code."""
 LONGEST = 35.0
-"""s, after which who has not collided has not; that of the Commission's code."""
+"""s, the duration of a run; that of the Commission's code."""
 LANE_GAP = 1.6
 """m, across the way between two cars 1.9 m wide, in the middle of lanes 3.5 m wide."""
 SIZE = (4.3, 1.9)
@@ -52,7 +52,7 @@ MODELS = ("un-r157", "fsm")
 
 
 class _Place(NamedTuple):
-    """The other at an instant, all ``(N,)``.
+    """The other vehicle at an instant, all ``(N,)``.
 
     Attributes:
         x: of its centre along the way, from where the ego's was at first [m].
@@ -78,10 +78,10 @@ def avoids_cut_in(
     other_size: tuple[float, float] = SIZE,
     driver: str = "un-r157",
 ) -> Bool:
-    """Say of each cut-in whether the regulation's driver avoids the collision.
+    """Return for each cut-in whether the regulation's driver avoids the collision.
 
     The other comes from the next lane at a constant lateral speed, at a constant speed along the
-    way, and stays in the middle of the ego's way once it is there. The arguments tell of the
+    way, and stays in the middle of the ego's way once it is there. The arguments describe the
     instant 0.1 s before the driver first decides. They are broadcast against each other.
 
     Args:
@@ -133,10 +133,10 @@ def avoids_cut_out(
     *,
     driver: str = "un-r157",
 ) -> Bool:
-    """Say of each cut-out whether the driver avoids the vehicle that is revealed by it.
+    """Return for each cut-out whether the driver avoids the vehicle that is revealed by it.
 
-    The arguments tell of the instant at which the vehicle that cuts out is more than 0.375 m beside
-    the middle of the ego's way. They are broadcast against each other.
+    The arguments describe the instant at which the vehicle that cuts out is more than 0.375 m
+    beside the middle of the ego's way. They are broadcast against each other.
 
     Args:
         ego_speed: ``(N,)`` [m/s].
@@ -162,10 +162,10 @@ def avoids_deceleration(
     *,
     driver: str = "un-r157",
 ) -> Bool:
-    """Say whether the driver avoids the vehicle ahead, which brakes to a standstill.
+    """Return whether the driver avoids the vehicle ahead, which brakes to a standstill.
 
-    The arguments tell of the instant at which the other begins to brake. They are broadcast against
-    each other.
+    The arguments describe the instant at which the other begins to brake. They are broadcast
+    against each other.
 
     Args:
         ego_speed: ``(N,)`` [m/s].
@@ -256,7 +256,7 @@ def _avoids(
         collided |= ~over & (gap < 0.0) & (other.side < 0.0)
         before, v = v, np.maximum(v - change / RATE, 0.0)
         over |= collided | (before == 0.0)
-        if cut_in:  # who is passed, or gets away
+        if cut_in:  # a vehicle that is passed, or gets away
             over |= (ahead < -half) | ((gap >= 0.0) & reacts & (closing <= 0.0))
         if over.all():
             break
@@ -267,21 +267,21 @@ def _avoids(
 def _un_r157_risk(
     ahead: Float, gap: Float, closing: Float, side: Float, cut_in: bool
 ) -> tuple[Bool, Bool]:
-    """Return where the driver reacts, and where there is nothing to react to any more."""
+    """Return where the driver reacts, and where the disturbance is no risk, so that it ends."""
     if not cut_in:
         return np.ones(len(ahead), dtype=np.bool_), np.zeros(len(ahead), dtype=np.bool_)
-    met = (ahead >= 0.0) & (side <= 0.0)
-    late = np.abs(gap) > CRITICAL_TTC * np.abs(closing)
-    return met & ~late, met & late
+    overlaps = (ahead >= 0.0) & (side <= 0.0)
+    far = np.abs(gap) > CRITICAL_TTC * np.abs(closing)
+    return overlaps & ~far, overlaps & far
 
 
 def _fsm_risk(
     v: Float, a: Float, ahead: Float, gap: Float, both: float, other: _Place
 ) -> tuple[Bool, Float]:
-    """Return where the distance is unsafe, and the deceleration that it asks for [m/s²]."""
+    """Return where the distance is unsafe, and the deceleration that it requires [m/s²]."""
     w, closing = other.speed, v - other.speed
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        past = (gap + both) / closing  # +inf beside who is as fast, < 0 beside who is faster
+        past = (gap + both) / closing  # +inf if the other is as fast, < 0 if it is faster
         comes = np.where(other.inward > 0.0, other.side / other.inward, np.inf)
     counts = (ahead >= 0.0) & ((other.side <= 0.0) | ((comes <= past + SLACK) & (comes < np.inf)))
     stops = w * w / (2.0 * LEADER_BRAKING)

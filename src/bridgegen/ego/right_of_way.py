@@ -1,7 +1,7 @@
-"""Who goes first where two routes cross: by signs and the map, else by the rule of the right.
+"""Right of way where two routes cross: by signs and the map, else priority to the right.
 
-Sources: StVO § 8 (right of way: signs, else who comes from the right), § 9 (who turns left waits
-for who comes towards), § 10; sign numbers of the VzKat, which our own maps use, too.
+Sources: StVO § 8 (right of way: signs, else priority to the right), § 9 (a left turn waits for
+oncoming traffic), § 10; sign numbers of the VzKat, which our own maps use, too.
 """
 
 import math
@@ -22,16 +22,16 @@ WAIT = ("205", STOP_SIGN)
 PRIORITY = ("301", "306")
 """Signs: right of way at this junction, priority road."""
 
-THEY_WAIT, NOBODY_SAYS, WE_WAIT = 1, 0, -1
+THEY_WAIT, NO_RULE, WE_WAIT = 1, 0, -1
 
 BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING = 1, 2, 3, 4
-"""What a claim rests on: the junction's priorities, signs, the rule of the right, or the rule that
+"""Reason of a claim: the junction's priorities, signs, priority to the right, or the rule that
 a left turn waits for oncoming traffic."""
 
 AT_JUNCTION = 40.0
-"""A sign so far before a junction [m] is for that junction."""
+"""A sign within this distance before a junction [m] is for that junction."""
 ASIDE = math.radians(45.0)
-"""Between the headings of two approaches: less is the same one, 180° less this the opposite one."""
+"""Largest angle between approaches of one direction; opposite ones differ by 180° less this."""
 
 
 class Crossing(NamedTuple):
@@ -43,29 +43,28 @@ class Crossing(NamedTuple):
 
 
 def right_of_way(model: OpenDrive, own: Route, other: Route) -> int:
-    """Return who waits at the first junction that two routes have in common.
+    """Return which route gives way at the first junction that two routes have in common.
 
-    ``THEY_WAIT`` only if a sign or the map makes them; where only the rule of the right would, one
-    does not count on it. ``NOBODY_SAYS`` where lights tell, or where they do not meet.
+    ``THEY_WAIT`` only if a sign or the map makes them; a driver does not rely on priority to the
+    right. ``NO_RULE`` where lights control the junction, or where the routes share none.
     """
     theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
     for ours in crossings(model, own):
         if ours.junction in theirs:
-            return _at(model, ours, theirs[ours.junction])
-    return NOBODY_SAYS
+            return _waiting(model, ours, theirs[ours.junction])
+    return NO_RULE
 
 
 def claim(model: OpenDrive, own: Route, other: Route) -> int:
     """Return which of two routes goes first at the first junction that they have in common.
 
-    Unlike ``right_of_way``, which tells a driver what to count on, this is the law as it stands:
-    it is antisymmetric, and it holds the rule of the right in both directions. Where lights
-    control the junction, they decide who may enter; the claim then holds what they leave open,
-    that a left turn waits for oncoming traffic.
+    Unlike ``right_of_way``, on which a driver may rely, this is the law: it is antisymmetric, and
+    includes priority to the right in both directions. Where lights control the junction, the claim
+    only holds what they leave open: a left turn waits for oncoming traffic.
 
     Returns:
-        > 0: the other route gives way; < 0: this one does; 0: no rule says. The absolute value
-        says why: ``BY_MAP``, ``BY_SIGNS``, ``FROM_THE_RIGHT`` or ``ONCOMING``.
+        > 0: the other route gives way; < 0: this one does; 0: no rule applies. The absolute value
+        is the reason: ``BY_MAP``, ``BY_SIGNS``, ``FROM_THE_RIGHT`` or ``ONCOMING``.
     """
     theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
     for ours in crossings(model, own):
@@ -100,7 +99,7 @@ def crossings(model: OpenDrive, route: Route) -> Iterator[Crossing]:
 
 
 def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
-    """Say whether a signal is for the traffic of a lane."""
+    """Return whether a signal is for the traffic of a lane."""
     if signal.validity:
         return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
     way = {"+": 1, "-": -1}.get(signal.orientation)
@@ -108,7 +107,7 @@ def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
 
 
 def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
-    """Return why the other gives way at a junction, 0 if no rule says so."""
+    """Return the reason why the other gives way at a junction, 0 if there is none."""
     if ours.before.road_id == theirs.before.road_id:
         return 0
     pairs = {(one.high, one.low) for one in model.junction(ours.junction).priorities}
@@ -117,7 +116,7 @@ def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
         return BY_MAP if inside in pairs else 0
     our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
     by_lights = any(sign.dynamic == "yes" for sign in (*our_signs, *their_signs))
-    difference = _standing(our_signs) - _standing(their_signs)
+    difference = _priority(our_signs) - _priority(their_signs)
     if difference and not by_lights:
         return BY_SIGNS if difference > 0 else 0
     from_theirs = _turn(_heading(model, theirs.before), _heading(model, ours.before))
@@ -127,9 +126,9 @@ def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
     return FROM_THE_RIGHT if from_theirs > ASIDE and not by_lights else 0
 
 
-def _at(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
+def _waiting(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
     if ours.before.road_id == theirs.before.road_id:
-        return NOBODY_SAYS
+        return NO_RULE
     for one in model.junction(ours.junction).priorities:
         if (one.high, one.low) == (ours.inside.road_id, theirs.inside.road_id):
             return THEY_WAIT
@@ -137,15 +136,15 @@ def _at(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
             return WE_WAIT
     our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
     if any(sign.dynamic == "yes" for sign in (*our_signs, *their_signs)):
-        return NOBODY_SAYS
-    difference = _standing(our_signs) - _standing(their_signs)
+        return NO_RULE
+    difference = _priority(our_signs) - _priority(their_signs)
     if difference:
         return THEY_WAIT if difference > 0 else WE_WAIT
     from_ours = _turn(_heading(model, ours.before), _heading(model, theirs.before))
     from_the_right = ASIDE < from_ours < math.pi - ASIDE
     towards = abs(from_ours) >= math.pi - ASIDE
     we_turn_left = towards and _turns_left(model, ours) and not _turns_left(model, theirs)
-    return WE_WAIT if from_the_right or we_turn_left else NOBODY_SAYS
+    return WE_WAIT if from_the_right or we_turn_left else NO_RULE
 
 
 def _signs(model: OpenDrive, step: Step) -> list[Signal]:
@@ -162,14 +161,14 @@ def _signs(model: OpenDrive, step: Step) -> list[Signal]:
     ]
 
 
-def _standing(signs: list[Signal]) -> int:
-    """Return 1 on a priority road, -1 where one waits, 0 where no sign says."""
+def _priority(signs: list[Signal]) -> int:
+    """Return 1 with priority signs, -1 with signs to give way, 0 without signs."""
     types = {sign.type for sign in signs}
     return int(not types.isdisjoint(PRIORITY)) - int(not types.isdisjoint(WAIT))
 
 
 def _heading(model: OpenDrive, step: Step) -> float:
-    """Return which way a lane leads at the end of a step [rad]."""
+    """Return the heading of a lane at the end of a step [rad]."""
     return lane_pose(model.road(step.road_id), step.lane_id, step.s_end).h
 
 

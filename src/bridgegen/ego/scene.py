@@ -1,7 +1,7 @@
-"""What a driver knows of the map before it drives: along its route, and of the others' ways.
+"""What a driver knows of the map before it drives: its route, and the ways of other participants.
 
-All of it is the map's. The ways are every lane chain that leads on from where an entity starts (or
-changes to); which of them it takes, nobody tells the driver.
+All of it comes from the map. The ways are all lane chains that lead on from where an entity starts
+(or changes to); the driver does not know which of them it takes.
 """
 
 import math
@@ -23,25 +23,25 @@ from bridgegen.openx.opendrive.routes import Place, Route, Step, Stretch, next_s
 Number = TypeVar("Number", bound=np.generic)
 
 WAYS = 6
-"""An entity is expected on so many ways at most."""
+"""Maximum number of ways on which an entity is expected."""
 
 WAY_LENGTH = 300.0
-"""How far a way is followed [m]."""
+"""Length up to which a way is followed [m]."""
 
 NARROW = 2.2
-"""A lane that is narrower [m] is none to change to."""
+"""Minimum width [m] of a lane to change to."""
 
 LINE_REACH = 15.0
-"""A stop line at most so far from a light [m along the road] is that light's."""
+"""Maximum distance between a light and its stop line [m along the road]."""
 
 SAMPLE = 0.5
-"""Between two samples of a way [m], about."""
+"""Approximate distance between two samples of a way [m]."""
 
 STOP_LINE = "stopline"
 
 
 class Scene(NamedTuple):
-    """What a driver knows of P road networks; what pads has no samples, or lies at infinity.
+    """What a driver knows of P road networks; padding has no samples, or lies at infinity.
 
     Attributes:
         road: ``(P, L, 3)``, see `road_along`.
@@ -53,7 +53,7 @@ class Scene(NamedTuple):
         hypothesis_counts: ``(P, W)`` int64, samples of each.
         hypothesis_steps: ``(P, W)`` [m], between two samples.
         hypothesis_zones: ``(P, W, ZONE)``, where each meets the ego's; see ``_yielding_kernels``.
-        hypothesis_ranks: ``(P, W)`` int64, who waits where they meet; see ``right_of_way``.
+        hypothesis_ranks: ``(P, W)`` int64, which gives way where they meet; see ``right_of_way``.
         hypothesis_first: ``(P, E + 1)`` int64: entity e's are those from ``[e]`` to ``[e + 1]``.
         path_ranks: ``(P, E)`` int64, as `hypothesis_ranks`, of the ways that the entities take.
         claims: ``(P, E, E)`` int64, which of two entities' routes goes first; see
@@ -191,7 +191,7 @@ class StopLine:
 
 
 def road_along(model: OpenDrive, route: Route, step: float, count: int) -> Float:
-    """Return what is along a route, at every sample of it.
+    """Return speed limits and lanes beside a route, at every sample of it.
 
     Returns:
         ``(count, 3)``: the speed limit [m/s], +inf where none is posted; how far left [m] the

@@ -1,4 +1,4 @@
-"""How critical a scenario was: one file per metric, each a function of a recorded rollout.
+"""Criticality metrics: one file per metric, each a function of a recorded rollout.
 
 ``registry`` knows them by name. A metric is the same whichever simulator made the rollout.
 """

@@ -1,10 +1,10 @@
 """Compiled required deceleration; public wrapper: ``btn.btn``.
 
-The ego goes s ahead while the other goes q, both straight on. The boxes touch while (q, s) is in a
-convex polygon: between four pairs of parallel lines, one for each axis of the boxes. To avoid the
-other by braking is to stay below the polygon, that is below the highest of three lines
-low + slope · q, for all q from ``first`` to ``last``. The lines come in the order of their slopes,
-so that each is the highest after the one before it.
+The ego travels s while the other travels q, both straight on. The boxes touch while (q, s) is in a
+convex polygon: between four pairs of parallel lines, one for each axis of the boxes. Avoiding the
+other by braking means staying below the polygon, that is below the highest of three lines
+low + slope · q, for all q from ``first`` to ``last``. The lines are sorted by slope, so that each
+is the highest after the one before it.
 """
 
 import math
@@ -19,7 +19,7 @@ PARALLEL = 1e-9  # a sine or cosine below this is rounding
 
 @kernel
 def when(q: float, u: float, b: float) -> float:
-    """Return when a body with speed u and acceleration b has gone q ≥ 0; +inf if it never does."""
+    """Return when a body with speed u and acceleration b has travelled q ≥ 0; +inf if never."""
     squared = u * u + 2.0 * b * q
     if q == 0.0:
         return 0.0
@@ -30,7 +30,7 @@ def when(q: float, u: float, b: float) -> float:
 
 @kernel
 def at_most(v: float, t: float, s: float) -> float:
-    """Return the least deceleration from speed v > 0 with which at most s > 0 is gone at time t."""
+    """Return the least deceleration from speed v > 0 to travel at most s > 0 until time t."""
     if v * t <= s:
         return 0.0
     if v * t >= 2.0 * s:
@@ -44,7 +44,7 @@ def to_stay_below(
 ) -> float:
     """Return the least deceleration that keeps the ego below the lines; +inf if none does.
 
-    ``stays`` says that the other, once at ``last``, is there for good.
+    ``stays``: the other, once at ``last``, stays there.
     """
     needed = 0.0
     q = first
@@ -79,7 +79,7 @@ def to_stay_below(
 def to_stand_when_touched(
     v: float, u: float, b: float, t_first: float, low: Float, slope: Float
 ) -> float:
-    """Return the deceleration that brings the ego to a stop just where and when it is touched."""
+    """Return the deceleration that stops the ego exactly where and when it is touched."""
     latest = t_first
     for i in range(3):
         if low[i] > 0.0 and slope[i] <= 0.0:
@@ -96,10 +96,10 @@ def required(
     ahead: float, left: float, c: float, s: float, la: float, wa: float, lb: float, wb: float,
     v: float, u: float, b: float, low: Float, slope: Float,
 ) -> float:  # fmt: skip
-    """Return the deceleration that one other asks of the ego; 0 if none.
+    """Return the deceleration that one other participant requires of the ego; 0 if none.
 
     In the ego's frame the other's centre is at (ahead, left) and its heading is (c, s); v and u are
-    their speeds, b is the other's acceleration. ``low`` and ``slope`` are ``(3,)`` to work in.
+    their speeds, b is the other's acceleration. ``low`` and ``slope`` are ``(3,)`` scratch.
     """
     reach = la + (abs(c) * lb + abs(s) * wb)
     if v == 0.0 or ahead <= -reach:
@@ -125,7 +125,7 @@ def required(
             return 0.0
         t_first = when(first, u, b)
         if t_first == math.inf or v * t_first > high + high_slope * first:
-            return 0.0  # the ego is through before it comes, as nearly all are who drive beside it
+            return 0.0  # the ego has passed before, as with nearly all vehicles beside it
         across, reach_across = left * c - ahead * s, wb + (abs(s) * la + abs(c) * wa)
         low[0] = min((-reach_across - across) / s, (reach_across - across) / s)
         highest = max((-reach_across - across) / s, (reach_across - across) / s)
@@ -150,7 +150,7 @@ def largest_required(
     half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, a: Float,
     distance: Float, n_steps: Int, most: float, out: Float,
 ) -> None:  # fmt: skip
-    """Write the largest deceleration that anybody asks of the ego, at most ``most``."""
+    """Write the largest deceleration that any participant requires of the ego, at most ``most``."""
     n_rows, n_entities, _ = x.shape
     low, slope = np.empty(3), np.empty(3)
     for i in range(n_rows):

@@ -1,6 +1,6 @@
 """Compiled metrics of collision courses; public wrappers: ``drac``, ``thw``, ``tet``.
 
-At every instant all bodies go on straight ahead at their present speeds.
+At every instant all bodies are predicted straight ahead at their present speeds.
 """
 
 import math
@@ -19,7 +19,7 @@ def contact(
 ) -> tuple[float, float]:  # fmt: skip
     """Return when boxes A and B touch [s], +inf if they never do, and their squared relative speed.
 
-    (dx, dy) leads from A's centre to B's; ``circles`` is the square of what their radii sum to.
+    (dx, dy) leads from A's centre to B's; ``circles`` is the square of the sum of their radii.
     """
     wx, wy = vb * cb - va * ca, vb * sb - va * sa
     squared = wx * wx + wy * wy
@@ -27,7 +27,7 @@ def contact(
     if across * across > circles * squared or (
         dx * wx + dy * wy >= 0.0 and dx * dx + dy * dy > circles
     ):
-        return math.inf, squared  # they pass each other by, or part
+        return math.inf, squared  # they pass each other, or separate
     return time_to_contact(
         dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, STANDSTILL * (va + vb)
     ), squared  # fmt: skip
@@ -61,7 +61,7 @@ def avoidance_rate(
                     best = most
                     break
                 if gap[k] == math.inf or (va[k] + vb[k]) ** 2 <= 2.0 * best * gap[k]:
-                    continue  # it is not there, or not even head-on
+                    continue  # it is absent, or too slow even head-on
                 time, squared = contact(
                     qx[k] - px[k], qy[k] - py[k], ca[k], sa[k], cb[k], sb[k], va[k], vb[k],
                     la, wa, lb, wb, circles,

@@ -1,4 +1,4 @@
-"""Compiled comparison of detections with the truth, of which ``perceived`` says what counts."""
+"""Compiled comparison of detections with the truth that counts, see ``perceived``."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import kernel
-from bridgegen.ego.detections import HEADING, LENGTH, NOBODY, SEEN_BY, WIDTH, X, Y
+from bridgegen.ego.detections import HEADING, LENGTH, MISSED, SEEN_BY, WIDTH, X, Y
 
 
 @kernel
@@ -40,7 +40,7 @@ def overlap(
     """Return the area [m²] that boxes A and B share.
 
     In A's frame, B's centre is at (dx, dy) and its heading is ``turn``; la, wa, lb, wb are half
-    lengths and widths. ``one`` and ``other`` are ``(8, 2)`` to work in.
+    lengths and widths. ``one`` and ``other`` are ``(8, 2)`` scratch.
     """
     c, s = math.cos(turn), math.sin(turn)
     one[0, 0], one[0, 1] = dx + (lb * c - wb * s), dy + (lb * s + wb * c)
@@ -74,7 +74,7 @@ def truth(
         counts[i] = False
         for e in range(1, n_entities):
             for k in range(n_steps[i]):
-                if detections[i, e, k, SEEN_BY] < NOBODY:
+                if detections[i, e, k, SEEN_BY] < MISSED:
                     continue
                 for c in range(detections.shape[3]):
                     nothing += 0.0 * detections[i, e, k, c]  # NaN if it is not finite
@@ -102,7 +102,7 @@ def mean_iou(
                     continue
                 count += 1
                 seen = detections[i, e, k]
-                if seen[SEEN_BY] == NOBODY:
+                if seen[SEEN_BY] == MISSED:
                     continue
                 c, s = cosine[i, e, k], sine[i, e, k]
                 dx, dy = seen[X] - centre_x[i, e, k], seen[Y] - centre_y[i, e, k]
@@ -112,7 +112,7 @@ def mean_iou(
                     la, wa, lb, wb, one, other,
                 )  # fmt: skip
                 total += common / (4.0 * (la * wa + lb * wb) - common)
-        out[i] = min(total / count, 1.0) if count else np.inf  # but for rounding
+        out[i] = min(total / count, 1.0) if count else np.inf  # rounding may exceed 1
 
 
 @kernel
@@ -125,7 +125,7 @@ def mean_error(
         total, count = 0.0, 0
         for e in range(1, n_entities):
             for k in range(n_steps[i]):
-                if counts[i, e, k] and detections[i, e, k, SEEN_BY] > NOBODY:
+                if counts[i, e, k] and detections[i, e, k, SEEN_BY] > MISSED:
                     dx = detections[i, e, k, X] - centre_x[i, e, k]
                     dy = detections[i, e, k, Y] - centre_y[i, e, k]
                     total += math.sqrt(dx * dx + dy * dy)

@@ -9,7 +9,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.compiled import kernel
 
 TIE = 1e-9
-"""Distances that differ by no more are alike [m]."""
+"""Distances that differ by no more are equal [m]."""
 
 
 @kernel
@@ -64,7 +64,7 @@ def largest_offset(offset: Float, n_steps: Int, out: Float) -> None:
 
 @kernel
 def widen(high: Float, low: Float, shift: int, n: int) -> None:
-    """Let window k take in window k + shift: its maximum and its minimum, in place."""
+    """Extend window k by window k + shift: maximum and minimum, in place."""
     for k in range(n - shift):
         high[k] = max(high[k], high[k + shift])
         low[k] = min(low[k], low[k + shift])

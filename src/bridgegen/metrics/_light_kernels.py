@@ -1,4 +1,4 @@
-"""Compiled watch over stop lines; public wrapper: ``r_red.r_red``."""
+"""Compiled count of red lights run; public wrapper: ``r_red.r_red``."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Compiled places of bodies; public wrapper: ``motion.motion``."""
+"""Compiled box centres of bodies; public wrapper: ``motion.motion``."""
 
 from bridgegen.arrays import Float, Int
 from bridgegen.compiled import kernel
@@ -9,7 +9,7 @@ def place(
     box: Float, x: Float, y: Float, cosine: Float, sine: Float, n_steps: Int,
     centre_x: Float, centre_y: Float,
 ) -> None:  # fmt: skip
-    """Write where each body's box has its centre."""
+    """Write the centre of each body's box."""
     n_rows, n_entities, _ = x.shape
     for i in range(n_rows):
         for e in range(n_entities):

@@ -32,7 +32,7 @@ def separation(
 
 @kernel
 def stride(x: Float, y: Float, c: Float, s: Float, radius: float, n: int) -> float:
-    """Return how far [m] any point of a body moves from one instant to the next, at most."""
+    """Return the greatest distance [m] that a point of a body moves between two instants."""
     most = 0.0
     for k in range(1, n):
         moved = math.sqrt((x[k] - x[k - 1]) ** 2 + (y[k] - y[k - 1]) ** 2)
@@ -46,10 +46,10 @@ def nearest_in_time(
     half: Float, x: Float, y: Float, c: Float, s: Float, distance: Float, e: int, n: int,
     best: int,
 ) -> int:  # fmt: skip
-    """Return the least of ``best`` and the steps between the ego's and e's being at one point.
+    """Return the least of ``best`` and the steps between the ego and e covering one point.
 
-    From each instant of the ego, e's track is followed both ways. Where the boxes are some way
-    apart, as many instants are skipped as e needs for it.
+    From each instant of the ego, e's track is searched in both directions. Where the boxes are
+    apart, as many instants are skipped as e needs for the distance.
     """
     la, wa, lb, wb = half[0, 0], half[0, 1], half[e, 0], half[e, 1]
     pace = stride(x[e], y[e], c[e], s[e], math.sqrt(lb * lb + wb * wb), n) * (1.0 + 1e-9)
@@ -59,13 +59,13 @@ def nearest_in_time(
             nearest = k
     if distance[nearest] == 0.0:
         return 0
-    for m in range(n):  # outwards from where they are closest: the best is found early
+    for m in range(n):  # outwards from the smallest distance, so that the best is found early
         i = nearest - m if m <= nearest else m
         for way in (-1, 1):
             j = i
             while 0 <= j < n and abs(j - i) < best:
                 skip = 1
-                if distance[j] < math.inf:  # else it is not there
+                if distance[j] < math.inf:  # else it is absent
                     apart = separation(
                         x[e, j] - x[0, i], y[e, j] - y[0, i],
                         c[0, i], s[0, i], c[e, j], s[e, j], la, wa, lb, wb,
@@ -85,9 +85,9 @@ def encroachment(
     half: Float, x: Float, y: Float, cosine: Float, sine: Float, distance: Float, n_steps: Int,
     longest: int, out: Float,
 ) -> None:  # fmt: skip
-    """Write each scenario's least number of steps between being at one point; +inf if none.
+    """Write each scenario's least number of steps between covering one point; +inf if none.
 
-    More than ``longest`` steps are none.
+    More than ``longest`` steps do not count.
     """
     n_rows, n_entities, _ = x.shape
     for i in range(n_rows):

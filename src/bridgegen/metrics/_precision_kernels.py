@@ -4,7 +4,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import kernel
-from bridgegen.ego.detections import CONFIDENCE, KIND, NOBODY, SEEN_BY, X, Y
+from bridgegen.ego.detections import CONFIDENCE, KIND, MISSED, SEEN_BY, X, Y
 
 FIRST_RECALL, LAST_RECALL = 11, 100  # per cent; recalls up to 10 % are left out
 LEAST_PRECISION = 0.1
@@ -12,7 +12,7 @@ LEAST_PRECISION = 0.1
 
 @kernel
 def classify(kind: float, class_of_kind: Int) -> int:
-    """Return the class of a kind; of one that there is not, the last."""
+    """Return the class of a kind; the last class if the kind does not exist."""
     if 0.0 <= kind < len(class_of_kind):
         return int(class_of_kind[int(kind)])
     return int(class_of_kind[-1])
@@ -23,13 +23,13 @@ def gather(
     wanted: int, centre_x: Float, centre_y: Float, x: Float, y: Float, detections: Float, n: int,
     class_of_kind: Int, reach: float, entity: Int, frame: Int, confidence: Float, error: Float,
 ) -> int:  # fmt: skip
-    """List one class's detections in range, in each frame by their error; return how many."""
+    """List one class's detections in range, in each frame by error; return their number."""
     m = 0
     for k in range(n):
         first = m
         for e in range(1, detections.shape[0]):
             seen = detections[e, k]
-            if seen[SEEN_BY] <= NOBODY or classify(seen[KIND], class_of_kind) != wanted:
+            if seen[SEEN_BY] <= MISSED or classify(seen[KIND], class_of_kind) != wanted:
                 continue
             gx, gy = seen[X] - x[k], seen[Y] - y[k]
             if gx * gx + gy * gy >= reach:
@@ -48,7 +48,7 @@ def gather(
 
 @kernel
 def order_of(confidence: Float, n: int) -> Int:
-    """Return the order of falling confidence of the first n, equal ones as they are."""
+    """Return the order of descending confidence of the first n; equal ones keep their order."""
     for i in range(1, n):
         if confidence[i] > confidence[i - 1]:
             return np.argsort(-confidence[:n], kind="mergesort")
@@ -60,9 +60,9 @@ def mark_hits(
     order: Int, entity: Int, frame: Int, centre_x: Float, centre_y: Float, detections: Float,
     wanted: Bool, threshold: float, taken: Bool, hit: Bool,
 ) -> None:  # fmt: skip
-    """Write which detections, in the order of their confidence, hit a box that is still free.
+    """Write which detections, by descending confidence, match a box that is still unmatched.
 
-    ``wanted`` and ``taken`` are ``(E, T)``: the boxes of this class within range, and those hit.
+    ``wanted`` and ``taken`` are ``(E, T)``: boxes of this class within range, and matched ones.
     """
     n_entities = wanted.shape[0]
     for j in range(len(order)):
@@ -82,7 +82,7 @@ def mark_hits(
 
 @kernel
 def average_precision(hit: Bool, n: int, n_truth: int) -> float:
-    """Return the average precision of n detections that are hits or not, by falling confidence."""
+    """Return the average precision of n detections, hits or not, by descending confidence."""
     if n == 0:
         return 0.0
     total = 0.0
@@ -96,7 +96,7 @@ def average_precision(hit: Bool, n: int, n_truth: int) -> float:
         here = hits / (j + 1)
         if 100 * hits < percent * n_truth:
             if j + 1 == n:
-                break  # so much was never recalled
+                break  # this recall is never reached
             then = (hits + 1) / (j + 2)
             here += (0.01 * percent * n_truth - hits) * (then - here)
         total += max(here - LEAST_PRECISION, 0.0)
@@ -144,4 +144,4 @@ def mean_average_precision(
                     threshold, taken, hit,
                 )  # fmt: skip
                 total += average_precision(hit, m, n_truth) / len(thresholds)
-        out[i] = min(total / n_classes, 1.0) if n_classes else np.inf  # but for rounding
+        out[i] = min(total / n_classes, 1.0) if n_classes else np.inf  # rounding may exceed 1

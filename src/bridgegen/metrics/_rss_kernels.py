@@ -1,4 +1,4 @@
-"""Compiled RSS distances; public wrapper: ``rss.rss``, whose ``Parameters`` come as an array."""
+"""Compiled RSS distances; public wrapper: ``rss.rss``, with its ``Parameters`` as an array."""
 
 import math
 
@@ -12,9 +12,9 @@ EGO_RESPONSE, OTHER_RESPONSE, ACCEL, BRAKE, HARD_BRAKE, SIDE_ACCEL, SIDE_BRAKE, 
 
 @kernel
 def advance(v: float, response: float, accel: float, brake: float) -> float:
-    """Return how far [m] a body comes, at worst, that approaches at v [m/s]; less than 0: goes.
+    """Return the worst-case distance [m] of a body that approaches at v [m/s]; < 0: it recedes.
 
-    It speeds up while it does not respond, then brakes to a stop.
+    It accelerates during its response time, then brakes to a stop.
     """
     after = v + response * accel
     return 0.5 * (v + after) * response + after * abs(after) / (2.0 * brake)
@@ -24,7 +24,7 @@ def advance(v: float, response: float, accel: float, brake: float) -> float:
 def approach(v: float, toward: float, response: float, p: Float) -> float:
     """Return `advance` on an axis; ``toward`` is the cosine of the body's heading to it.
 
-    One that heads away may brake hard at once, as one in front does; but for its sideways motion.
+    A receding one may brake hard at once, as a leader does, except for its lateral motion.
     """
     share = abs(toward)
     across = math.sqrt(max(1.0 - share * share, 0.0))
@@ -78,7 +78,7 @@ def missing_share(
                     to = 1.0 if left > 0.0 else -1.0
                     safe = ego_across + approach(vb, -to * s, p[OTHER_RESPONSE], p)
                     across = share_of_safe(side, p[MARGIN] + max(safe, 0.0))
-                    if across >= least:  # most are: who is in another lane
+                    if across >= least:  # most are: vehicles in another lane
                         continue
                 along = 0.0
                 if gap > 0.0:

@@ -14,7 +14,7 @@ STANDSTILL = 1e-12
 
 @kernel
 def sweep(position: float, rate: float, reach: float, still: float) -> tuple[float, float]:
-    """Return when |position + rate·t| ≤ reach begins and ends; it never does if begin > end."""
+    """Return when |position + rate·t| ≤ reach begins and ends; never if begin > end."""
     if abs(rate) <= still:
         if abs(position) <= reach:
             return -np.inf, np.inf
@@ -83,7 +83,7 @@ def pair(
         wx = vb[k] * cb - va[k] * ca
         wy = vb[k] * sb - va[k] * sa
         if dx * dx + dy * dy > circles:
-            # The boxes' circles are apart now; do they part, or pass each other by?
+            # The boxes' circles are apart now; do they separate, or pass each other?
             across = dx * wy - dy * wx
             if dx * wx + dy * wy >= 0.0 or across * across > circles * (wx * wx + wy * wy):
                 continue

@@ -1,4 +1,4 @@
-"""a_change: how abruptly the ego changed its acceleration."""
+"""a_change: the ego's most abrupt change of acceleration."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""btn: how much of its brakes the ego would have needed."""
+"""btn: brake threat number, the share of its brakes that the ego needs."""
 
 import numpy as np
 
@@ -16,11 +16,11 @@ def btn(rollout: Rollout, available: float = GRIP) -> Float:
     It is the required longitudinal acceleration over the available one. Required is the least
     constant deceleration by which the ego, on its present heading, lets the other pass in front of
     it or stays behind it, if the other keeps its present heading and acceleration until it stops.
-    Where the ego cannot avoid the contact by braking, the one by which it stands when it is
-    touched. 0 where it need not brake, and for those that come from behind.
+    If braking cannot avoid the contact, it is the one by which the ego stands when it is touched.
+    0 if it need not brake, and for participants from behind.
 
-    For one that follows another this is Jansson's (v₁ − v₂)² / (2 · gap) − a₂, and v₁² / (2 · way)
-    where the other stops first.
+    When following, this is Jansson's (v₁ − v₂)² / (2 · gap) − a₂, and v₁² / (2 · distance) if the
+    other stops first.
 
     Args:
         rollout: N scenarios.

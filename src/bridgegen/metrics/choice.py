@@ -1,4 +1,4 @@
-"""Which metrics there are to be: a driver that perceives nothing gives rise to no mean IoU."""
+"""Which metrics exist: for example no mean IoU with a driver that does not perceive."""
 
 from collections.abc import Collection, Sequence
 
@@ -9,11 +9,11 @@ from bridgegen.metrics.registry import TABLE_I, get
 
 
 def held_by(driver: Driver, *, detects: bool = False) -> tuple[Need, ...]:
-    """Return what a simulator's rollouts of a driver hold beside motion.
+    """Return what a simulator's rollouts of a driver hold besides motion.
 
     Args:
-        driver: it.
-        detects: whether somebody else detects things there, whatever the driver does.
+        driver: of the ego.
+        detects: whether a detector records detections, whatever the driver.
     """
     perceives = detects or driver.perceives
     return ("detections", "lights", "offset") if perceives else ("lights", "offset")
@@ -28,13 +28,13 @@ def existing(names: Sequence[str], held: Collection[Need]) -> tuple[str, ...]:
     return tuple(name for name in names if get(name).needs in (None, *held))
 
 
-def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str, ...]:
+def require(names: Sequence[str], held: Collection[Need], source: str) -> tuple[str, ...]:
     """Return the names, all of which must exist where rollouts hold ``held``.
 
     Args:
         names: of metrics.
         held: what the rollouts hold.
-        who: whose rollouts they are, for the message.
+        source: of the rollouts, for the message.
 
     Raises:
         UnknownNameError: a name is not a metric's.
@@ -44,7 +44,7 @@ def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str
     hints = {"detections": f"; drivers that perceive (--ego): {perceive}" if perceive else ""}
     needs = {name: get(name).needs for name in names}
     problems = [
-        f"the metric '{name}' needs {need}, and {who} has none{hints.get(need, '')}"
+        f"the metric '{name}' needs {need}, and {source} has none{hints.get(need, '')}"
         for name, need in needs.items()
         if need is not None and need not in held
     ]
@@ -54,13 +54,13 @@ def require(names: Sequence[str], held: Collection[Need], who: str) -> tuple[str
 
 
 def to_record(driver: Driver, asked: Sequence[str], *, detects: bool = False) -> tuple[str, ...]:
-    """Return what a search records: Table I's metrics, as far as they exist, and those asked for.
+    """Return what a search records: Table I's metrics, as far as they exist, and requested ones.
 
-    The others wait until somebody asks: together they take longer than the paper's.
+    Others are recorded only on request: together they take longer than the paper's.
 
     Raises:
         UnknownNameError: a name is not a metric's.
-        InputError: one that is asked for does not exist with this driver.
+        InputError: a requested one does not exist with this driver.
     """
     held = held_by(driver, detects=detects)
     chosen = require(asked, held, f"the driver '{driver.name}'")

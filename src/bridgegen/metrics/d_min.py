@@ -1,4 +1,4 @@
-"""d_min: how close the ego came to anybody."""
+"""d_min: the ego's smallest distance to another participant."""
 
 import numpy as np
 
@@ -44,6 +44,6 @@ METRIC = Metric(
     unit="m",
     description="smallest distance between the ego's oriented box and any other's",
     sense="smaller",
-    cap=200.0,  # farther than a lidar sees: nobody is there
+    cap=200.0,  # beyond a LiDAR's range
     compute=d_min,
 )

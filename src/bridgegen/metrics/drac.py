@@ -1,4 +1,4 @@
-"""drac: how hard somebody would have had to brake to avoid a collision."""
+"""drac: deceleration rate to avoid a crash."""
 
 import numpy as np
 
@@ -16,9 +16,9 @@ def drac(rollout: Rollout) -> Float:
 
     At an instant at which the ego and another are on a collision course at constant velocities,
     it is w² / (2 d): w is the speed of the one relative to the other, d the way until they touch
-    along that relative velocity (w times the time to collision). For one that follows another this
-    is the classical (v₁ − v₂)² / (2 · gap); of two that meet or cross it is the deceleration of
-    both together.
+    along that relative velocity (w times the time to collision). When following, this is the
+    classical (v₁ − v₂)² / (2 · gap); of oncoming or crossing traffic it is the deceleration of both
+    together.
 
     Returns:
         ``(N,)`` float64 [m/s²] in 0..20; 0 where there was no collision course; NaN where the

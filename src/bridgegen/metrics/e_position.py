@@ -1,4 +1,4 @@
-"""e_position: how far off the ego saw the others."""
+"""e_position: position error of the ego's detections."""
 
 import numpy as np
 

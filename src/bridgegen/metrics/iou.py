@@ -1,4 +1,4 @@
-"""iou: how well the boxes that the ego saw cover the true ones."""
+"""iou: intersection over union of the ego's detections with the truth."""
 
 import numpy as np
 

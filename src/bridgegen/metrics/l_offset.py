@@ -1,4 +1,4 @@
-"""l_offset: how far the ego strayed from its lane's centre."""
+"""l_offset: the ego's largest lateral offset from its lane's centre."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""map: how precise and complete the ego's detections were, mean average precision."""
+"""map: mean average precision, how precise and complete the ego's detections are."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ from bridgegen.simulation.rollout import Rollout
 def mean_average_precision(rollout: Rollout) -> Float:
     """Return the mean average precision of the detections over classes and distance thresholds.
 
-    As in nuScenes. Per class and threshold all frames' detections are taken by falling confidence;
-    each is a hit if the nearest box of its class and frame that no earlier one took is nearer than
-    the threshold, centre to centre. Precision is read off at recalls of 0.11, 0.12 … 1, linearly
-    between detections and 0 beyond the last; precision below 0.1 counts as 0, and 0.1 is the zero
-    of the scale. Classes are those that had an entity within range. Detections of equal confidence
-    are taken in the order of their frames, then of their distance from their own entity.
+    As in nuScenes. Per class and threshold all frames' detections are taken by descending
+    confidence; each is a hit if the nearest unmatched box of its class and frame is nearer than the
+    threshold, centre to centre. Precision is sampled at recalls of 0.11, 0.12 … 1, linearly between
+    detections and 0 beyond the last; precision below 0.1 counts as 0, and 0.1 is the zero of the
+    scale. Classes are those with an entity within range. Detections of equal confidence are sorted
+    by frame, then by distance from their own entity.
 
     Returns:
         ``(N,)`` float64 in 0..1; +inf where there was nothing to see; NaN where the scenario
@@ -38,7 +38,7 @@ def mean_average_precision(rollout: Rollout) -> Float:
 METRIC = Metric(
     name="map",
     unit="1",
-    description="mean average precision of the detections, as nuScenes has it",
+    description="mean average precision of the detections, as in nuScenes",
     sense="smaller",
     cap=1.0,
     compute=mean_average_precision,

@@ -1,4 +1,4 @@
-"""What a metric is, and the checks that every metric makes on a rollout."""
+"""The classes of metrics, and their checks of a rollout."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,21 +13,21 @@ from bridgegen.simulation.rollout import Rollout
 
 Derived = TypeVar("Derived")
 Need = Literal["detections", "lights", "offset"]
-"""What not every rollout holds: detections only if its ego perceives; traffic lights and the offset
-from the route only if a simulator made it, not a recording of somebody else's."""
+"""What a rollout may lack: detections unless its ego perceives; traffic lights and the offset from
+the route if it is a recording from elsewhere, not a simulator's."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number per scenario that says how critical it was.
+    """A number per scenario that measures its criticality.
 
     Attributes:
         name: as in Table I of the paper, or the field's abbreviation in small letters.
         unit: "m", "m/s" …; "count" for whole numbers.
-        description: one line for people.
+        description: one line.
         sense: which values are more critical, "smaller" or "larger" ones.
-        cap: the value, finite, that counts as "not critical at all"; in an objective every value
-            that is less critical still, +inf for one, counts as this. The quantity is not capped.
+        cap: the finite value that counts as "not critical at all"; in an objective every less
+            critical value, for example +inf, counts as this. The quantity itself is not capped.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Metric(Quantity):
 
     Attributes:
         compute: rollout → ``(N,)`` float64, NaN exactly where the scenario failed.
-        needs: what a rollout must hold for the metric to exist; None where the motion is enough.
+        needs: what a rollout must hold for the metric to exist; None if the motion is enough.
     """
 
     compute: Callable[[Rollout], Float]
@@ -62,7 +62,7 @@ class Metric(Quantity):
 
 
 def shared(rollout: Rollout, derive: Callable[[Rollout], Derived]) -> Derived:
-    """Return ``derive(rollout)``, worked out once however many metrics ask for it."""
+    """Return ``derive(rollout)``, computed once for all metrics."""
     if derive not in rollout.derived:
         rollout.derived[derive] = derive(rollout)
     derived: Derived = rollout.derived[derive]
@@ -90,7 +90,7 @@ def steps(rollout: Rollout) -> Int:
 
 
 def in_steps(name: str, seconds: float, time_step: float) -> int:
-    """Return how many whole time steps fit into a duration.
+    """Return the number of whole time steps in a duration.
 
     Raises:
         ValueError: the duration or the time step is not a positive number of seconds.
@@ -98,7 +98,7 @@ def in_steps(name: str, seconds: float, time_step: float) -> int:
     for what, value in ((name, seconds), ("time_step", time_step)):
         if not (isfinite(value) and value > 0.0):
             raise ValueError(f"{what} [s] must be finite and > 0, got {value}")
-    # 0.5 s are ten steps of 0.05 s, whatever the rounding of the quotient.
+    # 0.5 s are ten steps of 0.05 s, despite rounding of the quotient.
     return int(np.floor(seconds / time_step + 1e-9))
 
 

@@ -1,4 +1,4 @@
-"""What the metrics beyond Table I share: every body's place and direction, worked out once."""
+"""Shared by the metrics beyond Table I: every body's position and direction, computed once."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from bridgegen.simulation.rollout import Rollout
 
 @dataclass(frozen=True)
 class Motion:
-    """A rollout's bodies, as compiled code takes them; instants from ``n_steps`` on are unset.
+    """A rollout's bodies for compiled code; instants from ``n_steps`` on are unset.
 
     Attributes:
         half: ``(E, 2)`` float64 [m], half lengths and half widths.
         x, y: ``(N, E, T)`` float64 [m], the boxes' centres.
         cosine, sine: ``(N, E, T)`` float64, of the headings.
         v: ``(N, E, T)`` float64 [m/s].
-        distance: ``(N, E, T)`` float64 [m], from the ego's box; +inf where nobody is.
+        distance: ``(N, E, T)`` float64 [m], from the ego's box; +inf where absent.
         n_steps: ``(N,)`` int64.
     """
 
@@ -33,7 +33,7 @@ class Motion:
 
 
 def motion(rollout: Rollout) -> Motion:
-    """Return a rollout's bodies, worked out once for all metrics."""
+    """Return a rollout's bodies, computed once for all metrics."""
     return shared(rollout, _motion)
 
 

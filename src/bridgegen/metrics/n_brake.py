@@ -1,4 +1,4 @@
-"""n_brake: how often the ego braked hard."""
+"""n_brake: number of the ego's hard brakings."""
 
 from math import isfinite
 

@@ -1,4 +1,4 @@
-"""n_collision: how often the ego hit somebody."""
+"""n_collision: number of the ego's collisions."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def n_collision(rollout: Rollout, merge_within: float = 5.0) -> Float:
 METRIC = Metric(
     name="n_collision",
     unit="count",
-    description="contacts of the ego with others; with the same actor within 5 s they are one",
+    description="collisions of the ego; those with the same actor within 5 s count once",
     sense="larger",
     cap=0.0,
     compute=n_collision,

@@ -1,4 +1,4 @@
-"""What the metrics of perception share: which truth counts, and as what; and a rollout, checked.
+"""Shared by the metrics of perception: the truth that counts, its classes, a checked rollout.
 
 Source of the classes' ranges and of the thresholds: the detection task of nuScenes (Caesar et al.,
 nuScenes: A multimodal dataset for autonomous driving, CVPR 2020) in its configuration of 2019.
@@ -15,13 +15,13 @@ from bridgegen.participants import OBJECT_CLASSES
 from bridgegen.simulation.rollout import Rollout
 
 CLASSES = ("car", "heavy vehicle", "two-wheeler", "pedestrian", "other")
-"""What detections and the truth are sorted into: kinds that sensors take for each other are one."""
+"""Classes of detections and truth: kinds that sensors confuse are one class."""
 
 RANGES = np.array([50.0, 50.0, 40.0, 40.0, 30.0])
 """[m] Per class: a box whose centre is nearer than this to the ego's reference point counts."""
 
 THRESHOLDS = np.array([0.5, 1.0, 2.0, 4.0])
-"""[m] A detection whose centre is nearer than this to the truth's is a hit, for each once."""
+"""[m] Thresholds: a detection whose centre is nearer than this to the truth's is a hit."""
 
 CLASS_OF_KIND = np.array([CLASSES.index(one.detection_class) for one in OBJECT_CLASSES])
 """The class of each of `bridgegen.ego.kinds`, int64."""
@@ -29,17 +29,17 @@ CLASS_OF_KIND = np.array([CLASSES.index(one.detection_class) for one in OBJECT_C
 
 @dataclass(frozen=True)
 class Perceived:
-    """A rollout's detections and the truth, as compiled code takes them.
+    """A rollout's detections and the truth for compiled code.
 
     Attributes:
         half: ``(E, 2)`` float64 [m], half lengths and half widths.
-        x, y, h: ``(N, E, T)`` as the rollout has them.
+        x, y, h: ``(N, E, T)`` as in the rollout.
         cosine, sine: ``(N, E, T)`` float64, of the headings.
         centre_x, centre_y: ``(N, E, T)`` float64 [m], of the boxes; unset without a frame.
-        counts: ``(N, E, T)`` bool: there is a frame, and the entity is there, within its class's
+        counts: ``(N, E, T)`` bool: there is a frame, and the entity is present within its class's
             range.
         classes: ``(E,)`` int64, an index of `CLASSES`.
-        detections: ``(N, E, T, 8)`` as the rollout has them.
+        detections: ``(N, E, T, 8)`` as in the rollout.
         n_steps: ``(N,)`` int64 likewise.
     """
 
@@ -58,7 +58,7 @@ class Perceived:
 
 
 def perceived(rollout: Rollout) -> Perceived:
-    """Check a rollout and look for the truth that counts, once for all metrics.
+    """Check a rollout and find the truth that counts, once for all metrics.
 
     Raises:
         ValueError: it holds no detections or kinds, or malformed ones.

@@ -1,4 +1,4 @@
-"""pet: how much later one came to where the other had been."""
+"""pet: post-encroachment time."""
 
 import numpy as np
 
@@ -15,9 +15,9 @@ def pet(rollout: Rollout) -> Float:
     """Return the smallest post-encroachment time between the ego and any other.
 
     It is the least time between an instant at which the one covers a point and one at which the
-    other does, whoever came first: between leaving and entering the conflict area for those that
-    cross or merge, and the time gap for one that follows. The bodies are the oriented boxes; the
-    resolution is the time step. What is longer than `LONGEST` is no encroachment.
+    other does, in either order: between leaving and entering the conflict area for crossing or
+    merging traffic, and the time gap when following. The bodies are the oriented boxes; the
+    resolution is the time step. A time longer than `LONGEST` is no encroachment.
 
     Returns:
         ``(N,)`` float64 [s], 0 where they were in contact, +inf where they have no point in
@@ -41,7 +41,7 @@ def pet(rollout: Rollout) -> Float:
 METRIC = Metric(
     name="pet",
     unit="s",
-    description="smallest post-encroachment time: between one and the other at the same point",
+    description="smallest post-encroachment time: between two bodies at the same point",
     sense="smaller",
     cap=LONGEST,
     compute=pet,

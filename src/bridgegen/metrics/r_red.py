@@ -1,4 +1,4 @@
-"""r_red: how many red lights the ego ran."""
+"""r_red: number of red lights that the ego ran."""
 
 import numpy as np
 

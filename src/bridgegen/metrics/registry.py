@@ -47,10 +47,10 @@ ADDED = PlugIns("metric", "bridgegen.metrics")
 
 
 def _checked(found: object, name: str) -> Metric:
-    """Return a package's metric, whose results are checked.
+    """Return a package's metric, with checks of its results.
 
     Raises:
-        InputError: it is no metric of that name.
+        InputError: it is not a metric of that name.
     """
     if not isinstance(found, Metric):
         raise InputError(
@@ -58,7 +58,7 @@ def _checked(found: object, name: str) -> Metric:
         )
     if found.name != name:
         raise InputError(
-            f"{ADDED.place(name)} calls itself '{found.name}'; the two names must agree"
+            f"{ADDED.place(name)} has the name '{found.name}'; the two names must agree"
         )
 
     def compute(rollout: Rollout) -> Float:
@@ -88,7 +88,7 @@ METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 """In the order of Table I, then ours beyond it, then those of installed packages."""
 
 TABLE_I = tuple(module.METRIC.name for module in _TABLE_I)
-"""The names of the paper's eleven, which every run records as far as its rollouts hold them."""
+"""The names of the paper's eleven, which every run records as far as its rollouts allow."""
 
 
 def get(name: str) -> Metric:
@@ -108,7 +108,7 @@ def evaluate(rollout: Rollout, names: Sequence[str]) -> Float:
 
     Returns:
         ``(N, M)`` float64, a column per name, in the metric's unit; NaN throughout a row exactly
-        where the scenario failed (``rollout.status`` says why).
+        where the scenario failed (the reason is in ``rollout.status``).
 
     Raises:
         UnknownNameError: a name is not a metric's.

@@ -1,4 +1,4 @@
-"""rss: how much of the distance was missing that Responsibility-Sensitive Safety asks for."""
+"""rss: missing share of the distance that Responsibility-Sensitive Safety requires."""
 
 from dataclasses import astuple, dataclass
 
@@ -12,14 +12,14 @@ from bridgegen.simulation.rollout import Rollout
 
 @dataclass(frozen=True)
 class Parameters:
-    """What RSS assumes of those on the road.
+    """The assumptions of RSS on traffic participants.
 
-    The defaults are those that Intel's ad-rss-lib proposes (its documentation, Parameter
-    discussion); none is laid down by the authors of RSS.
+    The defaults are those of Intel's ad-rss-lib (its documentation, Parameter discussion); the
+    authors of RSS define none.
 
     Attributes:
         ego_response: [s] until the ego brakes.
-        other_response: [s] until another does.
+        other_response: [s] until another participant brakes.
         accel_max: [m/s²], along its heading, while it does not respond yet.
         brake_min: [m/s²], along its heading, that it brakes with at least.
         brake_max: [m/s²], along its heading, that one in front brakes with at most.
@@ -42,11 +42,11 @@ def rss(rollout: Rollout, parameters: Parameters | None = None) -> Float:
     """Return the largest share of the RSS safe distances that was missing.
 
     A situation is dangerous where both the longitudinal and the lateral distance are less than
-    safe. Of such a one the share is 1 − max(longitudinal, lateral), each distance as a share of the
-    safe one. Along and across are the ego's: roads are not known to a rollout. Beside it bodies
-    drive in all directions, so another's limits along and across its own heading count in
-    proportion to the cosine and the sine of the angle between the headings: one that crosses brakes
-    across our way as hard as it brakes at all.
+    safe. Its share is 1 − max(longitudinal, lateral), each distance as a share of the safe one. The
+    axes are the ego's: a rollout does not know the roads. Bodies drive in all directions, so
+    another's limits along and across its own heading count in proportion to the cosine and the sine
+    of the angle between the headings: a crossing one brakes across the ego's way as hard as it can
+    brake at all.
 
     Args:
         rollout: N scenarios.

@@ -1,4 +1,4 @@
-"""tet: for how long the time to collision was short."""
+"""tet: time exposed to a short time to collision."""
 
 import numpy as np
 
@@ -27,10 +27,10 @@ def tet(rollout: Rollout) -> Float:
 
 
 def short_times(rollout: Rollout) -> Float:
-    """Return how many instants had a short time to collision, and how short all in all.
+    """Return the number of instants with a short time to collision, and their total shortfall.
 
     Returns:
-        ``(N, 2)`` float64: a count, and the sum of what they fall short of `TARGET` [s].
+        ``(N, 2)`` float64: a count, and the sum of the differences to `TARGET` [s].
     """
     return shared(rollout, _short_times)
 

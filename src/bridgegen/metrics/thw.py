@@ -1,4 +1,4 @@
-"""thw: how little time the ego kept to those in front of it."""
+"""thw: smallest time headway of the ego."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ from bridgegen.simulation.rollout import Rollout
 def thw(rollout: Rollout) -> Float:
     """Return the smallest time headway of the ego to any other.
 
-    It is the time in which the ego, straight ahead at its present speed, first touches the place
-    that the other's body covers now: bumper to bumper for one that follows, and the time to the
-    place of the crossing for one that crosses.
+    It is the time in which the ego, straight ahead at its present speed, first touches the area
+    that the other's body covers now: bumper to bumper when following, and the time to the crossing
+    of crossing traffic.
 
     Returns:
-        ``(N,)`` float64 [s], 0 at contact, +inf where nobody was ever in front of the moving ego,
+        ``(N,)`` float64 [s], 0 at contact, +inf if no body was ever in front of the moving ego,
         NaN where the scenario failed.
 
     Source: Jansson, Collision Avoidance Theory, Linköping 2005; Westhofen et al., Criticality
@@ -35,6 +35,6 @@ METRIC = Metric(
     unit="s",
     description="smallest time headway: until the ego is where another is now",
     sense="smaller",
-    cap=10.0,  # nobody calls that following; countries fine below 0.4 to 1 s
+    cap=10.0,  # too long to count as following; countries fine below 0.4 to 1 s
     compute=thw,
 )

@@ -1,4 +1,4 @@
-"""tit: for how long, and by how much, the time to collision was short."""
+"""tit: time-integrated shortfall of the time to collision."""
 
 from bridgegen.arrays import Float
 from bridgegen.metrics.metric import Metric, without_failed
@@ -7,9 +7,9 @@ from bridgegen.simulation.rollout import Rollout
 
 
 def tit(rollout: Rollout) -> Float:
-    """Return the time integral of what the time to collision falls short of the target.
+    """Return the time integral of the difference between the target and the time to collision.
 
-    As `tet`, with every instant weighed by the seconds that are missing.
+    As `tet`, with every instant weighted by the missing seconds.
 
     Returns:
         ``(N,)`` float64 [s²], ≥ 0; NaN where the scenario failed.
@@ -23,7 +23,7 @@ def tit(rollout: Rollout) -> Float:
 METRIC = Metric(
     name="tit",
     unit="s²",
-    description="time integral of what the time to collision falls short of 3 s",
+    description="time integral of the time to collision's shortfall from 3 s",
     sense="larger",
     cap=0.0,
     compute=tit,

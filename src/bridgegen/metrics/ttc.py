@@ -1,4 +1,4 @@
-"""ttc: how little time was left to a collision, had everybody gone straight on."""
+"""ttc: smallest time to collision if all participants keep their velocity."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from bridgegen.simulation.rollout import Rollout
 def ttc(rollout: Rollout) -> Float:
     """Return the smallest two-dimensional time to collision of the ego with any other.
 
-    At every instant both oriented boxes go on at constant velocity, speed v along the heading,
-    without turning; the time to collision is when they first touch.
+    At every instant both oriented boxes are predicted at constant velocity, speed v along the
+    heading, without turning; the time to collision is when they first touch.
 
     Returns:
         ``(N,)`` float64 [s], 0 where the ego was in contact, +inf where no instant leads to a
@@ -36,7 +36,7 @@ def ttc_over_time(rollout: Rollout) -> Float:
     """Return the ego's least time to collision at each instant; its least is what ``ttc`` returns.
 
     Returns:
-        ``(N, T)`` float64 [s], 0 in contact, +inf where nothing would collide; NaN where a scenario
+        ``(N, T)`` float64 [s], 0 in contact, +inf without a collision course; NaN where a scenario
         failed. Padded instants repeat the last.
     """
     from bridgegen.metrics import _ttc_kernels

@@ -1,4 +1,4 @@
-"""v_d: how fast the ego was when it came closest."""
+"""v_d: the ego's speed at its smallest distance."""
 
 import numpy as np
 

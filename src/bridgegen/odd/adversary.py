@@ -81,18 +81,19 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     if participant not in able:
         raise InputError(
             f"{scenario.place}: an adversary drives a vehicle other than the ego that keeps to "
-            f"lanes and may move, got '{participant}'; it can drive: {', '.join(able) or 'nobody'}"
+            f"lanes and may move, got '{participant}'; it can drive: {', '.join(able) or 'none'}"
         )
-    who = scenario.participant(participant)
+    driven = scenario.participant(participant)
     own = [event for event in scenario.events if event.participant == participant]
     rest = tuple(event for event in scenario.events if event.participant != participant)
     _refuse_awaited(scenario, own, rest)
-    adversary = _adversary(scenario, who, own)
+    adversary = _adversary(scenario, driven, own)
     # The adversary is its driver.
     story = replace(
         scenario.story,
         participants=tuple(
-            replace(one, driver="scripted") if one is who else one for one in scenario.participants
+            replace(one, driver="scripted") if one is driven else one
+            for one in scenario.participants
         ),
         events=rest,
     )
@@ -116,36 +117,38 @@ def _can_be_driven(one: Participant, story: Story) -> bool:
     return on_lanes and one.name != "ego" and any(speed != 0.0 for speed in speeds_of(one, story))
 
 
-def _adversary(scenario: LogicalScenario, who: Participant, own: Iterable[EventSpec]) -> Adversary:
-    body = PARTICIPANTS[who.type].body
+def _adversary(
+    scenario: LogicalScenario, driven: Participant, own: Iterable[EventSpec]
+) -> Adversary:
+    body = PARTICIPANTS[driven.type].body
     changes = [a.change for event in own for a in event.actions if isinstance(a, SpeedChange)]
     rates = [one.rate for one in changes if one.rate is not None]
     numbers = [f"{k:02d}" for k in range(1, ceil(scenario.duration / PERIOD) + 1)]
     return Adversary(
-        participant=who.name,
-        speeds=tuple(speeds_of(who, scenario.story)),
+        participant=driven.name,
+        speeds=tuple(speeds_of(driven, scenario.story)),
         lane_width=scenario.roads.knobs["lane_width"],
         width=body.width,
         rate=rates[0] if rates else body.max_acceleration,
         acceleration=body.max_acceleration,
         braking=body.max_deceleration,
-        paces=tuple(f"{who.name}_pace_{number}" for number in numbers),
-        offsets=tuple(f"{who.name}_offset_{number}" for number in numbers),
+        paces=tuple(f"{driven.name}_pace_{number}" for number in numbers),
+        offsets=tuple(f"{driven.name}_offset_{number}" for number in numbers),
     )
 
 
 def _controls(adversary: Adversary) -> Iterable[Parameter]:
-    who = adversary.participant
+    name = adversary.participant
     for k, (pace, offset) in enumerate(zip(adversary.paces, adversary.offsets, strict=True)):
         when = f"from {k * PERIOD:g} s to {(k + 1) * PERIOD:g} s"
         yield Parameter(
             pace, Axis.EXTENSION, "1", 0.0, 1.0, 1.0,
-            description=f"Speed that the adversary has {who} make for {when}; 1: its highest.",
+            description=f"Speed that the adversary has {name} make for {when}; 1: its highest.",
             source="The speeds that the scenario gives it.",
         )  # fmt: skip
         yield Parameter(
             offset, Axis.EXTENSION, "1", -1.0, 1.0, 0.0,
-            description=f"Where in its lane the adversary steers {who} {when}; 1: leftmost.",
+            description=f"Where in its lane the adversary steers {name} {when}; 1: leftmost.",
             source="The lane's width, less its body's.",
         )  # fmt: skip
 

@@ -33,7 +33,7 @@ def jam_members(quantities: Quantities) -> tuple[str, ...]:
 
 
 class TemporaryChanges:
-    """What a file says of layer 3.
+    """A file's sections on layer 3.
 
     Attributes:
         participants: the vehicles of the jams.
@@ -42,7 +42,7 @@ class TemporaryChanges:
         derived: the places of what stands in a row.
 
     Args:
-        quantities: of the file; takes down what is wrong.
+        quantities: of the file; collects problems.
         roads: where it is.
     """
 
@@ -81,7 +81,7 @@ class TemporaryChanges:
             start = self._places.waypoint(given.start, (*path, "start"))
             problem = self._works_problem(given, start)
             if problem:
-                self._quantities.say(problem, path)
+                self._quantities.report(problem, path)
                 continue
             count = int(given.length / given.spacing) + 1
             cones = tuple(
@@ -150,7 +150,7 @@ class TemporaryChanges:
         distance: Quantity
         known = self._quantities.parameters.keys() | self._quantities.derived.keys()
         if any(isinstance(one, str) and one not in known for one in (start.distance, gap)):
-            return start  # that it is unknown has been said
+            return start  # reported as unknown already
         if isinstance(start.distance, str) or (isinstance(gap, str) and gaps):
             between = f"{gaps}*{gap}" if isinstance(gap, str) else repr(gaps * gap)
             text = f"{start.distance} {'+' if sign > 0 else '-'} ({along!r} + {between})"

@@ -84,7 +84,7 @@ def time_problems(document: Document) -> list[str]:
     data = document.data if isinstance(document.data, dict) else {}
     duration, step = data.get("duration"), data.get("time_step")
     if not isinstance(duration, int | float) or not isinstance(step, int | float):
-        return []  # the shape says so already
+        return []  # reported with the shape already
     for key, value in (("duration", duration), ("time_step", step)):
         if not 0.0 < value < math.inf:
             where = document.at((key,))
@@ -124,7 +124,7 @@ def try_out(scenario: LogicalScenario) -> None:
 
 
 def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[str]:
-    """Yield who may come off a leg, or start inside another."""
+    """Yield participants that may leave a leg's end, or start inside another."""
     for one in scenario.participants:
         ends = [(one.start, 0.0), *((point, 0.0) for point in one.path[1:])]
         for end, least in [*ends, *([(one.end, 0.0)] if one.end else [])]:

@@ -15,7 +15,7 @@ class Constraints:
         parameters: what may vary, by name.
         bounds: what limits it.
         derived: what follows from it.
-        axes: what is searched unless the user says otherwise.
+        axes: searched by default.
     """
 
     parameters: Mapping[str, Parameter]

@@ -22,7 +22,7 @@ from bridgegen.odd.binned import BinnedRows
 from bridgegen.odd.space import SearchSpace
 
 SAMPLE = 200_000
-"""Random points of the search space, always the same ones, that tell what is feasible."""
+"""Number of random points of the search space, always the same ones, that show what is feasible."""
 
 MAX_STRENGTH = 3
 MAX_BINS = 1000
@@ -155,7 +155,7 @@ def coverage(
         critical: ``(N,)`` bool.
         bins: equal bins over the declared range; a parameter of whole numbers has one for each.
         strength: the largest t.
-        sample: random points that tell what is feasible, beside X.
+        sample: random points that show what is feasible, besides X.
 
     Raises:
         InputError: bins or strength out of range.
@@ -176,7 +176,7 @@ def coverage_map(
     strength: int = MAX_STRENGTH,
     sample: int = SAMPLE,
 ) -> CoverageMap:
-    """Count as `coverage` does, and say in which pairs of bins the rows are.
+    """Count as `coverage` does, and return the pairs of bins of the rows.
 
     Args:
         space: what was searched.

@@ -55,7 +55,7 @@ def refuse_other_schema(path: Path) -> None:
     """Refuse a place where something else is than an earlier schema of ours.
 
     Raises:
-        StorageError: there is, or nobody can tell.
+        StorageError: there is one, or the folder cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -100,7 +100,7 @@ def _plain(one: Any) -> Any:
 
 
 def _between_keys(sections: dict[str, Any]) -> None:
-    """Add what holds between the keys of a section, as far as a schema can say it."""
+    """Add rules between the keys of a section, as far as a schema can express them."""
     for name in ("ParameterSection", "DerivedSection"):
         unit = sections[name]["properties"]["unit"]
         unit.pop("anyOf", None)
@@ -157,7 +157,7 @@ def _of_kind(kind: str) -> dict[str, Any]:
 
 
 def _if_there(key: str, then: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the rule that some keys are so where another one says something."""
+    """Return the rule for some keys that depends on another one's value."""
     there = {"properties": {key: {"not": _NULL}}, "required": [key]}
     return {"if": there, "then": {"properties": dict(then)}}
 

@@ -85,7 +85,7 @@ class Kind(ABC):
 
     @classmethod
     def declared(cls, names: Sequence[str], low: float | None, high: float | None) -> "Kind":
-        """Return the kind that a scenario file declares, with what it says under ``keys``."""
+        """Return the kind that a scenario file declares, with its settings of ``keys``."""
         return cls()
 
     def limits(self, low: float | None, high: float | None) -> tuple[float, float]:
@@ -119,7 +119,7 @@ class Kind(ABC):
         return None if isinstance(given, str) else float(given)
 
     def expected(self) -> str:
-        """Return what a user may give, as a message says it."""
+        """Return the valid values in words, for messages."""
         return "a number"
 
     # -- the decoder ---------------------------------------------------------------------------
@@ -232,7 +232,7 @@ class Kind(ABC):
         return f"{self.text(low, number)} to {self.text(high, number)}{unit}"
 
     def need_text(self, sign: str, limit: float, low: float, high: float, number: Show) -> str:
-        """Return what harm needs of a parameter, where sign and limit do not say it; else "".
+        """Return what harm needs of a parameter besides sign and limit; else "".
 
         Args:
             sign: ">=" or "<=".

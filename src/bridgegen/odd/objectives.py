@@ -18,23 +18,23 @@ HARM = ObjectiveSpec((Term("harm", 1.0),), "fixed", "raw", rule="harm")
 _CRITICAL: Path = ("objective", "critical")
 
 
-def read_objective(given: ObjectiveSection, say: Callable[[str, Path], None]) -> ObjectiveSpec:
-    """Return what a scenario optimises, and say what is wrong with it.
+def read_objective(given: ObjectiveSection, report: Callable[[str, Path], None]) -> ObjectiveSpec:
+    """Return what a scenario optimises, and report its problems.
 
     Args:
-        given: what the file says.
-        say: takes a problem and where it is.
+        given: the file's section.
+        report: gets a problem and its path.
     """
     seen: set[str] = set()
     for number, term in enumerate(given.terms):
         path: Path = ("objective", "terms", number)
         if term.metric in seen:
-            say(f"the metric '{term.metric}' occurs twice", path)
+            report(f"the metric '{term.metric}' occurs twice", path)
         seen.add(term.metric)
         if given.weights == "entropy" and term.weight is not None:
-            say(f"weights by entropy leave no weight to {term.metric}", path)
+            report(f"weights by entropy leave no weight to {term.metric}", path)
         elif given.weights == "fixed" and not 0.0 < (term.weight or 0.0) < math.inf:
-            say(
+            report(
                 f"fixed weights need one greater than 0 for {term.metric}, got {term.weight}",
                 path,
             )
@@ -42,7 +42,7 @@ def read_objective(given: ObjectiveSection, say: Callable[[str, Path], None]) ->
     limits = {} if isinstance(given.critical, str) else given.critical.model_dump()
     for key, value in list(limits.items()):
         if not 0.0 <= value < math.inf:
-            say(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
+            report(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
             del limits[key]
     terms = tuple(Term(one.metric, one.weight) for one in given.terms)
     rule: Literal["harm", "thresholds"] = "harm" if by_harm else "thresholds"

@@ -1,4 +1,4 @@
-"""Who drives the participants other than the ego: their script alone, or an attentive driver."""
+"""Drivers of participants other than the ego: their script alone, or the attentive driver."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ def require(name: str) -> str:
     """Return the name of a driver of other participants.
 
     Raises:
-        UnknownNameError: it is none.
+        UnknownNameError: no such driver.
     """
     if name not in DRIVERS:
         raise UnknownNameError("driver of other participants", name, DRIVERS)
@@ -33,7 +33,7 @@ def driven(
 ) -> tuple[Participant, ...]:
     """Return participants with one driver for all that have none of their own.
 
-    The ego, animals, objects and whoever never moves stay as they are.
+    The ego, animals, objects and participants that never move stay as they are.
     """
     acting = {event.participant for event in events}
     return tuple(
@@ -52,7 +52,7 @@ def with_others(scenario: LogicalScenario, others: str) -> LogicalScenario:
 
     Args:
         scenario: of five layers.
-        others: "attentive" or "scripted", whatever the scenario says. A participant that an
+        others: "attentive" or "scripted", instead of the scenario's. A participant that an
             adversary drives keeps it.
 
     Raises:

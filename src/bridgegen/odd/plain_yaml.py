@@ -36,7 +36,7 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclass(frozen=True)
 class Document:
-    """What a file says, and where.
+    """A file's contents, with their lines.
 
     Attributes:
         data: mappings, lists, texts, numbers, truth values and ``None``.

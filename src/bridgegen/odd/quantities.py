@@ -34,8 +34,8 @@ class Quantities:
         self.problems: list[str] = []
         self.used: set[str] = set()
 
-    def say(self, problem: str, path: Path) -> None:
-        """Take down a problem with its line."""
+    def report(self, problem: str, path: Path) -> None:
+        """Record a problem with its line."""
         self.problems.append(f"{problem} ({self.document.at(path)})")
 
     def check(
@@ -48,25 +48,25 @@ class Quantities:
         if not isinstance(value, str):
             if not (value > low if above else value >= low) or math.isinf(value):
                 extra = "" if low == -math.inf else " and finite"
-                self.say(f"{rule}{extra}, got {value}", path)
+                self.report(f"{rule}{extra}, got {value}", path)
             return
         self.used.add(value)
         one = self.parameters.get(value) or self.derived.get(value)
         if one is None:
             if value not in self.declared:
                 hint = nearest(value, [*self.parameters, *self.derived])
-                self.say(f"{label} names the unknown parameter '{value}'{hint}", path)
+                self.report(f"{label} names the unknown parameter '{value}'{hint}", path)
             return
         if isinstance(one, Parameter) and one.kind.names:
-            self.say(
+            self.report(
                 f"{label} needs a number, '{value}' is a category: derive a number from it", path
             )
         elif one.unit != unit:
-            self.say(f"{label} needs a parameter in {unit}, '{value}' is in {one.unit}", path)
+            self.report(f"{label} needs a parameter in {unit}, '{value}' is in {one.unit}", path)
         elif isinstance(one, Parameter) and (one.low < low or (above and one.low == low)):
-            self.say(f"{rule}, '{value}' goes down to {one.low:g}", path)
+            self.report(f"{rule}, '{value}' goes down to {one.low:g}", path)
         if one.axis is Axis.STATIC:
-            self.say(
+            self.report(
                 f"{label} must not depend on the static axis, '{value}' does: "
                 "one storyboard serves every road network",
                 path,

@@ -1,4 +1,4 @@
-"""From scenario files to logical scenarios, and every reason why a file is none, at once."""
+"""From scenario files to logical scenarios, with all errors of a file at once."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -61,7 +61,7 @@ def load(name_or_path: str | Path) -> LogicalScenario:
     Raises:
         UnknownNameError: no such name in the catalogue.
         FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
-        ScenarioError: what it says breaks a rule; all that does, with file and line.
+        ScenarioError: it breaks rules; all of them, with file and line.
     """
     text = str(name_or_path)
     path = Path(text)
@@ -119,8 +119,8 @@ class _Declarations:
         given = document.data.get("include") if isinstance(document.data, dict) else None
         for number, name in enumerate(given if isinstance(given, list) else ()):
             place = at(document.at(("include", number)))
-            file, said, prefix = str(name).partition(" as ")
-            if said and not (_PREFIX.fullmatch(prefix) and prefix not in self.prefixes):
+            file, separator, prefix = str(name).partition(" as ")
+            if separator and not (_PREFIX.fullmatch(prefix) and prefix not in self.prefixes):
                 self.problems.append(
                     "a fragment is included again as 'NAME as PREFIX', a prefix of its own of "
                     f"lower case letters that ends in '_', got '{name}'{place}"
@@ -306,37 +306,43 @@ def _read_fragment(name: str, folder: Path | None) -> Document:
 
 def _build(document: Document, folder: Path | None) -> LogicalScenario:
     problems = shape_problems(ScenarioFile, document)
-    said = _Declarations()
-    said.include(document, folder)
-    said.take(document)
-    said.set_defaults(document)
-    if not said.complete or not isinstance(document.data, dict):
-        raise ScenarioError(*problems, *said.problems)  # the rest would only say what follows
-    said.number_categories()
-    parameters = {one.name: one for one in said.parameters}
-    derived = {one.name: one for one in said.derived}
+    declarations = _Declarations()
+    declarations.include(document, folder)
+    declarations.take(document)
+    declarations.set_defaults(document)
+    if not declarations.complete or not isinstance(document.data, dict):
+        raise ScenarioError(*problems, *declarations.problems)  # others would be consequences
+    declarations.number_categories()
+    parameters = {one.name: one for one in declarations.parameters}
+    derived = {one.name: one for one in declarations.derived}
     declared: dict[str, Parameter | Derived] = {**derived, **parameters}
-    quantities = Quantities(document, parameters, derived, said.names)
+    quantities = Quantities(document, parameters, derived, declarations.names)
     roads = _roads(document, quantities)
     if roads is None:
-        raise ScenarioError(*problems, *said.problems)  # no place can be checked without them
-    board = Storyboard(quantities, roads, said.prefixes, jam_members(quantities))
+        raise ScenarioError(
+            *problems, *declarations.problems
+        )  # no place can be checked without them
+    board = Storyboard(quantities, roads, declarations.prefixes, jam_members(quantities))
     changes = TemporaryChanges(quantities, roads)
     said_of_others = document.data.get("others")
     others = said_of_others if said_of_others in DRIVERS else SCRIPTED
     participants = driven((*board.participants, *changes.participants), board.events, others)
     story = Story(participants, board.events, changes.jams, changes.works)
     objective = _objective(document.data.get("objective", "harm"), quantities)
-    said.derived += changes.derived
+    declarations.derived += changes.derived
     derived |= {one.name: one for one in changes.derived}
-    between = bounds_between_layers(roads, story, parameters, said.prefixes, document.place)
+    between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
     if not quantities.problems:
-        said.bounds += between
+        declarations.bounds += between
     used = quantities.used | roads.parameters | {one.name for one in changes.derived}
     used |= {prefix + name for prefix in story.later_weathers for name in NEEDED}
-    problems += said.problems + quantities.problems
-    problems += problems_of(said.parameters, said.bounds, said.derived, said.names)
-    problems += use_problems(declared | derived, said.bounds, said.names, used, document.place)
+    problems += declarations.problems + quantities.problems
+    problems += problems_of(
+        declarations.parameters, declarations.bounds, declarations.derived, declarations.names
+    )
+    problems += use_problems(
+        declared | derived, declarations.bounds, declarations.names, used, document.place
+    )
     problems += time_problems(document)
     given = section(ScenarioFile, document.data)
     if problems or given is None or objective is None:
@@ -356,8 +362,8 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         effects=tuple(one.function for one in given.effects),
         axes=read_axes(given.axes),
         parameters=parameters,
-        bounds=tuple(said.bounds),
-        derived=tuple(said.derived),
+        bounds=tuple(declarations.bounds),
+        derived=tuple(declarations.derived),
         objective=objective,
     )
     try_out(scenario)
@@ -369,11 +375,11 @@ def _objective(data: Any, quantities: Quantities) -> ObjectiveSpec | None:
     if data == "harm":
         return HARM
     raw = section(ObjectiveSection, data)
-    return None if raw is None else read_objective(raw, quantities.say)
+    return None if raw is None else read_objective(raw, quantities.report)
 
 
 def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
-    """Return what the file says of its roads; None if that is not of the right shape."""
+    """Return the file's roads; None if that section is not of the right shape."""
     data = document.data if isinstance(document.data, dict) else {}
     template = data.get("template")
     kind = next((one for one in KNOBS if one == template), None)
@@ -382,5 +388,5 @@ def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
         return None
     return read_roads(
         kind, given, quantities.parameters, quantities.derived, quantities.declared,
-        quantities.say,
+        quantities.report,
     )  # fmt: skip

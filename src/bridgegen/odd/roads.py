@@ -1,4 +1,4 @@
-"""The road network of a scenario file: a template, and what is said about its measures.
+"""The road network of a scenario file: a template and its parameters.
 
 A template is a kind of road network with named measures (*knobs*). Each is a constant, or the
 name of a parameter of the static axis; without a word about it, a static parameter of the knob's
@@ -26,7 +26,7 @@ class Knob:
 
     Attributes:
         unit: of its value.
-        usual: its value unless a file says otherwise.
+        usual: its default value.
         low: the least that makes sense.
         high: the most.
         why: where the usual value comes from, or what it means.
@@ -115,7 +115,7 @@ LETTERS = "ABCDE"
 
 @dataclass(frozen=True)
 class LegSpec:
-    """What a file says about one leg; None leaves it to the knobs.
+    """A file's section on one leg; None leaves it to the knobs.
 
     Attributes:
         heading: outwards [deg], counter-clockwise from +x.
@@ -172,7 +172,7 @@ class RoadsSpec:
     road_type: RoadType = "town"
 
     def __repr__(self) -> str:
-        """Return all that it says, in one spelling: a scenario's fingerprint is made of it."""
+        """Return its contents in canonical form, for a scenario's fingerprint."""
         return (
             f"RoadsSpec({self.template!r}, {dict(sorted(self.knobs.items()))!r}, "
             f"{dict(sorted(self.legs.items()))!r}, {self.segments!r}, {self.crosswalk_at!r}, "
@@ -197,7 +197,7 @@ class RoadsSpec:
         return {name: limit for name, limit in found.items() if limit != 100.0}
 
     def length(self, leg: str) -> Quantity | None:
-        """Return how long a leg is [m]; None where only its segments say so."""
+        """Return the length of a leg [m]; None if only its segments define it."""
         if self.template == "road":
             return None if self.segments else self.knobs["length"]
         return self.knobs["after_length" if leg == "after" else "arm_length"]
@@ -219,8 +219,8 @@ class RoadsSpec:
             if (leg == "after") != (way == "out"):
                 return 0.0
             return 1.0 if leg == "ramp" else self.knobs["lanes"]
-        said = self.legs[leg].lanes_in if way == "in" else self.legs[leg].lanes_out
-        return self.knobs["lanes_per_direction"] if said is None else float(said)
+        given = self.legs[leg].lanes_in if way == "in" else self.legs[leg].lanes_out
+        return self.knobs["lanes_per_direction"] if given is None else float(given)
 
 
 def usual(template: Template = "crossroads", **knobs: Quantity) -> RoadsSpec:
@@ -239,34 +239,34 @@ def usual(template: Template = "crossroads", **knobs: Quantity) -> RoadsSpec:
 
 def knobs_of(
     template: Template,
-    said: Mapping[str, Quantity],
+    given: Mapping[str, Quantity],
     declared: Mapping[str, Parameter],
 ) -> dict[str, Quantity]:
-    """Return every knob of a template: as said, a static parameter of its name, or as usual."""
+    """Return every knob of a template: as given, a static parameter of its name, or its default."""
     found: dict[str, Quantity] = {}
     for name, knob in KNOBS[template].items():
         one = declared.get(name)
         own = name if one is not None and one.axis is Axis.STATIC else knob.usual
-        found[name] = said.get(name, own)
+        found[name] = given.get(name, own)
     return found
 
 
 def knob_problems(
     template: Template,
-    said: Mapping[str, Quantity],
+    given: Mapping[str, Quantity],
     declared: Mapping[str, Parameter | Derived],
     names: Set[str],
 ) -> Iterator[tuple[str, str]]:
-    """Yield each knob that cannot be what it is said to be, and why.
+    """Yield each knob with an invalid value, and why.
 
     Args:
         template: the kind of road network.
-        said: what the file says, with static parameters of a knob's own name.
+        given: the file's values, with static parameters of a knob's own name.
         declared: parameters and derived quantities.
         names: all that is declared, also wrongly.
     """
     known = KNOBS[template]
-    for name, value in said.items():
+    for name, value in given.items():
         if name not in known:
             yield name, f"template {template} has no '{name}'{nearest(name, known)}"
             continue
@@ -300,4 +300,4 @@ def knob_problems(
             yield name, f"{rule}, '{value}' goes from {one.low:g} to {one.high:g}"
         elif one.kind.apart != (knob.unit == "count"):
             kind = "integer" if knob.unit == "count" else "float"
-            yield name, f"{name} needs a parameter of kind {kind}, '{value}' is none"
+            yield name, f"{name} needs a parameter of kind {kind}, '{value}' is not one"

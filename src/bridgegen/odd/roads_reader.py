@@ -36,32 +36,32 @@ def read_roads(
     parameters: Mapping[str, Parameter],
     derived: Mapping[str, Derived],
     declared: Set[str],
-    say: Say,
+    report: Say,
 ) -> RoadsSpec:
-    """Return the road network that a file describes, and say what is wrong with it.
+    """Return the road network that a file describes, and report its problems.
 
     Args:
         template: its kind.
-        given: what the file says about it.
+        given: the file's section on it.
         parameters: what it may name.
         derived: what it may not name, for the message.
         declared: all names, also of what is declared wrongly.
-        say: takes a problem and where it is.
+        report: gets a problem and its path.
     """
     every = {name for knobs in KNOBS.values() for name in knobs}
-    said = {name: value for name in every if (value := getattr(given, name)) is not None}
+    values = {name: value for name in every if (value := getattr(given, name)) is not None}
     known: dict[str, Parameter | Derived] = {**derived, **parameters}
-    knobs = knobs_of(template, said, parameters)
-    unknown = {name: value for name, value in said.items() if name not in knobs}
+    knobs = knobs_of(template, values, parameters)
+    unknown = {name: value for name, value in values.items() if name not in knobs}
     for name, problem in knob_problems(template, unknown | knobs, known, declared):
-        say(problem, ("roads", name))
-    legs = _legs(template, given, say)
+        report(problem, ("roads", name))
+    legs = _legs(template, given, report)
     if template != "road":
         for key in ("segments", "crosswalk_at"):
             if getattr(given, key):
-                say(f"template {template} has no '{key}'", ("roads", key))
+                report(f"template {template} has no '{key}'", ("roads", key))
     if template not in ("crossroads", "t-junction") and given.signals != "none":
-        say(f"template {template} has no signals", ("roads", "signals"))
+        report(f"template {template} has no signals", ("roads", "signals"))
     segments = tuple(
         Segment(
             one.length,
@@ -77,12 +77,12 @@ def read_roads(
             ("end_curvature", one.end_curvature, -_TIGHTEST, _TIGHTEST),
         ):
             for problem in _measure(key, value, low, high, known, declared):
-                say(problem, ("roads", "segments", number))
+                report(problem, ("roads", "segments", number))
     length = knobs.get("length", 0.0)
     at = given.crosswalk_at
     straight = not segments and isinstance(length, float)
     if at is not None and straight and not 0.0 < at < float(length):
-        say(
+        report(
             f"crosswalk_at [m] must lie on the road, 0 to {length:g}, got {at:g}",
             ("roads", "crosswalk_at"),
         )
@@ -98,8 +98,8 @@ def read_roads(
     )
 
 
-def _legs(template: Template, given: RoadsSection, say: Say) -> dict[str, LegSpec]:
-    """Return the legs of a junction: the usual ones, or those of which a heading is said."""
+def _legs(template: Template, given: RoadsSection, report: Say) -> dict[str, LegSpec]:
+    """Return the legs of a junction: the usual ones, or those with a given heading."""
     headings = dict(HEADINGS[template])
     if any(one.heading is not None for one in given.legs.values()):
         headings = {
@@ -108,32 +108,34 @@ def _legs(template: Template, given: RoadsSection, say: Say) -> dict[str, LegSpe
         }
     for name in given.legs:
         if not headings and not HEADINGS[template]:
-            say(f"template {template} has no legs to describe", ("roads", "legs"))
+            report(f"template {template} has no legs to describe", ("roads", "legs"))
             return {}
         if name not in headings or len(name) != 1 or name not in LETTERS:
-            say(
+            report(
                 f"a leg is one of {', '.join(headings)}, got '{name}'{nearest(name, headings)}",
                 ("roads", "legs", name),
             )
         elif math.isnan(headings[name]):
-            say(f"leg {name} must have a heading [deg]", ("roads", "legs", name))
+            report(f"leg {name} must have a heading [deg]", ("roads", "legs", name))
     legs = {
-        name: _leg(name, heading, given.legs.get(name, LegSection()), given, say)
+        name: _leg(name, heading, given.legs.get(name, LegSection()), given, report)
         for name, heading in sorted(headings.items())
         if math.isfinite(heading)
     }
     for problem in _angles(template, legs):
-        say(problem, ("roads", "legs"))
+        report(problem, ("roads", "legs"))
     return legs
 
 
-def _leg(name: str, heading: float, one: LegSection, given: RoadsSection, say: Say) -> LegSpec:
+def _leg(name: str, heading: float, one: LegSection, given: RoadsSection, report: Say) -> LegSpec:
     path: Path = ("roads", "legs", name)
     lanes_in = None if one.lanes_in is None else int(one.lanes_in)
     if one.turns and lanes_in != len(one.turns):
-        say(f"turns of leg {name} must be one list per lane in (lanes_in), innermost first", path)
+        report(
+            f"turns of leg {name} must be one list per lane in (lanes_in), innermost first", path
+        )
     if any(not turns for turns in one.turns):
-        say(f"each lane in of leg {name} must lead somewhere, got an empty list in turns", path)
+        report(f"each lane in of leg {name} must lead somewhere, got an empty list in turns", path)
     return LegSpec(
         heading,
         lanes_in,

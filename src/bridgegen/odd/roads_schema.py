@@ -21,7 +21,7 @@ class LegSection(ShapedSection):
     sign: Literal["stop", "yield"] | None = None
     """What stands at its stop line."""
     crosswalk: Annotated[bool, Field(strict=True)] | None = None
-    """Whether people cross it at the junction; as ``crosswalks`` says by default."""
+    """Whether it has a crosswalk at the junction; that of ``crosswalks`` by default."""
 
 
 class SegmentSection(ShapedSection):
@@ -36,7 +36,7 @@ class SegmentSection(ShapedSection):
 
 
 class RoadsSection(ShapedSection):
-    """The road network: what is said of its legs, and its measures (see ``roads.KNOBS``)."""
+    """The road network: its legs and its template parameters (see ``roads.KNOBS``)."""
 
     legs: dict[str, LegSection] = {}
     """Of a junction or roundabout, by letter, A to E."""

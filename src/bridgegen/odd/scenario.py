@@ -78,12 +78,12 @@ class SearchedScenario:
         title: one line.
         description: what happens.
         place: the file that it was read from.
-        axes: what is searched unless the user says otherwise.
+        axes: searched by default.
         parameters: what may vary, by name.
         bounds: what limits it.
         derived: what follows from it.
         objective: what is optimised.
-        driver: who drives the ego unless the user says otherwise; None leaves it to a file.
+        driver: default driver of the ego; None leaves it to a file.
         budget: evaluations, likewise.
         seed: of the search, likewise.
     """
@@ -103,7 +103,7 @@ class SearchedScenario:
 
     @property
     def fingerprint(self) -> str:
-        """A digest of all that it says: the same for the same scenario on any machine."""
+        """A digest of its contents: the same for the same scenario on any machine."""
         return sha256(_content(self).encode()).hexdigest()
 
     @property
@@ -160,11 +160,11 @@ class LogicalScenario(SearchedScenario):
         time_step: [s].
         road_end: what participants other than the ego do where their road ends.
         roads: the road network.
-        story: who takes part, and what happens.
-        driver: who drives the ego unless the user says otherwise.
+        story: participants and events.
+        driver: default driver of the ego.
         effects: the user's functions that add to each scenario, as ``file.py:function`` or the
             name of an entry point.
-        adversary: who drives a participant, if `bridgegen.odd.adversary.adversarial` made it.
+        adversary: driver of a participant, if `bridgegen.odd.adversary.adversarial` made it.
     """
 
     source: str
@@ -230,7 +230,7 @@ class LogicalScenario(SearchedScenario):
 
 
 def _content(scenario: SearchedScenario) -> str:
-    """Return all that a scenario says, as text.
+    """Return the contents of a scenario as text.
 
     `Thresholds` is written as the class was called when the first runs recorded a digest of it.
     """

@@ -63,7 +63,7 @@ class BoundSection(ShapedSection):
     why: Text
     """The reason."""
     source: Text
-    """Who says so."""
+    """Source of the rule."""
 
 
 class DerivedSection(ShapedSection):
@@ -78,7 +78,7 @@ class DerivedSection(ShapedSection):
     why: Text
     """The reason."""
     source: Text
-    """Who says so."""
+    """Source of the rule."""
     description: Text
     """What it is."""
 
@@ -156,9 +156,9 @@ class ScenarioFile(ShapedSection):
     roads: RoadsSection = RoadsSection()
     """Its measures."""
     driver: Word = "route-follower"
-    """Who drives the ego, unless --ego says otherwise; see 'bridgegen list drivers'."""
+    """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
     others: Literal["attentive", "scripted"] = "scripted"
-    """Who drives the other participants, unless --others says otherwise; see their ``driver``."""
+    """Default driver of the other participants (see --others, and their ``driver``)."""
     duration: Number
     """Of the simulation [s]."""
     time_step: Number
@@ -166,7 +166,7 @@ class ScenarioFile(ShapedSection):
     road_end: Literal["leave", "stand"] = "leave"
     """What participants other than the ego do where their road ends: leave, or stand."""
     axes: Annotated[list[AxisName], Field(min_length=1)]
-    """What is searched, unless --axes says otherwise."""
+    """Axes that are searched by default (see --axes)."""
     include: list[Text] = []
     """Fragments: of the catalogue, or files beside this one; "NAME as PREFIX_" again."""
     participants: dict[str, ParticipantSection]
@@ -182,7 +182,7 @@ class ScenarioFile(ShapedSection):
     parameters: dict[str, ParameterSection] = {}
     """By name: what may vary."""
     defaults: dict[str, NumberOrName] = {}
-    """Of included parameters, otherwise than their file says."""
+    """Changes of included parameters."""
     bounds: list[BoundSection] = []
     """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}

@@ -101,7 +101,7 @@ Section = TypeVar("Section", bound=ShapedSection)
 class OrWord:
     """A section of a file in whose place one word may stand: ``Annotated[S | Literal[word], …]``.
 
-    Unlike a plain union, it says of a section that does not fit what does not fit in it.
+    Unlike a plain union, it reports which parts of an invalid section are wrong.
     """
 
     def __init__(self, model: type[ShapedSection], word: str) -> None:

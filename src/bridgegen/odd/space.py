@@ -102,8 +102,8 @@ class SearchSpace:
     @property
     def labels(self) -> dict[str, dict[str, Any]]:
         """How the values of its parameters are read, of those that are no plain numbers."""
-        said = {name: one.kind.labels() for name, one in self.parameters.items()}
-        return {name: one for name, one in said.items() if one}
+        labels = {name: one.kind.labels() for name, one in self.parameters.items()}
+        return {name: one for name, one in labels.items() if one}
 
     def index(self, name: str) -> int:
         """Return the column of X that holds ``name``.
@@ -188,7 +188,7 @@ class SearchSpace:
         kept to the last bit, whether this space searches it or not.
 
         Args:
-            values: by name; a derived quantity may be given if it is what its formula says.
+            values: by name; a derived quantity may be given if it equals its formula's value.
 
         Returns:
             ``(len(names),)``.

@@ -1,4 +1,4 @@
-"""Who takes part in a logical scenario, where, and what happens: layers 3 and 4."""
+"""Participants and events of a logical scenario: layers 3 and 4."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -57,7 +57,7 @@ class Participant:
         name: "ego" for the system under test.
         type: what it is, one of `bridgegen.participants.TYPES`.
         start: where it stands at time 0.
-        end: where its route ends; None: it goes on along its lane, or along its path.
+        end: where its route ends; None: it continues along its lane, or along its path.
         speed: [m/s] at time 0; of the ego also its target.
         path: the points of its own way, ``start`` first; empty: it keeps to lanes.
         driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
@@ -79,7 +79,7 @@ class Participant:
 
 @dataclass(frozen=True)
 class Change:
-    """How something changes: one of the three says how long it takes; none, at once.
+    """The dynamics of a change: one of the three defines its duration; none: at once.
 
     Attributes:
         rate: [m/s²] (of a speed only).

@@ -1,4 +1,4 @@
-"""The shape of what a scenario file says of its story: who, where, what happens, and when."""
+"""The schema of a scenario file's story: participants, places, actions and conditions."""
 
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
@@ -45,7 +45,7 @@ class ParticipantSection(ShapedSection):
     speed: QuantityField = 0.0
     """At time 0 [m/s]; of the ego also its target."""
     driver: Word | None = None
-    """attentive or scripted, instead of what ``others`` says; not of the ego."""
+    """attentive or scripted, instead of ``others``; not of the ego."""
 
 
 class ConditionSection(ShapedSection):

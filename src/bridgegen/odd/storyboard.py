@@ -40,7 +40,7 @@ _WALKERS = tuple(
 
 
 class Storyboard:
-    """What a file says of its participants and events, as far as it has the right shape.
+    """A file's sections on participants and events, as far as they have the right shape.
 
     Attributes:
         participants: as ``LogicalScenario`` holds them.
@@ -48,7 +48,7 @@ class Storyboard:
         known: the participants' names, also of those that are described wrongly.
 
     Args:
-        quantities: of the file; takes down what is wrong.
+        quantities: of the file; collects problems.
         roads: what waypoints may lie on.
         prefixes: of the weathers that an event may change to.
         more: names of participants that other parts of the file bring.
@@ -63,7 +63,7 @@ class Storyboard:
     ) -> None:
         self._quantities, self._roads, self._prefixes = quantities, roads, prefixes
         self._places = Places(quantities, roads)
-        self._say, self._check = quantities.say, quantities.check
+        self._report, self._check = quantities.report, quantities.check
         document = quantities.document
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
         self._event_names = [str(name) for name, _ in entries(document, "events")]
@@ -71,26 +71,26 @@ class Storyboard:
         self._acting = {one.name: one for one in self.participants}
         self.events = tuple(self._events())
 
-    # -- who -----------------------------------------------------------------------------------
+    # -- participants --------------------------------------------------------------------------
 
     def _participants(self) -> Iterator[Participant]:
         if EGO not in self.known:
-            self._say("participants must hold 'ego', the system under test", ("participants",))
+            self._report("participants must hold 'ego', the system under test", ("participants",))
         elif len(self.known) < 2:
-            self._say("participants must hold somebody besides the ego", ("participants",))
+            self._report("participants must hold another one besides the ego", ("participants",))
         for key, data in entries(self._quantities.document, "participants"):
             name, path = str(key), ("participants", key)
             given = section(ParticipantSection, data)
             if given is None:
                 continue
             if not name.isidentifier() or not name.isascii():
-                self._say(f"a participant's name is a word, got '{name}'", path)
+                self._report(f"a participant's name is a word, got '{name}'", path)
             self._check(given.speed, "m/s", (*path, "speed"))
             self._check_driver(name, given, path)
             if given.path:
                 yield self._walker(name, given, path)
             elif given.start is None:
-                self._say(f"{name} must have a start or a path", path)
+                self._report(f"{name} must have a start or a path", path)
             else:
                 yield self._driver(name, given, given.start, path)
 
@@ -101,19 +101,19 @@ class Storyboard:
             for number, one in enumerate(given.path)
         )
         if given.start is not None or given.end is not None:
-            self._say(f"{name} must have a path, or a start and an end, not both", path)
+            self._report(f"{name} must have a path, or a start and an end, not both", path)
         varied = [q for one in points for q in (one.distance, one.offset) if isinstance(q, str)]
         if varied:
-            self._say(
+            self._report(
                 f"the places of a path are constants, one path serves every row; {name} has "
                 f"'{varied[0]}'",
                 path,
             )
         if len(points) < 2:
-            self._say(f"a path leads through two points at least, {name} has one", path)
+            self._report(f"a path leads through two points at least, {name} has one", path)
         if given.type not in _WALKERS:
             kinds = ", ".join(_WALKERS)
-            self._say(f"a {given.type} keeps to lanes; a path is for {kinds}", path)
+            self._report(f"a {given.type} keeps to lanes; a path is for {kinds}", path)
         if given.type == "pedestrian":
             self._places.check_crossing(name, points, path)
         driver = given.driver or ""
@@ -129,49 +129,51 @@ class Storyboard:
             end = self._places.waypoint(given.end, (*path, "end"), above=True)
             self._check_route(name, start, end, given, path)
         elif name == EGO:
-            self._say("the ego's route must have an end", path)
+            self._report("the ego's route must have an end", path)
         if name == EGO and isinstance(start.offset, str):
-            self._say(
+            self._report(
                 f"the ego's offset is a constant, its driver keeps to one path; got "
                 f"'{start.offset}'",
                 path,
             )
         conduct = PARTICIPANTS[given.type].seen_as.conduct
         if name == EGO and PARTICIPANTS[given.type].on_rails:
-            self._say(
+            self._report(
                 f"the ego must be a vehicle that its driver can steer, a {given.type} runs on "
                 f"rails; got type '{given.type}'",
                 (*path, "type"),
             )
         stands = conduct in ("obstacle", "pedestrian", "animal")
         if stands and (given.speed != 0.0 or end is not None):
-            self._say(f"{name} without a path stands: no speed, no end", path)
+            self._report(f"{name} without a path stands: no speed, no end", path)
         if given.type == "pedestrian" and start.lane != "sidewalk":
-            self._say(f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path)
+            self._report(
+                f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path
+            )
         if conduct == "vehicle" and start.lane == "sidewalk":
-            self._say(f"{name} must stand on a lane: vehicles are on roads only", path)
+            self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
         return Participant(name, given.type, start, end, given.speed, driver=given.driver or "")
 
     def _check_driver(self, name: str, given: ParticipantSection, path: Path) -> None:
-        """Check who drives a participant, if it says so."""
+        """Check a participant's driver, if it has one."""
         driver, place = given.driver, (*path, "driver")
         if driver is None:
             return
         if name == EGO:
-            self._say(
+            self._report(
                 f"the ego's driver is named once, by the scenario's own key 'driver'; got "
                 f"'{driver}' here",
                 place,
             )
         elif driver not in DRIVERS:
             hint = nearest(driver, DRIVERS)
-            self._say(
+            self._report(
                 f"the driver of {name} must be one of {', '.join(DRIVERS)} (others are for the "
                 f"ego), got '{driver}'{hint}",
                 place,
             )
         elif driver == ATTENTIVE and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
-            self._say(f"{name} is an obstacle, which nobody drives; got '{driver}'", place)
+            self._report(f"{name} is an obstacle, which has no driver; got '{driver}'", place)
 
     def _check_route(
         self,
@@ -184,23 +186,23 @@ class Storyboard:
         by_points = given.start is not None and given.start.point is not None
         if self._roads.template == "road":
             if (start.leg, start.way, start.lane) != (end.leg, end.way, end.lane):
-                self._say(f"a route changes no lane: {name} goes from {start} to {end}", path)
+                self._report(f"a route changes no lane: {name} goes from {start} to {end}", path)
             return
         if start.way != "in":
             got = f"P{_point(start)}" if by_points else str(start)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 1}" for leg in self._roads.legs)
-            self._say(
+            self._report(
                 f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
             )
         if end.way != "out":
             got = f"P{_point(end)}" if by_points else str(end)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
-            self._say(
+            self._report(
                 f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
             )
         back = start.leg == end.leg and start.way == "in" and end.way == "out"
         if back and self._roads.template != "roundabout":
-            self._say(
+            self._report(
                 f"a route must not turn back: P{_point(start)} to P{_point(end)} is one leg", path
             )
 
@@ -213,14 +215,14 @@ class Storyboard:
             if given is None:
                 continue
             if not name.isidentifier() or not name.isascii():
-                self._say(f"an event's name is a word, got '{name}'", path)
+                self._report(f"an event's name is a word, got '{name}'", path)
             actions = tuple(self._actions(name, given, path))
             if not actions:
-                self._say(f"{name} must change a speed, a lane or the weather", path)
+                self._report(f"{name} must change a speed, a lane or the weather", path)
             if given.participant is not None:
                 self._check_participant(given.participant, (*path, "participant"))
                 if given.participant == EGO:
-                    self._say("events move the others; the ego's driver is under test", path)
+                    self._report("events move the others; the ego's driver is under test", path)
             when = tuple(
                 tuple(self._conditions(given, one, (*path, "when", number)))
                 for number, one in enumerate(given.when)
@@ -231,16 +233,16 @@ class Storyboard:
         if given.weather is not None:
             if given.weather not in self._prefixes:
                 known = ", ".join(self._prefixes) or "none"
-                self._say(
+                self._report(
                     f"{name} changes the weather to one that is included with a prefix "
                     f"('weather as {given.weather}'); there are: {known}",
                     path,
                 )
             if given.participant is not None:
-                self._say(f"{name}: the weather is nobody's, it has no participant", path)
+                self._report(f"{name}: the weather is nobody's, it has no participant", path)
             yield WeatherChange(given.weather)
         elif given.participant is None:
-            self._say(f"{name} must have a participant", path)
+            self._report(f"{name} must have a participant", path)
         if given.speed is not None:
             self._check(given.speed, "m/s", (*path, "speed"))
             yield SpeedChange(
@@ -248,19 +250,21 @@ class Storyboard:
                 self._change(given.rate, given.time, given.distance, given.shape, path),
             )
         elif any(one is not None for one in (given.rate, given.time, given.distance)):
-            self._say(f"{name} says how fast a speed changes, but not to what (speed)", path)
+            self._report(f"{name} has a change of speed without its target (speed)", path)
         if given.lane_change is not None:
             one = given.lane_change
             if one.lanes == 0.0:
-                self._say("a lane change by 0 lanes is none", (*path, "lane_change"))
+                self._report("lane_change must not be 0 lanes", (*path, "lane_change"))
             if one.time is None and one.distance is None:
-                self._say("a lane change takes a time or a distance", (*path, "lane_change"))
+                self._report("a lane change takes a time or a distance", (*path, "lane_change"))
             change = self._change(None, one.time, one.distance, one.shape, (*path, "lane_change"))
             actor = self._acting.get(str(given.participant))
             if actor is not None and (actor.end is not None or actor.path):
-                self._say(f"{actor.name} changes lane, so it has no end and no path", path)
+                self._report(f"{actor.name} changes lane, so it has no end and no path", path)
             if actor is not None and PARTICIPANTS[actor.type].on_rails:
-                self._say(f"{actor.name}, a {actor.type}, runs on rails and changes no lane", path)
+                self._report(
+                    f"{actor.name}, a {actor.type}, runs on rails and changes no lane", path
+                )
             yield LaneChange(int(one.lanes), change)
 
     def _change(
@@ -276,7 +280,7 @@ class Storyboard:
             if value is not None:
                 self._check(value, unit, (*path, key), above=True)
         if sum(value is not None for value, _ in given.values()) > 1:
-            self._say("a change takes a rate, a time or a distance, one of them", path)
+            self._report("a change takes a rate, a time or a distance, one of them", path)
         return Change(rate, time, distance, shape)  # type: ignore[arg-type]
 
     def _conditions(
@@ -285,43 +289,43 @@ class Storyboard:
         """Yield the conditions of one alternative."""
         if one.all:
             if one.kind is not None:
-                self._say("an alternative is a condition, or 'all' of several, not both", path)
+                self._report("an alternative is a condition, or 'all' of several, not both", path)
             for number, each in enumerate(one.all):
                 yield from self._conditions(event, each, (*path, "all", number))
             return
         if one.kind is None:
-            self._say(f"a condition must have a kind: {', '.join(CONDITIONS)}", path)
+            self._report(f"a condition must have a kind: {', '.join(CONDITIONS)}", path)
             return
         kind, subject = CONDITIONS[one.kind], one.of or event.participant
         self._check(one.value, kind.unit, (*path, "value"))
         if one.kind == "after" and isinstance(one.value, str):
-            self._say(
+            self._report(
                 f"value of an 'after' condition [s] must be a constant, got '{one.value}': delays "
                 "are part of the storyboard, which is the same for all rows",
                 (*path, "value"),
             )
         if not kind.pair and one.to is not None:
-            self._say(f"a {one.kind} condition has no 'to', got '{one.to}'", path)
+            self._report(f"a {one.kind} condition has no 'to', got '{one.to}'", path)
         if kind.pair and one.to is None:
-            self._say(f"a {one.kind} condition needs 'to', the other participant", path)
+            self._report(f"a {one.kind} condition needs 'to', the other participant", path)
         elif kind.pair:
             self._check_participant(str(one.to), (*path, "to"))
             if one.to == subject:
-                self._say(f"a {one.kind} is to another participant, got '{one.to}' twice", path)
+                self._report(f"a {one.kind} is to another participant, got '{one.to}' twice", path)
         if one.of is not None:
             self._check_participant(one.of, (*path, "of"))
         elif subject is None and one.kind not in ("time", "after"):
-            self._say(f"a {one.kind} condition needs 'of', whose it is", path)
+            self._report(f"a {one.kind} condition needs 'of', whose it is", path)
         if (one.kind == "after") != (one.event is not None):
-            self._say("an 'after' condition, and no other, names an event", path)
+            self._report("an 'after' condition, and no other, names an event", path)
         elif one.event is not None and one.event not in self._event_names:
             hint = nearest(one.event, self._event_names)
-            self._say(f"unknown event '{one.event}'{hint}", path)
+            self._report(f"unknown event '{one.event}'{hint}", path)
         yield ConditionSpec(one.kind, one.value, one.to, one.of, one.event)
 
     def _check_participant(self, name: str, path: Path) -> None:
         if name not in self.known:
-            self._say(f"unknown participant '{name}'{nearest(name, self.known)}", path)
+            self._report(f"unknown participant '{name}'{nearest(name, self.known)}", path)
 
 
 def _point(place: Waypoint) -> int:

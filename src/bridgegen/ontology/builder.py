@@ -1,6 +1,6 @@
 """Collecting statements: individuals, their values, and the parameters that give these.
 
-What the individuals of a scenario are, the files beside this one say, one per layer.
+The files beside this one define the individuals of a scenario, one per layer.
 """
 
 from collections.abc import Mapping
@@ -112,7 +112,7 @@ class Builder:
         Raises:
             OntologyError: it is a category and gives a property; or it gives one property of an
                 individual, and another one elsewhere that the same individual has from somewhere
-                else: who reads it would take that for its.
+                else: readers would take that for its own.
         """
         derived = isinstance(parameter, Derived)
         node = self.node(f"p_{name}", "DerivedParameter" if derived else "Parameter")
@@ -126,7 +126,7 @@ class Builder:
         else:
             self.put(node, "has_low", float(parameter.low))
             self.put(node, "has_high", float(parameter.high))
-        if name not in self.bound:  # nobody carries its value, so it does so itself
+        if name not in self.bound:  # no other individual carries its value, so it does
             self.quantity(node, "has_value", name)
         for property_name in sorted(self.bound[name]):
             self.put(node, "binds_property", property_name)

@@ -1,6 +1,6 @@
 """Does a scenario keep its rules? Answers in sentences that a person understands.
 
-SHACL decides (`shapes`, run by pyshacl over a ``pyoxigraph.Store``) and `words` says it in words.
+SHACL decides (`shapes`, run by pyshacl over a ``pyoxigraph.Store``) and `words` phrases the result.
 pyshacl is imported at the first check, as that takes half a second.
 """
 
@@ -114,18 +114,18 @@ class _Compiled:
         if conforms:
             return
 
-        def said(result: Any, name: str) -> Any:
+        def text_of(result: Any, name: str) -> Any:
             return report.value(result, URIRef(_SH + name))
 
         for result in report.objects(None, URIRef(_SH + "result")):
-            value = said(result, "value")
+            value = text_of(result, "value")
             yield Finding(
-                shape=str(said(result, "sourceShape")),
-                component=str(said(result, "sourceConstraintComponent")),
-                focus=str(said(result, "focusNode")),
+                shape=str(text_of(result, "sourceShape")),
+                component=str(text_of(result, "sourceConstraintComponent")),
+                focus=str(text_of(result, "focusNode")),
                 value=str(value) if value is not None else None,
                 literal=isinstance(value, Literal),
-                message=str(said(result, "resultMessage")),
+                message=str(text_of(result, "resultMessage")),
             )
 
 

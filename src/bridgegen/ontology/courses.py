@@ -1,4 +1,4 @@
-"""Where somebody is when: a participant's course, as the individuals say it."""
+"""A participant's course (timed poses) as individuals."""
 
 import math
 
@@ -24,35 +24,35 @@ def rounded(course: Float) -> Float:
     return np.column_stack((times, places, headings)) + 0.0
 
 
-def add_course(builder: Builder, who: str, course: Float) -> ox.NamedNode:
-    """Add the event that from the start on somebody is where a course says.
+def add_course(builder: Builder, name: str, course: Float) -> ox.NamedNode:
+    """Add the event by which a participant follows a course from the start on.
 
     Args:
         builder: where to.
-        who: the participant's name.
+        name: of the participant.
         course: ``(V, 4)``: time [s], x, y [m], heading [rad], rounded.
     """
     put = builder.put
-    event = builder.node(f"{who}_course", "StoryboardEvent")
-    put(event, "has_name", f"{who}_course")
-    put(event, "has_who", builder.iri(who))
-    action = builder.node(f"{who}_course_action", "FollowTrajectoryAction")
+    event = builder.node(f"{name}_course", "StoryboardEvent")
+    put(event, "has_name", f"{name}_course")
+    put(event, "has_who", builder.iri(name))
+    action = builder.node(f"{name}_course_action", "FollowTrajectoryAction")
     put(event, "has_what", action)
-    trajectory = builder.node(f"{who}_course_path", "Trajectory")
+    trajectory = builder.node(f"{name}_course_path", "Trajectory")
     put(action, "has_trajectory", trajectory)
-    put(trajectory, "has_name", f"{who}_course_path")
+    put(trajectory, "has_name", f"{name}_course_path")
     for number, (time, x, y, h) in enumerate(course.tolist(), start=1):
-        vertex = builder.node(f"{who}_course_vertex_{number}", "Vertex")
+        vertex = builder.node(f"{name}_course_vertex_{number}", "Vertex")
         put(trajectory, "has_vertex", vertex)
         put(vertex, "has_index", number)
         put(vertex, "has_time", time)
-        place = builder.node(f"{who}_course_point_{number}", "WorldPosition")
+        place = builder.node(f"{name}_course_point_{number}", "WorldPosition")
         put(vertex, "has_position", place)
         put(place, "has_world_x", x)
         put(place, "has_world_y", y)
         put(place, "has_world_yaw", round(math.degrees(h), DIGITS))
-    begin = builder.node(f"{who}_course_trigger", "Trigger")
-    condition = builder.node(f"{who}_course_start", "SimulationTimeCondition")
+    begin = builder.node(f"{name}_course_trigger", "Trigger")
+    condition = builder.node(f"{name}_course_start", "SimulationTimeCondition")
     put(condition, "has_value", 0.0)
     put(begin, "has_condition", condition)
     put(event, "has_when", begin)

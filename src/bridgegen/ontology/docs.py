@@ -1,4 +1,4 @@
-"""The ontology as a page for people: every class and property, with all that is said of it.
+"""The ontology as a page: every class and property, with all statements about it.
 
 One HTML file without scripts that fetches nothing. A term's anchor is its local name, so that
 ``…#Crosswalk`` leads to it wherever the page is put.

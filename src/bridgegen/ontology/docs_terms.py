@@ -1,4 +1,4 @@
-"""What the documentation's page says of each class and each property."""
+"""The documentation page's entries for classes and properties."""
 
 from collections.abc import Callable, Iterable
 
@@ -11,7 +11,7 @@ _Properties = Callable[[str], Iterable[str]]
 
 
 class Terms:
-    """Says terms as markup, each as an article with the term's local name as its anchor."""
+    """Renders terms as markup, each as an article with the term's local name as its anchor."""
 
     def __init__(self, ontology: TBox) -> None:
         self.ontology = ontology
@@ -48,7 +48,7 @@ class Terms:
         )
 
     def cls(self, name: str) -> str:
-        """Return all that is said of a class."""
+        """Return the entry of a class."""
         ontology = self.ontology
         disjoint = [one for group in ontology.disjoint if name in group for one in group]
         pointing = [
@@ -127,7 +127,7 @@ class Terms:
         return f"<details><summary>{what} of superclasses</summary>{groups}</details>"
 
     def property(self, name: str) -> str:
-        """Return all that is said of a property."""
+        """Return the entry of a property."""
         ontology = self.ontology
         same = [local_name(one) for one in ontology.equivalents.get(name, ())]
         owners = [cls for cls, names in ontology.requires.items() if name in names]
@@ -159,7 +159,7 @@ class Terms:
 
 
 def is_in(iri: str, prefix: str) -> bool:
-    """Say whether a term belongs to a vocabulary."""
+    """Return whether a term belongs to a vocabulary."""
     return iri.startswith(VOCABULARIES[prefix][1])
 
 

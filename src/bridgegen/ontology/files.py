@@ -183,7 +183,7 @@ def _number_ranges() -> dict[ox.NamedNode, ox.NamedNode]:
 
 
 def _without_tbox(quads: list[ox.Quad]) -> list[ox.Quad]:
-    """Leave out what ``bridgegen.owl`` says, anonymous nodes (of a list, say) included."""
+    """Leave out the statements of ``bridgegen.owl``, with anonymous nodes (of lists)."""
     plain, trees = _known()
     ours = {quad for key, tree in _trees(quads) if key in trees for quad in tree}
     return [
@@ -202,7 +202,7 @@ def _known() -> tuple[frozenset[ox.Quad], frozenset[str]]:
 
 
 def _trees(quads: Iterable[ox.Quad]) -> Iterator[tuple[str, list[ox.Quad]]]:
-    """Yield each tree of anonymous nodes: what it says, their ids being arbitrary, and its quads.
+    """Yield each tree of anonymous nodes: its contents without their arbitrary ids, and its quads.
 
     A node that is referred to twice ends its tree, so each is visited once at most, and circles
     not at all.
@@ -224,8 +224,8 @@ def _trees(quads: Iterable[ox.Quad]) -> Iterator[tuple[str, list[ox.Quad]]]:
             return str(node)
         own = about.get(node, [])
         tree += own
-        said = sorted(f"{quad.predicate} {text(quad.object, tree, depth - 1)}" for quad in own)
-        return f"[{' ; '.join(said)}]"
+        parts = sorted(f"{quad.predicate} {text(quad.object, tree, depth - 1)}" for quad in own)
+        return f"[{' ; '.join(parts)}]"
 
     for root in roots:
         tree: list[ox.Quad] = []

@@ -1,7 +1,7 @@
 """Reading individuals: the questions that the converters and checks ask of a scenario's graph.
 
 Answers depend on classes, properties and values only, never on how an individual's IRI is
-spelled, so a file that somebody edited in Protégé reads like one that we wrote.
+spelled, so a file that was edited in Protégé reads like one that BridgeGen wrote.
 """
 
 import math
@@ -73,7 +73,7 @@ class Individuals:
         """Return the only individual of a class.
 
         Raises:
-            OntologyError: there is none, or there are several.
+            OntologyError: there is no such individual, or there are several.
         """
         found = self.of_class(name)
         if len(found) != 1:
@@ -85,7 +85,7 @@ class Individuals:
         return found[0]
 
     def is_a(self, node: Subject, name: str) -> bool:
-        """Say whether a node is of a class or of a class below it."""
+        """Return whether a node is of a class or of a class below it."""
         return any(node in self._of_type.get(cls, ()) for cls in self.subclasses(name))
 
     def subclasses(self, name: str) -> frozenset[ox.NamedNode]:

@@ -43,7 +43,7 @@ def build(
         ideal: its stages that are ideal, separated by commas.
         site: the intersection of a map that was made elsewhere; by default a crossroads is
             generated from the static parameters.
-        courses: who is where when: ``(V, 4)`` time [s], x, y [m], heading [rad], by the name of
+        courses: timed poses: ``(V, 4)`` time [s], x, y [m], heading [rad], by the name of
             a participant; rounded.
 
     Raises:
@@ -69,8 +69,8 @@ def build(
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
     for event in story.events:
         put(top, "has_event", add_event(builder, event, declared))
-    for who, course in (courses or {}).items():
-        put(top, "has_event", add_course(builder, who, course))
+    for name, course in (courses or {}).items():
+        put(top, "has_event", add_course(builder, name, course))
     for jam in story.jams:
         put(top, "has_event", add_jam(builder, jam, place))
     for works in story.works:
@@ -106,7 +106,7 @@ def build_static(static: Mapping[str, float] | Site, roads: RoadsSpec | None = N
 
 
 def reason(rule: Bound | Derived) -> str:
-    """Return why a constraint holds and who says so, on one line."""
+    """Return a constraint's reason and source on one line."""
     return " ".join(f"{rule.why} (source: {rule.source.strip()})".split())
 
 

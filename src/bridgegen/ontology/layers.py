@@ -1,7 +1,7 @@
-"""Which layer an individual belongs to: what its class, or the nearest class above, is said to be.
+"""The layer of an individual: that of its class, or of the nearest class above.
 
-The annotation ``bg:layer`` says it, in ``bridgegen.owl`` or in the file itself; no class is known
-here by its name, so that a new one finds its layer by itself.
+The annotation ``bg:layer`` defines it, in ``bridgegen.owl`` or in the file itself; no class is
+known here by its name, so that a new one finds its layer by itself.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -44,19 +44,19 @@ class Members:
 
     def __init__(self, individuals: Individuals) -> None:
         self.individuals = individuals
-        said: dict[Subject, dict[ox.NamedNode, list[Subject | ox.Literal]]] = {}
+        statements: dict[Subject, dict[ox.NamedNode, list[Subject | ox.Literal]]] = {}
         for subject, predicate, value, _ in individuals.quads:
             if isinstance(subject, Subject) and isinstance(value, Subject | ox.Literal):
-                said.setdefault(subject, {}).setdefault(predicate, []).append(value)
-        self._said = said
-        self.nodes = [node for node in said if any(self.classes(node))]
+                statements.setdefault(subject, {}).setdefault(predicate, []).append(value)
+        self._statements = statements
+        self.nodes = [node for node in statements if any(self.classes(node))]
 
     def values(self, node: Subject) -> Values:
-        """Return all that is said of a node, per property."""
-        return self._said.get(node, {})
+        """Return all values of a node, per property."""
+        return self._statements.get(node, {})
 
     def is_a(self, node: Subject, name: str) -> bool:
-        """Say whether a node is of a class of the ontology, or of one below it."""
+        """Return whether a node is of a class of the ontology, or of one below it."""
         return any(bg(name) in self._above(cls) for cls in self.classes(node))
 
     def class_of(self, node: Subject) -> ox.NamedNode:
@@ -66,7 +66,7 @@ class Members:
 
     def class_label(self, cls: ox.NamedNode) -> str:
         """Return what people call a class, as the ontology or the file labels it."""
-        own = texts(self._said.get(cls, {}).get(LABEL, ()))
+        own = texts(self._statements.get(cls, {}).get(LABEL, ()))
         name = local_name(cls)
         return own[0] if own else tbox().labels.get(name, name)
 
@@ -84,14 +84,14 @@ class Members:
 
     def classes(self, node: Subject) -> Iterator[ox.NamedNode]:
         """Yield the classes of a node; the syntax's own (owl:NamedIndividual) are none."""
-        for cls in self._said.get(node, {}).get(TYPE, ()):
+        for cls in self._statements.get(node, {}).get(TYPE, ()):
             if isinstance(cls, ox.NamedNode) and not cls.value.startswith((OWL, RDFS)):
                 yield cls
 
     def _layer_of_class(self, cls: ox.NamedNode) -> int | None:
         for one in self._above(cls):
-            for said in self._said.get(one, {}).get(bg("layer"), ()):
-                number = as_number(said) if isinstance(said, ox.Literal) else None
+            for value in self._statements.get(one, {}).get(bg("layer"), ()):
+                number = as_number(value) if isinstance(value, ox.Literal) else None
                 if number in LAYERS:
                     return int(number)
             if one == bg(local_name(one)) and local_name(one) in tbox().layers:

@@ -1,7 +1,7 @@
 """Actions, conditions and positions in words: "speed 1.8 m/s at 3 m/s²", "ego within 30 m".
 
-A class that has no phrase of its own is said by its label and its values, so that nothing is left
-out. Whatever is missing or is there twice, as may be in a file that somebody edited, is shown as
+A class without a phrase is described by its label and its values, so that nothing is left
+out. Missing or duplicate values, as may be in a file that was edited, are shown as
 it is; nothing here raises.
 """
 
@@ -24,7 +24,7 @@ _UNSAID = frozenset({TYPE, bg("has_name"), bg("has_parameter"), bg("binds_proper
 _DEEP = 8
 """Individuals within individuals; a circle in an edited file ends there."""
 _MOST_PLACES = 12
-"""Of a trajectory; of one with more, its two ends are said."""
+"""Maximum of a trajectory that is listed; of a longer one, its two ends are."""
 
 
 @dataclass
@@ -43,7 +43,7 @@ class Phrase:
 
 
 class Phrases:
-    """Says the individuals of a file in words."""
+    """Describes the individuals of a file in words."""
 
     def __init__(self, members: Members) -> None:
         self.members = members
@@ -65,7 +65,7 @@ class Phrases:
 
 
 class _Speaker:
-    """Says one phrase, and writes down what it is taken from."""
+    """Builds one phrase, and records its sources."""
 
     def __init__(self, members: Members, phrase: Phrase) -> None:
         self.members, self.phrase = members, phrase
@@ -113,7 +113,7 @@ Saying = Callable[[_Speaker, Subject], str]
 
 
 def _anything(speaker: _Speaker, node: Subject) -> str:
-    """Say a class without a phrase: its label, and all that is said of it."""
+    """Describe a class without a phrase: its label and all values."""
     members, parts = speaker.members, []
     for term, values in members.values(node).items():
         if term in _UNSAID or term == bg("has_rule"):
@@ -133,7 +133,7 @@ def _anything(speaker: _Speaker, node: Subject) -> str:
 
 
 def _change(speaker: _Speaker, node: Subject) -> str:
-    """Say how something changes: at a rate, within a time, over a distance; else at once."""
+    """Describe a change's dynamics: at a rate, within a time, over a distance; else at once."""
     text = "".join(
         f" {word} {speaker.value(node, name)}"
         for name, word in (
@@ -191,13 +191,15 @@ def _rule(speaker: _Speaker, node: Subject, usual: str) -> str:
 
 
 def _compared(quantity_: str, unit: str, usual: str, link: str = "has_entity_ref") -> Saying:
-    """Return how a condition is said: "quantity other ≥ value"; a subject comes first."""
+    """Return the phrase of a condition: "quantity other ≥ value", after its subject."""
 
     def say(speaker: _Speaker, node: Subject) -> str:
-        who = f"{speaker.link(node, 'has_subject')} " if speaker.has(node, "has_subject") else ""
+        subject = (
+            f"{speaker.link(node, 'has_subject')} " if speaker.has(node, "has_subject") else ""
+        )
         other = f" {speaker.link(node, link)}" if speaker.has(node, link) else ""
         value = speaker.value(node, "has_value", unit)
-        return f"{who}{quantity_}{other} {_rule(speaker, node, usual)} {value}"
+        return f"{subject}{quantity_}{other} {_rule(speaker, node, usual)} {value}"
 
     return say
 

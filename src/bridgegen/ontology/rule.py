@@ -1,4 +1,4 @@
-"""A constraint as SHACL-SPARQL, and how what it says is put together."""
+"""A constraint as SHACL-SPARQL, and the composition of its message."""
 
 from dataclasses import dataclass
 
@@ -41,9 +41,9 @@ class Rule:
 
     @property
     def message(self) -> str:
-        """The rule with its reason; of a rule about individuals, what is said of each."""
-        said = f"{with_unit(self.at_fault)} {self.text}" if self.at_fault else self.text
-        return f"{said}: {self.why}" if self.why else said
+        """The rule with its reason; for a rule about individuals, the statement on each."""
+        text = f"{with_unit(self.at_fault)} {self.text}" if self.at_fault else self.text
+        return f"{text}: {self.why}" if self.why else text
 
 
 def about(
@@ -64,7 +64,7 @@ def about(
         property_name: local name of the property at fault, or empty.
         text: what must be, going on after the property's name (or the individual's).
         why: the reason, one sentence.
-        source: who says so.
+        source: of the rule.
         select: the query.
         needs: classes and properties without which there is nothing to check.
     """

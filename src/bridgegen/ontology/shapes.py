@@ -95,7 +95,7 @@ def _required(cls: str, name: str) -> str:
 
 
 def _general_rules() -> Iterator[Rule]:
-    """Yield what holds in every scenario but takes a query to say."""
+    """Yield rules of every scenario that need a query."""
     yield Rule(
         "one-value", "", "Scenario", "a parameter has one value, wherever it is bound", None, "",
         "SELECT $this (MIN(?raw) AS ?value) WHERE { $this a bg:Scenario . "

@@ -1,4 +1,4 @@
-"""The road network that a scenario takes place on: what the individuals say of layers 1 and 2.
+"""The road network of a scenario: the individuals' statements on layers 1 and 2.
 
 The same description comes from a scenario's template (`bridgegen.ontology.templates`) or from a
 map that was made elsewhere (`bridgegen.openx.opendrive.site.find_site`).

@@ -165,7 +165,7 @@ def add_position(builder: Builder, name: str, waypoint: Waypoint, site: Site) ->
 
 
 def add_event(builder: Builder, event: EventSpec, declared: Mapping[str, object]) -> ox.NamedNode:
-    """Add an event: who does what, when."""
+    """Add an event: participant, actions and conditions."""
     put = builder.put
     kind = "EnvironmentChangeEvent" if event.participant is None else "StoryboardEvent"
     node = builder.node(event.name, kind)

@@ -1,4 +1,4 @@
-"""The terms of ``bridgegen.owl``: their IRIs, and what the ontology says about them.
+"""The terms of ``bridgegen.owl``: their IRIs, and the ontology's statements about them.
 
 Code refers to a term by its local name (``"has_length"``); `bg` makes the IRI of it.
 """
@@ -28,7 +28,7 @@ VOCABULARIES = {
 }
 """Those that classes are aligned with by ``rdfs:seeAlso``: per prefix, name and namespace.
 
-Every term was found in the vocabulary itself; ``docs/decisions.md`` says where it was looked up.
+Every term is taken from the vocabulary itself; ``docs/decisions.md`` names the sources.
 """
 PREFIXES = {"bg": BG, "dcterms": DCTERMS, "owl": OWL, "rdfs": RDFS, "xsd": XSD}
 
@@ -84,7 +84,7 @@ class TBox:
         comments: per term, what it means.
         sources: per term, where it comes from.
         see_also: per class that has any, IRIs of its counterparts in other vocabularies.
-        layers: per class that says so, its layer, 1 to 5; the others have that of a superclass.
+        layers: per class that declares one, its layer, 1 to 5; others have that of a superclass.
         functional: the properties that have at most one value.
         above: per data property whose values must exceed something, that.
         allowed: per data property with an enumeration, its values.
@@ -130,21 +130,21 @@ def tbox() -> TBox:
     everything = list(ox.parse(data, format=ox.RdfFormat.RDF_XML))
     header = ox.NamedNode(ONTOLOGY)
     quads = tuple(quad for quad in everything if quad.subject != header)
-    said: dict[ox.NamedNode, list[tuple[Subject, ox.NamedNode | ox.Literal]]] = {}
+    statements: dict[ox.NamedNode, list[tuple[Subject, ox.NamedNode | ox.Literal]]] = {}
     for quad in everything:
         if isinstance(quad.subject, Subject) and isinstance(quad.object, ox.NamedNode | ox.Literal):
-            said.setdefault(quad.predicate, []).append((quad.subject, quad.object))
+            statements.setdefault(quad.predicate, []).append((quad.subject, quad.object))
 
     def links(predicate: ox.NamedNode) -> list[tuple[ox.NamedNode, ox.NamedNode]]:
         return [
             (a, b)
-            for a, b in said.get(predicate, ())
+            for a, b in statements.get(predicate, ())
             if isinstance(a, ox.NamedNode) and isinstance(b, ox.NamedNode)
         ]
 
     def texts(predicate: ox.NamedNode) -> dict[str, tuple[str, ...]]:
         found: dict[str, tuple[str, ...]] = {}
-        for node, value in said.get(predicate, ()):
+        for node, value in statements.get(predicate, ()):
             if isinstance(value, ox.Literal):
                 found[local_name(node)] = (*found.get(local_name(node), ()), value.value)
         return found
@@ -211,13 +211,13 @@ def _grouped(pairs: Iterable[tuple[ox.NamedNode, ox.NamedNode]]) -> dict[str, tu
 
 def _disjoint(quads: Iterable[ox.Quad]) -> Iterator[tuple[str, ...]]:
     """Yield the members of each ``owl:AllDisjointClasses``."""
-    said = {(quad.subject, quad.predicate): quad.object for quad in quads}
-    for (_, predicate), head in said.items():
+    statements = {(quad.subject, quad.predicate): quad.object for quad in quads}
+    for (_, predicate), head in statements.items():
         if predicate == ox.NamedNode(OWL + "members"):
             names = []
             while isinstance(head, ox.BlankNode):
-                names.append(local_name(said[head, ox.NamedNode(RDF + "first")]))
-                head = said[head, ox.NamedNode(RDF + "rest")]
+                names.append(local_name(statements[head, ox.NamedNode(RDF + "first")]))
+                head = statements[head, ox.NamedNode(RDF + "rest")]
             yield tuple(names)
 
 

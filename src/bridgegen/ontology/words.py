@@ -51,7 +51,7 @@ class Finding:
         focus: the individual that was asked.
         value: the value at fault, if there is one.
         literal: whether it is a literal.
-        message: what the shape says of it.
+        message: of the shape.
     """
 
     shape: str
@@ -68,7 +68,7 @@ def violations_of(
     rules: Mapping[str, Rule],
     finding: Finding,
 ) -> Iterator[Violation]:
-    """Say a finding in words."""
+    """Return a finding in words."""
     key = local_name(finding.shape)
     focus = individuals.find(finding.focus) or ox.NamedNode(finding.focus)
     if key not in rules:
@@ -90,29 +90,29 @@ def _about_property(
     individuals: Individuals, focus: Subject, name: str, finding: Finding
 ) -> Violation:
     ontology = tbox()
-    who = individuals.describe(focus)
+    subject = individuals.describe(focus)
     what = f"{name} [{ontology.units[name]}]" if name in ontology.units else name
     got = "" if finding.value is None else _shown(individuals, finding)
     match local_name(finding.component).removesuffix("ConstraintComponent"):
         case "MinCount":
-            message = f"{who} must have {what}, and has none: {ontology.comments[name]}"
+            message = f"{subject} must have {what}, and has none: {ontology.comments[name]}"
         case "MaxCount":
             all_of_them = ", ".join(sorted(map(local_value, individuals.values(focus, name))))
-            message = f"{who} may have one {what} only, got {all_of_them}"
+            message = f"{subject} may have one {what} only, got {all_of_them}"
         case "Datatype":
             kind = _KINDS.get(local_name(ontology.ranges[name]), "a text (xsd:string)")
-            message = f"{what} of {who} must be {kind}, got {got}"
+            message = f"{what} of {subject} must be {kind}, got {got}"
         case "Class":
             target = local_name(ontology.ranges[name])
-            message = f"{what} of {who} must point to an individual of {target}, got {got}"
+            message = f"{what} of {subject} must point to an individual of {target}, got {got}"
         case "In":
             choice = ", ".join(ontology.allowed[name])
-            message = f"{what} of {who} must be one of {choice}, got {got}"
+            message = f"{what} of {subject} must be one of {choice}, got {got}"
         case "MinExclusive":
-            message = f"{what} of {who} must be above {ontology.above[name]:g}, got {got}"
+            message = f"{what} of {subject} must be above {ontology.above[name]:g}, got {got}"
         case other:
-            message = f"{what} of {who} breaks {other}, got {got}"
-    return Violation((focus.value,), who, name, "", message)
+            message = f"{what} of {subject} breaks {other}, got {got}"
+    return Violation((focus.value,), subject, name, "", message)
 
 
 def _shown(individuals: Individuals, finding: Finding) -> str:
@@ -152,15 +152,15 @@ def _about_parameter(
     what = f"{rule.target} [{declared.unit}]"
     places = _places(individuals, carriers(individuals, rule.target))
     if not places:
-        who = individuals.describe(focus)
-        message = f"{who}: {what} must have a value, and no individual carries one"
-        yield Violation((focus.value,), who, "", rule.target, message)
+        subject = individuals.describe(focus)
+        message = f"{subject}: {what} must have a value, and no individual carries one"
+        yield Violation((focus.value,), subject, "", rule.target, message)
     side = _limit(individuals, rule)
     why = f": {rule.why}" if rule.why else ""
     for got, found in places.items():
-        who = _who(individuals, found)
-        message = f"{who}: {rule.text}{side} must hold for {what}, got {got}{why}"
-        yield _at(found, who, rule.target, message)
+        subject = _described(individuals, found)
+        message = f"{subject}: {rule.text}{side} must hold for {what}, got {got}{why}"
+        yield _at(found, subject, rule.target, message)
 
 
 def _places(
@@ -174,19 +174,19 @@ def _places(
     return places
 
 
-def _who(individuals: Individuals, places: list[tuple[Subject, str]]) -> str:
+def _described(individuals: Individuals, places: list[tuple[Subject, str]]) -> str:
     more = len({node for node, _ in places}) - 1
     first = individuals.describe(places[0][0])
     return f"{first} and {more} more" if more else first
 
 
-def _at(places: list[tuple[Subject, str]], who: str, parameter: str, message: str) -> Violation:
+def _at(places: list[tuple[Subject, str]], subject: str, parameter: str, message: str) -> Violation:
     nodes = tuple(dict.fromkeys(node.value for node, _ in places))
-    return Violation(nodes, who, places[0][1], parameter, message)
+    return Violation(nodes, subject, places[0][1], parameter, message)
 
 
 def _limit(individuals: Individuals, rule: Rule) -> str:
-    """Return what the limit comes to, and from what: " (= 60 with precipitation = 60)"."""
+    """Return the value of the limit, and its inputs: " (= 60 with precipitation = 60)"."""
     if rule.limit is None:
         return ""
     given: dict[str, float] = {}
@@ -214,11 +214,11 @@ def _several_values(individuals: Individuals) -> Iterator[Violation]:
         places = _places(individuals, bound)
         if len(places) > 1:
             shown = " but ".join(
-                f"{value} at {_who(individuals, found)}" for value, found in places.items()
+                f"{value} at {_described(individuals, found)}" for value, found in places.items()
             )
             odd_one = min(places.values(), key=len)
             message = f"{name} must have one value wherever it is bound, got {shown}"
-            yield _at(odd_one, _who(individuals, odd_one), name, message)
+            yield _at(odd_one, _described(individuals, odd_one), name, message)
 
 
 def _outside_declared(individuals: Individuals, parameter: Subject) -> Iterator[Violation]:
@@ -228,9 +228,9 @@ def _outside_declared(individuals: Individuals, parameter: Subject) -> Iterator[
     )
     unit = ", ".join(individuals.texts(parameter, "has_unit")) or "1"
     for got, found in _places(individuals, individuals.bindings.get(name, [])).items():
-        who = _who(individuals, found)
-        message = f"{who}: {low} <= {name} <= {high} must hold for {name} [{unit}], got {got}"
-        yield _at(found, who, name, message)
+        subject = _described(individuals, found)
+        message = f"{subject}: {low} <= {name} <= {high} must hold for {name} [{unit}], got {got}"
+        yield _at(found, subject, name, message)
 
 
 # -- individuals -----------------------------------------------------------------------------------
@@ -240,10 +240,10 @@ def _about_individual(
     individuals: Individuals, rule: Rule, focus: Subject, finding: Finding
 ) -> Violation:
     node = individuals.find(str(finding.value)) or focus
-    who, what = individuals.describe(node), with_unit(rule.at_fault)
-    said = finding.message.removeprefix(what).lstrip()
-    message = f"{what} of {who} {said}" if rule.at_fault else f"{who} {said}"
-    return Violation((node.value,), who, rule.at_fault, "", message)
+    subject, what = individuals.describe(node), with_unit(rule.at_fault)
+    text = finding.message.removeprefix(what).lstrip()
+    message = f"{what} of {subject} {text}" if rule.at_fault else f"{subject} {text}"
+    return Violation((node.value,), subject, rule.at_fault, "", message)
 
 
 # -- values ----------------------------------------------------------------------------------------

@@ -29,7 +29,7 @@ def convert_file(owl: Path, folder: Path | None = None) -> tuple[list[Path], lis
     """Write the ``.xodr`` and ``.xosc`` of a scenario's ontology.
 
     Args:
-        owl: the ontology with its individuals, as written or as somebody edited it.
+        owl: the ontology with its individuals, as written or edited.
         folder: where to write; beside the ontology by default.
 
     Returns:
@@ -71,13 +71,13 @@ def import_file(
     """Write a whole OpenDRIVE map, or a scenario file on its map, as an ontology.
 
     Args:
-        file: the map (``.xodr``), or the scenario (``.xosc``), whose map lies where it says.
+        file: the map (``.xodr``), or the scenario (``.xosc``), which references its map.
         out: the file to write, new; beside the first by default.
-        partial: of a scenario, leave out what the ontology cannot say, instead of refusing it.
+        partial: leave out contents that the ontology cannot express, instead of refusing the file.
         ego: of a scenario, the entity under test, if it is not called so.
 
     Returns:
-        The file written, and a sentence for each thing that it does not say, or not in full.
+        The file written, and a sentence for each content that it lacks, or has in part.
 
     Raises:
         FileFormatError: not a file that can be read.
@@ -121,7 +121,7 @@ def _seen_from(out: Path, file: Path) -> str:
 
 
 def scenario_of(individuals: Individuals) -> LogicalScenario | None:
-    """Return the scenario of the catalogue that individuals say they are of; None if of none."""
+    """Return the scenario of the catalogue that individuals refer to; None if none."""
     said = {name for one in individuals.of_class("Scenario")
             for name in individuals.texts(one, "has_name")}  # fmt: skip
     known = said.intersection(scenario_names())

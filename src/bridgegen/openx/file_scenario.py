@@ -45,7 +45,7 @@ class RoadFile:
         name: of the file.
         digest: SHA-256 of it, in hexadecimal.
         data: its bytes.
-        model: what it says.
+        model: its contents.
     """
 
     name: str
@@ -174,7 +174,7 @@ class FileSource:
         return self._scenario.roads.model
 
     def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
-        """See `Source`: the file tells all rows the same."""
+        """See `Source`: the file is the same for all rows."""
         return {}
 
     def concrete(self, values: Mapping[str, float], road_file: str = "") -> "ConcreteFile":
@@ -207,7 +207,7 @@ class ConcreteFile:
 
     @cached_property
     def individuals(self) -> Individuals | None:
-        """See `ConcreteScenario`: all that the file says, or nothing."""
+        """See `ConcreteScenario`: all contents of the file, or nothing."""
         try:
             renamed = rename_entity(self.storyboard, ego_of(self.storyboard), EGO)
             return individuals_from_openscenario(renamed, self.roads, self.road_file, "")[0]
@@ -308,7 +308,7 @@ def _with_drivers(
 
 
 def _self_contained(scenario: FileScenario) -> osc.OpenScenario:
-    """Return the file without what it would look for beside itself: it is handed over elsewhere."""
+    """Return the file without references to files beside it: it is exported elsewhere."""
     network = replace(scenario.storyboard.road_network, scene_graph_file=None)
     return replace(
         scenario.storyboard, road_network=network, catalog_locations=osc.CatalogLocations()

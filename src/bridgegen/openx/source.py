@@ -21,7 +21,7 @@ from bridgegen.openx.openscenario.model import OpenScenario
 
 
 class ConcreteScenario(Protocol):
-    """One row of X, as the files that are handed over; each is made when it is asked for."""
+    """One row of X as the exported files; each is made on request."""
 
     @property
     def storyboard(self) -> OpenScenario:
@@ -37,7 +37,7 @@ class ConcreteScenario(Protocol):
 
     @property
     def individuals(self) -> Individuals | None:
-        """The ontology's; None where it cannot say what somebody else's file says."""
+        """The ontology's; None where it cannot express another tool's file."""
 
 
 class Source(Protocol):
@@ -57,11 +57,11 @@ class Source(Protocol):
 
     @property
     def course_names(self) -> tuple[str, ...]:
-        """The parameters that ``courses`` depends on; none where nobody is told a course."""
+        """The parameters that ``courses`` depends on; none without courses."""
 
     @property
     def unused_names(self) -> tuple[str, ...]:
-        """The parameters that nothing depends on: a map tells what they would."""
+        """The parameters that nothing depends on: a map defines their values."""
 
     @property
     def bodies(self) -> Mapping[str, str]:
@@ -112,7 +112,7 @@ def source_of(
 
 
 def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
-    """Return a scenario whose static parameters are what a map says.
+    """Return a scenario with its static parameters from a map.
 
     A start that is searched stays on the road that touches the junction: a position in an
     OpenSCENARIO file is on one road, whatever its parameter's value. The map's lowest speed limit
@@ -188,7 +188,7 @@ class OntologySource:
         return opendrive_from_owl(build_static(dict(values), self._scenario.roads))
 
     def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
-        """See `Source`: nobody is told one."""
+        """See `Source`: there are none."""
         return {}
 
     def concrete(

@@ -1,4 +1,4 @@
-"""What the charts over the iterations draw."""
+"""Data of the charts over the iterations."""
 
 from collections.abc import Mapping
 from typing import Any

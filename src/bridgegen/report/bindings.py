@@ -39,7 +39,7 @@ class Bindings:
         return ""
 
     def bound(self, phrase: Phrase) -> list[tuple[str, float]]:
-        """Return the parameters that give the values of a phrase, with these values."""
+        """Return the parameters that give the values of a phrase, with the values."""
         found: list[tuple[str, float]] = []
         for node, term in phrase.bound:
             name = self.of(node, term)

@@ -22,7 +22,7 @@ from bridgegen.report.data import (
     Column,
     Deferred,
     Evaluations,
-    Held,
+    PageRows,
     ReportData,
     RunSummary,
 )
@@ -36,22 +36,21 @@ from bridgegen.store.summary import Summary
 from bridgegen.triage.record import Mode, Triage
 
 SAMPLE = 50_000
-"""Random scenarios that tell what is feasible: fewer than `bridgegen coverage` draws, for speed."""
+"""Random scenarios that estimate feasibility: fewer than `bridgegen coverage` draws, for speed."""
 
 MOTIONS, MOTIONS_OF_THEIR_OWN = 200, 20
-"""Scenarios whose motion the page holds besides those of the kept: half a second's work. Of a long
-run as many as a tenth of its rows. Fewer where each has a road, or an adversary's course, of its
-own, which take ten times as long; none where a driver of the user's drives, who may take his
-time."""
+"""Maximum number of further scenarios whose motion the page holds: half a second's work. At most a
+tenth of the rows. Fewer where each has a road, or an adversary's course, of its own, which take ten
+times as long; none with a user's own driver, which may be slow."""
 
 AT_A_TIME = 40
-"""Scenarios that are rolled out together for it: long ones with many others take 2 MB."""
+"""Scenarios that are simulated together for it: a long one with many participants takes 2 MB."""
 
 INDEPENDENT = "random"
 """The algorithm whose rows are independent draws."""
 
 TRIPLES = 25_000_000
-"""Scenarios times triples of parameters up to which triples are counted: a tenth of a second."""
+"""Maximum of scenarios times triples of parameters to count triples: a tenth of a second."""
 
 
 def build_report(
@@ -90,17 +89,17 @@ def build_report(
         algorithm: its name.
         seed: of the run.
         budget: of the run.
-        command: the command line that makes the run again.
+        command: the command line that repeats the run.
         finished: whether the budget is spent.
         version: of BridgeGen.
-        notes: what the algorithm wants kept with the run.
-        view: the command line that shows this run with the motion of every scenario, if there is.
-        regions: the critical ones, as `regions.record` has them, if they are known.
+        notes: the algorithm's notes on the run.
+        view: the command line that shows this run with the motion of every scenario, if any.
+        regions: the critical ones, in the form of `regions.record`, if they are known.
         confirmations: of its scenarios in other simulators.
-        hashes: of what the run was made from and of what came of it.
-        coverage: whether to count what was covered.
-        files: those of ``kept``, by their paths relative to the page, if it is to hold them.
-        more: whether the page is to hold the motion of more than ``kept``.
+        hashes: digests of the run's inputs and results.
+        coverage: whether to compute coverage.
+        files: those of ``kept``, by their paths relative to the page, if the page includes them.
+        more: whether the page includes the motion of more scenarios than ``kept``.
         triage: failure modes and bound of the run, if they are known.
         minimal_files: of the minimal scenarios, by their paths relative to the page.
     """
@@ -147,7 +146,7 @@ def build_report(
     )
     modes = triage.modes[:MOST_MODES] if triage else ()
     first = [one.shown for one in modes]
-    if triage and not modes:  # what came nearest to harm
+    if triage and not modes:  # the scenarios nearest to harm
         nearest = [one.evaluation for one in triage.bound.least if one.evaluation is not None]
         first = nearest[:1]
     return ReportData(
@@ -168,11 +167,11 @@ def build_report(
 
 
 def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
-    """Return what counts as critical, in words.
+    """Return the criterion for critical scenarios, in words.
 
     Args:
         objective: with the rule.
-        cause: the only one that counts, if one was asked for.
+        cause: the only one that counts, if one was chosen.
     """
     limits, many = objective.thresholds, objective.thresholds.n_collision_above
     if objective.rule == "harm" and objective.count == "any":
@@ -193,7 +192,7 @@ def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
 
 def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
     space, declared = pipeline.space, pipeline.scenario.parameters
-    X, measured = Held(rows.X), Held(rows.metrics)
+    X, measured = PageRows(rows.X), PageRows(rows.metrics)
     lines = {line.name: line for line in pipeline.scenario.table()}
     parameters = tuple(
         Column(
@@ -248,9 +247,9 @@ def _minimal(
 def _more(
     pipeline: Pipeline, rows: Rows | Recorded, kept: set[int], wanted: Sequence[int]
 ) -> "_More":
-    """Return the playbacks of scenarios besides those that were kept.
+    """Return the playbacks of scenarios besides the exported ones.
 
-    First those that are wanted, then the most critical ones.
+    First the requested ones, then the most critical ones.
     """
     critical = np.flatnonzero(rows.critical & (rows.status == 0))
     best = critical[by_merit(rows.F[critical])]
@@ -266,9 +265,9 @@ def _more(
 
 
 class _More:
-    """Playbacks of some evaluations, each rolled out when it is asked for, a few at a time.
+    """Playbacks of some evaluations, simulated a few at a time on iteration.
 
-    There are many of a long run, and the page has room for some.
+    A long run has more of them than the page can hold.
     """
 
     def __init__(self, pipeline: Pipeline, rows: Rows | Recorded, order: Sequence[int]) -> None:
@@ -289,5 +288,5 @@ def _coverage(pipeline: Pipeline, rows: Rows | Recorded) -> CoverageMap:
     try:
         return coverage_map(space, X, critical, strength=strength, sample=SAMPLE)
     except ScenarioError:
-        # Constraints that contradict each other where the search never was: no sample, then.
+        # Constraints may contradict each other where the search has no row: no sample then.
         return coverage_map(space, X, critical, strength=strength, sample=0)

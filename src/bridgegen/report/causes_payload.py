@@ -1,4 +1,4 @@
-"""How many scenarios have which cause, as the page shows it."""
+"""Number of scenarios by cause, as data of the page."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from bridgegen.report.data import Evaluations
 
 
 def causes_payload(e: Evaluations) -> dict[str, Any] | None:
-    """Return how many evaluations have each cause; number 0 is none."""
+    """Return the number of evaluations per cause; cause 0 is none."""
     if e.cause is None:
         return None
     return {

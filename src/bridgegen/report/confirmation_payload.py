@@ -1,4 +1,4 @@
-"""What other simulators confirmed, as the plain data that the page shows."""
+"""Cross-simulator validation as the plain data that the page shows."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,23 +11,23 @@ from bridgegen.confirmation.verdict import name_of, sentences
 from bridgegen.report.series import packed
 
 MOST_NUMBERS = 150_000
-"""Numbers that all tracks together may have: well under a megabyte of the page."""
+"""Maximum count of numbers in all tracks together: well under a megabyte of the page."""
 
 
 def confirmations_payload(records: Sequence[Record]) -> list[dict[str, Any]]:
-    """Return what the page tells of each simulator, and where it had everybody.
+    """Return the results of each simulator, with the tracks of all participants.
 
-    ``without_tracks`` is how many scenarios' tracks found no room; those of the most critical
-    scenarios of every simulator come first.
+    ``without_tracks`` is the number of scenarios whose tracks exceed the room; those of the most
+    critical scenarios of every simulator come first.
 
     Args:
         records: one for each simulator.
     """
-    told = [_simulator(record) for record in records]
+    simulators = [_simulator(record) for record in records]
     tracks = [[_tracks(record, one) for one in record.scenarios] for record in records]
     room = MOST_NUMBERS
     for rank in range(max(map(len, tracks), default=0)):
-        for one, each in zip(told, tracks, strict=True):
+        for one, each in zip(simulators, tracks, strict=True):
             if rank >= len(each) or not each[rank]:
                 continue
             room -= _size(each[rank])
@@ -35,7 +35,7 @@ def confirmations_payload(records: Sequence[Record]) -> list[dict[str, Any]]:
                 one["without_tracks"] += 1
             else:
                 one["scenarios"][rank]["tracks"] = each[rank]
-    return told
+    return simulators
 
 
 def _simulator(record: Record) -> dict[str, Any]:
@@ -85,8 +85,8 @@ def _tracks(record: Record, one: Scenario) -> list[dict[str, Any]]:
 
 
 def _values(one: Course, name: str) -> Float:
-    told = [np.nan if value is None else float(value) for value in getattr(one, name)]
-    return np.concatenate([np.full(one.first, np.nan), np.array(told)])
+    values = [np.nan if value is None else float(value) for value in getattr(one, name)]
+    return np.concatenate([np.full(one.first, np.nan), np.array(values)])
 
 
 def _size(tracks: Sequence[Mapping[str, Any]]) -> int:

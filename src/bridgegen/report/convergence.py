@@ -1,4 +1,4 @@
-"""The evaluations condensed for the charts: statistics per batch, and the telling axes."""
+"""The evaluations condensed for the charts: statistics per batch, and the most relevant axes."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.report.data import Column, Evaluations
 
 MAX_BATCHES = 250
-"""More batches than this are merged, neighbours first: a screen shows no more."""
+"""Maximum number of batches; more are merged with their neighbours: a screen shows no more."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Trend:
 
 @dataclass(frozen=True)
 class Batches:
-    """Where each of B batches ends, and what it found.
+    """The bounds of each of B batches, and its critical share.
 
     Attributes:
         first: ``(B,)`` int64, the first iteration in the batch, counted from 1.
@@ -76,7 +76,7 @@ def trend(values: Float, group: Int, n_groups: int, *, larger_is_worse: bool) ->
     Args:
         values: ``(N,)`` float64; only finite ones count.
         group: ``(N,)`` int64 in 0..n_groups-1, ascending.
-        n_groups: how many groups there are.
+        n_groups: number of groups.
         larger_is_worse: whether the largest (v_d) or the smallest (d_min) is the most critical.
     """
     table = np.full((4, n_groups), np.nan)
@@ -91,10 +91,10 @@ def trend(values: Float, group: Int, n_groups: int, *, larger_is_worse: bool) ->
 
 
 def telling_parameters(columns: tuple[Column, ...], critical: Bool, ok: Bool) -> list[str]:
-    """Return the names of the searched parameters that vary, the most telling first.
+    """Return the names of the searched parameters that vary, the most relevant first.
 
-    Telling is the distance between the distributions of the critical and of the other
-    evaluations (Kolmogorov and Smirnov's statistic); where one of the two is empty, the order
+    Relevance is the distance between the distributions of the critical and of the other
+    evaluations (Kolmogorov–Smirnov statistic); where one of the two is empty, the order
     stays as declared.
 
     Args:

@@ -8,7 +8,7 @@ from bridgegen.arrays import Bool, Int
 from bridgegen.odd.coverage import CoverageMap, PairBins, ParameterBins, Ways
 
 IMPOSSIBLE = -1
-"""Stands for the number of rows in a bin that is not feasible."""
+"""Replaces the number of rows in a bin that is not feasible."""
 
 
 def coverage_payload(found: CoverageMap) -> dict[str, Any]:

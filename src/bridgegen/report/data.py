@@ -1,4 +1,4 @@
-"""What the report is made of: plain data in SI units, checked for shape when it is made.
+"""The report's data: plain data in SI units, whose shapes are checked on construction.
 
 Numbers may be NaN or infinite wherever a quantity does not exist (no critical scenario yet, no
 time to collision); the page shows a dash there.
@@ -22,7 +22,7 @@ from bridgegen.triage.record import Triage
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What was searched, how, and what came of it.
+    """The search: its scenario, settings and result.
 
     Attributes:
         scenario: the logical scenario's name ("crossroads-s4").
@@ -32,11 +32,11 @@ class RunSummary:
         ego: the system under test ("route-follower").
         algorithm: the search algorithm's name ("pso").
         seed: the seed of the whole run.
-        budget: evaluations that were asked for.
+        budget: requested number of evaluations.
         n_evaluations: evaluations done, failed ones included.
-        n_critical: how many of them are critical.
+        n_critical: number of critical ones.
         r_critic: critical evaluations / all evaluations, in [0, 1]; NaN before the first.
-        critical_rule: what counts as critical, in words that finish "critical means …"
+        critical_rule: the criterion, in words that complete "critical means …"
             ("a collision, or d_min below 2 m while v_d is at least 1 m/s").
         critical_distance: the rule's threshold on d_min [m], drawn in the distance curve; None
             draws no line.
@@ -55,8 +55,8 @@ class RunSummary:
         independent: whether each row was drawn by itself, as random search draws them.
         harm: the metric that makes a scenario critical, "harm" or "harm_any"; "" where the paper's
             thresholds do.
-        hashes: of what the run was made from and of what came of it, name → digest.
-        settings: further settings worth keeping, name → text, in display order.
+        hashes: of the run's inputs and results, name → digest.
+        settings: further settings, name → text, in display order.
     """
 
     scenario: str
@@ -91,18 +91,18 @@ class RunSummary:
 
 
 WHOLE = ("d_min", "v_d", "n_collision", "harm", "harm_any", "severity")
-"""The metrics of which the page says something over the whole run."""
+"""The metrics that the page summarises over the whole run."""
 
 
 class Deferred:
-    """The values of a column that are read when the page asks for those of the rows it holds.
+    """The values of a column, read when the page needs those of the rows that it holds.
 
     Args:
         held: the columns that are read together.
-        place: of this one among them.
+        place: index of this one among them.
     """
 
-    def __init__(self, held: "Held", place: int) -> None:
+    def __init__(self, held: "PageRows", place: int) -> None:
         self._held, self._place = held, place
 
     @property
@@ -111,15 +111,15 @@ class Deferred:
         return len(self._held.table)
 
     def __getitem__(self, rows: Bool) -> Float:
-        """Return the values of some rows, ``(N,)`` bool: of these, not of others."""
+        """Return the values of the rows selected by ``(N,)`` bool."""
         return self._held.of(rows)[:, self._place]
 
 
-class Held:
-    """The rows of a table that a page holds: read once, when they are known.
+class PageRows:
+    """The rows of a table that a page holds, read once, when they are known.
 
     Args:
-        table: ``(N, k)``, longer than memory, perhaps.
+        table: ``(N, k)``, possibly larger than memory.
 
     Attributes:
         table: the same.
@@ -146,7 +146,7 @@ class Column:
     """One quantity of every evaluation.
 
     Attributes:
-        name: the parameter's, metric's or objective's name, unique over all columns.
+        name: of the parameter, metric or objective, unique over all columns.
         unit: "m", "m/s", "%", "deg", "s", "count" …; "1" or "" for a pure number.
         values: ``(N,)`` float64 in that unit; NaN or ±inf where it does not exist. Those of
             objectives and of the metrics of `WHOLE` must be in memory.
@@ -154,7 +154,7 @@ class Column:
         low: lower end of the declared range, in the unit; None where there is none.
         high: upper end.
         searched: a parameter that the algorithm varied; False for fixed and derived ones.
-        labels: how a parameter's values are read, `bridgegen.odd.kinds.Kind.labels`.
+        labels: texts of a parameter's values, see `bridgegen.odd.kinds.Kind.labels`.
     """
 
     name: str
@@ -231,21 +231,21 @@ class Evaluations:
 
 @dataclass(frozen=True)
 class ReportData:
-    """All that ``page.write_report`` needs.
+    """The input of ``page.write_report``.
 
     Attributes:
         summary: the run in figures.
         evaluations: every row.
-        kept: the scenarios that were handed over, most critical first; may be empty.
-        more: further scenarios, whose motion the page holds as far as there is room, likewise;
-            gone through once for each page, so that they can be rolled out then.
-        files: those of the kept scenarios, by their paths relative to the page, in the order in
-            which they matter; the page holds them as far as there is room.
+        kept: the exported scenarios, most critical first; may be empty.
+        more: further scenarios, most critical first, whose motion the page holds as far as there
+            is room; iterated once per page, which simulates them then.
+        files: those of the exported scenarios, by their paths relative to the page, the most
+            important first; the page holds them as far as there is room.
         coverage: which bins and pairs of bins were evaluated, if it is to be shown.
-        notes: what the algorithm learnt.
-        regions: the critical ones, as `bridgegen.regions.record` has them, if they are known.
+        notes: the algorithm's notes on the run.
+        regions: the critical ones, in the form of `bridgegen.regions.record`, if they are known.
         confirmations: of its scenarios in other simulators, one each.
-        triage: the failure modes and what is known of the space, once the run has finished.
+        triage: the failure modes and the bound of the harmful share, once the run has finished.
         minimal: the minimal scenarios of failure modes; ``evaluation`` is the mode's ``shown``.
     """
 

@@ -1,4 +1,4 @@
-"""Conflicts of the rows, and the failure modes of the run, as the page has them."""
+"""Conflicts of the rows, and the failure modes of the run, as data of the page."""
 
 from collections import Counter
 from typing import Any
@@ -8,30 +8,30 @@ from bridgegen.conflict.findings import Findings
 from bridgegen.report.playback import Conflict
 from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
 
-TOLD = ("conflict", "conflict_type", "responsible", "rule", "partner")
-"""The texts of a row's finding, in the order in which the page has them."""
+FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
+"""The fields of a row's finding, in the page's order."""
 
 MOST_REASONS = 5
-"""Reasons of implausible rows that are named."""
+"""Maximum number of reasons of implausible rows that the page names."""
 
 MOST_MODES = 12
-"""Failure modes that the page shows."""
+"""Maximum number of failure modes that the page shows."""
 
 
 def findings_payload(findings: Findings, shown: Bool) -> dict[str, Any]:
     """Return the findings of the rows that the page holds.
 
-    ``keys`` are the different findings, five texts each, see ``TOLD``; ``at`` is the number of each
-    row's.
+    ``keys`` are the different findings, five texts each, see ``FINDING_FIELDS``; ``at`` is the
+    number of each row's.
     """
     columns = findings.columns()
-    texts = list(zip(*(columns[name][shown].tolist() for name in TOLD), strict=True))
+    texts = list(zip(*(columns[name][shown].tolist() for name in FINDING_FIELDS), strict=True))
     keys = {key: number for number, key in enumerate(dict.fromkeys(texts))}
     return {"keys": [list(key) for key in keys], "at": [keys[key] for key in texts]}
 
 
 def implausible_payload(findings: Findings | None) -> dict[str, Any]:
-    """Return how many rows could not happen, and why, the most frequent reason first."""
+    """Return the number of implausible rows, and the reasons, the most frequent first."""
     if findings is None:
         return {"count": 0, "reasons": []}
     reasons = Counter(one for one in findings.implausible.tolist() if one)
@@ -59,7 +59,7 @@ def conflict_payload(one: Conflict) -> dict[str, Any]:
 
 
 def triage_payload(found: Triage) -> dict[str, Any]:
-    """Return the failure modes, or what is known where there is none."""
+    """Return the failure modes, or without any the bound and the nearest scenarios."""
     return {
         "ego": found.ego,
         "modes": [_mode(one, found.neighbourhood(one.shown)) for one in found.modes[:MOST_MODES]],

@@ -2,9 +2,9 @@
 
 A page is one file that is opened from disk, where a browser loads no module. So the modules are
 joined here, each after those that it imports, into one scope: ``import`` statements and the word
-``export`` are taken out, and every name means what it meant. Two forms are known, at the start of a
-line: ``import { a, b } from "./x.js";`` (or ``import "./x.js";``), and ``export`` before a
-``function``, ``class``, ``const`` or ``let`` that declares one name.
+``export`` are removed, names keep their meaning. Two forms are supported, at the start of a line:
+``import { a, b } from "./x.js";`` (or ``import "./x.js";``), and ``export`` before a ``function``,
+``class``, ``const`` or ``let`` that declares one name.
 """
 
 import re
@@ -21,7 +21,7 @@ NAME = re.compile(r"[\w$]+")
 
 
 class ModuleError(Exception):
-    """The modules do not fit together, with the place."""
+    """The modules cannot be joined; the message names the place."""
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,17 @@ class Module:
 
     @cached_property
     def declared(self) -> list[str]:
-        """The names that it declares for itself and for others."""
+        """All names that it declares."""
         return [name for _, name in DECLARED.findall(self.text)]
 
     @cached_property
     def exported(self) -> list[str]:
-        """Those of them that others may import."""
+        """The names that other modules may import."""
         return [name for export, name in DECLARED.findall(self.text) if export]
 
     @cached_property
     def body(self) -> str:
-        """It without imports and exports.
+        """The text without imports and exports.
 
         Raises:
             ModuleError: an import or export of another form, with its line.
@@ -106,7 +106,7 @@ class _Graph:
 
 
 def in_order(entries: Iterable[str], read: Callable[[str], str | None]) -> list[Module]:
-    """Return the modules that some need, each once and after those that it imports.
+    """Return modules and all that they import, each once and after those that it imports.
 
     Args:
         entries: names of modules, in the order in which they run.

@@ -1,4 +1,4 @@
-"""The motion of a single scenario that the page has not got, simulated when it is asked for."""
+"""The motion of a scenario that the page does not hold, simulated on request."""
 
 from typing import Any, Protocol
 
@@ -14,20 +14,20 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """The name of its files."""
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Relative to the run's folder."""
+        """Their paths, relative to the run's folder."""
 
 
 def motion_payload(
     pipeline: Pipeline, rows: Rows | Recorded, evaluation: int, exported: Named | None = None
 ) -> dict[str, Any]:
-    """Return a scenario's playback, with the road and the picture that belong to it.
+    """Return a scenario's playback, with its road and picture.
 
-    ``playback`` is as in the page's data, but that its road, number −1, is the first of ``roads``
-    and its picture, if it has one, the first of ``pictures``.
+    ``playback`` is as in the page's data, except that its road, number −1, is the first of
+    ``roads`` and its picture, if it has one, the first of ``pictures``.
 
     Args:
         pipeline: what evaluated the rows.

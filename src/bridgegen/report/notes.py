@@ -1,4 +1,4 @@
-"""What the search algorithm learnt, as tables for people."""
+"""The search algorithm's notes as tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from bridgegen.odd.space import SearchSpace
 
 MOST = 200
-"""Rows of a table that the page holds, the first ones."""
+"""Maximum number of rows of a table on the page, the first ones."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class NoteTable:
         title: what it is about.
         columns: headings.
         rows: as many texts as columns, each.
-        left_out: rows after these that are not shown.
+        left_out: number of further rows that are not shown.
     """
 
     title: str
@@ -34,7 +34,7 @@ def tables(notes: Mapping[str, Any], space: SearchSpace) -> tuple[NoteTable, ...
 
     Args:
         notes: see `bridgegen.search.algorithm.TakesNotes`.
-        space: what was searched; boxes of its unit cube are told in its units where they can be.
+        space: the search space; boxes of its unit cube are given in its units where possible.
     """
     found = [
         NoteTable(title, *_cells(value, space))
@@ -93,8 +93,8 @@ def _is_side(name: str, edges: Any, space: SearchSpace) -> bool:
 def box_in_words(box: Mapping[str, Sequence[float]], space: SearchSpace) -> str:
     """Return a box of the unit cube as a rule.
 
-    A parameter that no constraint limits is told in its own unit; another one as shares of the
-    interval that the constraints leave to it.
+    A parameter that no constraint limits is given in its own unit; another one as shares of the
+    interval that the constraints leave.
     """
     if not box:
         return "anywhere"

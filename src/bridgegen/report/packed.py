@@ -1,4 +1,4 @@
-"""What the page holds but seldom needs: deflated, as text; ``inflate.js`` reads it."""
+"""Page data that is seldom needed: deflated, as text; ``inflate.js`` reads it."""
 
 import json
 import zlib
@@ -11,13 +11,13 @@ from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import playback_payload, road_payload
 
 CHUNK = 20
-"""Scenarios that are deflated together: alike, they take a third of what each would alone."""
+"""Scenarios that are deflated together: as they are alike, they take a third of the space."""
 
 MOST_MOTION = 4_000_000
-"""Characters that all motions together may take."""
+"""Maximum number of characters of all motions together."""
 
 MOST_FILES = 1_000_000
-"""Characters that all files together may take."""
+"""Maximum number of characters of all files together."""
 
 
 def deflated(data: bytes) -> str:
@@ -26,13 +26,13 @@ def deflated(data: bytes) -> str:
 
 
 def packed_motions(playbacks: Iterable[Playback], roads: Mapping[Any, int]) -> dict[str, Any]:
-    """Return the motions of scenarios, as many of the first as there is room for.
+    """Return the motions of the first scenarios, as many as there is room for.
 
-    Each text is a chunk: JSON of ``playbacks`` as in the page's own data, and of ``roads``, those
-    of them that the page has not got; number −1 is the first of these.
+    Each text is a chunk: JSON of ``playbacks`` as in the page's own data, and of ``roads``, the
+    roads of these that the page does not hold; number −1 is the first of them.
 
     Args:
-        playbacks: the scenarios; those that find no room are not asked for, a few excepted.
+        playbacks: the scenarios; at most one chunk beyond the room is consumed.
         roads: the numbers of the page's roads, by `road_key`.
     """
     texts: list[str] = []
@@ -40,14 +40,14 @@ def packed_motions(playbacks: Iterable[Playback], roads: Mapping[Any, int]) -> d
     room, left = MOST_MOTION, iter(playbacks)
     while some := tuple(islice(left, CHUNK)):
         own: dict[Any, int] = {}
-        told, drawn = [], []
+        motions, drawn = [], []
         for one in some:
             key = road_key(one)
             if key not in roads and key not in own:
                 own[key] = -1 - len(own)
                 drawn.append(road_payload(one))
-            told.append(playback_payload(one, roads[key] if key in roads else own[key], None))
-        chunk = {"playbacks": told, "roads": drawn}
+            motions.append(playback_payload(one, roads[key] if key in roads else own[key], None))
+        chunk = {"playbacks": motions, "roads": drawn}
         text = deflated(json.dumps(chunk, allow_nan=False, separators=(",", ":")).encode())
         room -= len(text)
         if room < 0:
@@ -58,7 +58,7 @@ def packed_motions(playbacks: Iterable[Playback], roads: Mapping[Any, int]) -> d
 
 
 def packed_files(files: Mapping[str, bytes]) -> dict[str, str]:
-    """Return files by their names, as many of the first as there is room for."""
+    """Return the first files by their names, as many as there is room for."""
     found: dict[str, str] = {}
     room = MOST_FILES
     for name, data in files.items():
@@ -71,5 +71,5 @@ def packed_files(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def road_key(playback: Playback) -> tuple[tuple[str, bytes], ...]:
-    """Return what tells a road from another."""
+    """Return a key that identifies a playback's road."""
     return tuple((lane.kind, lane.points.tobytes()) for lane in playback.lanes)

@@ -1,4 +1,4 @@
-"""Puts the page together: template, style, scripts, Plotly and the data, all in one file."""
+"""Assembles the page: template, style, scripts, Plotly and the data, in one file."""
 
 import html
 import importlib.util
@@ -17,16 +17,16 @@ from bridgegen.report.sections import SECTIONS
 WEB = files("bridgegen.report").joinpath("web")
 
 REPORT = (*(section.module for section in SECTIONS), "page.js")
-"""Modules that the report is made of, besides those that they import."""
+"""Modules of the report, besides those that they import."""
 
 SERVED = ("motion.js", *REPORT, "live.js")
-"""The same where the page is served; a page on disk has nothing that could ask for anything."""
+"""Modules of a served report; a page on disk makes no requests."""
 
 
 def write_report(path: Path, data: ReportData) -> None:
-    """Write the report as one HTML file that needs nothing else to be opened.
+    """Write the report as one self-contained HTML file.
 
-    A reader never sees half a file: it is written beside its place and then renamed.
+    The write is atomic: to a temporary file beside it, which is then renamed.
 
     Raises:
         StorageError: the file cannot be written (no such folder, read-only, disk full).
@@ -38,8 +38,8 @@ def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
     """Return the report as HTML, in parts.
 
     Args:
-        data: what it shows.
-        live: whether it is served by ``bridgegen view``, which it may ask for what is new.
+        data: of the report.
+        live: whether ``bridgegen view`` serves it, so that it can request updates.
     """
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
     connect = b"'self'" if live else b"'none'"
@@ -85,7 +85,7 @@ def write_still_page(path: Path, template: str, title: str, body: bytes) -> None
 
 
 def filled(template: str, title: str, css: bytes, **more: bytes) -> list[bytes]:
-    """Return a page in parts; what is put in is never searched for placeholders again.
+    """Return a page in parts; inserted parts are not searched for placeholders.
 
     Args:
         template: a file of ``web``.

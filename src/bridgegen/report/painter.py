@@ -16,7 +16,7 @@ from bridgegen.report.bindings import Bindings
 from bridgegen.report.picture import Box, Fact, Link, Parameter, Picture, Reason
 
 FEW = 4
-"""Lines of a box that are shown at once, unless more of them are searched or said in words."""
+"""Lines of a box that are shown at first, unless more are searched parameters or phrases."""
 
 _IN_WORDS = ("Action", "Condition", "ConditionGroup", "Trigger")
 _OF_AN_EVENT = (bg("has_what"), bg("has_when"))
@@ -32,16 +32,16 @@ def paint(
     """Return the picture of a file's individuals.
 
     Args:
-        individuals: of a scenario or a road network; whatever is odd in them is shown as it is.
-        violations: what `bridgegen.ontology.check.check` found.
-        checked: what it checked, in words.
+        individuals: of a scenario or a road network; invalid ones are shown unchanged.
+        violations: the result of `bridgegen.ontology.check.check`.
+        checked: what it checks, in words.
     """
     return _Painter(individuals, violations).picture(checked)
 
 
 @dataclass
 class _Sketch:
-    """A box in the making: its lines, and the label of each link."""
+    """An unfinished box: its lines, and the label of each link."""
 
     layer: int
     lines: list[tuple[str, Phrase]] = field(default_factory=list)
@@ -49,7 +49,7 @@ class _Sketch:
 
 
 class _Painter:
-    """Sketches every box, finds out what is wrong with which, and puts the picture together."""
+    """Sketches every box, assigns the violations, and assembles the picture."""
 
     def __init__(self, individuals: Individuals, violations: Sequence[Violation]) -> None:
         self.members = Members(individuals)
@@ -121,10 +121,10 @@ class _Painter:
         return [node for node in self.members.nodes if self.members.is_a(node, "Scenario")]
 
     def _left_out(self, scenarios: list[Subject]) -> tuple[str, ...]:
-        said = {
+        in_phrases = {
             one for sketch in self.sketches.values() for _, p in sketch.lines for one in p.nodes
         }
-        shown = said | set(scenarios) | self.sketches.keys() | self.parameters.keys()
+        shown = in_phrases | set(scenarios) | self.sketches.keys() | self.parameters.keys()
         return tuple(
             sorted(self.members.name(one) for one in self.members.nodes if one not in shown)
         )
@@ -132,10 +132,11 @@ class _Painter:
     # -- what is in it -------------------------------------------------------------------------
 
     def _describe(self, node: Subject, sketch: _Sketch) -> None:
-        said = {term: found for term, found in self.members.values(node).items()
+        values = {term: found for term, found in self.members.values(node).items()
                 if term not in _UNSAID}  # fmt: skip
         targets = {
-            term: [one for one in found if isinstance(one, Subject)] for term, found in said.items()
+            term: [one for one in found if isinstance(one, Subject)]
+            for term, found in values.items()
         }
         for term, others in targets.items():
             for other in others:
@@ -151,13 +152,13 @@ class _Painter:
         last = len(order)
         # Quantities before ids and kinds.
         for term in sorted(
-            said, key=lambda one: (not unit_of(one), order.get(local_name(one), last))
+            values, key=lambda one: (not unit_of(one), order.get(local_name(one), last))
         ):
             shown = self._shown(node, term)
             if shown:
                 phrase = Phrase(", ".join(shown), [(node, term)], [node])
                 sketch.lines.append((property_label(term), phrase))
-        # What is searched comes first, and what is said in words: it is what makes this scenario.
+        # Searched parameters and phrases come first: they characterise this scenario.
         sketch.lines.sort(
             key=lambda line: line[1].nodes == [node] and not self.bindings.bound(line[1])
         )
@@ -169,7 +170,7 @@ class _Painter:
     def _follow(
         self, box: Subject, node: Subject, path: tuple[ox.NamedNode, ...], seen: set[Subject]
     ) -> None:
-        """Link a box to those that can be reached from a node through what is no box."""
+        """Link a box to those that a node reaches through individuals without a box."""
         if node in self.parameters or node in seen or node == box:
             return
         if node in self.sketches:
@@ -199,11 +200,11 @@ class _Painter:
 
     @cached_property
     def _homes(self) -> tuple[dict[Subject, list[int]], list[int]]:
-        """Each box's violations, and those that are about no box."""
+        """Each box's violations, and those that concern no box."""
         owners: dict[str, list[Subject]] = {}
         for box, sketch in self.sketches.items():
             about = {box} | {node for _, phrase in sketch.lines for node in phrase.nodes}
-            # What is wrong with a parameter is shown wherever it gives a value.
+            # A parameter's violations are shown wherever it gives a value.
             named = {name for _, phrase in sketch.lines for name, _ in self.bindings.bound(phrase)}
             about |= {node for node, one in self.parameters.items() if one.name in named}
             for node in about:
@@ -239,7 +240,7 @@ class _Painter:
         )
 
     def _actor(self, node: Subject) -> Subject | None:
-        """Return the participant in whose box an event goes: one that has no layer of its own."""
+        """Return the participant whose box holds an event that has no layer of its own."""
         if self.members.layer(node) is not None:
             return None
         for one in self.members.values(node).get(bg("has_who"), ()):
@@ -272,7 +273,7 @@ def _called(term: ox.NamedNode) -> str:
 
 
 def _path_label(path: Sequence[ox.NamedNode]) -> str:
-    """Return the first property on a way that is called more than "has …", or else the last."""
+    """Return the label of the first property on a path that is more than "has …", else the last."""
     names = [local_name(term) for term in path]
     labels = [tbox().labels.get(name, name) for name in names if name not in _CALLED]
     telling = [label for label in labels if not label.startswith("has ")]
@@ -280,7 +281,7 @@ def _path_label(path: Sequence[ox.NamedNode]) -> str:
 
 
 def _unique(nodes: Sequence[Subject]) -> dict[Subject, str]:
-    """Return the end of each node's IRI, with a number where it is there already."""
+    """Return the end of each node's IRI, with a number where it is a duplicate."""
     found: dict[Subject, str] = {}
     used: set[str] = set()
     for node in nodes:

@@ -1,6 +1,6 @@
 """The report's data as the JSON that the page reads.
 
-Numbers in bulk are rounded to what a screen can show; the handed-over files keep every bit. A
+Numbers in bulk are rounded to what a screen can show; the exported files keep every bit. A
 number that is NaN or infinite becomes null.
 """
 
@@ -28,15 +28,15 @@ from bridgegen.report.sections import sections_payload
 from bridgegen.search.dominance import by_merit, non_dominated
 
 ROWS = 20_000
-"""Rows of a longer run that the page holds, evenly spread; the iterations show all of it."""
+"""Maximum number of rows on the page, evenly spread; the iterations include all rows."""
 
 
 def to_json(data: ReportData, *, live: bool = False) -> str:
     """Return the page's data as JSON that is safe inside a ``<script>`` element.
 
     Args:
-        data: what the page shows.
-        live: whether the page may ask the server that it comes from for what is new.
+        data: of the report.
+        live: whether the page may request updates from its server.
     """
     return script_json({**payload(data), "live": live})
 
@@ -89,10 +89,10 @@ def payload(data: ReportData) -> dict[str, Any]:
 
 
 def news(data: ReportData, after: int) -> dict[str, Any]:
-    """Return what a page lacks that knows the first ``after`` evaluations.
+    """Return the update for a page that holds the first ``after`` evaluations.
 
-    Of the rows those that are new, and the ranks of all; or all of them anew, ``whole``, where a
-    long run is thinned. Everything else as it is now: what sections draw is under ``sections``.
+    It has the new rows, and the ranks of all; or all rows again (``whole``) where a long run is
+    thinned. Everything else is complete; the sections' data are under ``sections``.
     """
     e, harm = data.evaluations, data.summary.harm
     shown = _shown(e, [])
@@ -132,7 +132,7 @@ def _summary(data: ReportData) -> dict[str, Any]:
 
 
 def _shown(e: Evaluations, kept: list[int]) -> Bool:
-    """Return which rows the page holds, ``(N,)``: none that failed, and of a long run some."""
+    """Return which rows the page holds, ``(N,)``: no failed ones, and of a long run a sample."""
     ok: Bool = e.status == 0
     if ok.size > ROWS:
         some = np.zeros(ok.size, dtype=np.bool_)
@@ -178,14 +178,14 @@ def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
         if column.name == harm:
             order = order[np.argsort(-column.whole[order], kind="stable")]
     rank[order] = np.arange(1, critical.size + 1)
-    told: list[int] = rank[ok].tolist()
-    return told
+    shown: list[int] = rank[ok].tolist()
+    return shown
 
 
 def _front(e: Evaluations, ok: Bool) -> list[int]:
-    """Return the places, among the rows shown, of those that no other one dominates.
+    """Return the indices, among the rows shown, of the non-dominated ones.
 
-    Nothing where there are not several objectives.
+    Empty unless there are several objectives.
     """
     if len(e.objectives) < 2 or not ok.any():
         return []

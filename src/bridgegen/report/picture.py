@@ -1,9 +1,9 @@
-"""A scenario's individuals as a picture of five columns: which boxes, what is in them, what links.
+"""A scenario's individuals as a picture of five columns: boxes, their contents, links.
 
 A box is an individual that belongs to a layer, or an event (with its participant, in layer 4).
-What belongs to no layer (actions, conditions, positions, routes) is said in words in the box of
-whatever refers to it; so is an action or a condition that has a layer. Parameters are no boxes: a
-value that one gives shows its name and range.
+Individuals without a layer (actions, conditions, positions, routes) become phrases in the boxes
+that refer to them; so do actions and conditions that have a layer. Parameters have no box: a value
+that one gives shows its name and range.
 """
 
 from collections.abc import Iterator, Mapping
@@ -51,7 +51,7 @@ class Reason:
     """A violated constraint.
 
     Attributes:
-        about: who violates it, and in what ("weather_fog (Fog): fog_density").
+        about: the individual that violates it, and its property ("weather_fog (Fog): fog_density").
         text: one sentence: the individual, the value, the rule, why it holds, the source.
     """
 
@@ -78,13 +78,13 @@ class Box:
 
     Attributes:
         id: the end of its IRI; unique in the picture.
-        name: what people call it.
-        cls: what people call its class.
+        name: its label.
+        cls: the label of its class.
         layer: 1 to 5, its column.
         facts: bound values and words first.
         links: to other boxes.
-        broken: which of the picture's violations are its own.
-        shown: how many of its facts matter; the rest is shown on demand.
+        broken: indices of its own violations among the picture's.
+        shown: how many of its facts are shown at first; the rest on demand.
         inside: events whose participant it is.
     """
 
@@ -109,8 +109,8 @@ class Picture:
         boxes: the columns from left to right, by class in the ontology's order, then by name.
         parameters: those that give a value in a box, by name.
         violations: all of them.
-        homeless: which violations are about no box.
-        left_out: individuals that are in no box and in nobody's words.
+        homeless: indices of the violations that concern no box.
+        left_out: individuals that are in no box and in no phrase.
         checked: what was checked, in words.
     """
 
@@ -124,7 +124,7 @@ class Picture:
     checked: str
 
     def all_boxes(self) -> Iterator[Box]:
-        """Yield every box, those inside others, too."""
+        """Yield every box, nested ones included."""
         for box in self.boxes:
             yield box
             yield from box.inside

@@ -1,7 +1,7 @@
 """Pictures of scenarios as plain dicts and lists, for ``picture.js``.
 
-Boxes of one class stand together; many of them fold into one, which says once what they have in
-common. A column that several scenarios share (on the same roads, say) is held once.
+Boxes of one class are grouped; many of them fold into one, which shows what they have in common
+once. A column that several scenarios share (for example, on the same roads) is stored once.
 """
 
 import json
@@ -14,13 +14,13 @@ from bridgegen.ontology.phrases import quantity
 from bridgegen.report.picture import Box, Fact, Parameter, Picture
 
 FOLD = 3
-"""More boxes of a class than these fold into one."""
+"""Maximum number of boxes of a class before they fold into one."""
 
 _PLAIN = {"count": "", "1": ""}
 
 
 def pictures_payload(pictures: Sequence[Picture]) -> dict[str, Any]:
-    """Return pictures as they are sent to the page.
+    """Return pictures as the page's data.
 
     Args:
         pictures: one per scenario.
@@ -96,7 +96,7 @@ def _box(box: Box, common: Sequence[Fact] = ()) -> dict[str, Any]:
 
 
 def _fact(fact: Fact) -> list[Any]:
-    """Return label, text, then the bound values and whether it is wrong, if there are any."""
+    """Return label, text, then, if any, the bound values and whether a constraint is violated."""
     bound = [[name, float(f"{value:.5g}")] for name, value in fact.bound]
     whole = [fact.label, fact.text, bound, 1]
     return whole if fact.wrong else whole[:3] if bound else whole[:2]

@@ -12,24 +12,24 @@ from bridgegen.report.data import Evaluations
 def regions_payload(
     record: Mapping[str, Any], evaluations: Evaluations, shown: Bool
 ) -> dict[str, Any]:
-    """Return what the page needs to tell, draw and filter by regions.
+    """Return the data to describe, draw and filter by regions.
 
     Args:
-        record: as `bridgegen.regions.record` has it.
+        record: in the form of `bridgegen.regions.record`.
         evaluations: of the run.
-        shown: ``(N,)``, the rows that the page holds; a region names those that lie in it by their
-            places among these.
+        shown: ``(N,)``, the rows that the page holds; a region names the rows in it by their
+            indices among these.
     """
     columns = {one.name: one.values for one in evaluations.parameters}
     keys = ("evaluations", "critical", "critical_held", "space_share", "confidence", "at_least")
-    told = []
+    regions = []
     for one in record["regions"]:
         box = {name: one["box"][name] for name in one["named"]}
         inside = np.ones(int(shown.sum()), np.bool_)
         for name, ends in box.items():
             x = columns[name][shown] if name in columns else np.full(inside.size, np.nan)
             inside &= (ends["low"] <= x) & (x <= ends["high"])
-        told.append(
+        regions.append(
             {
                 **{key: one[key] for key in ("number", "confirmed", "rule", "sentence")},
                 "narrowed": bool(one.get("narrowed")),
@@ -40,7 +40,7 @@ def regions_payload(
                 "rows": np.flatnonzero(inside).tolist(),
             }
         )
-    return {**{key: record[key] for key in keys}, "regions": told}
+    return {**{key: record[key] for key in keys}, "regions": regions}
 
 
 def _evidence(one: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Numbers in bulk, rounded to what a screen can show; what is NaN or infinite becomes None."""
+"""Numbers in bulk, rounded to what a screen can show; NaN and infinity become None."""
 
 import math
 
@@ -20,7 +20,7 @@ def significant(values: Float, digits: int = DIGITS) -> list[float | None]:
 
 
 def decimals(values: Float, places: int) -> list[float | None]:
-    """Round to decimal places; null for what is not finite, and no negative zero."""
+    """Round to decimal places; None if not finite, and no negative zero."""
     with np.errstate(over="ignore", invalid="ignore"):
         rounded = np.round(values, min(places, 300)) + 0.0  # 10**300: the last that float64 holds
     kept = np.where(np.isfinite(rounded), rounded, values)

@@ -41,9 +41,10 @@ def _body(scenario: LogicalScenario) -> Iterator[str]:
         "defaults, when they are closest; dashed: where each starts.</figcaption></figure>"
     )
     lines = "".join(f"<li>{_text(line)}</li>" for line in story_lines(scenario))
-    yield f'<section class="card"><h2>Who and what</h2><ul class="story">{lines}</ul></section>'
+    yield '<section class="card"><h2>Participants and events</h2>'
+    yield f'<ul class="story">{lines}</ul></section>'
     yield '<section class="card"><h2>Parameters</h2><div class="wide"><table><thead><tr>'
-    yield "<th>parameter</th><th>axis</th><th>range</th><th>default</th><th>what it is</th></tr>"
+    yield "<th>parameter</th><th>axis</th><th>range</th><th>default</th><th>description</th></tr>"
     yield "</thead><tbody>"
     for parameter in scenario.parameters.values():
         yield _parameter(parameter)

@@ -16,7 +16,7 @@ from bridgegen.odd.story import (
 
 
 def story_lines(scenario: LogicalScenario) -> Iterator[str]:
-    """Yield who takes part, and what happens when."""
+    """Yield the participants, then the events."""
     jammed = {name for jam in scenario.story.jams for name in jam.participants}
     for one in scenario.participants:
         if one.name not in jammed:

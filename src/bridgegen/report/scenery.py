@@ -1,4 +1,4 @@
-"""What is drawn of a concrete scenario besides its motion: the road, the bodies, the lights."""
+"""Drawings of a concrete scenario besides its motion: the road, the bodies, the lights."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,10 +32,10 @@ class RoadPicture:
 
 
 class Scenery:
-    """The drawings of a pipeline's road networks, each made once.
+    """The drawings of a pipeline's road networks, each drawn once.
 
     Args:
-        pipeline: whose scenarios are drawn.
+        pipeline: of the scenarios.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
@@ -65,7 +65,7 @@ def street_lights(model: OpenDrive) -> Float:
 
 
 def bodies(rollout: Rollout, types: Mapping[str, str]) -> tuple[Entity, ...]:
-    """Return the bodies of a rollout, each as what it is (`Source.bodies`)."""
+    """Return the bodies of a rollout with their types (`Source.bodies`)."""
     return tuple(
         Entity(name, length, width, ahead, types.get(name, "obstacle"))
         for name, (length, width, ahead) in zip(rollout.names, rollout.box.tolist(), strict=True)
@@ -73,7 +73,7 @@ def bodies(rollout: Rollout, types: Mapping[str, str]) -> tuple[Entity, ...]:
 
 
 def lamps(rollout: Rollout, row: int, found: list[Light]) -> tuple[Lamp, ...]:
-    """Return the lights that change in one scenario of a rollout, with what they show."""
+    """Return the lights that change in one scenario of a rollout, with their states."""
     shown = {name: number for number, name in enumerate(rollout.light_names)}
     return tuple(
         Lamp(one.x, one.y, one.h, rollout.lights[row, shown[one.id]], one.id)

@@ -1,7 +1,7 @@
-"""The sections of the report: what each draws, and the module of ``web`` that draws it.
+"""The sections of the report: the data of each, and the module of ``web`` that draws it.
 
-A section is a module that adds itself (``addSection`` in ``web/sections.js``) with its style beside
-it, a function here that returns what it draws, and its line in `SECTIONS`.
+A section is a module that registers itself (``addSection`` in ``web/sections.js``) with its style
+beside it, a function here that returns its data, and its line in `SECTIONS`.
 """
 
 from collections.abc import Callable
@@ -25,11 +25,11 @@ class Section:
 
     Attributes:
         module: of ``web``.
-        key: of what it draws in the page's data.
-        payload: returns that, as plain data, from the report's data and the rows that the page
+        key: of its data in the page's data.
+        payload: returns them, as plain data, from the report's data and the rows that the page
             holds, ``(N,)`` bool; None where there is nothing to draw. Without it the section draws
             the rows, which every page holds.
-        grows: whether a page that is served takes it anew with every batch.
+        grows: whether a served page updates it with every batch.
     """
 
     module: str
@@ -80,12 +80,12 @@ SECTIONS = (
 
 
 def sections_payload(data: ReportData, shown: Bool, *, grown: bool = False) -> dict[str, Any]:
-    """Return what the sections draw, by key.
+    """Return the sections' data, by key.
 
     Args:
         data: of the report.
         shown: ``(N,)``, the rows that the page holds.
-        grown: only of the sections that a served page takes anew.
+        grown: only those of the sections that a served page updates.
     """
     return {
         one.key: one.payload(data, shown)

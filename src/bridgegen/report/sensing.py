@@ -1,4 +1,4 @@
-"""What the ego's sensors made of the others, taken out of a rollout frame by frame."""
+"""The ego's detections of other participants, extracted from a rollout frame by frame."""
 
 import numpy as np
 
@@ -9,27 +9,27 @@ from bridgegen.report.playback import Sensed
 from bridgegen.simulation.rollout import Rollout
 
 TOLERANCE = float(THRESHOLDS[0])
-"""[m] A detection that is farther off is no hit at the strictest of nuScenes's thresholds."""
+"""[m] A detection farther off is no match at the strictest of nuScenes's thresholds."""
 
 
 def sensed(rollout: Rollout) -> list[Sensed]:
-    """Return what the egos of N scenarios sensed; nothing where they have no sensors.
+    """Return the detections of the egos of N scenarios; an empty list without sensors.
 
-    Which entities count, and which detection is whose, is as the metrics of perception say it.
+    Which entities count, and how detections match them, is as in the metrics of perception.
     """
     if not rollout.detections.size:
         return []
     counts = perceived(rollout).counts
     found = []
     for row, n_steps in enumerate(rollout.n_steps.tolist()):
-        told = rollout.detections[row, :, :n_steps]
-        steps = np.flatnonzero((told[1:, :, column.SEEN_BY] >= column.NOBODY).any(axis=0))
-        frames = told[:, steps]
+        detections = rollout.detections[row, :, :n_steps]
+        steps = np.flatnonzero((detections[1:, :, column.SEEN_BY] >= column.MISSED).any(axis=0))
+        frames = detections[:, steps]
         seen_by = frames[:, :, column.SEEN_BY].astype(np.int64)
         seen_by[0] = -1
         if rollout.present.size:
             seen_by[~rollout.present[row][:, steps]] = -1
-        nothing = seen_by <= column.NOBODY
+        nothing = seen_by <= column.MISSED
 
         def of(name: int, frames: np.ndarray = frames, nothing: np.ndarray = nothing) -> np.ndarray:
             return np.where(nothing, np.nan, frames[:, :, name])

@@ -1,4 +1,4 @@
-"""The result in words: what a manager would copy, and the small table beside it."""
+"""The result in words: a summary to copy, and the small table beside it."""
 
 import math
 
@@ -12,7 +12,7 @@ from bridgegen.report.data import ReportData, RunSummary
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 
 MOST_TITLES = 3
-"""Failure modes that the text names."""
+"""Maximum number of failure modes that the text names."""
 
 AVOIDED = {
     Cause.PERCEPTION: "would not happen with ideal perception",
@@ -23,7 +23,7 @@ AVOIDED = {
 
 
 def sentences(data: ReportData) -> list[str]:
-    """Return a few sentences: what was searched, what was found, how bad, is it so elsewhere."""
+    """Return a few sentences: the search, its findings, their severity and confirmation."""
     s = data.summary
     if s.n_evaluations == 0:
         return [f"No scenario of “{s.title}” has been simulated yet."]
@@ -52,7 +52,7 @@ def sentences(data: ReportData) -> list[str]:
 
 
 def summary_table(data: ReportData) -> list[tuple[str, str]]:
-    """Return the rows of the small table: what, and how much of it with its unit.
+    """Return the rows of the small table: quantity, and value with unit.
 
     The paper's distances and speeds where its thresholds make a scenario critical; else collisions,
     near misses and severity.
@@ -100,7 +100,7 @@ def _of_harm(data: ReportData) -> list[tuple[str, str]]:
 
 
 def interval_note(s: RunSummary) -> str:
-    """Return what the interval of R_critic means, and what it does not."""
+    """Return the meaning of the interval of R_critic, and its limits."""
     if not s.n_evaluations:
         return ""
     if s.independent:
@@ -109,16 +109,16 @@ def interval_note(s: RunSummary) -> str:
             "of critical scenarios in this domain, drawn as random search draws them."
         )
     return (
-        "* Wilson's interval for as many independent draws. These rows are none: "
-        f"{s.algorithm} chose them by plan or by what earlier ones had shown. It tells how much so "
-        "many rows can say of this search, not how likely harm is in this domain: random search "
-        "and the fresh scenarios of 'bridgegen regions' tell that, and 'bridgegen compare' how "
+        "* Wilson's interval for as many independent draws. These rows are not independent: "
+        f"{s.algorithm} chose them by plan or by the results of earlier ones. It shows the "
+        "precision for this search, not how likely harm is in this domain: random search and the "
+        "fresh scenarios of 'bridgegen regions' estimate that; 'bridgegen compare' shows how "
         "R_critic varies from seed to seed."
     )
 
 
 def provenance(s: RunSummary) -> list[tuple[str, str]]:
-    """Return what somebody needs to make the run again, name and text."""
+    """Return the data to repeat the run, name and text."""
     rows = [
         ("Scenario", s.scenario),
         ("Road", s.road),
@@ -155,7 +155,7 @@ def speed(value: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time span in the unit that suits it."""
+    """Return a time span in a suitable unit."""
     if not math.isfinite(seconds):
         return "–"
     if seconds < 120.0:
@@ -168,16 +168,16 @@ def duration(seconds: float) -> str:
 
 
 def _causes(data: ReportData) -> str:
-    """Return what a replay of each critical scenario told."""
+    """Return the causes by one re-simulation of each critical scenario."""
     causes = data.evaluations.cause
     if causes is None:
         return ""
-    told = [
+    counts = [
         f"{n:,} {AVOIDED[cause]} ({cause.label})"
         for cause in CAUSES
         if (n := int(np.count_nonzero(causes == cause)))
     ]
-    return f"Quick labels, of one replay each with one stage idealised: {', '.join(told)}."
+    return f"Quick labels, of one replay each with one stage idealised: {', '.join(counts)}."
 
 
 def _modes(data: ReportData) -> str:
@@ -195,7 +195,7 @@ def _ways(n: int) -> str:
 
 
 def _implausible(data: ReportData) -> list[str]:
-    """Return how many rows could not happen and are left out."""
+    """Return how many rows are implausible and not counted."""
     findings = data.evaluations.findings
     n = int(np.count_nonzero(findings.implausible != "")) if findings else 0
     if not n:

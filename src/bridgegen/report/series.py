@@ -1,8 +1,8 @@
-"""Numbers over time as few characters: rounded, and as what they differ from a straight line.
+"""Compact time series: rounded second differences.
 
 A series is its runs of finite values, each ``[first instant, length, value, difference, second
-differences …]`` in whole units of 1/scale; second differences of 0 at the end are left out. What
-moves smoothly has small ones, and what stands still has none at all. ``series.js`` reads them.
+differences …]`` in whole units of 1/scale; second differences of 0 at the end are left out. Smooth
+motion has small ones, standstill none. ``series.js`` reads them.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from bridgegen.arrays import Float
 
 LARGEST = 2.0**50
-"""In units. What is larger counts as missing: beyond, JavaScript does not count exactly."""
+"""In units. Larger values count as missing: beyond, JavaScript's integers are not exact."""
 
 Runs = list[list[int]]
 
@@ -20,7 +20,7 @@ def packed(values: Float, scale: int) -> Runs:
 
     Args:
         values: ``(T,)`` float64; what is not finite is missing.
-        scale: units to 1, so that what is read differs by half a unit at most.
+        scale: units to 1; the rounding error is at most half a unit.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         units = np.round(values * scale)
@@ -31,17 +31,17 @@ def packed(values: Float, scale: int) -> Runs:
 
 def _run(first: int, units: np.ndarray) -> list[int]:
     steps = np.diff(units)
-    told = np.concatenate([units[:1], steps[:1], np.diff(steps)])
-    kept = np.trim_zeros(told[1:], "b")
-    return [first, len(units), int(told[0]), *kept.tolist()]
+    numbers = np.concatenate([units[:1], steps[:1], np.diff(steps)])
+    kept = np.trim_zeros(numbers[1:], "b")
+    return [first, len(units), int(numbers[0]), *kept.tolist()]
 
 
 def unpacked(runs: Runs, n: int, scale: int) -> Float:
     """Return the ``(n,)`` values of a series; NaN where they are missing."""
     values = np.full(n, np.nan)
     for first, length, start, *rest in runs:
-        told = np.zeros(max(length - 1, 0), dtype=np.int64)
-        told[: len(rest)] = rest
-        units = start + np.concatenate([[0], np.cumsum(np.cumsum(told))])
+        changes = np.zeros(max(length - 1, 0), dtype=np.int64)
+        changes[: len(rest)] = rest
+        units = start + np.concatenate([[0], np.cumsum(np.cumsum(changes))])
         values[first : first + length] = units / scale
     return values

@@ -14,7 +14,7 @@ from bridgegen.report.picture_payload import pictures_payload
 from bridgegen.report.scenario_page import write_scenario_page
 
 GENERATOR = "bridgegen show"
-"""As which its pages say they are made."""
+"""The generator that its pages name."""
 
 
 def show_scenario(name_or_path: str, out: Path | None = None) -> Path:
@@ -42,11 +42,11 @@ def show_scenario(name_or_path: str, out: Path | None = None) -> Path:
 def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
     """Draw an ontology file's individuals as a page.
 
-    An ``.owl`` of a scenario of the catalogue is held against that scenario's constraints, any
+    An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints, any
     other against the ranges that it declares itself.
 
     Args:
-        owl: the file, as written or as somebody edited it.
+        owl: the file, as written or edited.
         out: the page; by default beside the file, with its name and ``.html``. An earlier picture
             is replaced, any other file is not.
 

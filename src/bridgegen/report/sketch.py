@@ -1,4 +1,4 @@
-"""A bird's-eye sketch of one concrete scenario as SVG: who starts where, and how they meet."""
+"""A bird's-eye sketch of one concrete scenario as SVG: starts and closest approach."""
 
 import html
 import math
@@ -14,10 +14,10 @@ from bridgegen.report.playback import AREA_KINDS, Entity, Lamp, Outline
 from bridgegen.report.scenery import Scenery, bodies, lamps
 
 WIDTH, HEIGHT = 960, 430
-"""Of the picture, in pixels."""
+"""Size of the picture in pixels."""
 
-_REACH = (34.0, 95.0)  # m, half of what the picture is wide: at least, at most
-_AFTER = 2.0  # s, how long beyond the closest approach the ways go on
+_REACH = (34.0, 95.0)  # m, half of the picture's width: minimum, maximum
+_AFTER = 2.0  # s, length of the drawn paths beyond the closest approach
 _MOVES = 0.05  # m/s
 _GROUND, _INK, _PAPER = "#dfe5da", "#17202c", "#ffffff"
 _AREAS = {
@@ -36,7 +36,7 @@ _ROAD_WORKS = ("cone", "sign")
 
 
 class _View(NamedTuple):
-    """What the picture shows: its middle [m], and pixels per metre."""
+    """The view: its middle [m], and pixels per metre."""
 
     x: float
     y: float
@@ -49,7 +49,7 @@ class _View(NamedTuple):
         return " ".join("{:.1f},{:.1f}".format(*self.point(x, y)) for x, y in points.tolist())
 
     def sees(self, points: Float) -> bool:
-        """Return whether anything of a shape may be in the picture."""
+        """Return whether a part of a shape may be in the picture."""
         half = np.array([WIDTH, HEIGHT]) / self.scale / 2.0
         low, high = points.min(axis=0), points.max(axis=0)
         middle = np.array([self.x, self.y])
@@ -64,8 +64,8 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
         x: ``(len(space.names),)``; by default the row of the defaults.
 
     Returns:
-        SVG of `WIDTH` by `HEIGHT` pixels: every body where it is at the closest approach, its way
-        there and a little on, and as a dashed outline where it starts.
+        SVG of `WIDTH` by `HEIGHT` pixels: every body at the closest approach, its path until
+        shortly afterwards, and as a dashed outline its start.
     """
     x = pipeline.space.row({}) if x is None else x
     rollout = pipeline.rollout(x[np.newaxis])
@@ -108,13 +108,13 @@ def _number(e: int, moving: Sequence[bool]) -> int:
 
 
 def _stays(there: Bool) -> Iterator[tuple[int, int]]:
-    """Yield the first and the last instant of each time in which a body is there."""
+    """Yield the first and the last instant of each interval in which a body is present."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
     yield from ((first, end - 1) for first, end in edges.reshape(-1, 2).tolist())
 
 
 def _view(where: Float, ego: Float) -> _View:
-    """Return the view that holds poses (·, 3); of long ways, the stretch about the ego's."""
+    """Return the view that holds poses (·, 3); of long paths, the stretch about the ego's."""
     points = where[:, :2]
     low, high = points.min(axis=0), points.max(axis=0)
     half = 0.5 * (high - low) + 8.0
@@ -173,7 +173,7 @@ def _centre(body: Entity, at: Float) -> tuple[float, float]:
 def _way(
     body: Entity, where: Float, stay: tuple[int, int, int], colour: str, view: _View
 ) -> Iterator[str]:
-    """Yield where a body starts and goes, with an arrow's head at the end.
+    """Yield a body's start and path, with an arrow's head at the end.
 
     ``stay`` is its first instant, that of the closest approach, and its last one.
     """
@@ -221,7 +221,7 @@ def _body(body: Entity, at: Float, colour: str, view: _View, *, start: bool = Fa
 
 
 def _labels(labels: list[tuple[str, str, tuple[float, float]]]) -> Iterator[str]:
-    """Yield the bodies' names, each at that place about its body which hides least."""
+    """Yield the bodies' names, each beside its body where it hides least."""
     taken: list[tuple[float, float, float, float]] = [
         (x - 10, y - 10, x + 10, y + 10) for _, _, (x, y) in labels
     ]

@@ -1,1 +1,1 @@
-"""What a person sees in the terminal: progress bars and tables."""
+"""Terminal output: progress bars and tables."""

@@ -26,14 +26,14 @@ class RunsScreen(Live):
         self._before = 0
 
     def begin(self, runs: int, budget: int, ended: int, made: int) -> None:
-        """Begin with so many runs, of which some have ended, with that many evaluations."""
+        """Begin with a number of runs, of which some have ended, and their evaluations."""
         self._runs, self._ended, self._before = runs, ended, made
         self._budget = budget
         self._total = made + (runs - ended) * budget
         self._show()
 
     def batch(self, name: str, evaluations: int) -> None:
-        """Show that a run has so many evaluations."""
+        """Show a run's number of evaluations."""
         self._evaluations[name] = evaluations
         self._show()
 
@@ -72,7 +72,7 @@ class ComparisonScreen(RunsScreen):
 
 
 def print_comparison(comparison: "Comparison", seconds: float) -> None:
-    """Print, for each scenario, what was found and two tables; then where the files are."""
+    """Print, for each scenario, its findings and two tables; then the files' paths."""
     from bridgegen.comparison import words
 
     plan = comparison.plan
@@ -121,14 +121,14 @@ def _criticality(comparison: "Comparison", scenario: str) -> Table:
 
 
 def _variety(comparison: "Comparison", scenario: str) -> Table:
-    """Return the table of what was found besides, and how long it took."""
+    """Return the table of variety and of the time that it took."""
     from bridgegen.comparison import words
 
-    told = {
+    shown_names = {
         "distinct", "modes", "critical_bins", "critical_pairs", "hypervolume", "gd", "spread",
         "seconds",
     }  # fmt: skip
-    shown = [one for one in comparison.measures if one.name in told]
+    shown = [one for one in comparison.measures if one.name in shown_names]
     table = _table("algorithm", *(one.title for one in shown))
     for name in comparison.plan.algorithms:
         lines = (comparison.line(scenario, name, one.name) for one in shown)

@@ -1,4 +1,4 @@
-"""A run confirmed in another simulator: the bar meanwhile, then the table and what it comes to."""
+"""Confirmation in another simulator: the bar, then the table and the result."""
 
 import json
 from collections import Counter
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class ConfirmationScreen(Live):
-    """The live progress of scenarios that are run elsewhere."""
+    """The live progress of scenarios that run in another simulator."""
 
     def stage(self, stage: str) -> None:
-        """Take down what begins."""
+        """Show the stage that begins."""
         if stage == "compile":
             self.say_compiling()
             self.show(what="compiling")
@@ -28,13 +28,13 @@ class ConfirmationScreen(Live):
             self.show(what="writing the report", facts="")
 
     def progress(self, done: int, total: int, tally: "Tally") -> None:
-        """Take down how many are done, of how many, and what they come to."""
+        """Show how many scenarios are done, of how many, and their results."""
         facts = f"{tally[True]} confirmed, {tally[False]} not, {tally[None]} not run"
         self.show(done=done, total=total, facts=facts)
 
 
 def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
-    """Print what became of each scenario, why some are not confirmed, and what it comes to."""
+    """Print each scenario's result, why some are not confirmed, and the totals."""
     from bridgegen.confirmation.summary import to_json
     from bridgegen.confirmation.verdict import name_of, sentences
 
@@ -57,7 +57,7 @@ def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
             console.print(f"\n{name_of(one)} is not confirmed. {one.explanation}")
     failures = Counter(one.failure for one in found.scenarios if one.there is None)
     if failures:
-        console.print("\nNot run, which says nothing of them:")
+        console.print("\nNot run, so neither confirmed nor refuted:")
         for why, count in failures.most_common():
             console.print(f"  {count} x {why}")
     console.print("\n" + "\n".join(sentences(record.label, found.scenarios)))
@@ -101,6 +101,6 @@ def _touch(one: "Outcome") -> float | None:
 
 
 def _change(here: float | None, there: float | None, *, none: str = "∞") -> str:
-    """Return a value here and there; once, where nobody would see a difference."""
+    """Return a value in both simulators; once if both print the same."""
     a, b = (none if one is None else f"{one:.2f}" for one in (here, there))
     return a if a == b else f"{a} → {b}"

@@ -1,4 +1,4 @@
-"""What a run covered."""
+"""A run's coverage."""
 
 import json
 from dataclasses import asdict
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_json: bool) -> None:
-    """Print how many t-way combinations of bins were evaluated, then each parameter's bins."""
+    """Print the number of evaluated t-way combinations of bins, then each parameter's bins."""
     if as_json:
         print(json.dumps({"run": str(run), **_plain(asdict(found))}, indent=2))
         return
@@ -30,8 +30,8 @@ def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_jso
     ]
     print_table(head, rows, as_json=False)
     print(
-        f"\nFeasible: met among {found.sample} random scenarios, or in the run; a lower bound. "
-        "The constraints\nexclude others. Critical: combinations that hold a critical scenario.\n"
+        f"\nFeasible: found in {found.sample} random scenarios, or in the run; a lower bound. "
+        "The constraints\nexclude others. Critical: combinations with a critical scenario.\n"
     )
     print("Evaluations per bin, lowest first, of these critical; – where none is feasible:")
     width = max(len(one.name) for one in found.parameters)
@@ -46,7 +46,7 @@ def _cells(one: "ParameterBins") -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return arrays and tuples as lists, all the way down."""
+    """Return nested arrays and tuples as lists."""
     if isinstance(value, dict):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Scenario files, recordings, drivers: what simulating, measuring and trying them came to."""
+"""Results of simulating scenario files, measuring recordings and checking drivers."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def print_file_result(file: Path, result: "FileResult") -> None:
-    """Print what one scenario file came to."""
+    """Print the result of one scenario file."""
     print(f"{file}: ego {result.driver}, {result.seconds:g} s simulated")
     if result.status != "ok":
         print(f"failed: {result.status}")
@@ -83,7 +83,7 @@ def _print_conflict(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> 
 
 
 def print_measured(file: Path, measured: "Measured", *, as_json: bool) -> None:
-    """Print what a recording came to."""
+    """Print the metrics of a recording."""
     rollout, n = measured.rollout, measured.rollout.shape[2]
     if as_json:
         facts = {
@@ -111,12 +111,12 @@ def _print_metrics(values: Mapping[str, float]) -> None:
 
 
 def _finite(values: Mapping[str, float]) -> dict[str, float | None]:
-    """Return values as JSON has them: null for what is infinite or NaN."""
+    """Return values for JSON: None if infinite or NaN."""
     return {name: value if isfinite(value) else None for name, value in values.items()}
 
 
 def print_checks(checks: "Iterable[Check]", *, as_json: bool) -> bool:
-    """Print what was tried on a driver as it comes in; return whether it kept everything."""
+    """Print the checks of a driver as they complete; return whether all passed."""
     done, scenario = [], ""
     for check in checks:
         done.append(check)

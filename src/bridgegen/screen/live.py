@@ -16,10 +16,10 @@ from rich.progress import (
 
 
 class Live:
-    """One live bar on stderr: what is done, how many of how many, facts, the time that remains.
+    """One live bar on stderr: the stage, how many of how many, facts, the remaining time.
 
     Args:
-        total: how many there are, if that is known.
+        total: number of items, if it is known.
     """
 
     def __init__(self, total: int | None = None) -> None:
@@ -39,7 +39,7 @@ class Live:
 
     @property
     def seconds(self) -> float:
-        """Since it was made [s]."""
+        """Time since construction [s]."""
         return time.perf_counter() - self._began
 
     def show(
@@ -50,12 +50,12 @@ class Live:
         total: int | None = None,
         facts: str | None = None,
     ) -> None:
-        """Show what has changed."""
+        """Show changes."""
         fields: dict[str, Any] = {} if facts is None else {"facts": facts}
         self._progress.update(self._task, description=what, completed=done, total=total, **fields)
 
     def say_compiling(self) -> None:
-        """Tell, once, why nothing moves, if the kernels are not compiled yet."""
+        """Explain the delay, once, if the kernels are not compiled yet."""
         from bridgegen.kernel_cache import is_compiled
 
         if not self._told and not is_compiled():

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 class RegionsScreen(Live):
-    """The live progress of fresh scenarios that are simulated."""
+    """The live progress of simulating fresh scenarios."""
 
     def stage(self, stage: str) -> None:
-        """Take down what begins."""
+        """Show the stage that begins."""
         if stage == "compile":
             self.say_compiling()
             self.show(what="compiling")
@@ -25,12 +25,12 @@ class RegionsScreen(Live):
             self.show(what="writing the report")
 
     def progress(self, done: int, total: int) -> None:
-        """Take down how many are done, and how many there are."""
+        """Show how many scenarios are done, and how many there are."""
         self.show(what="simulating", done=done, total=total)
 
 
 def print_regions(run: "RunRegions", *, as_json: bool) -> None:
-    """Print a run's regions: what holds, then what does not, then what that comes to."""
+    """Print a run's regions: the confirmed ones, the others, then the totals."""
     facts, found = run.record, run.found
     if as_json:
         print(json.dumps(facts, indent=2))
@@ -54,14 +54,14 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
         _print_regions(run, confirmed, confirmed + others)
     if found.regions:
         print(
-            "\nfresh: random scenarios of the region, simulated for this table: the share that "
-            "counts, with\nits 95 % interval. run: those that the search chose there, a biased "
-            "share. space: how many\nof all random scenarios lie in the region."
+            "\nfresh: random scenarios of the region, simulated for this table: the unbiased "
+            "share, with\nits 95 % interval. run: those that the search chose there, a biased "
+            "share. space: share\nof all random scenarios that lie in the region."
         )
     else:
         print(
             "No part of the parameters' ranges stands out in a decision tree of the evaluations:\n"
-            "too few are critical, or nowhere enough of them."
+            "too few are critical, or they are not concentrated enough."
         )
     if confirmed:
         print(
@@ -74,7 +74,7 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
     if run.unstated:
         print(
             f"{len(run.unstated)} of the confirmed regions cannot be stated as classes: the "
-            "ontology cannot say this\nscenario, or has no value of a parameter that the rule "
+            "ontology cannot express this\nscenario, or has no value of a parameter that the rule "
             "names."
         )
 

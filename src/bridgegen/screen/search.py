@@ -1,4 +1,4 @@
-"""A campaign: its bar, and its figures when it has ended."""
+"""A campaign: its bar, and its final figures."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 _STAGES = {
     "compile": "compiling",
-    "search": "",  # the bar says it; a terminal has but 80 columns
-    "triage": "testing what was found",
+    "search": "",  # the bar shows it; a terminal has only 80 columns
+    "triage": "testing the findings",
     "export": "writing the critical scenarios",
     "report": "writing the report",
 }
 
 MOST_MODES = 10
-"""Failure modes that are shown at most."""
+"""Maximum number of failure modes shown."""
 
 MOST_REASONS = 5
-"""Why evaluations failed is told in so many lines at most."""
+"""Maximum number of lines with reasons of failed evaluations."""
 
 
 class SearchScreen(Live):
@@ -43,9 +43,9 @@ class SearchScreen(Live):
         """The callbacks for a campaign."""
         from bridgegen.campaign import SearchCallbacks
 
-        return SearchCallbacks(stage=self._stage, workers=self._meet, batch=self._batch)
+        return SearchCallbacks(stage=self._stage, workers=self._set_workers, batch=self._batch)
 
-    def _meet(self, workers: "Workers") -> None:
+    def _set_workers(self, workers: "Workers") -> None:
         self._workers = workers
 
     def _stage(self, stage: str) -> None:
@@ -54,13 +54,13 @@ class SearchScreen(Live):
         self.show(what=_STAGES[stage])
 
     def _by(self) -> str:
-        """Return who does it, where somebody else does: the cluster's workers may come and go."""
+        """Return the number of workers, unless they are threads; a cluster's may change."""
         from bridgegen.workers import Threads
 
-        who = self._workers
-        if who is None or isinstance(who, Threads):
+        workers = self._workers
+        if workers is None or isinstance(workers, Threads):
             return ""
-        return f" by {who.count} worker" + "s" * (who.count != 1)
+        return f" by {workers.count} worker" + "s" * (workers.count != 1)
 
     def _batch(self, progress: "Progress") -> None:
         column = progress.result.metrics[:, progress.metrics.index("d_min")]
@@ -77,9 +77,9 @@ class SearchScreen(Live):
 
 
 def print_summary(run: "Run", seconds: float) -> None:
-    """Print what was found, a run's figures, the whole job's time [s], and where its files are.
+    """Print a run's findings and figures, the total time [s], and its files' paths.
 
-    What was found comes first; with the paper's rule of what is critical, after the figures.
+    The findings come first; with the paper's rule for critical scenarios, after the figures.
     """
     s, settings, found = run.summary, run.settings, run.triage
     leads = settings.optimised.get("rule") == "harm"
@@ -115,7 +115,7 @@ def print_summary(run: "Run", seconds: float) -> None:
 
 
 def _print_found(found: "Triage") -> None:
-    """Print the failure modes, one line each, and what is known of the space."""
+    """Print the failure modes, one line each, and the bound of the harmful share."""
     from bridgegen.triage.words import headline, mode_in_words
 
     print(headline(found))

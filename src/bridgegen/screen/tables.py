@@ -19,7 +19,7 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_jso
         return
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in head:
-        table.add_column(name, overflow="fold")  # nothing is lost in a narrow terminal
+        table.add_column(name, overflow="fold")  # a narrow terminal cuts nothing
     for row in rows:
         table.add_row(*("" if value is None else _shown(value) for value in row))
     Console(markup=False, emoji=False).print(table)
@@ -30,7 +30,7 @@ def _shown(value: object) -> str:
 
 
 def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None:
-    """Print parameters with range and default; below each, what it is and its constraints."""
+    """Print parameters with range and default; below each, its description and constraints."""
     if as_json:
         print(json.dumps([{**asdict(line), "axis": str(line.axis)} for line in lines], indent=2))
         return

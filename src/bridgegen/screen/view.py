@@ -1,4 +1,4 @@
-"""A page that is served: where it is, until Ctrl-C."""
+"""A served page: its address, until Ctrl-C."""
 
 import sys
 import tempfile
@@ -13,15 +13,15 @@ _REDIRECT = """<!doctype html><meta charset="utf-8"><title>BridgeGen</title>
 
 
 def serve(server: Server, *, browser: bool, fragment: str = "") -> None:
-    """Serve a page until Ctrl-C, and say so.
+    """Serve a page until Ctrl-C, and print its address.
 
-    The browser is not given the address itself, whose token every user of this machine could read
-    in the list of processes, but a page that only this user can read and that leads there.
+    The browser does not get the address itself, whose token every user of this machine could read
+    in the list of processes, but a page that only this user can read and that redirects there.
 
     Args:
-        server: what serves it.
+        server: of the page.
         browser: whether to open it in the user's browser.
-        fragment: what the address ends with.
+        fragment: end of the address.
     """
     url = server.url + fragment
     serving = server.start()
@@ -40,7 +40,7 @@ def serve(server: Server, *, browser: bool, fragment: str = "") -> None:
 
 
 def _redirect(folder: Path, url: str) -> str:
-    """Write a page that leads to an address; return its own."""
+    """Write a page that redirects to an address; return its own address."""
     page = folder / "open.html"
     page.write_text(_REDIRECT.format(url=url), "utf-8")
     return page.as_uri()

@@ -1,4 +1,4 @@
-"""CMA-ES between two restarts: the search distribution and how a generation moves it."""
+"""CMA-ES between two restarts: the search distribution and its update by a generation."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ class Distribution:
     """
 
     def __init__(self, mean: Float, step: float, population: int) -> None:
-        """Begin with a sphere.
+        """Start with a sphere.
 
         Args:
             mean: ``(n,)`` float64, n ≥ 1.
@@ -69,7 +69,7 @@ class Distribution:
         """Move towards the better rows of a generation.
 
         Args:
-            ranked: ``(population, n)`` float64, what was sampled, the best first.
+            ranked: ``(population, n)`` float64, the sample, the best first.
         """
         n, chosen = len(self.mean), self.population // 2
         self.generations += 1
@@ -87,7 +87,7 @@ class Distribution:
 
         keep = self._keep_path
         self._path = (1 - keep) * self._path
-        if going:  # else the step size is behind, and C must not grow in its place
+        if going:  # else the step size lags behind, and C must not grow instead
             self._path += np.sqrt(keep * (2 - keep) * self._mass) * move
         missing = 0.0 if going else self._rank_one * keep * (2 - keep)
         weights = self._weights.copy()
@@ -113,11 +113,11 @@ class Distribution:
 
     @property
     def reach(self) -> float:
-        """The standard deviation of the parameter in which it is widest."""
+        """The largest standard deviation of a parameter."""
         return self.step * float(np.sqrt(np.diag(self.C).max()))
 
     @property
     def degenerate(self) -> bool:
-        """Whether its axes differ by more than numbers can tell (a condition beyond 1e14)."""
+        """Whether the covariance is ill-conditioned (condition number above 1e14)."""
         least, largest = float(self.scales.min()), float(self.scales.max())
         return not (np.isfinite(largest) and least > 1e-7 * largest)

@@ -1,4 +1,4 @@
-"""What the algorithms built on pymoo share. Imported only when one of them is built."""
+"""Base of the algorithms built on pymoo. Imported only when one of them is constructed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,13 +18,13 @@ Box = tuple[Float, Float]
 
 
 def pymoos(problem: Problem, box: Box) -> PymooProblem:
-    """Return pymoo's description of what is searched; it is never evaluated by pymoo."""
+    """Return pymoo's description of the problem; pymoo never evaluates it."""
     return PymooProblem(n_var=problem.n_var, n_obj=problem.n_obj, xl=box[0], xu=box[1])
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep pymoo from printing its hint about compiled modules; the user's choice is restored."""
+    """Suppress pymoo's hint about compiled modules; the user's setting is restored."""
     before: Any = Config.warnings["not_compiled"]
     Config.warnings["not_compiled"] = False
     try:
@@ -34,20 +34,20 @@ def quiet() -> Iterator[None]:
 
 
 class Generations:
-    """An algorithm of pymoo's, a generation a batch; begun afresh when it has no more to ask.
+    """An algorithm of pymoo; one generation per batch; restarts when it has no more rows.
 
     Args:
-        build: makes pymoo's algorithm, not yet set up.
-        problem: what is searched.
-        seed: of all that it draws; several numbers make one.
-        restart_within: begin afresh once half of the population is so close to the best row, in
-            each parameter. A population that has converged would ask for one row for ever; what it
-            found is in the store, and another start may find another kind of critical scenario.
-            Many objectives: so close to one row of the front, that is, when that has shrunk to a
-            point; one that is spread goes on being filled.
-        scaled: it measures distances between objectives, so each is scaled to [0, 1] over all who
-            live and their children. Who dominates whom stays the same.
-        box: where it searches; the whole cube by default.
+        build: constructs pymoo's algorithm, not yet set up.
+        problem: the search problem.
+        seed: of all its random numbers; several numbers form one seed.
+        restart_within: restart once half of the population is this close to the best row, in
+            each parameter. A converged population would propose one row forever; its findings are
+            in the store, and another start may find another kind of critical scenario.
+            Many objectives: this close to one row of the front, that is, when the front has shrunk
+            to a point; a front that is spread is not restarted.
+        scaled: it measures distances between objectives, so each is scaled to [0, 1] over the
+            population and its children. Dominance stays the same.
+        box: bounds of the search; the whole cube by default.
     """
 
     def __init__(
@@ -70,10 +70,10 @@ class Generations:
         self.restart()
 
     def restart(self) -> None:
-        """Forget all and begin with a new population."""
+        """Discard the state and start with a new population."""
         with quiet():
             self.algorithm = self._build()
-            # The budget is the campaign's; pymoo's own criteria would end the search early.
+            # The campaign limits the budget; pymoo's own criteria would end the search early.
             self.algorithm.setup(
                 pymoos(self._problem, self._box),
                 termination=NoTermination(),
@@ -92,22 +92,22 @@ class Generations:
         return U
 
     def tell(self, U: Float, results: Results) -> None:
-        """Take the results of the rows that were asked.
+        """Process the results of the rows of the last ``ask``.
 
         Raises:
-            ValueError: U is not what was last asked.
+            ValueError: U is not the result of the last ``ask``.
         """
         if self._asked is None or not np.array_equal(U, self._asked.get("X")):
-            raise ValueError("U must be the rows that were last asked")
+            raise ValueError("U must be the rows of the last ask")
         finite, failed = self._penalty.apply(results.F, results.ok)
-        self._asked.set("F", finite, "failed", failed, "told", finite)
+        self._asked.set("F", finite, "failed", failed, "unscaled", finite)
         living = self.algorithm.pop if self.algorithm.is_initialized else ()
-        # Who failed carries the penalty of that time; worse finite rows may have been told since,
-        # and any of them must count as better.
+        # A failed row has the penalty of its batch; worse finite rows may have followed, and any of
+        # them must count as better.
         for one in living:
             if one.get("failed"):
                 one.F = self._penalty.value
-                one.set("told", one.F)
+                one.set("unscaled", one.F)
         if self._scaled:
             _scale([*living, *self._asked])
         self.algorithm.tell(infills=self._asked)
@@ -118,10 +118,9 @@ class Generations:
 
 
 def _scale(individuals: list[Any]) -> None:
-    """Set F to what was told, each objective scaled to [0, 1] over all of them."""
-    told = 0.5 * np.array([one.get("told") for one in individuals])  # twice the range fits float64
-    low, span = told.min(axis=0), np.ptp(told, axis=0)
-    for one, values in zip(
-        individuals, (told - low) / np.where(span > 0.0, span, 1.0), strict=True
-    ):
+    """Set F to the unscaled objectives, each scaled to [0, 1] over all individuals."""
+    # Half, so that the range fits float64.
+    F = 0.5 * np.array([one.get("unscaled") for one in individuals])
+    low, span = F.min(axis=0), np.ptp(F, axis=0)
+    for one, values in zip(individuals, (F - low) / np.where(span > 0.0, span, 1.0), strict=True):
         one.F = values

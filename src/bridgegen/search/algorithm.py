@@ -1,4 +1,4 @@
-"""What every search algorithm is: ask for rows of the unit cube, tell their objectives."""
+"""The protocol of search algorithms: ask for rows of the unit cube, tell their objectives."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ from bridgegen.errors import InputError, UnknownNameError
 Value = bool | int | float | str
 
 EXTRAS = {"rl": ("torch", "stable_baselines3", "gymnasium")}
-"""The modules that come with an extra."""
+"""The modules of each extra."""
 
 JSON = None | bool | int | float | str | Sequence["JSON"] | Mapping[str, "JSON"]
-"""What a run can keep; no NaN and no inf."""
+"""Values that a run can record; no NaN and no inf."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Setting:
     """One hyper-parameter of an algorithm.
 
     Attributes:
-        default: its value unless the user gives another; also fixes the type.
-        text: what it does, one line.
+        default: its value unless the user gives another; also defines the type.
+        text: its effect, one line.
         low: smallest value allowed, for numbers.
         high: largest value allowed, for numbers.
         choices: the values allowed, for texts; empty where any is.
@@ -42,7 +42,7 @@ class Setting:
 
 RESTART_WITHIN = Setting(
     1e-3,
-    "begin afresh once half of the population is this close to the best row, as a share of each "
+    "restart once half of the population is this close to the best row, as a share of each "
     "parameter's range; 0: never",
     0.0,
     1.0,
@@ -55,7 +55,7 @@ class Arena(Protocol):
 
     Attributes:
         n_decisions: of each scenario.
-        n_observed: numbers that it sees at each.
+        n_observed: size of an observation.
         decisions: ``(n_decisions, 2)`` int64, the columns of U that it decides.
     """
 
@@ -64,10 +64,10 @@ class Arena(Protocol):
     decisions: Int
 
     def play(self, U: Float, act: Callable[[Float, Bool], Float]) -> Float:
-        """Let an agent decide, and return the rows that came of it.
+        """Let an agent decide, and return the resulting rows.
 
         Args:
-            U: ``(N, n_var)``; the columns of decisions do not count.
+            U: ``(N, n_var)``; the columns of decisions are ignored.
             act: ``(N, n_observed)`` observations and ``(N,)`` bool, whether a row still runs →
                 ``(N, 2)`` decisions in [0, 1].
 
@@ -79,11 +79,11 @@ class Arena(Protocol):
 
 @dataclass(frozen=True)
 class Problem:
-    """What is searched.
+    """A search problem.
 
     Attributes:
-        parameters: the searched ones' names, one per column of U.
-        metrics: the names of those that are recorded, one per column of ``Results.metrics``.
+        parameters: names of the searched parameters, one per column of U.
+        metrics: names of the recorded metrics, one per column of ``Results.metrics``.
         n_obj: objectives, all minimised.
         arena: where an adversary drives in closed loop; None without one.
     """
@@ -95,18 +95,18 @@ class Problem:
 
     @property
     def n_var(self) -> int:
-        """Searched parameters."""
+        """Number of searched parameters."""
         return len(self.parameters)
 
     @classmethod
     def unnamed(cls, n_var: int, n_obj: int = 1) -> Self:
-        """Return a problem of no scenario: parameters x0, x1 …, no metrics."""
+        """Return a problem without a scenario: parameters x0, x1 …, no metrics."""
         return cls(tuple(f"x{i}" for i in range(n_var)), (), n_obj)
 
 
 @dataclass(frozen=True)
 class Results:
-    """What n rows came to.
+    """Results of n rows.
 
     Attributes:
         F: ``(n, n_obj)`` float64, smaller is more critical; anything, NaN included, in rows that
@@ -114,7 +114,7 @@ class Results:
         ok: ``(n,)`` bool, False where the simulation failed.
         critical: ``(n,)`` bool, by the scenario's thresholds.
         metrics: ``(n, len(problem.metrics))`` float64, in the metrics' units; NaN in rows that are
-            not ok; +inf where the metric says so (a time to a collision that never comes).
+            not ok; +inf by the metric's definition (time to a collision that never occurs).
         cause: ``(n,)`` int8, a `Cause` each; NONE where not critical, or not sought.
     """
 
@@ -126,7 +126,7 @@ class Results:
 
     @classmethod
     def of_F(cls, F: Float, ok: Bool | None = None) -> Self:
-        """Return results of no scenario: objectives, nothing critical, no metrics.
+        """Return results without a scenario: objectives, no critical rows, no metrics.
 
         Args:
             F: ``(n, n_obj)``.
@@ -139,26 +139,26 @@ class Results:
 
 
 Arity = Literal["one", "many", "any"]
-"""How many columns of F an algorithm takes: exactly one; one or more; or it takes no notice."""
+"""How many columns of F an algorithm takes: exactly one; one or more; or it ignores them."""
 
 
 class Algorithm(Protocol):
     """A search algorithm over the unit cube; every objective is minimised.
 
-    ``ask`` and ``tell`` alternate: each ``tell`` answers the last ``ask``, whole and in its order.
-    An algorithm draws random numbers only from its own generator, so that one seed gives one
-    sequence of rows, bit for bit; the campaign's resume replays a run on that promise.
+    ``ask`` and ``tell`` alternate: each ``tell`` has the results of the last ``ask``, all of them,
+    in its order. An algorithm draws random numbers only from its own generator, so that one seed
+    gives one sequence of rows, bit for bit; resuming a run replays it and relies on that.
 
     It may name an ``extra`` that must be installed, see `EXTRAS`, and it may have other methods:
     ``notes``, see `TakesNotes`; ``state`` and ``restore``, see `Restorable`.
 
     Attributes:
-        name: what the user calls it.
+        name: for the user.
         description: one line for ``bridgegen list algorithms``.
         source: where the method is published.
         settings: its hyper-parameters by name; the constructor takes them as keywords.
         objectives: how many it takes: "one", "many" (a campaign gives it a column of F for each
-            term of the scenario's objective, if not told otherwise), or "any" (it takes no notice).
+            term of the scenario's objective by default), or "any" (it ignores F).
     """
 
     name: ClassVar[str]
@@ -184,54 +184,53 @@ class Algorithm(Protocol):
         """Return the next rows to evaluate.
 
         Returns:
-            ``(n, n_var)`` float64 in [0, 1]; n = 0 says that there are no more.
+            ``(n, n_var)`` float64 in [0, 1]; n = 0 if there are no more.
         """
         ...
 
     def tell(self, U: Float, results: Results) -> None:
-        """Take the results of the last ``ask``.
+        """Process the results of the last ``ask``.
 
         Args:
-            U: ``(n, n_var)`` float64, the rows that were asked.
-            results: of these rows; not to be changed.
+            U: ``(n, n_var)`` float64, the rows of the last ``ask``.
+            results: of these rows; must not be changed.
         """
 
 
 @runtime_checkable
 class TakesNotes(Protocol):
-    """An algorithm that learns something which is worth keeping with the run."""
+    """An algorithm with notes that are recorded with the run."""
 
     def notes(self) -> Mapping[str, JSON]:
-        """Return what it has learnt so far, by title.
+        """Return its notes so far, by title.
 
-        The campaign records it when the search ends, is interrupted or stopped; ``Run.notes`` has
-        it, and the report shows it. Where a value is a list of mappings with the same keys, it is
-        shown as a table. A mapping called "box" holds, for some parameters, the lowest and highest
-        value in the unit cube; the report adds the parameters' own values, where no constraint
-        couples them.
+        The campaign records them when the search ends, is interrupted or stopped; ``Run.notes`` has
+        them, and the report shows them. A list of mappings with the same keys is shown as a table.
+        A mapping called "box" holds, for some parameters, the lowest and highest value in the unit
+        cube; the report adds the parameters' own values, where no constraint couples them.
         """
         ...
 
 
 @runtime_checkable
 class Restorable(Protocol):
-    """An algorithm for which replaying a long run would take too long: it can be saved."""
+    """An algorithm whose state can be saved, because replaying a long run would take too long."""
 
     def state(self) -> bytes:
-        """Return all that the next rows depend on, as it is between ``tell`` and ``ask``.
+        """Return the state that determines the next rows, between ``tell`` and ``ask``.
 
         The campaign saves it with the batch; only the newest is kept.
         """
         ...
 
     def restore(self, state: bytes) -> None:
-        """Become what the algorithm was that returned ``state``, made with the same arguments.
+        """Restore the state of an algorithm that was constructed with the same arguments.
 
         Args:
-            state: perhaps damaged, or not written by BridgeGen at all: nothing in it is run.
+            state: possibly damaged, or not written by BridgeGen at all: it must not be executed.
 
         Raises:
-            ValueError: it is no state of such an algorithm.
+            ValueError: not a state of such an algorithm.
         """
 
 
@@ -241,7 +240,7 @@ def resolve(
     """Check a constructor's arguments and return every setting's value, given or default.
 
     Raises:
-        InputError: the rules that are broken, all of them; or its extra is not installed.
+        InputError: all rules that are broken; or its extra is not installed.
         UnknownNameError: no such setting.
     """
     name = algorithm.name
@@ -270,13 +269,13 @@ def resolve(
 
 
 def _require(name: str, extra: str | None) -> None:
-    """Refuse an algorithm whose extra is not installed; imports nothing."""
+    """Raise InputError if an algorithm's extra is not installed; imports nothing."""
     if extra and not all(find_spec(module) for module in EXTRAS[extra]):
         raise InputError(f"algorithm '{name}' needs the extra: pip install 'bridgegen[{extra}]'")
 
 
 def _wanted(setting: Setting, value: Value) -> str | None:
-    """Return what ``value`` must be, where it is not."""
+    """Return the rule that ``value`` breaks, or None."""
     kind = type(setting.default)
     fits = type(value) is kind or (kind is float and type(value) is int)
     if not fits:

@@ -1,4 +1,4 @@
-"""CMA-ES: an evolution strategy that learns which way the objective falls."""
+"""CMA-ES: an evolution strategy that learns the shape of the objective."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -13,15 +13,15 @@ from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, 
 class CMAES:
     """A normal distribution that moves, stretches and turns towards the better rows.
 
-    Ours, not a package's: those on PyPI refuse one parameter, and one of them draws from NumPy's
-    global generator. Where it meets the cube's faces, rows are reflected into it, while the
-    distribution learns from them as they were drawn: seen from inside, the objective goes on as
-    its mirror image, so that an optimum in a corner, where many critical scenarios are, is not
-    harder to come near to than one inside.
+    This is an own implementation: packages on PyPI refuse one parameter, and one of them draws from
+    NumPy's global generator. Rows outside the cube are reflected into it, while the distribution
+    learns from the unreflected ones: the objective continues as its mirror image, so that an
+    optimum in a corner, where many critical scenarios are, is no harder to approach than one
+    inside.
 
-    It begins afresh, anywhere in the cube, when it has contracted, when its axes differ too much,
-    or when nothing improves; restarts alternate between twice as many rows per generation as the
-    last large search had and small, more local searches, whichever have had fewer evaluations.
+    It restarts, anywhere in the cube, when it has contracted, when its axes differ too much, or
+    when nothing improves; restarts alternate between large searches, with twice as many rows per
+    generation each time, and small, more local ones, whichever have had fewer evaluations.
 
     Source: Hansen (2016), arXiv:1604.00772; restarts: Hansen (2009), "Benchmarking a
     BI-population CMA-ES on the BBOB-2009 function testbed"; reflection, among other ways, in
@@ -35,12 +35,10 @@ class CMAES:
         "population": Setting(
             0, "rows per batch of the first search; 0: 4 + 3 ln(parameters)", 0, 100_000
         ),
-        "step": Setting(
-            0.3, "standard deviation that it begins with, as a share of each range", 0.01, 1.0
-        ),
+        "step": Setting(0.3, "initial standard deviation, as a share of each range", 0.01, 1.0),
         "restart_within": Setting(
             1e-3,
-            "begin afresh once its standard deviation is this small, as a share of every "
+            "restart once its standard deviation is this small, as a share of every "
             "parameter's range",
             1e-12,
             1.0,
@@ -52,7 +50,7 @@ class CMAES:
         values = resolve(CMAES, problem, seed, settings)
         self._n_var, self._step = problem.n_var, float(values["step"])
         self._within = float(values["restart_within"])
-        # Fewer than three rows leave none to move away from.
+        # With fewer than three rows there is none to move away from.
         self._first = max(3, values["population"] or 4 + int(3 * np.log(problem.n_var)))
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._large = self._first
@@ -60,13 +58,13 @@ class CMAES:
         self._begin("first", self._first, self._step)
 
     def _begin(self, kind: str, population: int, step: float, most: float = np.inf) -> None:
-        """Begin a search anywhere, of at most so many evaluations."""
+        """Start a search anywhere, of at most ``most`` evaluations."""
         self._kind, self._most, self._used = kind, most, 0
         self._search = Distribution(self._rng.random(self._n_var), step, population)
         self._best: list[float] = []
 
     def _restart(self) -> None:
-        """Begin a large search or a small one, whichever kind has had fewer evaluations."""
+        """Start a large or a small search, whichever kind has had fewer evaluations."""
         if self._spent["large"] <= self._spent["small"]:
             self._large = min(2 * self._large, 2**9 * self._first)
             self._begin("large", self._large, self._step)
@@ -101,6 +99,6 @@ class CMAES:
 
 
 def reflected(rows: Float) -> Float:
-    """Return rows with what lies outside [0, 1] mirrored at the faces, as often as it takes."""
+    """Return rows with values outside [0, 1] mirrored at the faces, as often as needed."""
     inside: Float = 1.0 - np.abs(1.0 - np.mod(rows, 2.0))
     return inside

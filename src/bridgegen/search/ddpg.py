@@ -8,12 +8,12 @@ from bridgegen.search.rl.agent import ACTION, COMMON, MEMORY, STEP, Agent, Learn
 
 
 class DDPG(Agent):
-    """An actor that climbs a critic, which learns from all that is remembered.
+    """An actor that maximises a critic, which learns from a replay buffer.
 
-    Noise is added to what the actor chooses, so that it tries something; with ``action`` = row,
-    the actor's −1 and 1 are the ends of a parameter's range. Where the paper is silent: noise is
-    Gaussian, not Lillicrap's correlated one; after each batch the networks are trained ``epochs``
-    times on as many remembered transitions as a batch has.
+    Noise is added to the actor's actions, for exploration; with ``action`` = row, the actor's −1
+    and 1 are the ends of a parameter's range. Where the paper is silent: noise is Gaussian, not
+    Lillicrap's correlated one; after each batch the networks are trained ``epochs`` times on as
+    many transitions of the buffer as a batch has.
 
     Source: Lillicrap et al. (2016), "Continuous control with deep reinforcement learning"; Raffin
     et al. (2021), "Stable-Baselines3". Discount and learning rates: paper, Table IV.
@@ -29,7 +29,7 @@ class DDPG(Agent):
         "epochs": Setting(32, "gradient steps after a batch", 1, 1000),
         "lr_actor": Setting(3e-4, "learning rate of the actor", 0.0, 1.0),
         "lr_critic": Setting(1e-3, "learning rate of the critic", 0.0, 1.0),
-        "tau": Setting(0.005, "share of the way that target networks follow", 0.0, 1.0),
+        "tau": Setting(0.005, "update rate of the target networks", 0.0, 1.0),
         "noise": Setting(
             0.5, "standard deviation of the noise; 1 is half an action's range", 0, 10
         ),

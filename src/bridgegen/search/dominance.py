@@ -1,4 +1,4 @@
-"""Who dominates whom among rows of objectives, all of them minimised."""
+"""Pareto dominance among rows of objectives, all of them minimised."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from bridgegen.arrays import Bool, Float, Int
 
 
 def non_dominated(F: Float) -> Bool:
-    """Return which rows no other row is better than: ``(n,)`` bool; equal rows stand together.
+    """Return which rows no other row dominates: ``(n,)`` bool; equal rows get equal values.
 
     A row dominates another if it is nowhere worse and somewhere better.
 
@@ -26,8 +26,8 @@ def non_dominated(F: Float) -> Bool:
 def by_merit(F: Float) -> Int:
     """Return the rows, best first: ``(n,)`` int64.
 
-    With many objectives, those that no other dominates come first; then counts the sum of
-    objectives, each scaled to [0, 1] over the rows.
+    With many objectives, non-dominated rows come first; then the sum of objectives decides, each
+    scaled to [0, 1] over the rows.
 
     Args:
         F: ``(n, n_obj)`` float64, finite.
@@ -62,9 +62,9 @@ def crowding(F: Float) -> Float:
 
 
 def thin(F: Float, size: int) -> Int:
-    """Return the rows of a front that stay when it is cut to a size, in their order.
+    """Return the rows of a front that remain when it is cut to a size, in their order.
 
-    The most crowded row goes, one at a time, each time anew; the last of equals goes first.
+    The most crowded row is removed, one at a time, with distances recomputed; of equals the last.
 
     Args:
         F: ``(n, n_obj)`` float64, finite: a front.

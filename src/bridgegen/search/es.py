@@ -9,11 +9,11 @@ from bridgegen.search.evolved import Evolved
 
 
 class ES(Evolved):
-    """The best of each generation's children become the parents of the next; none lives longer.
+    """The best of a generation's children become the next parents; no parent survives.
 
-    Each individual carries its own step sizes, one a parameter, which mutate before they are used
-    (a log-normal self-adaptation); some children move by differences of parents instead. The
-    first generation is drawn anywhere, as many as there are parents.
+    Each individual has its own step sizes, one per parameter, which mutate before use (log-normal
+    self-adaptation); some children move by differences of parents instead. The first generation is
+    drawn anywhere, as many as there are parents.
 
     Source: Runarsson and Yao (2005), "Search biases in constrained evolutionary optimization",
     without its constraints.

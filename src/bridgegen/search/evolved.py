@@ -1,4 +1,4 @@
-"""What the algorithms built on pymoo's populations share: a generation is a batch."""
+"""Base of the algorithms built on pymoo's populations: a generation is a batch."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -9,10 +9,10 @@ from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, 
 
 
 class Evolved(ABC):
-    """A population that changes from generation to generation; begun afresh when it has converged.
+    """A population that changes from generation to generation; restarts when it has converged.
 
     Attributes:
-        scaled: whether it measures distances between objectives, which then must be of one scale.
+        scaled: whether it measures distances between objectives, which then need one scale.
     """
 
     name: ClassVar[str]
@@ -38,9 +38,9 @@ class Evolved(ABC):
         return self._search.ask()
 
     def tell(self, U: Float, results: Results) -> None:
-        """Make of what the rows came to who lives on, or where to go next.
+        """Select the survivors, or the next moves, by the rows' results.
 
         Raises:
-            ValueError: U is not what was last asked.
+            ValueError: U is not the result of the last ``ask``.
         """
         self._search.tell(U, results)

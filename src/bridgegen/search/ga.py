@@ -7,10 +7,10 @@ from bridgegen.search.genetic import Genetic
 
 
 class GA(Genetic):
-    """A population that is selected by tournament, crossed, mutated, and thinned to the best.
+    """Tournament selection, crossover, mutation, and survival of the best.
 
     Source: Deb and Agrawal (1995), "Simulated binary crossover for continuous search space";
-    elitist survival of parents and children together, as pymoo has it.
+    elitist survival of parents and children together, as in pymoo.
     """
 
     name: ClassVar[str] = "ga"
@@ -18,7 +18,7 @@ class GA(Genetic):
     source: ClassVar[str] = "Deb and Agrawal (1995), Complex Systems 9(2)"
     objectives: ClassVar[Arity] = "one"
 
-    def _made_of(self, **parts: Any) -> Any:
+    def _algorithm(self, **parts: Any) -> Any:
         from pymoo.algorithms.soo.nonconvex import ga
 
         return ga.GA(**parts)

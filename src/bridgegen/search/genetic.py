@@ -1,4 +1,4 @@
-"""What the genetic algorithms of pymoo's share: how children are made."""
+"""Base of pymoo's genetic algorithms: crossover and mutation."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ class Genetic(Evolved):
 
     Crossover is simulated binary, mutation polynomial (each parameter with probability 1/n of a
     mutated child, or 1/2 where n is one or two); a child that is a known individual is not
-    evaluated again. Who is selected, and who lives on, is each algorithm's own.
+    evaluated again. Selection and survival are each algorithm's own.
 
     Source: Deb and Agrawal (1995), "Simulated binary crossover for continuous search space".
     """
@@ -32,12 +32,12 @@ class Genetic(Evolved):
         from pymoo.operators.mutation.pm import PM
 
         values = self._values
-        return self._made_of(
+        return self._algorithm(
             pop_size=values["population"],
             crossover=SBX(prob=values["crossover"], eta=values["crossover_eta"]),
             mutation=PM(prob=values["mutation"], eta=values["mutation_eta"]),
         )
 
     @abstractmethod
-    def _made_of(self, **parts: Any) -> Any:
-        """Return pymoo's algorithm, not yet set up, of a population's size and its operators."""
+    def _algorithm(self, **parts: Any) -> Any:
+        """Return pymoo's algorithm, not yet set up, with a population size and operators."""

@@ -1,4 +1,4 @@
-"""Full factorial design, the brute force."""
+"""Full factorial design: brute force."""
 
 from collections.abc import Mapping
 from hashlib import blake2b
@@ -10,21 +10,21 @@ from bridgegen.arrays import Float
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 BATCH = 40
-"""Rows that are asked for at a time; the results do not depend on it."""
+"""Rows per batch; the results do not depend on it."""
 
 _ROUNDS = 8
 
 
 class Grid:
-    """Every combination of a number of levels per parameter, each once; then there are no more.
+    """Every combination of a number of levels per parameter, each once; then it ends.
 
     Levels are at the centres of equal bins: (k + ½) / levels. The order is a permutation by the
     seed, so that a budget smaller than the grid takes a random sample of it without repetition,
     and not one corner. The permutation is computed, never stored: a Feistel network over the
     pair of indices of the first and the second half of the parameters. Each round adds a hash of
-    one half to the other, which can be undone, so that no point is left out or comes twice.
+    one half to the other, which is invertible, so that every point occurs exactly once.
 
-    Source: what the paper, Section I, sets out to avoid; the network is Luby and Rackoff's (1988).
+    Source: the brute force of the paper's Section I; the network is Luby and Rackoff's (1988).
     """
 
     name: ClassVar[str] = "grid"
@@ -53,10 +53,10 @@ class Grid:
         return (np.array(levels, np.float64).reshape(-1, self._n_var) + 0.5) / self._levels
 
     def tell(self, U: Float, results: Results) -> None:
-        """Take no notice: the grid is fixed by its levels, its order by the seed."""
+        """Ignore the results: the grid is fixed by its levels, its order by the seed."""
 
     def _point(self, index: int) -> list[int]:
-        """Return the levels of the point that comes at ``index``."""
+        """Return the levels of the point at ``index`` of the order."""
         halves = list(divmod(index, self._sizes[1]))
         for count in range(_ROUNDS):
             here = count % 2
@@ -70,7 +70,7 @@ class Grid:
         return levels
 
     def _hash(self, count: int, half: int) -> int:
-        # As long as the half it is added to, and 16 bytes more: the remainder is then uniform.
+        # 16 bytes longer than the half that it is added to: the remainder is then uniform.
         size = max(self._sizes).bit_length() // 8 + 17
         text, digest = b"%d:%d:%s" % (count, half, self._key), b""
         while len(digest) < size:

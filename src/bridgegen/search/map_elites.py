@@ -14,26 +14,26 @@ from bridgegen.search.space_filling import latin_hypercube
 
 CELLS_AT_MOST = 100_000
 ELITES_KEPT = 1000
-"""Elites that are kept with the run, the most critical."""
+"""Maximum number of elites in the run's notes, the most critical ones."""
 
 
 class MAPElites:
     """An archive of cells, each with the most critical row whose behaviour falls into it.
 
     A behaviour is described by metrics or by searched parameters, as the user chooses; by default
-    by the first two parameters: the most critical scenario that each combination of them allows.
-    New rows are made of two elites: the first, moved along the line to the second and a little
-    anywhere. What is sought is not one worst scenario but many different ones.
+    by the first two parameters: the most critical scenario of each combination of them. A new row
+    is an elite that is moved along the line to another one and by a small random step. The goal is
+    not one worst scenario but many different ones.
 
     Where the source is silent:
 
     - the first rows are a Latin hypercube;
-    - a descriptor's range is the user's, or a parameter's whole range, or what the first rows
-      came to; what lies beyond it belongs to the outermost cell, +inf (no collision ever) too;
+    - a descriptor's range is the user's, or a parameter's whole range, or that of the first rows'
+      values; values beyond it belong to the outermost cell, +inf (no collision ever) too;
     - a row with a descriptor that does not exist (NaN) is in no cell.
 
-    Ours, not pyribs's: that loads scikit-learn, pandas, Numba and, where it is installed, PyTorch
-    for an archive of five arrays.
+    This is an own implementation: pyribs loads scikit-learn, pandas, Numba and, where it is
+    installed, PyTorch for an archive of five arrays.
 
     Source: Mouret and Clune (2015), "Illuminating search spaces by mapping elites"; the variation
     is Vassiliades and Mouret's (2018), "Discovering the elite hypervolume by leveraging
@@ -46,13 +46,13 @@ class MAPElites:
     settings: ClassVar[Mapping[str, Setting]] = {
         "descriptors": Setting(
             "",
-            "metrics or parameters that tell kinds of scenarios apart, with ranges if wanted: "
+            "metrics or parameters that distinguish kinds of scenarios, optionally with ranges: "
             "v_d=0:15,ttc (a parameter's range in shares of it); empty: the first two parameters",
         ),
         "cells": Setting(10, "cells per descriptor", 1, 10_000),
         "population": Setting(40, "rows per batch", 1, 100_000),
-        "initial": Setting(40, "space-filling rows at first", 1, 1_000_000),
-        "near": Setting(0.02, "standard deviation of a row's step anywhere", 0.0, 1.0),
+        "initial": Setting(40, "number of initial space-filling rows", 1, 1_000_000),
+        "near": Setting(0.02, "standard deviation of a row's random step", 0.0, 1.0),
         "line": Setting(1.0, "that of its step along the line, per distance", 0.0, 2.0),
     }
     objectives: ClassVar[Arity] = "one"
@@ -96,7 +96,7 @@ class MAPElites:
         self._worst = max(self._worst, float(F[good].max(initial=-np.inf)))
 
     def notes(self) -> Mapping[str, JSON]:
-        """Return how much of the archive is filled, and its elites, the most critical first."""
+        """Return the archive's filled share, and its elites, the most critical first."""
         names = [one.name for one in self._descriptors]
         if self._archive is None:
             return {"descriptors": list(names), "cells filled": 0}
@@ -135,7 +135,7 @@ class _Archive:
     """
 
     def __init__(self, spans: Float, per_descriptor: int, n_var: int) -> None:
-        """Make an empty one.
+        """Construct an empty archive.
 
         Args:
             spans: ``(n, 2)`` float64, where each descriptor's cells begin and end.
@@ -150,7 +150,7 @@ class _Archive:
         self.filled = np.empty(0, np.int64)
 
     def add(self, U: Float, F: Float, behaviour: Float, critical: Bool) -> None:
-        """Take in the rows that are better than what their cells hold; the first of equals."""
+        """Add the rows that are better than their cells' elites; of equals the first."""
         within = np.clip(behaviour, self.low, self.high)
         shares = (within - self.low) / (self.high - self.low)
         places = np.minimum((shares * self._sizes[0]).astype(np.int64), self._sizes[0] - 1)
@@ -172,8 +172,8 @@ class _Descriptor:
         name: of a metric or a parameter.
         column: its column in the metrics, or in U.
         is_metric: which of the two.
-        low: where its cells begin; NaN: where the first rows do.
-        high: where they end; NaN likewise.
+        low: where its cells begin; NaN: at the first rows' minimum.
+        high: where they end; NaN: at the first rows' maximum.
     """
 
     name: str
@@ -189,22 +189,22 @@ class _Descriptor:
         return column
 
     def span(self, values: Float) -> tuple[float, float]:
-        """Return where its cells begin and end, by the first rows' values where nobody said."""
+        """Return where its cells begin and end, by default by the first rows' values."""
         if isfinite(self.low):
             return self.low, self.high
         known = np.clip(values[np.isfinite(values)], -1e300, 1e300)  # their distance is finite
         low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-        # A constant gets the middle cells; others may come.
+        # A constant is in the middle cells; later values may differ.
         room = max(abs(low), 1.0) / 2 if high - low <= 1e-9 * max(abs(low), 1.0) else 0.0
         return low - room, high + room
 
 
 def _parse(text: str, problem: Problem) -> tuple[_Descriptor, ...]:
-    """Return the descriptors that a setting says.
+    """Parse the descriptors of a setting.
 
     Raises:
         UnknownNameError: no such metric or parameter.
-        InputError: a range that is none, or a name that comes twice.
+        InputError: an invalid range, or a duplicate name.
     """
     parts = [part.strip() for part in text.split(",") if part.strip()]
     parts = parts or list(problem.parameters[:2])
@@ -230,5 +230,5 @@ def _parse(text: str, problem: Problem) -> tuple[_Descriptor, ...]:
         found.append(_Descriptor(name, place.index(name), is_metric, low, high))
     names = [one.name for one in found]
     if len(set(names)) < len(names):
-        raise InputError(f"map-elites: each descriptor must come once, got {', '.join(names)}")
+        raise InputError(f"map-elites: descriptors must be unique, got {', '.join(names)}")
     return tuple(found)

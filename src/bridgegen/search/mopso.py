@@ -20,27 +20,27 @@ from bridgegen.search.penalty import Penalty
 from bridgegen.search.space_filling import latin_hypercube
 
 TURNED = -0.001
-"""What is left of a particle's velocity at a face of the cube."""
+"""Factor of a particle's velocity at a face of the cube."""
 ETA = 20.0
 """Distribution index of the mutation."""
 
 
 class MOPSO:
-    """A swarm whose particles are drawn to their own best row and to a front that all have found.
+    """A swarm whose particles are drawn to their own best row and to the swarm's common front.
 
-    Its leaders are an archive of rows that none dominates; the most crowded goes when it is full,
+    Its leaders are an archive of non-dominated rows; the most crowded is removed when it is full,
     and of two drawn at random the less crowded leads. Velocities are constricted, and bounded by
     half of the cube. Some particles are mutated (polynomially, a parameter with probability
-    1/n) as they move, so that a swarm behind one leader does not stay there.
+    1/n) as they move, so that a swarm behind one leader does not stagnate.
 
-    Ours, not pymoo's MOPSO_CD: that evaluates rows of its own while it is set up, which an exact
-    budget cannot have, and has no mutation. Where the source is silent:
+    This is an own implementation: pymoo's MOPSO_CD evaluates additional rows during setup, which an
+    exact budget does not allow, and has no mutation. Where the source is silent:
 
     - the first rows are a Latin hypercube;
-    - a swarm that has converged begins afresh, as the other algorithms do.
+    - a converged swarm restarts, as the other algorithms do.
 
     Source: Nebro et al. (2009), "SMPSO: a new PSO-based metaheuristic for multi-objective
-    optimization", on the ground of Reyes-Sierra and Coello Coello's (2006), which the paper cites.
+    optimization", based on Reyes-Sierra and Coello Coello's (2006), which the paper cites.
     """
 
     name: ClassVar[str] = "mopso"
@@ -74,18 +74,18 @@ class MOPSO:
         self._started = False
 
     def ask(self) -> Float:
-        """Return where the particles are, one row each."""
+        """Return the particles' positions, one row each."""
         return self._x.copy()
 
     def tell(self, U: Float, results: Results) -> None:
-        """Move the particles' best rows and the front, and from them the next velocities."""
+        """Update the particles' best rows, the front, and the velocities."""
         F, failed = self._penalty.apply(results.F, results.ok)
         if not self._started:
             self._best, self._best_F, self._best_failed = self._x.copy(), F, failed
             self._front, self._front_F = self._x[:0], F[:0]
             self._started = True
         else:
-            # Who failed carries the penalty of that time; any finite row counts as better.
+            # A failed row has the penalty of its batch; any finite row counts as better.
             self._best_F = np.where(self._best_failed[:, None], self._penalty.value, self._best_F)
             # The newer of two rows that do not dominate each other is kept, as in the source.
             worse: Bool = np.logical_and(
@@ -101,7 +101,7 @@ class MOPSO:
             self._move()
 
     def _collect(self, x: Float, F: Float) -> None:
-        """Let the front take in rows, each place of objectives once, and cut it to its size."""
+        """Add rows to the front, each point of the objective space once, and cut it to size."""
         everything = np.concatenate([self._front, x])
         all_F = np.concatenate([self._front_F, F])
         first = np.sort(np.unique(all_F, axis=0, return_index=True)[1])

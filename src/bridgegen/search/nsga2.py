@@ -7,7 +7,7 @@ from bridgegen.search.genetic import Genetic
 
 
 class NSGA2(Genetic):
-    """Individuals survive by the front of non-dominated ones that they are on, then by crowding.
+    """Individuals survive by the rank of their non-dominated front, then by crowding.
 
     Source: Deb, Pratap, Agarwal and Meyarivan (2002), "A fast and elitist multiobjective genetic
     algorithm: NSGA-II".
@@ -20,7 +20,7 @@ class NSGA2(Genetic):
     source: ClassVar[str] = "Deb et al. (2002), doi:10.1109/4235.996017"
     objectives: ClassVar[Arity] = "many"
 
-    def _made_of(self, **parts: Any) -> Any:
+    def _algorithm(self, **parts: Any) -> Any:
         from pymoo.algorithms.moo import nsga2
 
         return nsga2.NSGA2(**parts)

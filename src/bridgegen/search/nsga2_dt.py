@@ -23,29 +23,29 @@ from bridgegen.search.space_filling import latin_hypercube
 from bridgegen.search.tree import Leaf, fit_leaves
 
 Rounds = Generator[Float, Results, None]
-"""Yields rows to evaluate, is sent their results."""
+"""A generator that yields rows to evaluate, and gets their results by ``send``."""
 
 
 BOXES_KEPT = 100
-"""Boxes of a tree that are kept with the run, the surest; a long campaign has thousands."""
+"""Maximum number of a tree's boxes in the run's notes, the surest; a long run has thousands."""
 
 
 class NSGA2DT:
-    """NSGA-II in each of the boxes that a decision tree calls critical, then another tree.
+    """NSGA-II in each critical box of a decision tree, then another tree.
 
-    A space-filling sample comes first. Then, again and again: a tree is fitted to all unique
-    evaluations, critical or not (failed ones are neither); each leaf with enough rows and a large
-    enough critical share is a box; NSGA-II runs in each for some generations, begun with the
-    leaf's non-dominated rows, which are not evaluated again, and as many space-filling ones as
-    make up a population. Where no leaf is critical, the whole cube is the box.
+    A space-filling sample is first. Then, repeatedly: a tree is fitted to all unique evaluations,
+    critical or not (failed ones are neither); each leaf with enough rows and a large enough
+    critical share is a box; NSGA-II runs in each for some generations, from the leaf's
+    non-dominated rows, which are not evaluated again, filled up to a population with space-filling
+    ones. If no leaf is critical, the whole cube is the box.
 
-    Boxes are visited in the order of (critical + 1) / (rows + 2), Laplace's estimate of a
-    critical share: the surest first, so that a budget that ends within a round has been spent
-    where most was known; a leaf of 10 critical rows of 10 comes after one of 90 of 90.
+    Boxes are visited in descending order of (critical + 1) / (rows + 2), Laplace's estimate of a
+    critical share, so that a budget that ends within a round is spent where the evidence is
+    strongest; a leaf of 10 critical rows of 10 comes after one of 90 of 90.
 
     Crossover and mutation are simulated binary and polynomial, with the paper's probabilities,
-    0.7 and 0.05; the mutation's is read per parameter. Per child, 19 of 20 children would have
-    nothing but recombined values of their parents.
+    0.7 and 0.05; that of mutation applies per parameter. If it applied per child, 19 of 20 children
+    would only recombine values of their parents.
 
     Source: Ben Abdessalem et al. (2018), "Testing vision-based control systems using learnable
     evolutionary algorithms"; probabilities, population: paper, Table V.
@@ -59,7 +59,7 @@ class NSGA2DT:
         "initial": Setting(40, "space-filling rows before the first tree", 2, 1_000_000),
         "generations": Setting(5, "of NSGA-II in a box, until the next tree", 1, 10_000),
         "share": Setting(0.5, "critical share that makes a leaf critical", 0.01, 1.0),
-        "min_rows": Setting(10, "rows that a leaf has at least", 1, 100_000),
+        "min_rows": Setting(10, "minimum number of rows of a leaf", 1, 100_000),
         "crossover": Setting(0.7, "probability that two parents are crossed", 0.0, 1.0),
         "crossover_eta": Setting(15.0, "how close children stay to their parents", 0.0, 1000.0),
         "mutation": Setting(0.05, "probability that a child's parameter is mutated", 0.0, 1.0),
@@ -80,17 +80,17 @@ class NSGA2DT:
     def ask(self) -> Float:
         """Return the next sample, or the next generation in a box.
 
-        The first one in a box holds known rows, which the campaign does not evaluate again.
+        The first generation in a box has known rows, which the campaign does not evaluate again.
         """
         return self._next.copy()
 
     def tell(self, U: Float, results: Results) -> None:
-        """Learn what the rows came to, and make the next ones."""
+        """Process the rows' results, and make the next rows."""
         self._known.add(U, results)
         self._next = self._rounds.send(results)
 
     def notes(self) -> Mapping[str, JSON]:
-        """Return each tree's size, and the critical boxes: the last tree's and the surest first."""
+        """Return each tree's size, and the critical boxes, the last tree's and the surest first."""
         return {"decision trees": list(self._trees), "critical boxes": list(self._critical)}
 
     def _search(self) -> Rounds:
@@ -107,7 +107,7 @@ class NSGA2DT:
                     search.tell(U, (yield U))
 
     def _boxes(self) -> list[Leaf]:
-        """Return the critical leaves of a tree over all that is known, or the whole cube."""
+        """Return the critical leaves of a tree over all known rows, or the whole cube."""
         known, least = self._known, self._values["min_rows"]
         low, high = np.zeros(self._problem.n_var), np.ones(self._problem.n_var)
         leaves = fit_leaves(known.U, known.critical, low=low, high=high, min_rows=least)
@@ -131,13 +131,13 @@ class NSGA2DT:
         return critical or [Leaf(low, high, len(known.U), int(known.critical.sum()))]
 
     def _described(self, leaf: Leaf) -> dict[str, JSON]:
-        """Return a leaf: where it is narrower than the cube, and what is in it."""
+        """Return a leaf's description: its bounds where narrower than the cube, and its rows."""
         edges = zip(self._problem.parameters, leaf.low.tolist(), leaf.high.tolist(), strict=True)
         box: JSON = {name: [low, high] for name, low, high in edges if low > 0.0 or high < 1.0}
         return {"box": box, "rows": leaf.rows, "critical": leaf.critical}
 
     def _population(self, leaf: Leaf) -> Float:
-        """Return what NSGA-II begins with in a box: ``(population, n_var)`` float64."""
+        """Return NSGA-II's initial population in a box: ``(population, n_var)`` float64."""
         size, inside = self._values["population"], leaf.holds(self._known.U)
         U, F = self._known.U[inside], self._known.F[inside]
         front = np.flatnonzero(non_dominated(F))
@@ -161,7 +161,7 @@ class NSGA2DT:
 
 
 class _Known:
-    """Every evaluation that did not fail, once.
+    """Every successful evaluation, once.
 
     Attributes:
         U: ``(n, n_var)`` float64.
@@ -176,7 +176,7 @@ class _Known:
         self._rows: set[bytes] = set()
 
     def add(self, U: Float, results: Results) -> None:
-        """Take in rows that are new and have a result."""
+        """Add rows that are new and have a result."""
         good = results.ok & np.isfinite(results.F).all(axis=1)
         fresh = []
         for k in np.flatnonzero(good).tolist():

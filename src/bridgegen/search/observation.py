@@ -1,4 +1,4 @@
-"""The generator as an agent: what it observes, how its actions become rows, what rewards it.
+"""The generator as an agent: observations, actions as rows, rewards.
 
 Shared by the algorithms of deep reinforcement learning and by the public environments.
 """
@@ -16,21 +16,20 @@ Encoding = Literal["step", "row"]
 ENCODINGS: tuple[Encoding, ...] = ("step", "row")
 
 LARGEST = 1000.0
-"""Magnitude of a metric, in its own unit, that is observed as ±1; more is no more."""
+"""Magnitude of a metric, in its own unit, that is observed as ±1; larger ones are clipped."""
 
 
 class Observer:
-    """Turns rows and their metrics into observations: finite numbers in [−1, 1].
+    """Converts rows and their metrics to observations: finite numbers in [−1, 1].
 
     First the row, [0, 1] → [−1, 1]. Then each metric m as sign(m)·ln(1 + |m|)/ln(1 + LARGEST): fine
     near 0, where collisions are, and coarse far away. A value less critical than its metric's cap,
-    +inf among them, counts as the cap; NaN, which a failed scenario has, as 0.
+    including +inf, becomes the cap; NaN, of a failed scenario, becomes 0.
 
-    What the conflict analysis measures is not observed: an agent sees the metrics.
+    The conflict analysis is not observed, only the metrics.
 
     Args:
-        problem: names the parameters and the metrics; metrics that BridgeGen does not know have no
-            cap.
+        problem: with the names of parameters and metrics; unknown metrics have no cap.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -59,10 +58,10 @@ class Observer:
 
 
 class Reward:
-    """−F on a scale of its own, which the first results set: their median is 0, quartiles 1 apart.
+    """−F, scaled by the first results: their median becomes 0, their quartiles are 1 apart.
 
-    Clipped to ±`LIMIT`; a failed scenario has −`LIMIT`. The scale stays as it is from then on, so
-    that a reward means the same throughout a run.
+    Clipped to ±`LIMIT`; a failed scenario has −`LIMIT`. The scale is constant from then on, so that
+    rewards are comparable throughout a run.
     """
 
     LIMIT = 5.0
@@ -85,14 +84,14 @@ class Reward:
                 self.scale[:] = 1.0, centre, high - low
         _, centre, spread = self.scale
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            # Where all were equal, better is LIMIT and worse is −LIMIT; 0/0 is as good as before.
+            # Where all were equal, better is LIMIT, worse is −LIMIT, and equal (0/0) is 0.
             scaled = np.nan_to_num((centre - F) / spread, nan=0.0)
         reward = np.clip(np.where(good, scaled, -self.LIMIT), -self.LIMIT, self.LIMIT)
         return reward.astype(np.float32)
 
 
 def step_from(U: Float, move: Float) -> Float:
-    """Return the rows that are ``move`` away, reflected at the faces of the cube.
+    """Return the rows displaced by ``move``, reflected at the faces of the cube.
 
     Args:
         U: ``(n, n_var)`` in [0, 1].

@@ -1,4 +1,4 @@
-"""Pairwise covering array: every pair of levels of every two parameters, in few rows."""
+"""Pairwise covering array: every pair of levels of any two parameters, in few rows."""
 
 from collections.abc import Mapping
 from itertools import islice
@@ -10,17 +10,17 @@ from bridgegen.arrays import Float
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 BATCH = 40
-"""Rows that are asked for at a time; the results do not depend on it."""
+"""Rows per batch; the results do not depend on it."""
 
 
 class Pairwise:
-    """A covering array of strength two, allpairspy's; then there are no more rows.
+    """A covering array of strength two, allpairspy's; then it ends.
 
     For any two parameters and any level of each, some row has both. Levels are at the centres of
-    equal bins: (k + ½) / levels. The library's array is always the same one; the seed permutes
-    its columns and the levels within each, which keeps what it covers. Its order is kept: it is
+    equal bins: (k + ½) / levels. The library's array is deterministic; the seed permutes its
+    columns and the levels within each, which preserves the coverage. Its order is kept: it is
     greedy, so that a budget smaller than the array still covers many pairs. Where constraints
-    narrow a parameter's interval, levels are shares of what they leave.
+    narrow a parameter's interval, levels are shares of the rest.
 
     Source: Czerwonka (2006), "Pairwise testing in the real world".
     """
@@ -54,4 +54,4 @@ class Pairwise:
         return U
 
     def tell(self, U: Float, results: Results) -> None:
-        """Take no notice: the array is fixed by its levels and the seed."""
+        """Ignore the results: the array is fixed by its levels and the seed."""

@@ -1,4 +1,4 @@
-"""What stands in for the objectives of a failed row."""
+"""The objectives of a failed row."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from bridgegen.arrays import Bool, Float
 
 
 class Penalty:
-    """Stands in for the objectives of rows without a usable result.
+    """Replaces the objectives of rows without a usable result.
 
-    A row counts as failed where its simulation failed or an objective is not finite. It gets,
-    in every objective, a finite value worse than the worst finite one told so far.
+    A row counts as failed if its simulation failed or an objective is not finite. In every
+    objective it gets a finite value worse than the worst finite one so far.
     """
 
     def __init__(self, n_obj: int) -> None:
@@ -31,11 +31,11 @@ class Penalty:
 
     @property
     def value(self) -> Float:
-        """``(n_obj,)`` float64, the penalty as of now; it grows with the worst value told."""
+        """``(n_obj,)`` float64, the present penalty; it grows with the worst value so far."""
         if not np.isfinite(self._worst).all():
             return np.ones_like(self._worst)
         with np.errstate(over="ignore"):
-            # The margin is never lost to rounding, and is of the objective's own size.
+            # The margin exceeds rounding errors, and scales with the objective.
             margin = np.maximum(self._worst - self._best, np.maximum(np.abs(self._worst), 1.0))
             value: Float = np.minimum(self._worst + margin, np.finfo(np.float64).max)
         return value

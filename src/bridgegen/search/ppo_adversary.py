@@ -1,4 +1,4 @@
-"""An adversary in closed loop: an agent that drives a participant, taught by PPO."""
+"""An adversary in closed loop: an agent that drives a participant, trained by PPO."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -17,15 +17,15 @@ from bridgegen.search.space_filling import latin_hypercube
 class PPOAdversary(Saved):
     """An agent that drives a participant step by step, rewarded for harm the ego could avoid.
 
-    Every half second it sees where the ego is, how fast, and where their ways meet, and decides
-    which speed to make for and where to be in its lane, within the scenario's limits. It drives 40
-    scenarios at a time and learns from all its decisions in them. What else the scenario leaves
-    open (where it starts, the weather) is drawn at random for one half of them, and near the best
-    of those so far for the other.
+    Every half second it observes the ego's position and speed, and where their paths meet, and
+    decides on its target speed and lateral position in its lane, within the scenario's limits. It
+    drives 40 scenarios at a time and learns from all its decisions in them. The scenario's other
+    parameters (its start, the weather) are drawn at random for one half of them, and near the best
+    so far for the other.
 
-    Its reward comes when the scenario ends: −F, and ``BONUS`` more where the scenario is critical
-    and the ego could have avoided it; harm that no careful driver would have avoided (`Cause`) is
-    worth no more than an average scenario. Where no causes are sought, all harm counts.
+    Its reward comes at the end of the scenario: −F, and ``BONUS`` more if the scenario is critical
+    and the ego could have avoided it; harm that no careful driver would have avoided (`Cause`)
+    gets the reward of an average scenario. Without cause analysis, all harm counts.
 
     Source: Schulman et al. (2017), "Proximal policy optimization algorithms"; against a driver in
     closed loop: Feng et al. (2021), "Intelligent driving intelligence test".
@@ -41,18 +41,18 @@ class PPOAdversary(Saved):
         "population": Setting(40, "scenarios side by side, and rows per batch", 2, 10_000),
         "epochs": Setting(32, "passes over a batch's decisions, K_epochs", 1, 1000),
         "minibatch": Setting(
-            400, "decisions between two updates at most, shared out evenly", 2, 100_000
+            400, "maximum number of decisions per update; updates have equal shares", 2, 100_000
         ),
-        "gamma": Setting(0.99, "discount of rewards to come", 0.0, 1.0),
+        "gamma": Setting(0.99, "discount of future rewards", 0.0, 1.0),
         "gae": Setting(0.95, "lambda of generalised advantage estimation", 0.0, 1.0),
         "lr_actor": Setting(3e-4, "learning rate of the policy", 0.0, 1.0),
         "lr_critic": Setting(1e-3, "learning rate of the value function", 0.0, 1.0),
         "lr_std": Setting(3e-3, "learning rate of the standard deviations", 0.0, 1.0),
-        "std": Setting(1.0, "standard deviation that the policy begins with", 1e-3, 10.0),
+        "std": Setting(1.0, "initial standard deviation of the policy", 1e-3, 10.0),
         "clip": Setting(0.2, "how far an update may change an action's probability", 1e-3, 1.0),
         "entropy": Setting(0.0, "weight of the policy's entropy", 0.0, 1.0),
         "width": Setting(64, "units in each of the networks' two hidden layers", 1, 4096),
-        "elite": Setting(40, "best scenarios so far, near which others begin", 1, 10_000),
+        "elite": Setting(40, "best scenarios so far, near which others start", 1, 10_000),
         "near": Setting(0.1, "how near, as a share of each parameter's range", 1e-4, 1.0),
     }
     objectives: ClassVar[Arity] = "one"
@@ -64,7 +64,7 @@ class PPOAdversary(Saved):
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         values = self._values = resolve(type(self), problem, seed, settings)
         if problem.arena is None:
-            raise InputError(f"{self.name}: there must be a participant that it drives, got none")
+            raise InputError(f"{self.name}: the scenario must have an adversary, got none")
         from bridgegen.search.rl.duel import Duel
         from bridgegen.search.rl.models import own_generators
 
@@ -98,7 +98,7 @@ class PPOAdversary(Saved):
             return self._arena.play(U, self._duel.act)
 
     def tell(self, U: Float, results: Results) -> None:
-        """Reward the agent, and teach it."""
+        """Reward the agent, and train it."""
         F = np.asarray(results.F[:, 0], np.float64)
         good = results.ok & np.isfinite(F)
         reward = self._reward(F, good).astype(np.float64)

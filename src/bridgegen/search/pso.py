@@ -19,9 +19,9 @@ class PSO(Evolved):
       falls back to a random place between its old one and the face it crossed (pymoo's rule);
     - each generation, the particle that holds the best row is replaced by a polynomial mutation
       of that row;
-    - a swarm that has converged would ask for one row for ever (on a smooth function of ten
-      parameters that takes some 180 generations). It is scattered afresh, and forgets: what it
-      found is in the store, and another start may find another kind of critical scenario.
+    - a converged swarm would propose one row forever (on a smooth function of ten parameters after
+      some 180 generations). It restarts without memory: its findings are in the store, and another
+      start may find another kind of critical scenario.
 
     Source: Kennedy and Eberhart (1995), "Particle swarm optimization"; the inertia weight is Shi
     and Eberhart's (1998). Hyper-parameters: paper, Table IV.

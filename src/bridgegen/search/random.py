@@ -34,4 +34,4 @@ class Random:
         return self._rng.random(self._shape)
 
     def tell(self, U: Float, results: Results) -> None:
-        """Take no notice: that is what makes it the baseline."""
+        """Ignore the results: this is the baseline."""

@@ -1,4 +1,4 @@
-"""The algorithms by name: ours, and those that installed packages add."""
+"""The algorithms by name: BridgeGen's own, and those that installed packages add."""
 
 from bridgegen.errors import InputError
 from bridgegen.plugins import PlugIns
@@ -48,7 +48,7 @@ ALGORITHMS: dict[str, type[Algorithm]] = {
 
 
 def names() -> list[str]:
-    """Return every algorithm's name, ours first; imports no other package."""
+    """Return every algorithm's name, BridgeGen's own first; imports no other package."""
     return ADDED.names(ALGORITHMS)
 
 
@@ -71,6 +71,6 @@ def get(name: str) -> type[Algorithm]:
     algorithm: type[Algorithm] = found
     if algorithm.name != name:
         raise InputError(
-            f"{ADDED.place(name)} calls itself '{algorithm.name}'; the two names must agree"
+            f"{ADDED.place(name)} has the name '{algorithm.name}'; the two names must agree"
         )
     return algorithm

@@ -40,4 +40,4 @@ class Sobol:
         return np.concatenate(parts)
 
     def tell(self, U: Float, results: Results) -> None:
-        """Take no notice: the sequence is fixed by the seed."""
+        """Ignore the results: the sequence is fixed by the seed."""

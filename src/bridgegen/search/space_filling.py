@@ -1,4 +1,4 @@
-"""Samples that leave no stretch of any parameter empty."""
+"""Samples that cover the whole range of every parameter."""
 
 import numpy as np
 

@@ -7,7 +7,7 @@ from bridgegen.search.genetic import Genetic
 
 
 class SPEA2(Genetic):
-    """Individuals survive by how many they and their betters dominate, then by distance to others.
+    """Individuals survive by strength (how many their dominators dominate), then by density.
 
     Source: Zitzler, Laumanns and Thiele (2001), "SPEA2: Improving the strength Pareto evolutionary
     algorithm".
@@ -21,7 +21,7 @@ class SPEA2(Genetic):
     objectives: ClassVar[Arity] = "many"
     scaled: ClassVar[bool] = True
 
-    def _made_of(self, **parts: Any) -> Any:
+    def _algorithm(self, **parts: Any) -> Any:
         from pymoo.algorithms.moo import spea2
 
         return spea2.SPEA2(survival=spea2.SPEA2Survival(normalize=False), **parts)

@@ -1,7 +1,7 @@
-"""A decision tree over rows: boxes in which the rows are alike, critical or not.
+"""A decision tree over rows: boxes whose rows are mostly critical or mostly not.
 
-CART splits a box at a value of one column, so that the two halves are purer than the whole (Gini
-impurity), again and again. Its leaves partition the box that was given.
+CART recursively splits a box at a value of one column, so that the two halves are purer than the
+whole (Gini impurity). Its leaves partition the outer box.
 Source: L. Breiman et al., "Classification and Regression Trees", 1984; the tree is scikit-learn's.
 """
 
@@ -34,7 +34,7 @@ class Leaf:
 
     @property
     def share(self) -> float:
-        """Critical rows of its rows, in [0, 1]; 0 where it has none."""
+        """Critical share of its rows, in [0, 1]; 0 without rows."""
         return self.critical / max(self.rows, 1)
 
     def holds(self, X: Float) -> Bool:
@@ -54,19 +54,19 @@ def fit_leaves(
     max_depth: int | None = None,
     pruning: float = 0.0,
 ) -> list[Leaf]:
-    """Return all leaves of a tree that tells critical rows from others.
+    """Return all leaves of a tree that separates critical rows from others.
 
-    Pure leaves are among them; where no split helps, the one leaf is the whole box. One input
-    gives one result, bit for bit.
+    They include pure leaves; if no split helps, the only leaf is the whole box. The result is
+    deterministic, bit for bit.
 
     Args:
         X: ``(N, n_var)``, rows inside the outer box.
         critical: ``(N,)`` bool.
         low: ``(n_var,)``, of the outer box, inclusive.
         high: likewise, its upper edges.
-        min_rows: rows that a leaf has at least, unless there are fewer in all.
-        seed: decides between splits that are equally good; 0 .. 2³²−1.
-        max_depth: splits on the way to a leaf, at most; as many as it takes by default.
+        min_rows: minimum number of rows of a leaf, unless there are fewer in all.
+        seed: decides between equally good splits; 0 .. 2³²−1.
+        max_depth: maximum number of splits above a leaf; unlimited by default.
         pruning: of Breiman's cost-complexity; a split must lower the weighted impurity of the
             leaves below it by more than this for each leaf that it adds.
 
@@ -96,7 +96,7 @@ def fit_leaves(
         min_samples_leaf=min_rows, max_depth=max_depth, ccp_alpha=pruning, random_state=seed
     )
     tree, found = model.fit(ranks, labels).tree_, []
-    stack = [(0, np.arange(len(rows)), lowest, highest)]  # a tree may be too deep to recur
+    stack = [(0, np.arange(len(rows)), lowest, highest)]  # a tree may be too deep for recursion
     while stack:
         node, inside, low, high = stack.pop()
         left, right = int(tree.children_left[node]), int(tree.children_right[node])
@@ -116,8 +116,8 @@ def fit_leaves(
 def _ranks(rows: Float) -> npt.NDArray[np.float32]:
     """Return each value's rank among its column's distinct values.
 
-    Only the order counts to a tree. scikit-learn rounds X to float32, in which different rows may
-    be one, and which may put a row on the other side of a threshold; ranks are exact in it.
+    A tree depends only on the order. scikit-learn rounds X to float32, which may merge different
+    rows, or move one across a threshold; ranks are exact in float32.
     """
     ranks = np.empty(rows.shape, np.float32)
     for number, column in enumerate(rows.T):

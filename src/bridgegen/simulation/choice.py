@@ -123,7 +123,7 @@ def _checked(found: object, name: str) -> Kind:
         )
     if found.name != name:
         raise InputError(
-            f"{ADDED.place(name)} calls itself '{found.name}'; the two names must agree"
+            f"{ADDED.place(name)} has the name '{found.name}'; the two names must agree"
         )
     return found
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.ego.detections import BOTH, CAMERA, LIDAR, NO_FRAME, NOBODY, SEEN_BY, X, Y
+from bridgegen.ego.detections import BOTH, CAMERA, LIDAR, MISSED, NO_FRAME, SEEN_BY, X, Y
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
@@ -39,7 +39,7 @@ def test_every_tenth_of_a_second_somebody_looks(pipeline, X_random):
         assert looked[row, : rollout.n_steps[row] : 2].all()
         assert not looked[row, 1 : rollout.n_steps[row] : 2].any()
     assert np.isin(
-        rollout.detections[:, 1:, :, SEEN_BY], (NO_FRAME, NOBODY, CAMERA, LIDAR, BOTH)
+        rollout.detections[:, 1:, :, SEEN_BY], (NO_FRAME, MISSED, CAMERA, LIDAR, BOTH)
     ).all()
 
 
@@ -72,7 +72,7 @@ def test_thick_fog_hides_the_other(pipeline):
         gap = np.hypot(rollout.x[:, 1] - rollout.x[:, 0], rollout.y[:, 1] - rollout.y[:, 0])
         far = frames & (gap > 35.0)
         assert far.sum() > 5
-        shares.append((rollout.detections[:, 1, :, SEEN_BY][far] > NOBODY).mean())
+        shares.append((rollout.detections[:, 1, :, SEEN_BY][far] > MISSED).mean())
     assert shares[0] > 0.95
     assert shares[1] < 0.5
 

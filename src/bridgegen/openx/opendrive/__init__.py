@@ -2,5 +2,5 @@
 
 `model` says what there is, `read` and `write` turn it from and into text, `from_owl` makes it of
 an ontology's individuals, `site` finds the intersection of a map, `routes` leads from lane to
-lane, `validate` says what is wrong, `outline` what to draw.
+lane, `validate` reports errors, `outline` defines the drawing.
 """

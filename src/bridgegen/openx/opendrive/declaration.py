@@ -1,4 +1,4 @@
-"""How a dataclass of the model says what it looks like in XML: once, for reader and writer alike.
+"""Declaration of a model dataclass's XML form: once, for reader and writer alike.
 
 Each field names the attribute or the child elements that it stands for; its Python type says
 what may be in it. `plan` turns a class into the list of its fields.

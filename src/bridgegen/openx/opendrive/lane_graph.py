@@ -1,6 +1,6 @@
 """The lanes of a road network as a graph: what follows what, what lies beside, what is nearest.
 
-A node is a lane of one lane section, travelled in one of both directions: who overtakes on the
+A node is a lane of one lane section, travelled in one of both directions: overtaking traffic on the
 oncoming lane travels it against its own traffic. Nodes are numbered in the order of the file.
 """
 
@@ -111,7 +111,7 @@ class LaneGraph:
                 target = self.numbers.get(Node(*stretch, there))
                 if target is not None and target not in leads[number]:
                     leads[number].append(target)
-                    # … and who drives the other way round comes back
+                    # … and traffic in the other direction comes back
                     leads[target ^ 1].append(number ^ 1)
         return tuple(map(tuple, leads))
 

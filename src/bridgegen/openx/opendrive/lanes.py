@@ -145,7 +145,7 @@ def lane_pose(road: Road, lane_id: int, s: float) -> LanePose:
 
 
 def values(records: Sequence[Cubic], s: Float) -> Float:
-    """Return what a list of cubics says at many s; 0 before the first; ``(P,)`` float64."""
+    """Return the values of a list of cubics at many s; 0 before the first; ``(P,)`` float64."""
     if not records:
         return np.zeros_like(s)
     table = np.array([(one.s, one.a, one.b, one.c, one.d) for one in records])

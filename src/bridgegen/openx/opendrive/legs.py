@@ -7,7 +7,7 @@ from bridgegen.openx.opendrive.model import CONTACTS, Lane, Road
 
 
 def leads_to(road: Road, lane: Lane, end: str) -> bool:
-    """Say whether traffic on a lane leaves its road at this end, ``"start"`` or ``"end"``."""
+    """Return whether traffic on a lane leaves its road at this end, ``"start"`` or ``"end"``."""
     return (road.direction(lane.id) > 0) == (end == "end")
 
 

@@ -1,6 +1,6 @@
 """The road network as OpenDRIVE describes it, in the standard's terms (ASAM OpenDRIVE 1.7).
 
-Plain immutable values: two models are equal if they say the same. Angles are radians, lengths
+Plain immutable values: two models are equal if their contents are. Angles are radians, lengths
 metres. Each field declares its form in XML, which `read` and `write` follow.
 
 What a file may hold besides is dropped by the reader: ``userData`` that is not ours, ``include``,
@@ -25,7 +25,7 @@ from bridgegen.openx.opendrive.user_data import UserData
 CONTACTS = ("start", "end")
 JUNCTION_TYPES = ("default", "direct")
 NO_JUNCTION = "-1"
-"""What ``Road.junction`` says of a road that is no part of a junction."""
+"""The value of ``Road.junction`` for a road outside junctions."""
 
 DRIVABLE = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional")

@@ -92,12 +92,12 @@ def _road(model: OpenDrive, road: Road, step: float) -> Iterator[Shape]:
             yield "edge", points(road, s, left)
             yield "edge", points(road, s, right)
         yield from _between(road, section, s, t, drivable)
-    told = list(stop_lines(road))
+    lines = list(stop_lines(road))
     for contact in ("start", "end"):
         end = 0.0 if contact == "start" else road.length
-        if not any(abs(s - end) < _NEAR for s, _ in told) and _waits(model, road, contact):
+        if not any(abs(s - end) < _NEAR for s, _ in lines) and _waits(model, road, contact):
             yield from _stop_line(road, contact)
-    yield from (("stop", line) for _, line in told)
+    yield from (("stop", line) for _, line in lines)
     yield from (("stripe", area) for area in crosswalk_stripes(road))
     yield from (("sign", line) for line in signs(road))
 
@@ -123,16 +123,18 @@ def _between(
 
 
 def _waits(model: OpenDrive, road: Road, contact: str) -> bool:
-    """Return whether who leaves a road by one of its ends may have to wait there.
+    """Return whether traffic that leaves a road by one of its ends may have to wait there.
 
-    On motorways nobody does; where some of a junction's roads have lights or signs, those do.
+    Not on motorways; if some of a junction's roads have lights or signs, only on those.
     """
     link = road.link(contact)
     if link is None or any(one.type == "motorway" for one in road.types):
         return False
     legs = [one for one in model.roads if one.ends_at(link.element_id) and not one.is_connecting]
-    told = [one for one in legs if any(s.dynamic == "yes" or s.type in _WAIT for s in one.signals)]
-    return not told or road in told
+    signed = [
+        one for one in legs if any(s.dynamic == "yes" or s.type in _WAIT for s in one.signals)
+    ]
+    return not signed or road in signed
 
 
 def _stop_line(road: Road, contact: str) -> Iterator[Shape]:

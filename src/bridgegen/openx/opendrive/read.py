@@ -198,7 +198,7 @@ def _table(cls: type) -> tuple[list[tuple[Field, str]], list[Field], _Tree]:
 
 
 def _parse(one: Field, raw: str) -> float | int | bool | str:
-    """Return the value that a text stands for; a ValueError says what it must be."""
+    """Return the value of a text; a ValueError states the valid form."""
     form = one.form
     if form.words and (float not in one.types or raw in form.words):
         if raw not in form.words:

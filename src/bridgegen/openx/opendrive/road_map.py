@@ -20,8 +20,8 @@ class RoadMap:
 
     Attributes:
         path: of the file.
-        data: its bytes, handed over unchanged.
-        model: what it says.
+        data: its bytes, exported unchanged.
+        model: its contents.
         site: the intersection.
     """
 

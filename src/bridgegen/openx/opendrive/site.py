@@ -13,7 +13,7 @@ from bridgegen.openx.opendrive.legs import heading, leads_to
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
 
 KNOWN_SITES = {"Town05": "965"}
-"""The junction to use on a map, by the map's name, where nobody says which.
+"""The default junction of a map, by the map's name.
 
 Source: Town05 is CARLA's (version of 2019); 965 has two lanes in and out on each of four legs.
 """
@@ -22,7 +22,7 @@ TEMPLATES = ("crossroads", "t-junction")
 """Templates whose scenarios can take place on a map."""
 
 ROAD_TYPES = ("town", "rural", "motorway")
-"""Types of road that a scenario tells apart."""
+"""Types of road that a scenario distinguishes."""
 
 _KINDS = {3: "TJunction", 4: "Crossroads"}
 
@@ -229,7 +229,7 @@ def _arm_road(road: Road, end: str, ids: list[int], inbound: set[int]) -> ArmRoa
 
 
 def _steady(road: Road, ids: list[int]) -> bool:
-    """Say whether a road has the same drivable lanes in all its sections, linked one to one."""
+    """Return whether a road has the same drivable lanes in all its sections, linked one to one."""
     last = len(road.sections) - 1
     for index, section in enumerate(road.sections):
         lanes = [lane for lane in section.lanes if lane.drivable]
@@ -246,9 +246,9 @@ def _steady(road: Road, ids: list[int]) -> bool:
 def _continuation(
     model: OpenDrive, road: Road, end: str, ids: list[int]
 ) -> tuple[Road, str, dict[int, int]] | None:
-    """Return the road that goes on from the far end: it, its nearer end, its lane per lane.
+    """Return the road that continues from the far end: it, its nearer end, its lane per lane.
 
-    None where there is none, or where not every lane goes on.
+    None if there is none, or if not every lane continues.
     """
     far = "end" if end == "start" else "start"
     link = road.link(far)
@@ -260,7 +260,7 @@ def _continuation(
     mapped: dict[int, int] = {}
     for lane_id in ids:
         lane = road.section_at(far).lane(lane_id)
-        assert lane is not None  # as `_steady` said
+        assert lane is not None  # checked by `_steady`
         links = lane.successors if far == "end" else lane.predecessors
         if len(links) != 1:
             return None

@@ -1,4 +1,4 @@
-"""What the ontology says and OpenDRIVE has no words for: our own ``<userData>`` elements.
+"""Statements of the ontology that OpenDRIVE cannot express: own ``<userData>`` elements.
 
 The standard allows them at any element, and other tools pass over them. A code is ours where it
 begins with `PREFIX`; after that comes the local name of a property of the ontology (or
@@ -19,25 +19,25 @@ PREFIX = "bridgegen:"
 
 @dataclass(frozen=True, slots=True)
 class UserData:
-    """One thing said; ``code`` begins with `PREFIX`."""
+    """A named value; ``code`` begins with `PREFIX`."""
 
     code: str = attribute("code")
     value: str = attribute("value", default="")
 
 
-def say(name: str, value: str | float) -> UserData:
-    """Return a statement; numbers are written in full."""
+def user_datum(name: str, value: str | float) -> UserData:
+    """Return a named value; numbers are written in full."""
     return UserData(PREFIX + name, value if isinstance(value, str) else repr(float(value)))
 
 
-def said(data: Sequence[UserData], name: str) -> list[str]:
+def values_of(data: Sequence[UserData], name: str) -> list[str]:
     """Return all values of a name, in the file's order."""
     return [one.value for one in data if one.code == PREFIX + name]
 
 
 def number(data: Sequence[UserData], name: str) -> float | None:
-    """Return the finite number said under a name; None where there is none (or nonsense)."""
-    for value in said(data, name):
+    """Return the finite number of a name; None if there is none, or it is invalid."""
+    for value in values_of(data, name):
         try:
             found = float(value)
         except ValueError:
@@ -48,14 +48,14 @@ def number(data: Sequence[UserData], name: str) -> float | None:
 
 
 def exact(data: Sequence[UserData], name: str, measured: float, slack: float = 1e-6) -> float:
-    """Return a number to the last digit: as it is said, where what is measured agrees.
+    """Return a number to the last digit: as stated, if the measured value agrees.
 
-    Where somebody moved things without knowing of our ``userData``, the geometry counts.
+    If another tool moved things without regard to BridgeGen's ``userData``, the geometry counts.
 
     Args:
         data: of the element.
         name: of the property.
-        measured: what the geometry says, to rounding.
+        measured: the geometry's value, with rounding.
         slack: by how much the two may differ, in the property's unit.
     """
     found = number(data, name)

@@ -187,7 +187,7 @@ def _ends(model: OpenDrive, road: Road) -> Iterator[str]:
         link = road.link(contact)
         if link is None or link.element_type != "road":
             continue
-        assert link.contact_point is not None  # as `broken_references` said
+        assert link.contact_point is not None  # checked by `broken_references`
         other = model.road(link.element_id)
         there = f"the {link.contact_point} of road {other.id}"
         what = f"road {road.id}: its {contact} is at {there}, which"

@@ -68,7 +68,7 @@ class RandomRouteAction(Element):
 
 @dataclass(frozen=True)
 class RoutingAction(Element):
-    """One of the actions that say where to go."""
+    """One of the routing actions."""
 
     action: AssignRouteAction | FollowTrajectoryAction | AcquirePositionAction | RandomRouteAction
 

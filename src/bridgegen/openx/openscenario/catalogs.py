@@ -1,6 +1,6 @@
 """Finding the entries of catalogues in the files of strangers.
 
-A catalogue's folder, its name and its entries' names come from a file that somebody else wrote:
+A catalogue's folder, its name and its entries' names come from an untrusted file:
 only regular files of a folder are read, so many, so large, and nothing that they name in turn but
 further entries.
 """

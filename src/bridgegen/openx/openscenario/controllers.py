@@ -1,4 +1,4 @@
-"""Who drives: controllers given, switched on and off, and overridden at their pedals."""
+"""Controllers: assigned, switched on and off, and overridden at their pedals."""
 
 from dataclasses import dataclass
 from typing import Annotated

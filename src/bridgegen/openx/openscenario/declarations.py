@@ -18,7 +18,7 @@ TIME_STEP = "time_step"
 """The header's property for the step [s] of the evaluation: the standard has no place for it."""
 
 DEFAULT_TIME_STEP = 0.05
-"""[s], where a header does not say it."""
+"""[s], the default without the header's value."""
 
 CAUSE = "cause"
 """The header's property for what a critical scenario's harm is put down to."""
@@ -31,7 +31,7 @@ CONFLICT_TYPE = "conflict_type"
 """The header's property for the type of a critical scenario's decisive conflict."""
 
 RESPONSIBLE = "responsible"
-"""The header's property for who is responsible for it: ego, other, shared or none."""
+"""The header's property for the responsible party: ego, other, shared or none."""
 
 SEVERITY = "severity"
 """The header's property for its severity, the probability of a MAIS3+ injury."""
@@ -97,7 +97,7 @@ class License(Element):
 
 @dataclass(frozen=True)
 class FileHeader(Element):
-    """Who wrote the file, when, what for, and in which version of the standard."""
+    """The file's author, date, purpose, and version of the standard."""
 
     rev_major: UnsignedShort
     rev_minor: UnsignedShort

@@ -1,4 +1,4 @@
-"""A file that says how a scenario's parameters are distributed, and how it is read.
+"""Parameter distributions of a scenario, and their reader.
 
 Source: ASAM OpenSCENARIO XML 1.1 to 1.3, ``ParameterValueDistribution``.
 """
@@ -208,7 +208,7 @@ class DistributionFile(Element):
 
 
 def is_distribution(path: Path) -> bool:
-    """Say whether a file holds a distribution.
+    """Return whether a file holds a distribution.
 
     Raises:
         FileFormatError: missing, unreadable, not well-formed, or hostile.
@@ -251,7 +251,7 @@ def distribution_of(
     | PoissonDistribution
     | Histogram,
 ) -> Distribution:
-    """Return what an element says.
+    """Return the contents of an element.
 
     Raises:
         InputError: it is no distribution.

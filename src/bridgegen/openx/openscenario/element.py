@@ -1,6 +1,6 @@
 """How the model is declared: dataclass fields are the XML attributes and child elements.
 
-One declaration serves reading, writing and checking. A field's annotation says it all:
+One declaration serves reading, writing and checking. A field's annotation defines everything:
 
 - an alias of ``values`` (``Double``, ``String``, …) or an enumeration: an attribute, whose XML name
   is the field's in camelCase;

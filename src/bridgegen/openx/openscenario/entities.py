@@ -1,4 +1,4 @@
-"""Who takes part: vehicles with their boxes and limits, and who drives them."""
+"""Entities: vehicles with their boxes and limits, and their drivers."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -123,7 +123,7 @@ class Vehicle(Element):
 
 @dataclass(frozen=True)
 class Pedestrian(Element):
-    """Somebody on foot, or an animal; the reference point is the middle, on the ground."""
+    """A pedestrian, or an animal; the reference point is the middle, on the ground."""
 
     parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String
@@ -151,7 +151,7 @@ class MiscObject(Element):
 
 @dataclass(frozen=True)
 class Controller(Element):
-    """Who drives; the properties say how."""
+    """A driver; the properties configure it."""
 
     parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
     name: String

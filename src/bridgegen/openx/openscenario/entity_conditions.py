@@ -75,7 +75,7 @@ class TimeHeadwayCondition(Element):
 
 @dataclass(frozen=True)
 class TimeToCollisionConditionTarget(Element):
-    """With whom, or where."""
+    """The other entity, or a position."""
 
     target: EntityRef | Position
 
@@ -177,7 +177,7 @@ class RelativeLaneRange(Element):
 
 @dataclass(frozen=True)
 class RelativeClearanceCondition(Element):
-    """True while nobody is so far ahead or behind [m], on some lanes."""
+    """True while no entity is within these distances ahead or behind [m], on some lanes."""
 
     opposite_lanes: Boolean
     free_space: Boolean

@@ -1,13 +1,13 @@
 """From a scenario file that refers elsewhere to a scenario that stands by itself.
 
-All of it happens in this one place, when a file is read, so that whoever has a scenario meets
+All of it happens in this one place, when a file is read, so that users of a scenario meet
 
 - no ``CatalogReference``: the entry stands there, with the parameters that it was given;
 - no parameters but the scenario's own, declared with a literal; all others are what they stand for
   (see ``scopes``), but where an action or a condition names one it is made one of the scenario's;
 - no ``EntitySelection``: its members stand wherever there may be several entities.
 
-Elements that come from a catalogue say so in their lines (`catalogs.CatalogLine`).
+Elements from a catalogue are marked in their lines (`catalogs.CatalogLine`).
 """
 
 from dataclasses import replace
@@ -65,7 +65,7 @@ def expanded(
 
 
 def _refers(element: Element) -> bool:
-    """Say whether an element makes a file one that does not stand by itself."""
+    """Return whether an element makes a file one that does not stand by itself."""
     if isinstance(element, ParameterDeclaration):
         return is_made(element) or reads_as_number(element)
     if getattr(element, _DECLARED, None) is not None:
@@ -267,7 +267,7 @@ class _Expander:
 
 
 def _is_no_trailer(element: Element) -> bool:
-    """Say whether a parameter, meant for the trailer's name, is left empty."""
+    """Return whether a parameter, meant for the trailer's name, is left empty."""
     if not isinstance(element, Trailer) or not isinstance(element.trailer, EntityRef):
         return False
     return element.trailer.entity_ref == ""

@@ -190,7 +190,7 @@ def _fits(want: Kind, have: Kind, value: Literal) -> bool:
 
 
 def _reads_as(want: Kind, have: Kind, value: Literal) -> bool:
-    """Say whether a text reads as a value of another type."""
+    """Return whether a text reads as a value of another type."""
     if have is not Kind.STRING:
         return False
     try:
@@ -229,7 +229,7 @@ def _violates(
 
 
 def _nearly(rule: Rule, value: Literal, limit: Literal) -> bool:
-    """Say whether a number misses a limit by no more than rounding (``odd.parameters.slack``)."""
+    """Return whether a number misses a limit only by rounding (``odd.parameters.slack``)."""
     inclusive = rule in (Rule.GREATER_OR_EQUAL, Rule.LESS_OR_EQUAL, Rule.EQUAL_TO)
     if not inclusive or not isinstance(value, float) or not isinstance(limit, float):
         return False

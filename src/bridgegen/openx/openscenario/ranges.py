@@ -22,7 +22,7 @@ from bridgegen.openx.openscenario.parameters import broken, kind_of, numbers
 from bridgegen.openx.openscenario.values import Expr, Kind, ParameterRef, parse_literal
 
 UNIT = "?"
-"""The unit of a parameter whose file does not say it."""
+"""The unit of a parameter whose file states none."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class _Builder:
         | dst.DeterministicSingleParameterDistribution
         | dst.StochasticDistribution,
     ) -> None:
-        """Take in one distribution, or say why not."""
+        """Add one distribution, or report why not."""
         if isinstance(one, dst.DeterministicMultiParameterDistribution):
             self._add_sets(one.distribution)
             return
@@ -345,7 +345,7 @@ class _Builder:
 
     @contextmanager
     def _saying(self, element: Element) -> Iterator[None]:
-        """Take down why something is refused, with its line."""
+        """Record a problem with its line."""
         try:
             yield
         except InputError as error:

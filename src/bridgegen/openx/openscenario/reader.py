@@ -62,7 +62,7 @@ def shorten(problems: list[str]) -> list[str]:
 
 
 class _EnoughError(Exception):
-    """There are more problems than anybody wants to know."""
+    """The maximum number of problems is reached."""
 
 
 @dataclass

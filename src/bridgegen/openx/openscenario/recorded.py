@@ -37,7 +37,7 @@ class Recording:
         h: ``(E, K)`` [rad], heading, continuous.
         v: ``(E, K)`` [m/s], ≥ 0.
         began: per event, in the order of the file, the instant at which it began; -1 if never.
-        present: ``(E, K)`` bool, who is there; None where everybody always is.
+        present: ``(E, K)`` bool; None if all entities always are.
         light_names: ids of the S traffic lights that change.
         lights: ``(S, K)`` int8, their states, as `bridgegen.simulation.rollout.Rollout` has them.
     """
@@ -156,7 +156,7 @@ def _timetable(
 
 
 def _comings_and_goings(recording: Recording) -> Iterator[osc.ManeuverGroup]:
-    """Yield who comes and goes when, and what way those take who come."""
+    """Yield when entities appear and disappear, and the paths of those that appear."""
     step, k = recording.time_step, recording.x.shape[1]
     for e, name in enumerate(recording.names):
         events = []

@@ -57,7 +57,7 @@ def texts_resolved(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, dict[s
     """Return a scenario in which literals stand for all that is no number.
 
     Its parameters stay declared, and numbers refer to them still; so do properties, which are
-    texts to the standard but may well be numbers to who reads them.
+    texts to the standard but may be numbers to their readers.
 
     Args:
         scenario: as read, so its references are known to fit.
@@ -86,7 +86,7 @@ def texts_resolved(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, dict[s
 
 
 def _number(expression: osc.Expr, numbers: Mapping[str, float]) -> float:
-    with np.errstate(all="ignore"):  # what has no value is told with its place
+    with np.errstate(all="ignore"):  # missing values are reported with their place
         return float(expression.resolve(numbers))
 
 

@@ -209,14 +209,14 @@ class Scope:
 
 
 def is_made(declaration: ParameterDeclaration) -> bool:
-    """Say whether a parameter's value refers to others, or is to be computed."""
+    """Return whether a parameter's value refers to others, or is to be computed."""
     if kind_of(declaration.parameter_type) in _TEXTS:
         return _NAMES.fullmatch(declaration.value) is not None
     return "$" in declaration.value
 
 
 def reads_as_number(declaration: ParameterDeclaration) -> bool:
-    """Say whether a parameter is a text that may stand for a number or a boolean."""
+    """Return whether a parameter is a text that may stand for a number or a boolean."""
     return kind_of(declaration.parameter_type) is Kind.STRING and (
         _NUMBER.fullmatch(declaration.value) is not None
     )

@@ -27,8 +27,8 @@ _KINDS: dict[type[Element], ObjectType] = {
 def without_selections(scenario: OpenScenario) -> OpenScenario:
     """Return a scenario in which the members of each selection stand for it.
 
-    They do wherever an element lists entities, and as those who act at the start. Elsewhere the
-    name stays, and is nobody's.
+    They do wherever an element lists entities, and as actors of initial actions. Elsewhere the
+    name stays, and refers to no entity.
     """
     selections = scenario.entities.entity_selections
     if not selections:

@@ -75,7 +75,7 @@ class ControllerDistributionEntry(Element):
 
 @dataclass(frozen=True)
 class ControllerDistribution(Element):
-    """Who drives the vehicles."""
+    """The vehicles' drivers."""
 
     entries: Annotated[tuple[ControllerDistributionEntry, ...], AtLeast(1)]
 

@@ -27,9 +27,9 @@ def problems(scenario: osc.OpenScenario, road_network: OpenDrive | None = None) 
     """Return all that is wrong, one sentence each, with the line where the scenario was read.
 
     Checked: parameters; names that must differ; entities, parts of the storyboard and controllers
-    of lights that are referred to; the standard's ranges; that whoever acts is there to act; and,
-    on a road network, that every road and light is there, every lane position lies on a lane and
-    every route can be driven without a lane change.
+    of lights that are referred to; the standard's ranges; that actors are present when they act;
+    and, on a road network, that every road and light is there, every lane position lies on a lane
+    and every route can be driven without a lane change.
 
     Args:
         scenario: parameters are taken at their declared values.
@@ -113,13 +113,13 @@ class _Check:
                     yield element.line, f"{what} must {rule}, got {raw} = {value:g}"
 
     def is_rate(self, element: Element) -> bool:
-        """Say whether an element's number is a rate, whose sign says no more than the target."""
+        """Return whether an element's number is a rate, whose sign says no more than the target."""
         return isinstance(element, osc.TransitionDynamics) and (
             self.value(element.dynamics_dimension) == osc.DynamicsDimension.RATE
         )
 
     def actors(self) -> Iterator[Problem]:
-        """Yield maneuver groups whose private actions are nobody's."""
+        """Yield maneuver groups whose private actions have no actor."""
         for group in walk(self.scenario):
             if isinstance(group, osc.ManeuverGroup) and not group.actors.entity_refs:
                 private = any(isinstance(below, osc.PrivateAction) for below in walk(group))

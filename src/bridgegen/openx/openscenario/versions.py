@@ -55,7 +55,7 @@ def to_version(scenario: osc.OpenScenario, version: str, place: str) -> osc.Open
         place: what to call the scenario in messages.
 
     Raises:
-        UnsupportedError: what that version cannot say, by name and line, all of it at once.
+        UnsupportedError: contents that the version does not support, by name and line, all at once.
     """
     was, minor = scenario.file_header.rev_minor, VERSIONS[version]
     if minor < 3:

@@ -1,4 +1,4 @@
-// The page's address names scenario and time: "#0001@3.45", or "#evaluation-57@3.45" of one that was not handed over.
+// The page's address names scenario and time: "#0001@3.45", or "#evaluation-57@3.45" of one that was not exported.
 
 export function addressOf(kept, isKept, index) {
   const name = isKept ? encodeURIComponent(kept.name) : `evaluation-${kept.evaluation + 1}`;

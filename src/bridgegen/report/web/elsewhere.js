@@ -38,7 +38,7 @@ class Elsewhere {
       const same = text(here[name]) === text(there[name]);
       return element("td", {}, same ? text(here[name]) : `${text(here[name])} → ${text(there[name])}`);
     };
-    const first = !there ? "–" : parts ? `${parts.entity} at ${parts.time.toFixed(2)} s` : "nobody";
+    const first = !there ? "–" : parts ? `${parts.entity} at ${parts.time.toFixed(2)} s` : "none";
     const why = element("details", {}, element("summary", {}, first), element("span", {}, scenario.text));
     why.open = verdict !== 1;
     return element("tr", {}, element("td", {}, button), element("td", { class: `verdict-${verdict}` }, words),

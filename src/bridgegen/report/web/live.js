@@ -6,7 +6,7 @@ import { filters } from "./filters.js";
 import { number } from "./numbers.js";
 
 const EVERY = 1500; // ms between two questions while the run grows
-const SELDOM = 5000; // once it has ended, or nobody answers
+const SELDOM = 5000; // once it has ended, or the server does not answer
 
 class Live {
   constructor() {
@@ -46,7 +46,7 @@ class Live {
   // What only a page that is loaded anew can show.
   offer({ kept, elsewhere: confirmed }) {
     const known = data.confirmations.reduce((sum, one) => sum + one.scenarios.length, 0);
-    const what = kept > data.kept.length ? "the files that were handed over" : confirmed > known ? "what other simulators confirmed" : "";
+    const what = kept > data.kept.length ? "the exported files" : confirmed > known ? "what other simulators confirmed" : "";
     $("live-reload").hidden = !what;
     if (what) $("live-reload").textContent = `Show ${what}`;
   }

@@ -26,7 +26,7 @@ class Playbacks {
     return data.live ? "served" : null;
   }
 
-  // Of one that was not handed over; null if it cannot be had after all.
+  // Of one that was not exported; null if it is unavailable.
   async get(evaluation) {
     if (this.packed.has(evaluation)) return this.packed.get(evaluation);
     const playback = this.fetched.get(evaluation) ?? (await this.ask(evaluation));

@@ -5,7 +5,7 @@ import { boxCentre } from "./geometry.js";
 import { unpackSeries } from "./series.js";
 
 const LETTERS = { "-": [-1, true], 0: [0, true], 1: [1, true], 2: [2, true], 3: [3, true], m: [0, false], a: [1, false], b: [2, false], c: [3, false] };
-const SENSORS = ["nobody", "camera", "LiDAR", "camera and LiDAR"];
+const SENSORS = ["no sensor", "camera", "LiDAR", "camera and LiDAR"];
 export const SIGNALS = ["off", "red", "red and yellow", "yellow", "green"];
 const running = (differences) => { let sum = 0; return differences.map((d) => (sum += d)); };
 

@@ -16,7 +16,7 @@ function takeElsewhere() {
 takeElsewhere();
 document.addEventListener("grown", takeElsewhere);
 
-// A key of VERDICTS; null of what nobody ran there.
+// A key of VERDICTS; null if it was not run there.
 export function verdictOf(scenario) {
   if (!scenario) return null;
   return scenario.confirmed === null ? -1 : Number(scenario.confirmed);

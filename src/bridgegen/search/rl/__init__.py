@@ -1,4 +1,4 @@
-"""What dqn, ddpg and ppo are made of: episodes, and Stable-Baselines3's models.
+"""Parts of dqn, ddpg and ppo: episodes, and Stable-Baselines3's models.
 
-``agent`` and ``walkers`` need no torch; the others are imported only when a search is built.
+``agent`` and ``walkers`` need no torch; the other modules are imported when a search is built.
 """

@@ -1,4 +1,4 @@
-"""What PPO, DDPG and DQN share: batches of episodes, each a step of every environment."""
+"""Base of PPO, DDPG and DQN: batches of episodes, each a step of every environment."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -18,36 +18,36 @@ COMMON = {
     "population": Setting(40, "environments side by side, and rows per batch", 2, 10_000),
     "horizon": Setting(2, "steps of an episode", 1, 10_000),
     "elite": Setting(10, "best rows so far, at one of which an episode begins", 1, 10_000),
-    "gamma": Setting(0.99, "discount of rewards to come", 0.0, 1.0),
+    "gamma": Setting(0.99, "discount of future rewards", 0.0, 1.0),
     "width": Setting(64, "units in each of the networks' two hidden layers", 1, 4096),
 }
-"""Settings that all have."""
+"""Settings of all of them."""
 
 STEP = Setting(0.1, "size of a step, as a share of each parameter's range", 1e-4, 1.0)
-MEMORY = Setting(2000, "transitions that are remembered, the newest", 1, 1_000_000)
+MEMORY = Setting(2000, "size of the replay buffer, in transitions", 1, 1_000_000)
 ACTION = Setting("step", "what an action is: a step from the last row, or a row", choices=ENCODINGS)
 
 
 class Learner(Protocol):
-    """A model of Stable-Baselines3's, driven from outside."""
+    """A model of Stable-Baselines3 without its own training loop."""
 
     @property
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """All that its next actions depend on, to be read or changed in place."""
+        """The arrays that determine its next actions, to be read or changed in place."""
         ...
 
     def rows(self, U: Float, observation: Observation, batch: int) -> Float:
         """Return the rows that the agents choose, ``(n, n_var)`` in [0, 1].
 
         Args:
-            U: ``(n, n_var)``, where they are.
-            observation: ``(n, size)``, what they observe there.
+            U: ``(n, n_var)``, their positions.
+            observation: ``(n, size)``, their observations there.
             batch: its number, 1 for the first.
         """
         ...
 
     def learn(self, reward: npt.NDArray[np.float32], observation: Observation, batch: int) -> None:
-        """Learn what the rows came to, and what is observed there."""
+        """Learn from the rows' rewards and observations."""
         ...
 
 
@@ -56,7 +56,7 @@ class Agent(Saved, ABC):
 
     Observation: the last row and its metrics. Action: a row, or a step from the last one. Reward:
     −F. A batch is one step of ``population`` environments. The first batch is a Latin hypercube;
-    see `Walkers` for episodes, `Observer` and `Reward` for what is observed and rewarded.
+    see `Walkers` for episodes, `Observer` and `Reward` for observations and rewards.
 
     Every batch draws from generators seeded by the search's seed and its own number.
     """
@@ -82,10 +82,10 @@ class Agent(Saved, ABC):
 
     @abstractmethod
     def _build(self, n_var: int, n_obs: int) -> Learner:
-        """Return a new learner; what it draws is this search's own."""
+        """Return a new learner, whose random numbers depend on this search's seed only."""
 
     def ask(self) -> Float:
-        """Return the rows that the agents choose; at first, rows that fill the space."""
+        """Return the rows that the agents choose; first, a Latin hypercube."""
         batch, walkers = int(self._batch[0]), self._walkers
         if batch == 0:
             return latin_hypercube(self._rng(1), len(walkers.U), self._problem.n_var)

@@ -14,7 +14,7 @@ from bridgegen.search.rl.on_policy import model_of
 
 
 class Duel:
-    """A policy that decides for a participant, and what it has decided in the present batch.
+    """A policy that decides for a participant, and its decisions in the present batch.
 
     Args:
         values: of the settings.
@@ -32,7 +32,7 @@ class Duel:
         self.arrays: Arrays = arrays_of(self._model.policy, [self._model.policy.optimizer])
 
     def begin(self) -> None:
-        """Forget what was decided."""
+        """Discard the decisions."""
         self._steps = []
 
     def act(self, observation: Float, running: Bool) -> Float:
@@ -45,7 +45,7 @@ class Duel:
         return decided
 
     def learn(self, reward: npt.NDArray[np.float32]) -> None:
-        """Learn from what each scenario came to in the end."""
+        """Learn from each scenario's final reward."""
         model, n = self._model, len(reward)
         buffer, alive = model.rollout_buffer, np.zeros((self._n_decisions, n), dtype=bool)
         alive[: len(self._steps)] = [running for *_, running in self._steps]
@@ -63,12 +63,12 @@ class Duel:
                 began.astype(np.float32), value, log_probability,
             )  # fmt: skip
         buffer.compute_returns_and_advantage(last_values=torch.zeros(n), dones=np.ones(n))
-        # What came after a scenario's end was not decided: it teaches nothing.
+        # Steps after a scenario's end hold no decisions: they are not trained on.
         buffer.advantages[~alive] = 0.0
         buffer.returns[~alive] = buffer.values[~alive]
         model.train()
 
 
 def _even(total: int, most: int) -> int:
-    """Return the largest number, two or more and up to ``most``, that divides a total evenly."""
+    """Return the largest divisor of a total from 2 to ``most``."""
     return max((one for one in range(2, min(most, total) + 1) if total % one == 0), default=total)

@@ -1,4 +1,4 @@
-"""What the algorithms built on Stable-Baselines3 share. Imported only when one of them is built."""
+"""Base of the algorithms built on Stable-Baselines3. Imported only when one is constructed."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 @contextmanager
 def own_generators(seed: Iterable[int]) -> Iterator[None]:
-    """Give torch's and NumPy's global generators a seed of ours, and back what was there.
+    """Seed torch's and NumPy's global generators, and restore their state afterwards.
 
     Stable-Baselines3 draws from both. Each batch has its own seed, so that no generator's state
     needs to be saved. One thread: sums are then in one order, and nets this small are no faster
@@ -27,7 +27,7 @@ def own_generators(seed: Iterable[int]) -> Iterator[None]:
     torch_before, threads = torch.get_rng_state(), torch.get_num_threads()
     try:
         np.random.seed(int(state[0]))  # noqa: NPY002
-        # Not manual_seed: it would seed every device there is.
+        # Not manual_seed: it would seed every device.
         torch.default_generator.manual_seed(int(state[1]))
         torch.set_num_threads(1)
         yield
@@ -38,9 +38,9 @@ def own_generators(seed: Iterable[int]) -> Iterator[None]:
 
 
 class Spaces(VecEnv):
-    """Says how many environments there are and what their spaces are; nobody steps in it.
+    """Declares the number of environments and their spaces; it cannot be stepped.
 
-    The campaign evaluates batches, so a model is driven from outside: ``ask`` is its policy's
+    The campaign evaluates batches, so a model has no loop of its own: ``ask`` is its policy's
     forward pass, ``tell`` fills its buffer and calls its ``train``.
     """
 
@@ -49,30 +49,30 @@ class Spaces(VecEnv):
         self.observation_space = spaces.Box(-1.0, 1.0, (n_obs,), np.float32)
         self.action_space = action
 
-    def _nobody(self, *args: Any, **given: Any) -> Any:
+    def _unsupported(self, *args: Any, **given: Any) -> Any:
         raise NotImplementedError("only a campaign evaluates rows")
 
-    reset = step_async = step_wait = close = _nobody
-    get_attr = set_attr = env_method = env_is_wrapped = _nobody
+    reset = step_async = step_wait = close = _unsupported
+    get_attr = set_attr = env_method = env_is_wrapped = _unsupported
 
 
 def silent(model: Any) -> None:
-    """Let a model log to nowhere."""
+    """Discard a model's log."""
     model.set_logger(Logger(None, []))
 
 
 def arrays_of(policy: torch.nn.Module, optimizers: Iterable[torch.optim.Optimizer]) -> Arrays:
-    """Return all that training changes, as views: what is written there is the model's.
+    """Return all arrays that training changes, as views: writing to them changes the model.
 
     Args:
         policy: with all its networks, the target ones included.
-        optimizers: Adam's of its parameters.
+        optimizers: Adam optimisers of its parameters.
     """
     arrays = {f"net {name}": one.numpy() for name, one in policy.state_dict().items()}
     for i, optimizer in enumerate(optimizers):
         for j, group in enumerate(optimizer.param_groups):
             for k, parameter in enumerate(group["params"]):
-                # What Adam would make at its first step.
+                # As Adam initialises them at its first step.
                 own: dict[str, torch.Tensor] = {
                     "step": torch.tensor(0.0),
                     "exp_avg": torch.zeros_like(parameter),

@@ -1,4 +1,4 @@
-"""Stable-Baselines3's DDPG and DQN, driven from outside. Imported only when one is built."""
+"""Stable-Baselines3's DDPG and DQN as learners. Imported only when one is constructed."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -17,7 +17,7 @@ from bridgegen.search.rl.models import Arrays, Spaces, arrays_of, silent
 
 class _DDPG(DDPG):
     def _update_learning_rate(self, optimizers: Any) -> None:
-        """Leave the optimisers' own learning rates alone."""
+        """Keep the optimisers' own learning rates."""
 
 
 class _Remembering:
@@ -25,7 +25,7 @@ class _Remembering:
 
     Args:
         model: with a replay buffer of its own.
-        optimizers: its.
+        optimizers: of the model.
         epochs: gradient steps after a batch.
     """
 
@@ -45,18 +45,18 @@ class _Remembering:
         }
 
     def learn(self, reward: npt.NDArray[np.float32], observation: Observation, batch: int) -> None:
-        """Remember the batch and train; see `Learner`."""
+        """Store the batch and train; see `Learner`."""
         assert self._asked is not None
         before, action = self._asked
         buffer, n = self._buffer, len(reward)
-        # Where the buffer writes next is known from the batch's number, so that it needs no saving.
+        # The batch's number determines the buffer's write position, which needs no saving.
         buffer.pos, buffer.full = (batch - 1) % buffer.buffer_size, batch > buffer.buffer_size
         buffer.add(before, observation, action, reward, np.zeros(n), [{}] * n)
         self._model.train(self._epochs, batch_size=n)
 
 
 class DDPGLearner(_Remembering):
-    """An actor, a critic, their targets, and what they remember.
+    """An actor, a critic, their targets, and the replay buffer.
 
     Args:
         values: of the settings.
@@ -85,7 +85,7 @@ class DDPGLearner(_Remembering):
         super().__init__(model, optimizers, values["epochs"])
 
     def rows(self, U: Float, observation: Observation, batch: int) -> Float:
-        """Let the actor choose, and add noise; see `Learner`."""
+        """Return the actor's choices with noise; see `Learner`."""
         kept = observation.copy()
         self._actor.set_training_mode(False)
         with torch.no_grad():
@@ -99,7 +99,7 @@ class DDPGLearner(_Remembering):
 
 
 class DQNLearner(_Remembering):
-    """A Q-network, its target, and what they remember.
+    """A Q-network, its target, and the replay buffer.
 
     Args:
         values: of the settings.
@@ -126,7 +126,7 @@ class DQNLearner(_Remembering):
         super().__init__(model, [model.policy.optimizer], values["epochs"])
 
     def rows(self, U: Float, observation: Observation, batch: int) -> Float:
-        """Take the best action for every observation, or any; see `Learner`."""
+        """Take the best action for every observation, or a random one; see `Learner`."""
         kept, n = observation.copy(), len(observation)
         with torch.no_grad():
             best = self._dqn.q_net(torch.from_numpy(kept)).argmax(dim=1)
@@ -137,6 +137,6 @@ class DQNLearner(_Remembering):
         return step_from(U, self._moves[action])
 
     def learn(self, reward: npt.NDArray[np.float32], observation: Observation, batch: int) -> None:
-        """Let the target follow, remember the batch and train; see `Learner`."""
+        """Update the target, store the batch and train; see `Learner`."""
         self._dqn._on_step()
         super().learn(reward, observation, batch)

@@ -1,4 +1,4 @@
-"""Stable-Baselines3's PPO, driven from outside. Imported only when it is built."""
+"""Stable-Baselines3's PPO as a learner. Imported only when it is constructed."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -37,7 +37,7 @@ class Model(PPO):
     """PPO with the learning rates of its policy."""
 
     def _update_learning_rate(self, optimizers: Any) -> None:
-        """Leave the policy's own learning rates alone."""
+        """Keep the policy's own learning rates."""
 
 
 def model_of(
@@ -75,7 +75,7 @@ def model_of(
 
 
 class PPOLearner:
-    """A policy, its value function, and the batch that they learn from next.
+    """A policy, its value function, and the next batch to learn from.
 
     Args:
         values: of the settings.
@@ -102,7 +102,7 @@ class PPOLearner:
         return step_from(U, self._step * action.double().numpy())
 
     def learn(self, reward: npt.NDArray[np.float32], observation: Observation, batch: int) -> None:
-        """Train on the batch; what comes after it counts as the value function says."""
+        """Train on the batch; the value function estimates the rewards after it."""
         model, n = self._model, len(reward)
         kept, action, value, log_probability = self._asked
         with torch.no_grad():

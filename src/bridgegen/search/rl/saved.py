@@ -1,4 +1,4 @@
-"""The state of a learner, as plain arrays: nothing in it is ever run."""
+"""The state of a learner, as plain arrays: it is never executed."""
 
 import json
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import numpy.typing as npt
 class Saved:
     """An algorithm whose next rows depend on arrays alone; see `Restorable`.
 
-    The arrays are those that it works on, in one order, with the same shapes at all times.
+    The arrays are its working state, in one order, with constant shapes.
     """
 
     name: ClassVar[str]
@@ -23,17 +23,17 @@ class Saved:
         return self._header() + b"".join(array.tobytes() for array in self._arrays.values())
 
     def restore(self, state: bytes) -> None:
-        """Become what the algorithm was that returned ``state``.
+        """Restore the state of an algorithm.
 
         Raises:
-            ValueError: it was made by another algorithm, with other settings or metrics, with
-                another version of what it runs on; or it is damaged.
+            ValueError: the state is of another algorithm, other settings or metrics, other versions
+                of its libraries; or it is damaged.
         """
         header, arrays = self._header(), self._arrays.values()
         if not state.startswith(header):
-            raise ValueError(f"it is no state of {self.name} with these settings and metrics")
+            raise ValueError(f"not a state of {self.name} with these settings and metrics")
         if len(state) != len(header) + sum(array.nbytes for array in arrays):
-            raise ValueError("it is longer or shorter than it must be")
+            raise ValueError("wrong length")
         parts, at = [], len(header)
         for array in arrays:
             part = np.frombuffer(state, array.dtype, array.size, at).reshape(array.shape)

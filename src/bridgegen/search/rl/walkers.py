@@ -12,16 +12,16 @@ class Walkers:
     """n rows, each in an episode of its own, and the best rows so far, where episodes begin.
 
     An episode ends after ``horizon`` steps, or at a row that fails, and the next one begins at one
-    of the ``elite`` best rows that were evaluated, drawn at random. Nothing is terminal: rewards
-    could be earned on and on, so that an end is a truncation. The walkers' episodes are out of
-    step with each other, so that in every batch as many begin.
+    of the ``elite`` best evaluated rows, drawn at random. No state is terminal: rewards could
+    continue, so that every end is a truncation. The walkers' episodes are staggered, so that every
+    batch begins equally many.
 
-    Starting where much is known to be reached: Salimans and Chen (2018), arXiv:1812.03381; Ecoffet
-    et al. (2021), doi:10.1038/s41586-020-03157-9.
+    Starting from good states: Salimans and Chen (2018), arXiv:1812.03381; Ecoffet et al. (2021),
+    doi:10.1038/s41586-020-03157-9.
 
     Attributes:
-        U: ``(n, n_var)`` float64, where the walkers are.
-        observation: ``(n, size)`` float32, what they observe.
+        U: ``(n, n_var)`` float64, the walkers' positions.
+        observation: ``(n, size)`` float32, their observations.
         reward: the scale of rewards.
     """
 
@@ -38,7 +38,7 @@ class Walkers:
 
     @property
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """All that they are, to be read or changed in place."""
+        """Their whole state, to be read or changed in place."""
         return {
             "U": self.U,
             "observation": self.observation,
@@ -57,10 +57,10 @@ class Walkers:
     def step(
         self, U: Float, results: Results, rng: np.random.Generator
     ) -> tuple[npt.NDArray[np.float32], Observation]:
-        """Move to the rows that were evaluated, and begin new episodes where some have ended.
+        """Move to the evaluated rows, and begin new episodes where some have ended.
 
         Returns:
-            ``(n,)`` rewards, and ``(n, size)`` what is observed there, before new episodes begin.
+            ``(n,)`` rewards, and ``(n, size)`` observations there, before new episodes begin.
         """
         F = np.asarray(results.F[:, 0], np.float64)
         good = results.ok & np.isfinite(F)
@@ -79,7 +79,7 @@ class Walkers:
         return reward, observation
 
     def _keep(self, U: Float, observation: Observation, F: Float) -> None:
-        """Let the best rows be the best of themselves and these, each once."""
+        """Update the best rows by these, each once."""
         U = np.concatenate([self._best_U, U])
         observation = np.concatenate([self._best_observation, observation])
         F = np.concatenate([self._best_F, F])

@@ -38,7 +38,7 @@ from bridgegen.simulation.embedded.world import run_controllers
 
 @inlined_kernel
 def before_driver(k, plan, roads, state, record):
-    """Do at instant k what the storyboard says, up to what it asks of the ego."""
+    """Execute the storyboard at instant k, up to its commands for the ego."""
     run_controllers(
         k * plan.dt, plan.controllers, plan.phases, plan.changes, state.slots, state.phase_now,
         state.phase_until, state.lights,
@@ -59,7 +59,7 @@ def before_driver(k, plan, roads, state, record):
 
 @inlined_kernel
 def after_driver(k, demanded, curvature, plan, roads, state, record):
-    """Move everybody on to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
+    """Move all entities to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
     if plan.attends:
@@ -70,7 +70,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     elif plan.is_driven and state.drives[LONGITUDINALLY] == 1:
         move_paced(k, demanded, plan, roads, state, record)
         first = 1
-    for e in range(first, record.x.shape[0]):  # those who look at nobody come first
+    for e in range(first, record.x.shape[0]):  # entities that depend on no other come first
         state.timed[e] = state.present[e] and state.follow[e] >= 0
         if state.timed[e]:
             move_by_timetable(e, k, plan, roads, state, record)

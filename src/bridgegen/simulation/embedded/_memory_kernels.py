@@ -1,8 +1,8 @@
-"""What the compiled rollout reads, remembers and writes: arrays with names.
+"""Inputs, state and outputs of the compiled rollout: named arrays.
 
 ``Plan`` is the same for all rows. ``Roads`` holds P road networks, ``State`` and ``Record`` N rows;
-``roads_of``, ``state_of`` and ``record_of`` take one out, without its first axis, and that is what
-all other kernels see. ``State`` is all that a row needs to go on from one instant to the next.
+``roads_of``, ``state_of`` and ``record_of`` return one, without its first axis, for all other
+kernels. ``State`` is all that a row carries from one instant to the next.
 """
 
 # mypy: allow-untyped-defs
@@ -26,7 +26,7 @@ UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again wh
 
 
 class Plan(NamedTuple):
-    """The compiled storyboard; `Program` tells the tables' columns."""
+    """The compiled storyboard; `Program` documents the tables' columns."""
 
     bodies: Float
     kinds: Int
@@ -80,7 +80,7 @@ class Plan(NamedTuple):
 class Roads(NamedTuple):
     """The paths on a road network, and what the driver knows of it.
 
-    `Network` and `bridgegen.ego.scene.Scene` tell the shapes.
+    `Network` and `bridgegen.ego.scene.Scene` document the shapes.
     """
 
     paths: Float
@@ -147,7 +147,7 @@ class State(NamedTuple):
         lights: ``(L,)`` int8, the traffic lights' states.
         phase_now: ``(K,)`` int64, the phase that each controller is in,
         phase_until: ``(K,)`` [s], and until when.
-        present: ``(E,)`` bool, who is there.
+        present: ``(E,)`` bool, whether each is present.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] for how long it has stood.
@@ -168,7 +168,7 @@ class State(NamedTuple):
         follow_action: ``(E,)`` int64, the action that leads it along a trajectory; -1: none,
         follow_began: ``(E,)`` [s], when the times of the timetable begin.
         timed: ``(E,)`` bool, a timetable moves it at this instant.
-        placed: ``(E,)`` bool, it was put where it is at this instant, and does not move on.
+        placed: ``(E,)`` bool, it was teleported at this instant, and does not move on.
         goal: ``(E, 2)`` [m], the position that it is sent to,
         goal_action: ``(E,)`` int64, by which action; -1: none.
         wanted: ``(2,)`` int64, the route and the node of the way that is not planned yet.
@@ -183,23 +183,23 @@ class State(NamedTuple):
         profile: ``(E, R, 4)`` the course of a speed profile; see ``_course_kernels``,
         profile_rows: ``(E,)`` int64, how many rows of it count.
         waits: ``(E,)`` int64, the change of lane that waits for a gap; -1: none,
-        allowed: ``(E,)`` [m/s²], what its driver allows at most; +inf: what the storyboard says,
-        minds: ``(E, MIND)`` what that driver keeps in mind; see `bridgegen.ego._attentive_kernels`.
+        allowed: ``(E,)`` [m/s²], the most that its driver allows; +inf: the storyboard's,
+        minds: ``(E, MIND)`` state of that driver; see `bridgegen.ego._attentive_kernels`.
         seen: ``(SEEN, E)`` what those drivers see; likewise,
-        far: ``(E,)`` room for one to work in.
-        attention: ``(E, 3)``, what a careful driver keeps of each body; see its kernel.
+        far: ``(E,)`` scratch of one driver.
+        attention: ``(E, 3)``, a careful driver's state per body; see its kernel.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
         around: ``(E, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
         passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
         feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
-        mind: ``(·,)`` what else it keeps in mind; see ``ego._reference_kernels``, or what a
-            compiled driver of the user's own asks for.
-        told: ``(·,)`` what such a driver is told, see ``_own_driver_kernels``,
-        ahead: ``(·, 4)`` of its route,
-        others: ``(·, TRACK)`` and of the others,
-        answer: ``(·,)`` and what it answers.
+        mind: ``(·,)`` its further state; see ``ego._reference_kernels``, or the memory of a user's
+            compiled driver.
+        inputs: ``(·,)`` inputs of such a driver on ego and scene, see ``_own_driver_kernels``,
+        ahead: ``(·, 4)`` its route,
+        others: ``(·, TRACK)`` the tracks,
+        answer: ``(·,)`` and its output.
     """
 
     slots: Annotated[Float, "slots"]
@@ -269,17 +269,17 @@ class State(NamedTuple):
     passages: Annotated[Float, "passages", "passage"]
     feet: Annotated[Float, "hypotheses"]
     mind: Annotated[Float, "mind"]
-    told: Annotated[Float, "told"]
+    inputs: Annotated[Float, "inputs"]
     ahead: Annotated[Float, "ahead", 4]
     others: Annotated[Float, "others", "track"]
     answer: Annotated[Float, "answer"]
 
 
 class Record(NamedTuple):
-    """What is written: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`.
+    """The outputs: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`.
 
     ``detections`` are ``(E, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing;
-    ``present`` is ``(E, T)``, or ``(0, 0)`` where everybody always is.
+    ``present`` is ``(E, T)``, or ``(0, 0)`` if all entities always are.
     """
 
     x: Float

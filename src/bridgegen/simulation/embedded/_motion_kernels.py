@@ -11,7 +11,7 @@ from bridgegen.ego._path_kernels import X, Y, project
 STEP, LINEAR, CUBIC, SINUSOIDAL = 0, 1, 2, 3
 RATE, TIME, DISTANCE = 0, 1, 2
 SAME_SPEED, SAME_TIME = 1e-9, 1e-9  # m/s, s, what is less is rounding
-STANDS = 1e-6  # m/s, who is slower stands
+STANDS = 1e-6  # m/s, below which a body stands
 SEARCH_STEP = 5.0  # m, between the points at which a foot on another path is first looked for
 
 

@@ -21,7 +21,7 @@ from bridgegen.simulation.embedded.storyboard import start
 
 @kernel
 def simulate_rows(plan, networks, rows, states, records):
-    """Roll out N rows, one after the other; ``rows`` tells the road network of each."""
+    """Roll out N rows, one after the other; ``rows`` is the road network of each."""
     plan = plan_of(plan)
     for i in range(len(rows)):
         roads = roads_of(networks, rows[i])

@@ -27,10 +27,10 @@ from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
-    TOLD,
+    N_INPUTS,
     code_of,
+    fill_input_rows,
     observe_rows,
-    tell_rows,
 )
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
@@ -105,9 +105,9 @@ class Batch:
         self._do(kernels.start_rows)
 
     def before_driver(self, k: int) -> None:
-        """Do at instant k what the storyboard says, up to what it asks of the ego.
+        """Execute the storyboard at instant k, up to its commands for the ego.
 
-        ``state.command[:, 0]`` is then the speed that it is asked to drive at [m/s].
+        ``state.command[:, 0]`` is then the commanded speed [m/s].
         """
         self._do(kernels.before_drivers, k)
 
@@ -157,7 +157,7 @@ class Batch:
         self, k: int, step: float, route: Float, tracks: Float, stop: Float,
         light: npt.NDArray[np.int8],
     ) -> None:  # fmt: skip
-        """Fill what a driver in Python is told of the rows that run; see `Observation`.
+        """Fill the observations of a driver in Python for the running rows; see `Observation`.
 
         Args:
             k: the instant; once each, in order, for the sensors look.
@@ -173,7 +173,7 @@ class Batch:
         )  # fmt: skip
 
     def impose(self, k: int, bodies: Int, states: Float) -> None:
-        """Put bodies ``(B,)`` of the rows that run where ``(N, B, 4)`` says; see `CoSimulation`."""
+        """Move bodies ``(B,)`` of the running rows to poses ``(N, B, 4)``; see `CoSimulation`."""
         drivers.impose_rows(
             k, bodies, states, self._plan, self._roads.tables, self._rows, self.state, self.record
         )
@@ -184,12 +184,12 @@ class Batch:
         drivers.egos_are_through(self._plan, self._roads.tables, self._rows, self.state, through)
         return through
 
-    def tell(self, k: int) -> None:
-        """Fill what a compiled driver of the user's own is told of the rows that run."""
-        tell_rows(k, self._plan, self._roads.tables, self._rows, self.state, self.record)
+    def fill_inputs(self, k: int) -> None:
+        """Fill the inputs of a user's compiled driver for the running rows."""
+        fill_input_rows(k, self._plan, self._roads.tables, self._rows, self.state, self.record)
 
     def fail(self, status: int, message: str) -> None:
-        """End all rows that run, where they are, with a status and what else there is to say."""
+        """End all running rows, where they are, with a status and a message."""
         state, record = self.state, self.record
         for i in np.flatnonzero(self.running):
             record.a[i] = 0.0
@@ -255,7 +255,7 @@ def _known(program: Program, values: Mapping[str, npt.ArrayLike]) -> dict[str, n
 
 
 def _plan(program: Program) -> memory.Plan:
-    """Return the program's tables, and what else a plan says."""
+    """Return the program's tables, and the rest of a plan."""
     stages = {f"ideal_{stage}": int(stage in program.driver.ideal) for stage in STAGES}
     given: dict[str, Any] = {
         "looks_closely": int(program.probes[:, CLOSELY].any()),
@@ -274,7 +274,7 @@ def _plan(program: Program) -> memory.Plan:
 
 
 def _scene(program: Program) -> Float:
-    """Return what a compiled driver of the user's own is told of the scene."""
+    """Return the scene for a user's compiled driver."""
     return np.array([program.time_step, program.n_steps, *program.bodies[0, :7]])
 
 
@@ -358,7 +358,7 @@ def _state(
         "passage": PASSAGE,
         "hypotheses": hypotheses,
         "mind": MIND if own_memory is None else own_memory,
-        "told": TOLD,
+        "inputs": N_INPUTS,
         "ahead": ROUTE_POINTS if has_own else 0,
         "others": e - 1 if has_own else 0,
         "answer": ANSWER,

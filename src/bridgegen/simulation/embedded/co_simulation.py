@@ -103,7 +103,7 @@ class CoSimulation:
         return weather
 
     def is_ours(self, event: int, driven: Sequence[int]) -> bool:
-        """Say whether an event moves other entities than the ego, and only some that are driven.
+        """Return whether an event moves other entities than the ego, and only some that are driven.
 
         Args:
             event: its number.

@@ -31,7 +31,8 @@ class Intentions:
         steps: ``(P,)`` int64, the instants; those at or after a row's end are meaningless.
         way: ``(N, P)`` int64, number of the way; -1 where it follows none.
         station: ``(N, P)`` float64, of its reference point along the way [m].
-        acceleration: ``(N, P)`` float64 [m/s²], as planned; NaN where the driver does not tell.
+        acceleration: ``(N, P)`` float64 [m/s²], as planned; NaN where the driver does not report
+        it.
         shift: ``(N, P, 4)`` float64, its course beside the way, see ``ego._shift_kernels``.
     """
 

@@ -41,13 +41,13 @@ class EmbeddedSimulator:
     Args:
         storyboard: the scenario file, validated.
         place: its name, for messages.
-        driver: who drives the ego; what the file says by default.
-        ideal: stages of the driver that are ideal; what the driver says by default.
-        others: "attentive" or "scripted": who drives all other participants; what the file says by
+        driver: of the ego; the file's by default.
+        ideal: idealised stages of the driver; its own by default.
+        others: "attentive" or "scripted": the driver of all other participants; the file's by
             default.
-        time_step: [s]; what the file says by default.
-        skipped: takes a sentence for each thing that it cannot run, which is left out then instead
-            of refused, with the event, action, entity or condition group that it is part of.
+        time_step: [s]; the file's by default.
+        skipped: gets a sentence for each unsupported element, which is then left out instead of
+            rejected, with the event, action, entity or condition group that contains it.
 
     Attributes:
         program: the compiled storyboard.
@@ -225,7 +225,7 @@ class EmbeddedSimulator:
             row: in 0..P-1, its road network.
             values: per parameter; see `Simulator.run`.
             status: of `STATUS_MESSAGES`.
-            message: what else there is to say.
+            message: further details.
         """
         batch = self.batch(roads, np.array([row]), values)
         batch.start()

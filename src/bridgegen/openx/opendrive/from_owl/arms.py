@@ -19,7 +19,7 @@ from bridgegen.openx.opendrive.model import (
     Width,
 )
 from bridgegen.openx.opendrive.plan_view import Cubic, Geometry
-from bridgegen.openx.opendrive.user_data import UserData, say
+from bridgegen.openx.opendrive.user_data import UserData, user_datum
 
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
 
@@ -53,7 +53,7 @@ class Arm:
         road_type: OpenDRIVE's.
         objects: what lies on it.
         signals: what stands beside it.
-        user_data: what else is said of it.
+        user_data: its further values.
     """
 
     name: str
@@ -159,13 +159,13 @@ def road_of(
 
 
 def _with_turns(arm: Arm, sections: tuple[LaneSection, ...]) -> tuple[LaneSection, ...]:
-    """Return the section of a leg whose inbound lanes say which turns they allow."""
+    """Return the section of a leg whose inbound lanes state their allowed turns."""
     if not any(arm.turns):
         return sections
     (section,) = sections
     left = arm.lane_id(0, inbound=True) > 0
     lanes = tuple(
-        replace(lane, user_data=tuple(say("allows_turn", one) for one in sorted(turns)))
+        replace(lane, user_data=tuple(user_datum("allows_turn", one) for one in sorted(turns)))
         for lane in (section.left if left else section.right)
         for turns in (arm.turns[abs(lane.id) - 1] if abs(lane.id) <= len(arm.turns) else (),)
     )

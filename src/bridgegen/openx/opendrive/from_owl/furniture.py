@@ -14,7 +14,7 @@ from bridgegen.openx.opendrive.furniture import (
     Signal,
     Validity,
 )
-from bridgegen.openx.opendrive.user_data import UserData, say
+from bridgegen.openx.opendrive.user_data import UserData, user_datum
 
 Reach = tuple[tuple[float, float], ...]
 """How far a road reaches to its left and to its right [m]: its driving lanes, all of it."""
@@ -75,7 +75,7 @@ def objects_on(
         line = _area(
             _id(individuals, node), name, "roadMark", middle, STOP_LINE_WIDTH, low, high, STOP_LINE
         )
-        yield replace(line, validity=ranges(ids), user_data=(say("has_distance", at),))
+        yield replace(line, validity=ranges(ids), user_data=(user_datum("has_distance", at),))
     for node in _on(individuals, "StreetLight", road):
         s, t = individuals.number(node, "has_distance"), individuals.number(node, "has_t")
         _beside(individuals, node, t, reach, problems)
@@ -130,7 +130,7 @@ def signals_on(
                 height=0.9,
                 width=0.3 if light else 0.6,
                 validity=ranges(ids),
-                user_data=() if limit is None else (say("has_speed_limit", limit),),
+                user_data=() if limit is None else (user_datum("has_speed_limit", limit),),
             )
 
 
@@ -186,23 +186,23 @@ def controllers_of(individuals: Individuals) -> tuple[Controller, ...]:
 def _program(
     individuals: Individuals, controller: Subject, shown: dict[int, str]
 ) -> tuple[UserData, ...]:
-    """Return a controller as the ontology knows it: who it is, and its phases."""
-    said: list[UserData] = []
+    """Return a controller of the ontology: its identity and phases."""
+    data: list[UserData] = []
     for name in ("has_name", "has_object_id"):
         text = individuals.optional_text(controller, name)
         if text is not None:
-            said.append(say(name, text))
+            data.append(user_datum(name, text))
     offset = individuals.optional_number(controller, "has_offset")
     if offset is not None:
-        said.append(say("has_offset", offset))
+        data.append(user_datum("has_offset", offset))
     phases = individuals.links(controller, "has_phase")
     for phase in sorted(phases, key=lambda one: individuals.integer(one, "has_index")):
         index = individuals.integer(phase, "has_index")
         state = STATES[shown[index]] if index in shown else "red"
         duration = individuals.number(phase, "has_duration")
         name = individuals.optional_text(phase, "has_name") or ""
-        said.append(say("phase", f"{index} {state} {duration!r} {name}".rstrip()))
-    return tuple(said)
+        data.append(user_datum("phase", f"{index} {state} {duration!r} {name}".rstrip()))
+    return tuple(data)
 
 
 def _on(individuals: Individuals, cls: str, road: Subject) -> Iterator[Subject]:

@@ -102,7 +102,7 @@ def _ways(arm: Arm, arms: tuple[Arm, ...]) -> dict[Turn, list[Arm]]:
 
 
 def _allowed(arm: Arm, lane: int, ways: dict[Turn, list[Arm]]) -> Iterator[Crossing]:
-    """Yield the ways of a lane that says which turns it allows."""
+    """Yield the ways of a lane that states its allowed turns."""
     turns: tuple[Turn, ...] = ("left", "straight", "right")
     for turn in turns:
         if turn not in arm.turns[lane]:
@@ -145,7 +145,7 @@ def build(
         size: from one leg's end to the opposite one's [m].
         arms: two or more; their ids and the junction's are whole numbers.
         controllers: of the arms' traffic lights.
-        user_data: what else is said of the junction.
+        user_data: further values of the junction.
 
     Raises:
         OntologyError: two lanes cannot be joined by a curve that a car can drive.

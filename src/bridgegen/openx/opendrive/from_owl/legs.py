@@ -9,7 +9,7 @@ from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.opendrive.from_owl.arms import Arm, Strips
 from bridgegen.openx.opendrive.from_owl.furniture import objects_on, signals_on
-from bridgegen.openx.opendrive.user_data import UserData, say
+from bridgegen.openx.opendrive.user_data import UserData, user_datum
 
 _SLACK = 1e-9
 _CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
@@ -25,7 +25,7 @@ def read_arm(
         individuals: the road network.
         leg: a Road.
         problems: takes what is wrong.
-        widens: it may have more lanes near the junction than are said here (a merge's), so that
+        widens: it may have more lanes near the junction than are stated here (a merge's), so that
             of several lane sections the one farthest from there counts.
 
     Raises:
@@ -87,13 +87,13 @@ def read_arm(
 def _about(
     individuals: Individuals, leg: Subject, heading: float, junction_end: str
 ) -> Iterator[UserData]:
-    """Yield what OpenDRIVE cannot say of a road, or only to rounding."""
+    """Yield values of a road that OpenDRIVE cannot express, or only with rounding."""
     if junction_end != "none":
-        yield say("has_heading", heading)
+        yield user_datum("has_heading", heading)
     for name in _CLOSES:
         limit = individuals.optional_number(leg, name)
         if limit is not None:
-            yield say(name, limit)
+            yield user_datum(name, limit)
 
 
 class _Lanes:
@@ -162,7 +162,7 @@ class _Lanes:
         turns = frozenset(individuals.texts(lane, "allows_turn")) if kind == "driving" else None
         self._lanes[direction][abs(lane_id)] = kind, width, turns or frozenset()
 
-    def _check(self, direction: str, count: str, said: int | None) -> None:
+    def _check(self, direction: str, count: str, stated: int | None) -> None:
         lanes = self._lanes[direction]
         ids = sorted(lanes)
         driving = [number for number in ids if lanes[number][0] == "driving"]
@@ -174,9 +174,9 @@ class _Lanes:
             self._problems.append(
                 f"{self._what}: driving lanes '{direction}' must lie inside all strips"
             )
-        if said is not None and said != len(driving):
+        if stated is not None and stated != len(driving):
             self._problems.append(
-                f"{self._what}: {count} must be its number of lanes, {len(driving)}, got {said}"
+                f"{self._what}: {count} must be its number of lanes, {len(driving)}, got {stated}"
             )
 
     def driving(self, direction: str) -> tuple[float, ...]:
@@ -190,7 +190,7 @@ class _Lanes:
         return tuple(lanes[k][:2] for k in sorted(lanes) if lanes[k][0] != "driving")
 
     def turns(self) -> tuple[frozenset[str], ...]:
-        """Return where each inbound lane may lead, innermost first; empty where none says so."""
+        """Return each inbound lane's allowed turns, innermost first; empty if none are stated."""
         lanes = self._lanes["in"]
         found = tuple(lanes[k][2] for k in sorted(lanes) if lanes[k][0] == "driving")
         return found if any(found) else ()

@@ -52,10 +52,10 @@ def build(
         after: the carriageway beyond, without the acceleration lane.
         merge: length of the acceleration lane [m].
         taper: length over which it narrows [m].
-        user_data: what else is said of the junction.
+        user_data: further values of the junction.
 
     Raises:
-        OntologyError: numbers of lanes that do not go on, or too short a carriageway.
+        OntologyError: numbers of lanes that do not continue, or too short a carriageway.
     """
     problems = []
     if len(main.inbound) != len(after.outbound) or not main.inbound:

@@ -1,6 +1,6 @@
 """OWL2OpenDRIVE: from the static individuals of an ontology to a road network (Section IV-E).
 
-Only the individuals count: a file that somebody edited in Protégé converts like one of ours.
+Only the individuals count: a file that was edited in Protégé converts like an original one.
 """
 
 from collections import Counter
@@ -15,7 +15,7 @@ from bridgegen.openx.opendrive.from_owl.arms import Arm
 from bridgegen.openx.opendrive.from_owl.furniture import controllers_of
 from bridgegen.openx.opendrive.from_owl.legs import corner, read_arm, read_id, refuse
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.user_data import UserData, say
+from bridgegen.openx.opendrive.user_data import UserData, user_datum
 
 MOST_LEGS = 5
 KINDS = ("Crossroads", "TJunction", "Roundabout", "Merge", "Intersection")
@@ -161,12 +161,13 @@ def _roundabout(
 
 
 def _about(individuals: Individuals, crossing: Subject) -> tuple[UserData, ...]:
-    """Return what OpenDRIVE cannot say of a junction: its class and its measures."""
+    """Return values of a junction that OpenDRIVE cannot express: its class and its measures."""
     cls = next(name for name in KINDS if individuals.is_a(crossing, name))
     measures = [(name, individuals.optional_number(crossing, name)) for name in MEASURES]
     return (
-        say("class", cls), *(say(name, value) for name, value in measures if value is not None)
-    )  # fmt: skip
+        user_datum("class", cls),
+        *(user_datum(name, value) for name, value in measures if value is not None),
+    )
 
 
 def _measure(individuals: Individuals, node: Subject, name: str, problems: list[str]) -> float:

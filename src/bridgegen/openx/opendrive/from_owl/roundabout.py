@@ -24,7 +24,7 @@ from bridgegen.openx.opendrive.model import (
     Width,
 )
 from bridgegen.openx.opendrive.plan_view import Cubic, Geometry
-from bridgegen.openx.opendrive.user_data import UserData, say
+from bridgegen.openx.opendrive.user_data import UserData, user_datum
 
 APPROACH = 14.0
 """From the ring's centre line to where a leg begins [m]: room for the curves in and out; ours."""
@@ -48,7 +48,7 @@ def build(
         radius: of the ring lane's centre [m].
         ring_width: of the ring lane [m].
         arms: three to five, one lane in and one out each.
-        user_data: what else is said of it; the first junction carries it, the others name that.
+        user_data: its further values; the first junction carries them, the others name that.
 
     Raises:
         OntologyError: a leg with other lanes, or curves too tight for a car.
@@ -136,7 +136,7 @@ def build(
             )
             links = (LaneLink(left[3], -1),)
             connections.append(Connection(str(len(connections)), left[0], road_id, "start", links))
-        about = user_data if k == 0 else (say("part_of", ids[0]),)
+        about = user_data if k == 0 else (user_datum("part_of", ids[0]),)
         junctions.append(
             Junction(ids[k], f"{name} {arm.name}", tuple(connections), user_data=about)
         )

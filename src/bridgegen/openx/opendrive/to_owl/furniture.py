@@ -1,4 +1,4 @@
-"""OpenDRIVE2OWL, its layer 2: lights, signs, lines and lamps, and who switches the lights."""
+"""OpenDRIVE2OWL, its layer 2: lights, signs, lines and lamps, and the lights' controllers."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,11 +19,11 @@ from bridgegen.openx.opendrive.lanes import centre_of, section_index
 from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name, part_name
 from bridgegen.openx.opendrive.model import SPEED_UNITS, Road
-from bridgegen.openx.opendrive.user_data import exact, number, said
+from bridgegen.openx.opendrive.user_data import exact, number, values_of
 
 _CLASSES = {code: cls for cls, code in SIGNS.items()}
 _GERMAN = ("", "DE", "DEU", "GER", "GERMANY", "OPENDRIVE")
-"""Countries (in capitals) whose signs have the German catalogue's types, or which say nothing."""
+"""Countries (in capitals) whose signs have the German catalogue's types, or which have none."""
 _STOP_LINE_SIGN = "294"
 """The German catalogue's stop line, which some maps have as a signal."""
 
@@ -156,7 +156,7 @@ class Furniture:
             ]
             if not lights:
                 continue
-            ours = said(controller.user_data, "has_object_id")
+            ours = values_of(controller.user_data, "has_object_id")
             key = ("ours", ours[0]) if ours else ("theirs", str(number_))
             node = nodes.get(key)
             if node is None:
@@ -165,7 +165,9 @@ class Furniture:
                 )
                 put(self._network, "has_signal_controller", node)
                 put(node, "has_object_id", ours[0] if ours else controller.id)
-                names = said(controller.user_data, "has_name") if ours else [controller.name or ""]
+                names = (
+                    values_of(controller.user_data, "has_name") if ours else [controller.name or ""]
+                )
                 if names and names[0]:
                     put(node, "has_name", names[0])
                 offset = number(controller.user_data, "has_offset")
@@ -189,7 +191,7 @@ class Furniture:
 
 def _phases(controller: Controller) -> Iterator[tuple[int, str, float, str]]:
     """Yield the phases that our ``userData`` knows: index, state, duration [s], name."""
-    for text in said(controller.user_data, "phase"):
+    for text in values_of(controller.user_data, "phase"):
         words = text.split(maxsplit=3)
         try:
             index, state, duration = int(words[0]), words[1], float(words[2])
@@ -220,7 +222,7 @@ def _sign(signal: Signal) -> tuple[str, float | None]:
 
 
 def _valid(road: Road, s: float, validity: Sequence[Validity]) -> list[int]:
-    """Return the ids of the driving lanes at ``s`` that something says it is for."""
+    """Return the ids of the driving lanes at ``s`` that an element is valid for."""
     return [
         lane.id for lane in road.sections[section_index(road, s)].lanes
         if lane.drivable and any(one.from_lane <= lane.id <= one.to_lane for one in validity)
@@ -246,7 +248,7 @@ def _between(road: Road, s: float, right: float, left: float) -> list[int]:
 
 
 def _box(item: Object) -> Box:
-    """Return how far an object reaches; its own place, where it says nothing of its size."""
+    """Return an object's extent; its position only, if it states no size."""
     outline = item.outline or next(iter(item.outlines), None)
     hdg = item.hdg or 0.0
     length, width = item.length, item.width

@@ -8,7 +8,7 @@ from bridgegen.ontology.vocabulary import tbox
 from bridgegen.openx.opendrive.from_owl.network import KINDS, MEASURES
 from bridgegen.openx.opendrive.map_names import junction_name, lane_name, part_name, road_name
 from bridgegen.openx.opendrive.model import Connection, Junction, OpenDrive, Road
-from bridgegen.openx.opendrive.user_data import number, said
+from bridgegen.openx.opendrive.user_data import number, values_of
 
 _BY_LEGS = {3: "TJunction", 4: "Crossroads"}
 _NEEDED = {"Roundabout": ("has_radius",), "Merge": ("has_merge_length", "has_taper_length")}
@@ -30,7 +30,7 @@ class Junctions:
         self._whole = {
             junction.id: first
             for junction in model.junctions
-            for first in said(junction.user_data, "part_of")[:1]
+            for first in values_of(junction.user_data, "part_of")[:1]
             if self.kinds.get(first) == "Roundabout" and first != junction.id
         }
 
@@ -104,7 +104,7 @@ class Junctions:
 
 def _kind(junction: Junction) -> str | None:
     """Return the class that our ``userData`` gives a junction, with all that it needs."""
-    for name in said(junction.user_data, "class")[:1]:
+    for name in values_of(junction.user_data, "class")[:1]:
         needed = (number(junction.user_data, one) for one in _NEEDED.get(name, ()))
         if name in KINDS and all(value is not None and value > 0.0 for value in needed):
             return name

@@ -1,4 +1,4 @@
-"""What of a map its individuals do not say: it stays in the map's own file, which they name."""
+"""Contents of a map that its individuals lack: they stay in the map's own file, which they name."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -10,9 +10,9 @@ from bridgegen.openx.opendrive.to_owl.furniture import class_of
 
 
 def losses(model: OpenDrive) -> Iterator[str]:
-    """Yield a sentence for each kind of thing of a map that its individuals do not say in full.
+    """Yield a sentence for each kind of content of a map that its individuals lack in part.
 
-    Left out of every import, and not told here: elevations and lateral profiles, lane offsets,
+    Left out of every import, and not reported here: elevations and lateral profiles, lane offsets,
     widths but at the start and the middle of a lane section, where along a lane its lines begin,
     the shapes and heights of objects, and lane speed limits.
 

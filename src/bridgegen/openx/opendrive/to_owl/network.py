@@ -1,8 +1,8 @@
 """OpenDRIVE2OWL: a whole map as the static part of an ontology (Algorithm 1, step 3).
 
 Every road, lane, junction, crosswalk, traffic light, sign, line and lamp becomes an individual,
-linked as the map links them. What the ontology cannot say stays in the map's own file, which the
-road network names; `bridgegen.openx.opendrive.to_owl.losses` lists it.
+linked as the map links them. What the ontology cannot express stays in the map's own file, which
+the road network names; `bridgegen.openx.opendrive.to_owl.losses` lists it.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from bridgegen.openx.opendrive.model import Lane, OpenDrive, Road, RoadLink
 from bridgegen.openx.opendrive.plan_view import Arc, Line, Spiral
 from bridgegen.openx.opendrive.to_owl.furniture import Furniture
 from bridgegen.openx.opendrive.to_owl.junctions import Junctions
-from bridgegen.openx.opendrive.user_data import number, said
+from bridgegen.openx.opendrive.user_data import number, values_of
 
 STRIPS = {"shoulder": "Shoulder", "sidewalk": "Sidewalk", "walking": "Sidewalk"}
 """The class of a lane that cars do not travel on, by its type; of all others, ``RoadStrip``."""
@@ -50,7 +50,7 @@ def individuals_from_opendrive(
         map_file: the path that its file has, seen from the ontology's.
         digest: SHA-256 of the file, in hexadecimal.
         name: of the ontology that they become part of; the map's by default.
-        controllers: whether to say who switches the lights; a scenario file may say so better.
+        controllers: whether to add the lights' controllers; a scenario file may define them better.
     """
     return Individuals(_Map(model, map_file, digest, name, controllers).quads)
 
@@ -145,7 +145,7 @@ class _Map(Builder):
     def counts(self, node: ox.NamedNode, road: Road, end: str) -> None:
         """State how many lanes lead in and out where a road meets its junction, and their width.
 
-        Of a merge's carriageway those count that go on, not the acceleration lane.
+        Of a merge's carriageway only lanes that continue count, not the acceleration lane.
         """
         sections: Sequence[int] = range(len(road.sections))
         link = road.link(end) if end in ("start", "end") else None
@@ -181,7 +181,7 @@ class _Map(Builder):
         width = _middle_width(road, index, lane)
         if lane.drivable or width > 0.0:
             self.put(node, "has_width", width)
-        for turn in said(lane.user_data, "allows_turn"):
+        for turn in values_of(lane.user_data, "allows_turn"):
             if turn in tbox().allowed["allows_turn"]:
                 self.put(node, "allows_turn", turn)
 

@@ -34,13 +34,13 @@ class Actions:
         self.texts: list[osc.ParameterDeclaration] = []
 
     def action(
-        self, event: str, who: tuple[str, ...], node: Subject
+        self, event: str, actors: tuple[str, ...], node: Subject
     ) -> osc.PrivateAction | osc.GlobalAction:
         """Return an action of an event.
 
         Args:
             event: its name, for what the action declares.
-            who: the event's actors, by name.
+            actors: the event's actors, by name.
             node: the action's individual.
 
         Raises:
@@ -57,13 +57,13 @@ class Actions:
             return self._signal(node)
         if ind.is_a(node, "AddEntityAction") or ind.is_a(node, "DeleteEntityAction"):
             return self._presence(node)
-        if not who:
+        if not actors:
             raise OntologyError(f"{ind.describe(node)} must have an actor (has_who of its event)")
-        return self.private(who[0], node)
+        return self.private(actors[0], node)
 
     # -- of participants ---------------------------------------------------------------------------
 
-    def private(self, who: str, node: Subject) -> osc.PrivateAction:
+    def private(self, actor: str, node: Subject) -> osc.PrivateAction:
         """Return an action of a participant.
 
         Raises:
@@ -82,41 +82,41 @@ class Actions:
         }
         for name, make in kinds.items():
             if ind.is_a(node, name):
-                return make(who, node)
+                return make(actor, node)
         raise UnsupportedError(
             f"{ind.describe(node)} must be one of {', '.join(kinds)}, EnvironmentAction, "
             "TrafficSignalStateAction, AddEntityAction or DeleteEntityAction to be written"
         )
 
-    def _teleport(self, who: str, node: Subject) -> osc.PrivateAction:
-        del who
+    def _teleport(self, actor: str, node: Subject) -> osc.PrivateAction:
+        del actor
         place = self._individuals.link(node, "has_position")
         position = self._places.position(place, oriented=True)
         return osc.PrivateAction(osc.TeleportAction(position))
 
-    def _speed(self, who: str, node: Subject) -> osc.PrivateAction:
+    def _speed(self, actor: str, node: Subject) -> osc.PrivateAction:
         """Return a speed action: by rate [m/s²], time [s] or distance [m], or at once."""
-        del who
+        del actor
         speed = self._quantities.get(node, "has_target_speed")
         target = osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(speed))
         return osc.PrivateAction(
             osc.LongitudinalAction(osc.SpeedAction(self._dynamics(node), target))
         )
 
-    def _lane_change(self, who: str, node: Subject) -> osc.PrivateAction:
+    def _lane_change(self, actor: str, node: Subject) -> osc.PrivateAction:
         ind = self._individuals
         lanes = ind.integer(node, "has_lane_count")
         offset = None
         if ind.optional_number(node, "has_target_offset") is not None:
             offset = self._quantities.get(node, "has_target_offset")
-        target = osc.LaneChangeTarget(osc.RelativeTargetLane(who, lanes))
+        target = osc.LaneChangeTarget(osc.RelativeTargetLane(actor, lanes))
         return osc.PrivateAction(
             osc.LateralAction(osc.LaneChangeAction(self._dynamics(node), target, offset))
         )
 
-    def _lane_offset(self, who: str, node: Subject) -> osc.PrivateAction:
+    def _lane_offset(self, actor: str, node: Subject) -> osc.PrivateAction:
         """Return a move aside: at once where the shape is a step, else as softly as is said."""
-        del who
+        del actor
         ind = self._individuals
         most = None
         if ind.optional_number(node, "has_max_lateral_acceleration") is not None:
@@ -133,8 +133,8 @@ class Actions:
             )
         )
 
-    def _synchronize(self, who: str, node: Subject) -> osc.PrivateAction:
-        del who
+    def _synchronize(self, actor: str, node: Subject) -> osc.PrivateAction:
+        del actor
         there, master = (
             self._places.position(self._individuals.link(node, link), oriented=False)
             for link in ("has_position", "has_master_position")
@@ -161,7 +161,7 @@ class Actions:
         value = self._quantities.get(node, given[0])
         return osc.TransitionDynamics(shape, dimensions[given[0]], value)
 
-    def _follow(self, who: str, node: Subject) -> osc.PrivateAction:
+    def _follow(self, actor: str, node: Subject) -> osc.PrivateAction:
         """Return the following of a trajectory: to the times that its vertices have, if any."""
         ind = self._individuals
         trajectory = ind.link(node, "has_trajectory")
@@ -186,7 +186,7 @@ class Actions:
                 for one, time in zip(vertices, times, strict=True)
             )
         )
-        del who
+        del actor
         reference: osc.NoTime | osc.Timing = osc.NoTime()
         if timed:
             reference = osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)
@@ -199,8 +199,8 @@ class Actions:
         )
         return osc.PrivateAction(osc.RoutingAction(action))
 
-    def _assign_route(self, who: str, node: Subject) -> osc.PrivateAction:
-        return self.route(f"{who}_route", self._individuals.link(node, "has_route"))
+    def _assign_route(self, actor: str, node: Subject) -> osc.PrivateAction:
+        return self.route(f"{actor}_route", self._individuals.link(node, "has_route"))
 
     def route(self, name: str, node: Subject) -> osc.PrivateAction:
         """Return a route by its ends: between them one intersection, crossed the shortest way."""

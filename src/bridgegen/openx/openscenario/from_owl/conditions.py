@@ -21,7 +21,7 @@ USUAL_RULES = {
     "TimeToCollisionCondition": _MOST,
     "TimeHeadwayCondition": _MOST,
 }
-"""How a condition compares where its individual says nothing (has_rule)."""
+"""The comparison of a condition whose individual states none (has_rule)."""
 
 
 class Conditions:
@@ -40,7 +40,7 @@ class Conditions:
         self._individuals, self._quantities = individuals, quantities
         self._places, self._cast = places, cast
 
-    def group(self, name: str, who: tuple[str, ...], node: Subject) -> osc.ConditionGroup:
+    def group(self, name: str, actors: tuple[str, ...], node: Subject) -> osc.ConditionGroup:
         """Return conditions that suffice together.
 
         Their edge is ``none``: a rising edge needs an earlier instant at which the condition was
@@ -49,7 +49,7 @@ class Conditions:
 
         Args:
             name: of the group.
-            who: the event's actors, by name.
+            actors: the event's actors, by name.
             node: a Condition or a ConditionGroup.
 
         Raises:
@@ -65,12 +65,12 @@ class Conditions:
         found = []
         for k, one in enumerate(nodes, start=1):
             label = name if len(nodes) == 1 else f"{name}_{k}"
-            made, delay = self._condition(who, one)
+            made, delay = self._condition(actors, one)
             found.append(osc.Condition(label, delay, osc.ConditionEdge.NONE, made))
         return osc.ConditionGroup(tuple(found))
 
     def _condition(
-        self, who: tuple[str, ...], node: Subject
+        self, actors: tuple[str, ...], node: Subject
     ) -> tuple[AnyCondition, float | osc.ParameterRef]:
         """Return a condition and its delay [s]."""
         ind = self._individuals
@@ -89,7 +89,7 @@ class Conditions:
             return osc.ByValueCondition(
                 osc.SimulationTimeCondition(time, self._rule(node, _LEAST))
             ), 0.0
-        return _of(self._subject(who, node), self._of_entity(node)), 0.0
+        return _of(self._subject(actors, node), self._of_entity(node)), 0.0
 
     def _of_entity(self, node: Subject) -> osc.EntityCondition:
         ind = self._individuals
@@ -144,23 +144,23 @@ class Conditions:
         said = self._individuals.optional_text(node, "has_rule")
         return usual if said is None else osc.Rule(said)
 
-    def _subject(self, who: tuple[str, ...], node: Subject) -> str:
+    def _subject(self, actors: tuple[str, ...], node: Subject) -> str:
         """Return whose state a condition looks at."""
         ind = self._individuals
         if ind.optional_link(node, "has_subject") is not None:
             return self._cast.name(node, "has_subject")
-        if len(who) != 1:
+        if len(actors) != 1:
             raise OntologyError(
                 f"{ind.describe(node)} must say whose it is (has_subject): its event has "
-                f"{len(who)} actors"
+                f"{len(actors)} actors"
             )
-        return who[0]
+        return actors[0]
 
     def _other(self, node: Subject) -> str:
         return self._cast.name(node, "has_entity_ref")
 
 
-def _of(who: str, condition: osc.EntityCondition) -> osc.ByEntityCondition:
+def _of(actor: str, condition: osc.EntityCondition) -> osc.ByEntityCondition:
     return osc.ByEntityCondition(
-        osc.TriggeringEntities(osc.TriggeringEntitiesRule.ANY, (osc.EntityRef(who),)), condition
+        osc.TriggeringEntities(osc.TriggeringEntitiesRule.ANY, (osc.EntityRef(actor),)), condition
     )

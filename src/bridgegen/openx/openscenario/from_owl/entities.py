@@ -1,4 +1,4 @@
-"""OWL2OpenSCENARIO, its entities: bodies, and who drives them."""
+"""OWL2OpenSCENARIO, its entities: bodies and drivers."""
 
 from collections.abc import Callable, Mapping
 
@@ -11,7 +11,7 @@ from bridgegen.openx.openscenario.values import format_double
 from bridgegen.participants import PARTICIPANTS, ParticipantKind
 
 MAX_SPEED = "max_speed"
-"""Property of somebody on foot: how fast they can go [m/s]; the standard has it for vehicles."""
+"""Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
 
 _ESMINI_CONTROLLER = "ExternalController"
 # An axle as on a mid-size saloon; the ontology has no more of it than the wheelbase.
@@ -79,7 +79,7 @@ def _body(individuals: Individuals, node: Subject) -> osc.Vehicle | osc.Pedestri
 
 
 def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
-    """Return the property that names a kind of which the category does not say all."""
+    """Return the property that names a kind that the category alone does not identify."""
     return () if kind.written.is_exact else (osc.Property(KIND, kind.name),)
 
 
@@ -157,7 +157,7 @@ def _axle(max_steering: float, body_width: float, x: float) -> osc.Axle:
 
 
 def _controller(individuals: Individuals, node: Subject) -> osc.ObjectController:
-    """Return a named controller; who wants another driver replaces it or its property.
+    """Return a named controller; another driver replaces it or its property.
 
     To esmini it is an external one, which stays idle until it is activated; a type that esmini
     does not know would be an error in its log.

@@ -1,4 +1,4 @@
-"""OWL2OpenSCENARIO, its events: who does what, and when.
+"""OWL2OpenSCENARIO, its events: actors, actions and conditions.
 
 Every action and condition class of the ontology that a scenario's individuals may have is written
 here, or refused by name.
@@ -46,26 +46,26 @@ class Events:
             name = plain_text(individuals, node, "has_name")
             if name in groups:
                 raise OntologyError(f"events must have different names, got {name} twice")
-            who = self._cast.names(node, "has_who")
+            actors = self._cast.names(node, "has_who")
             groups[name] = osc.ManeuverGroup(
                 name=f"{name}_group",
                 maximum_execution_count=1,
-                actors=osc.Actors(False, tuple(osc.EntityRef(one) for one in who)),
-                maneuvers=(osc.Maneuver(f"{name}_maneuver", (self._event(name, who, node),)),),
+                actors=osc.Actors(False, tuple(osc.EntityRef(one) for one in actors)),
+                maneuvers=(osc.Maneuver(f"{name}_maneuver", (self._event(name, actors, node),)),),
             )
         return tuple(groups.values())
 
-    def _event(self, name: str, who: tuple[str, ...], node: Subject) -> osc.Event:
+    def _event(self, name: str, actors: tuple[str, ...], node: Subject) -> osc.Event:
         ind = self._individuals
         actions = tuple(
-            osc.Action(f"{name}_action_{k}", self._actions.action(name, who, action))
+            osc.Action(f"{name}_action_{k}", self._actions.action(name, actors, action))
             for k, action in enumerate(ind.links(node, "has_what"), start=1)
         )
         if not actions:
             raise OntologyError(f"{ind.describe(node)} must have has_what, and has none")
         trigger = ind.link(node, "has_when")
         groups = tuple(
-            self._conditions.group(f"{name}_condition_{k}", who, condition)
+            self._conditions.group(f"{name}_condition_{k}", actors, condition)
             for k, condition in enumerate(ind.links(trigger, "has_condition"), start=1)
         )
         if not groups:

@@ -63,7 +63,7 @@ PARAMETER, EVENT, SIGNALS = "parameter", "event", "signals"
 
 
 class Notes:
-    """Says what the rest of the file cannot.
+    """Writes statements that the rest of the file cannot express.
 
     Args:
         individuals: one scenario.

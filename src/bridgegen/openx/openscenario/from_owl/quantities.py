@@ -93,7 +93,7 @@ class Quantities:
                 f"parameter {name} must have a value: no individual that is bound to it has one"
             )
         if len(found) > 1:
-            shown = ", ".join(f"{value!r} on {who}" for value, who in sorted(found.items()))
+            shown = ", ".join(f"{value!r} on {owner}" for value, owner in sorted(found.items()))
             raise OntologyError(f"parameter {name} must have one value, got {shown}")
         value = next(iter(found))
         low, high = self._range(parameter)

@@ -1,6 +1,6 @@
 """OWL2OpenSCENARIO (paper, Algorithm 1, step 3): a storyboard from the ontology's individuals.
 
-It reads nothing but individuals, so a file that somebody edited in Protégé converts as one that
+It reads nothing but individuals, so a file that was edited in Protégé converts as one that
 we wrote. Every number that is bound to a parameter becomes ``$name``, and the parameter's value
 is the individual's. Nothing depends on static parameters but the road file that is named.
 

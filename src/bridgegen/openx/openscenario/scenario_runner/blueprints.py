@@ -80,7 +80,7 @@ OBJECTS: Mapping[osc.MiscObjectCategory, tuple[str, ...]] = {
     osc.MiscObjectCategory.POLE: ("static.prop.streetsign",),
     osc.MiscObjectCategory.VEGETATION: ("static.prop.plantpot06", "static.prop.plantpot07"),
 }
-"""What is no kind of participant; those say themselves what looks like them."""
+"""Objects that are no kind of participant; those name their blueprints themselves."""
 
 
 def blueprint(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> str | None:

@@ -1,4 +1,4 @@
-"""A controller for CARLA's ScenarioRunner: who moves by the clock, and a start at speed.
+"""A controller for CARLA's ScenarioRunner: timed trajectories, and an initial speed.
 
 BridgeGen puts this file beside the scenarios that it exports; they name it as their controllers'
 ``module``. It needs ScenarioRunner 0.9.15 or newer and nothing of BridgeGen.
@@ -6,7 +6,7 @@ BridgeGen puts this file beside the scenarios that it exports; they name it as t
 - An actor with a trajectory is, at each of its times, where the trajectory says, on its lane or
   off it: vehicles by their velocity, pedestrians by their walk, other things by their place. Who is
   pushed away from there is let go.
-- An actor without one, the ego, gets its initial speed once and is then left to who drives it.
+- An actor without one, the ego, gets its initial speed once and is then left to its driver.
 - With the property ``traffic_lights`` "stand", CARLA's own programme of the lights stands still
   while the scenario runs, so that the states that the scenario sets last.
 - ``duration`` is the last vertex's time [s]: ScenarioRunner 0.9.15 does not pass the times on, so
@@ -77,7 +77,7 @@ class BridgegenControl(BasicControl):  # type: ignore[misc]  # not typed
         self._began, self._reached_goal, self._is_let_go = None, False, False
 
     def reset(self) -> None:
-        """Leave the actor, and let CARLA's lights go on."""
+        """Release the actor, and let CARLA's lights continue."""
         if self._lights_stand and self._ticks:
             CarlaDataProvider.get_world().freeze_all_traffic_lights(False)
         self._actor = None
@@ -164,5 +164,5 @@ class BridgegenControl(BasicControl):  # type: ignore[misc]  # not typed
 
 
 def _turn(degrees: float) -> float:
-    """Return the shortest turn that comes to as much [deg]."""
+    """Return the shortest equivalent turn [deg]."""
     return (degrees + 180.0) % 360.0 - 180.0

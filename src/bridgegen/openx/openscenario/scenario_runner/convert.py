@@ -1,11 +1,11 @@
 """A recorded scenario for CARLA's ScenarioRunner: OpenSCENARIO 1.0, with its idioms.
 
-The ego starts where and as fast as it did, and is left to whoever drives ``hero``. All others are
+The ego has its recorded start and speed, and is left to the driver of ``hero``. All others are
 where they were when, by a controller of ours that lies beside the file (`CONTROL`): of
 ScenarioRunner's own, that for vehicles drives along lanes' centres, and that for pedestrians has no
 clock.
 
-Source: ScenarioRunner 0.9.15 and 0.9.16; what each part relies on is said where it is.
+Source: ScenarioRunner 0.9.15 and 0.9.16; each part documents what it relies on.
 """
 
 import re
@@ -50,9 +50,10 @@ _IN_THE_GROUND = frozenset(
 def for_scenario_runner(
     scenario: osc.OpenScenario, recording: Recording, roads: OpenDrive, name: str
 ) -> osc.OpenScenario:
-    """Return a scenario that ScenarioRunner runs as it was recorded, whoever drives the ego.
+    """Return a scenario that ScenarioRunner runs as recorded, with any driver of the ego.
 
-    Who leaves where the road ends stands there instead: ScenarioRunner cannot delete an entity.
+    A participant that disappears where the road ends stands there instead: ScenarioRunner cannot
+    delete an entity.
 
     Args:
         scenario: without parameters (`resolve.resolved`), of version 1.2.
@@ -104,7 +105,7 @@ def for_scenario_runner(
 
 
 def _impossible(recording: Recording, bodies: list[Any]) -> Iterator[str]:
-    """Yield why the scenario cannot be handed to ScenarioRunner."""
+    """Yield the reasons why the scenario cannot be exported for ScenarioRunner."""
     last = recording.x.shape[1] - 1
     for e, (name, body) in enumerate(zip(recording.names, bodies, strict=True)):
         if e and name == HERO:
@@ -112,7 +113,7 @@ def _impossible(recording: Recording, bodies: list[Any]) -> Iterator[str]:
         if recording.stays(e) != [(0, last)]:
             yield (
                 f"the entity {name} must be there from start to end, and it comes or goes: "
-                "ScenarioRunner has no controller for who is added later"
+                "ScenarioRunner has no controller for entities that are added later"
             )
         if isinstance(body, osc.ExternalObjectReference):
             yield f"the entity {name} must have a body in the file, got a reference to {body.name}"
@@ -156,7 +157,7 @@ def _weather(scenario: osc.OpenScenario) -> osc.Environment:
 
 
 def _ground(scenario: osc.OpenScenario, name: str, roads: OpenDrive) -> float:
-    """Return how high the road is where an entity starts [m], as far as its start says so."""
+    """Return the road's height where an entity starts [m], as far as its start states it."""
     for private in scenario.storyboard.init.actions.privates:
         for one in walk(private) if private.entity_ref == name else ():
             place: Any = one.position.position if isinstance(one, osc.TeleportAction) else None
@@ -174,7 +175,7 @@ def _start(
     courses: Mapping[str, Course],
     controllers: Mapping[str, osc.ControllerAction],
 ) -> Iterator[osc.PrivateAction]:
-    """Yield where somebody starts, how fast, and who moves them."""
+    """Yield a participant's start, speed and controller."""
     yield osc.PrivateAction(osc.TeleportAction(courses[name].position(0)))
     if name not in controllers:
         return
@@ -209,7 +210,7 @@ def _controller(name: str, properties: Mapping[str, str | float]) -> osc.Control
 def _arrival(
     scenario: osc.OpenScenario, ego: str, body: Any, roads: OpenDrive
 ) -> osc.ReachPositionCondition | None:
-    """Return where the scenario ends when the ego gets there; None if it does not say so."""
+    """Return the position at which the ego ends the scenario; None if there is none."""
     stop = scenario.storyboard.stop_trigger
     for group in stop.condition_groups if stop else ():
         reached = [one for one in walk(group) if isinstance(one, osc.ReachPositionCondition)]

@@ -1,4 +1,4 @@
-"""Who is where when, as ScenarioRunner takes it.
+"""Timed poses of participants for ScenarioRunner.
 
 Its frame is the standard's: it turns y and headings to CARLA's left-handed frame itself, in files
 whose description does not begin with ``CARLA:``. A place is CARLA's: of a vehicle or an object the
@@ -22,7 +22,7 @@ Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject
 
 @dataclass(frozen=True)
 class Course:
-    """Where the middle of somebody's box is at K evenly spaced instants.
+    """The positions of a box's middle at K evenly spaced instants.
 
     Attributes:
         x: ``(K,)`` [m].

@@ -42,7 +42,7 @@ def act(
     """Return the one act: everybody's course, the lights and the weather.
 
     Args:
-        courses: of those who have one, by name; not the ego's.
+        courses: of the participants that have one, by name; not the ego's.
         recording: for its lights.
         changes: of the environment, each with its time [s]; the first is the start's.
         roads: the map, for where its lights are.
@@ -95,8 +95,8 @@ def end(recording: Recording, arrival: osc.ReachPositionCondition | None) -> osc
     over = _at(_duration(recording), recording.time_step, "duration")
     if arrival is None:
         return over
-    who = osc.TriggeringEntities(osc.TriggeringEntitiesRule.ANY, (osc.EntityRef(HERO),))
-    arrives = osc.ByEntityCondition(who, osc.EntityCondition(arrival))
+    triggering = osc.TriggeringEntities(osc.TriggeringEntitiesRule.ANY, (osc.EntityRef(HERO),))
+    arrives = osc.ByEntityCondition(triggering, osc.EntityCondition(arrival))
     condition = osc.Condition("ego_arrives", 0.0, osc.ConditionEdge.NONE, arrives)
     return osc.Trigger((*over.condition_groups, osc.ConditionGroup((condition,))))
 
@@ -194,7 +194,7 @@ def _misplaced(recording: Recording, known: Mapping[str, Light]) -> Iterator[str
         if near:
             yield (
                 f"the traffic light {name} must stand {LIGHT_REACH:g} m or more from all others, "
-                f"got {', '.join(near)} nearer: ScenarioRunner could not tell them apart"
+                f"got {', '.join(near)} nearer: ScenarioRunner could not distinguish them"
             )
         if (recording.lights[s] >= len(STATES)).any():
             yield f"the traffic light {name} takes up a state that CARLA has not"

@@ -23,7 +23,7 @@ def add_action(
     builder: StoryBuilder,
     event: str,
     name: str,
-    who: tuple[str, ...],
+    actors: tuple[str, ...],
     wrapped: osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction,
 ) -> ox.NamedNode:
     """Add an action of an event.
@@ -32,7 +32,7 @@ def add_action(
         builder: where to.
         event: the event's name.
         name: of the individual.
-        who: the event's actors.
+        actors: the event's actors.
         wrapped: the action.
 
     Raises:
@@ -44,8 +44,8 @@ def add_action(
         raise UnsayableError(wrapped, "UserDefinedAction")
     action = wrapped.action
     inner = getattr(action, "action", action)
-    if not who:
-        raise UnsayableError(wrapped, "a PrivateAction of nobody")
+    if not actors:
+        raise UnsayableError(wrapped, "a PrivateAction without an actor")
     if isinstance(action, osc.TeleportAction):
         node = builder.node(name, "TeleportAction")
         put_place(builder, node, "has_position", f"{name}_place", action.position)
@@ -60,7 +60,7 @@ def add_action(
         node = builder.node(name, "SpeedAction")
         put_speed(builder, node, inner)
     elif isinstance(inner, osc.LaneChangeAction | osc.LaneOffsetAction):
-        node = _lateral(builder, name, who, inner)
+        node = _lateral(builder, name, actors, inner)
     elif isinstance(inner, osc.FollowTrajectoryAction):
         node = builder.node(name, "FollowTrajectoryAction")
         add_trajectory(builder, name, node, inner, None)
@@ -107,7 +107,7 @@ def _put_change(builder: StoryBuilder, node: ox.NamedNode, how: osc.TransitionDy
 def _lateral(
     builder: StoryBuilder,
     name: str,
-    who: tuple[str, ...],
+    actors: tuple[str, ...],
     action: osc.LaneChangeAction | osc.LaneOffsetAction,
 ) -> ox.NamedNode:
     if isinstance(action, osc.LaneOffsetAction):
@@ -126,7 +126,7 @@ def _lateral(
     target = action.lane_change_target.target
     if not isinstance(target, osc.RelativeTargetLane):
         raise UnsayableError(target, "AbsoluteTargetLane")
-    if builder.text(target.entity_ref) != who[0]:
+    if builder.text(target.entity_ref) != actors[0]:
         raise UnsayableError(target, f"a RelativeTargetLane of {target.entity_ref}, not the actor,")
     node = builder.node(name, "LaneChangeAction")
     builder.put(node, "has_lane_count", round(builder.now(target.value, target)))

@@ -48,7 +48,7 @@ class StoryBuilder(Builder):
         cast: entities that have been stated, by name.
         events: events that are, or will be, stated, by name.
         referred: events whose end the event that is being stated waits for.
-        problems: lines, and what could not be said there.
+        problems: lines, and their contents that cannot be expressed.
         bindings: nodes, their properties, and the parameters that give these.
         free: nodes and those of their properties that have numbers of their own.
         parameters: the individuals of the file's numeric parameters, by name.

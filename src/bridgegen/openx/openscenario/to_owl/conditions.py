@@ -22,7 +22,7 @@ _SAYABLE = (
 
 
 def add_trigger(
-    builder: StoryBuilder, event: str, who: tuple[str, ...], trigger: osc.Trigger | None
+    builder: StoryBuilder, event: str, actors: tuple[str, ...], trigger: osc.Trigger | None
 ) -> ox.NamedNode:
     """Add the trigger of an event; without one it happens at the start.
 
@@ -40,28 +40,28 @@ def add_trigger(
         raise UnsayableError(trigger, f"the event {event}, which never happens,")
     for number, group in zip(numbered(len(groups)), groups, strict=True):
         name = f"{event}_condition_{number}"
-        builder.put(node, "has_condition", _add_group(builder, name, who, group))
+        builder.put(node, "has_condition", _add_group(builder, name, actors, group))
     return node
 
 
 def _add_group(
-    builder: StoryBuilder, name: str, who: tuple[str, ...], group: osc.ConditionGroup
+    builder: StoryBuilder, name: str, actors: tuple[str, ...], group: osc.ConditionGroup
 ) -> ox.NamedNode:
     if len(group.conditions) == 1:
-        return _add_condition(builder, name, who, group.conditions[0])
+        return _add_condition(builder, name, actors, group.conditions[0])
     node = builder.node(name, "ConditionGroup")
     numbers = numbered(len(group.conditions))
     for number, condition in zip(numbers, group.conditions, strict=True):
-        part = _add_condition(builder, f"{name}_{number}", who, condition)
+        part = _add_condition(builder, f"{name}_{number}", actors, condition)
         builder.put(node, "has_condition", part)
     return node
 
 
 def _add_condition(
-    builder: StoryBuilder, name: str, who: tuple[str, ...], wrapped: osc.Condition
+    builder: StoryBuilder, name: str, actors: tuple[str, ...], wrapped: osc.Condition
 ) -> ox.NamedNode:
     if isinstance(wrapped.condition, osc.ByEntityCondition):
-        return _by_entity(builder, name, who, wrapped.condition)
+        return _by_entity(builder, name, actors, wrapped.condition)
     one = wrapped.condition.condition
     node = builder.node(name, type(one).__name__)
     if isinstance(one, osc.SimulationTimeCondition):
@@ -87,7 +87,7 @@ def _add_condition(
 
 
 def _by_entity(
-    builder: StoryBuilder, name: str, who: tuple[str, ...], wrapped: osc.ByEntityCondition
+    builder: StoryBuilder, name: str, actors: tuple[str, ...], wrapped: osc.ByEntityCondition
 ) -> ox.NamedNode:
     refs = wrapped.triggering_entities.entity_refs
     if len(refs) != 1:
@@ -99,7 +99,7 @@ def _by_entity(
         raise UnsayableError(one, type(one).__name__)
     node = builder.node(name, type(one).__name__)
     subject = builder.entity(refs[0].entity_ref, refs[0])
-    if who != (builder.text(refs[0].entity_ref),):
+    if actors != (builder.text(refs[0].entity_ref),):
         builder.put(node, "has_subject", subject)
     if isinstance(one, osc.CollisionCondition):
         if not isinstance(one.target, osc.EntityRef):
@@ -120,7 +120,7 @@ def _by_entity(
 
 
 def _other(builder: StoryBuilder, one: Relative) -> str | osc.ParameterRef:
-    """Return whom a condition measures to, in the one way that the ontology means.
+    """Return the entity that a condition measures to, in the one way that the ontology defines.
 
     Raises:
         UnsayableError: another distance, other axes, between boxes, or to a position.

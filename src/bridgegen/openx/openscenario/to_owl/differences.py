@@ -1,4 +1,4 @@
-"""What one file says that another does not: how a conversion there and back is checked.
+"""Contents of one file that another lacks: the check of a round trip.
 
 Names that nothing refers to are labels and not compared, and neither is what the second says
 besides; a value that the standard takes where none is written is that value.
@@ -141,7 +141,7 @@ def _about(child: Element) -> str:
 
 
 def _is_nothing(one: Element) -> bool:
-    """Say whether an element says nothing by being there."""
+    """Return whether an element's presence has no meaning."""
     if isinstance(one, osc.Precipitation):
         return one.precipitation_type == osc.PrecipitationType.DRY
     silent = (

@@ -1,4 +1,4 @@
-"""OpenSCENARIO2OWL, its entities: bodies, who drives them, and how they start."""
+"""OpenSCENARIO2OWL, its entities: bodies, drivers, and starts."""
 
 import pyoxigraph as ox
 
@@ -128,10 +128,10 @@ def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: st
 def as_number(
     builder: StoryBuilder, text: str | osc.ParameterRef, element: osc.Property | osc.Properties
 ) -> float:
-    """Return the finite number that a property says.
+    """Return the finite number of a property.
 
     Raises:
-        UnsayableError: it says none.
+        UnsayableError: it has none.
     """
     said = builder.text(text)
     try:

@@ -1,4 +1,4 @@
-"""OpenSCENARIO2OWL, its events: who does what, and when; and the temporary changes.
+"""OpenSCENARIO2OWL, its events: actors, actions and conditions; and the temporary changes.
 
 A storyboard's stories, acts, groups and maneuvers are levels without a meaning of their own where
 they begin with the scenario and happen once: their names are not kept. An event of a maneuver with
@@ -88,7 +88,7 @@ def _begins_at_once(builder: StoryBuilder, trigger: osc.Trigger | None) -> bool:
 
 
 def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happening]) -> set[str]:
-    """Add the events; one that waits for an event that cannot be said cannot be said either.
+    """Add the events; one that waits for an event that cannot be expressed is left out, too.
 
     Returns:
         The names of those that are stated.
@@ -163,12 +163,12 @@ def _add_event(builder: StoryBuilder, one: Happening) -> None:
     builder.put(node, "has_name", one.name)
     for actor in nodes.values():
         builder.put(node, "has_who", actor)
-    who = tuple(sorted(nodes))
+    names = tuple(sorted(nodes))
     for number, action in zip(numbered(len(wrapped)), wrapped, strict=True):
         suffix = "" if int(number) == 1 else f"_{number}"
         name = f"{one.name}_action{suffix}"
-        builder.put(node, "has_what", add_action(builder, one.name, name, who, action))
-    trigger = add_trigger(builder, one.name, who, one.event.start_trigger)
+        builder.put(node, "has_what", add_action(builder, one.name, name, names, action))
+    trigger = add_trigger(builder, one.name, names, one.event.start_trigger)
     builder.put(node, "has_when", trigger)
 
 

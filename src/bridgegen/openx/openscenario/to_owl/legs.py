@@ -43,10 +43,10 @@ def stretches(roads: OpenDrive, ends: set[str]) -> dict[str, Stretch]:
     return found[0] if len(found) == 1 else {}
 
 
-def told(
+def with_legs(
     legs: Mapping[str, Stretch], nodes: Mapping[str, ox.NamedNode], quads: Iterable[ox.Quad]
 ) -> Iterator[ox.Quad]:
-    """Yield the statements of a map, its roads' nearer ends and continuations as they are here.
+    """Yield the statements of a map, with the legs' nearer ends and continuations.
 
     Args:
         legs: roads of the legs, by their ids.

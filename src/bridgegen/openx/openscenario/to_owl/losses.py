@@ -1,4 +1,4 @@
-"""OpenSCENARIO2OWL, its check: what a file says that its individuals, written again, do not."""
+"""OpenSCENARIO2OWL, its check: contents of a file that its individuals, written again, lack."""
 
 from collections.abc import Callable, Iterator
 

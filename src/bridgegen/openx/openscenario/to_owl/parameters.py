@@ -1,4 +1,4 @@
-"""OpenSCENARIO2OWL, its parameters: their ranges, and what the header's properties say of them.
+"""OpenSCENARIO2OWL, its parameters: their ranges, and the header's properties on them.
 
 A parameter's value is already on the individuals that it gives; one that gives nothing carries its
 value itself. What a file of others does not say: the axis is ``weather`` of what gives nothing but
@@ -26,13 +26,13 @@ Facts = dict[str, dict[str, list[osc.Property]]]
 
 
 class Notes:
-    """What the header's properties say (`bridgegen.openx.openscenario.from_owl.notes`).
+    """The header's properties (`bridgegen.openx.openscenario.from_owl.notes`).
 
     Attributes:
         time_step: the property of it, if there is one.
         road_end: likewise.
         severity: likewise.
-        findings: by name, the properties that say why it is critical.
+        findings: by name, the properties on why it is critical.
         of: per kind (``parameter``, ``event``, ``signals``) and name, what is said, by its name.
     """
 
@@ -89,7 +89,7 @@ def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) 
 
 
 def _categories(notes: Notes, declared: Mapping[str, osc.ParameterDeclaration]) -> Iterator[str]:
-    """Yield the parameters that are categories: texts of which the header says an axis."""
+    """Yield the parameters that are categories: texts with an axis in the header."""
     for name in notes.of[PARAMETER]:
         one = declared.get(name)
         if one is not None and one.parameter_type is osc.ParameterType.STRING:
@@ -127,7 +127,7 @@ def _add_parameter(
     builder.put(node, "has_name", name)
     if formula:
         builder.put(node, "has_expression", builder.text(formula[0].value))
-    if not bound:  # nobody carries its value, so it does so itself
+    if not bound:  # no other individual carries its value, so it does
         builder.put(node, "has_value", value)
         builder.put(node, "has_parameter", node)
     names = sorted(bound) or ["has_value"]
@@ -147,7 +147,7 @@ def _constrain(
     facts: dict[str, list[osc.Property]],
     names: Iterable[str],
 ) -> None:
-    """State the rules that the header says a parameter obeys."""
+    """State a parameter's rules in the header."""
     for rule in facts.get("constraint", ()):
         text = builder.text(rule.value)
         builder.put(node, "constraint", text)
@@ -187,7 +187,7 @@ def _check_clear(
     bound: dict[str, list[ox.NamedNode]],
     free: Iterable[tuple[ox.NamedNode, str]],
 ) -> None:
-    """Make sure that nobody takes a number of somebody's own for the parameter's.
+    """Make sure that an individual's own number is not taken for the parameter's.
 
     The ontology binds an individual to a parameter and the parameter to properties.
 

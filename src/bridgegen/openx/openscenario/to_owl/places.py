@@ -67,7 +67,7 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
 
 
 def same_place(one: osc.Position, other: osc.Position) -> bool:
-    """Say whether two positions are one place, whichever way one looks there."""
+    """Return whether two positions are one place, whichever way one looks there."""
     a, b = one.position, other.position
     if isinstance(a, osc.LanePosition) and isinstance(b, osc.LanePosition):
         return (a.road_id, a.lane_id, a.s, a.offset) == (b.road_id, b.lane_id, b.s, b.offset)

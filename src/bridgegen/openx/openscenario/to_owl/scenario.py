@@ -41,7 +41,7 @@ from bridgegen.openx.openscenario.to_owl.events import (
     add_events,
     happenings,
 )
-from bridgegen.openx.openscenario.to_owl.legs import stretches, told
+from bridgegen.openx.openscenario.to_owl.legs import stretches, with_legs
 from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
@@ -61,7 +61,7 @@ def individuals_from_openscenario(
     *,
     partial: bool = False,
 ) -> tuple[Individuals, list[str]]:
-    """Return the individuals of a scenario file, and what it says that they do not.
+    """Return the individuals of a scenario file, and its contents that they lack.
 
     Args:
         scenario: the file, as `bridgegen.openx.openscenario.read` returns it.
@@ -74,7 +74,7 @@ def individuals_from_openscenario(
         The individuals, and a sentence for each thing left out: none unless ``partial``.
 
     Raises:
-        UnsupportedError: something cannot be said (at most 50 problems are named); also if
+        UnsupportedError: contents cannot be expressed (at most 50 problems are named); also if
             ``partial``, if there is no entity ``ego`` that can.
     """
     importer = _Importer(scenario, roads, map_file)
@@ -115,7 +115,7 @@ class _Importer:
             controllers=signals is None or not signals.controllers,
         )
         nodes = {one: self.builder.iri(road_name(one)) for one in self.builder.legs}
-        self.static = tuple(told(self.builder.legs, nodes, whole.quads))
+        self.static = tuple(with_legs(self.builder.legs, nodes, whole.quads))
         self.derived: dict[str, osc.Event] = {}
         self.stated: set[str] = set()
         self.happenings: list[Happening] = []
@@ -235,10 +235,10 @@ class _Importer:
                         builder.put(node, "has_weather", weather)
                 return
 
-    # -- what is not said --------------------------------------------------------------------------
+    # -- losses ------------------------------------------------------------------------------------
 
     def problems(self, individuals: Individuals) -> Iterator[tuple[int, str]]:
-        """Yield lines, and what stands there that the individuals do not say."""
+        """Yield lines, and their contents that the individuals lack."""
         builder = self.builder
         yield from builder.problems
         entities = {builder.text(one.name) for one in self.scenario.entities.scenario_objects}

@@ -18,7 +18,7 @@ def kind(body: Body) -> int:
 
 
 def measures(tables: Tables, body: Body) -> tuple[float, ...]:
-    """Return a row of ``Program.bodies``; who has no limits has infinite ones."""
+    """Return a row of ``Program.bodies``; missing limits are infinite."""
     if isinstance(body, osc.ExternalObjectReference):
         tables.unsupported(body, "ExternalObjectReference")
         return (0.0,) * 8

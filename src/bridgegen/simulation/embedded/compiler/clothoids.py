@@ -24,7 +24,7 @@ def bends(
 ) -> tuple[osc.Position, tuple[Bend, ...], tuple[float | None, ...]]:
     """Return where a clothoid, or a chain of them, starts, its bends, and when to be at their ends.
 
-    What cannot be run is taken down in ``tables``. Rows may not vary it.
+    Unsupported elements are reported to ``tables``. Rows may not vary it.
     """
 
     def number(element: osc.Clothoid | osc.ClothoidSplineSegment, name: str) -> float:

@@ -109,7 +109,7 @@ class _Compiler:
         return without(scenario, [one for one, other in pairs if id(other) in culprits])
 
     def has_ego(self, left: osc.OpenScenario) -> bool:
-        """Say whether a scenario still has the entity that is this one's ego."""
+        """Return whether a scenario still has the entity that is this one's ego."""
         return self.tables.names[:1] == Tables(left, self.place).names[:1]
 
     def compile(

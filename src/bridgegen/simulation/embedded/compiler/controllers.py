@@ -57,7 +57,7 @@ class Controllers:
         return lateral, longitudinal
 
     def may_rest(self, which: int) -> bool:
-        """Say whether the driver does not steer, or set the speed, at some time."""
+        """Return whether the driver does not steer, or set the speed, at some time."""
         return not self.drives[which] or 0 in self._later[which]
 
     def of(self, entity: int) -> Iterator[osc.Controller]:
@@ -118,7 +118,7 @@ class Controllers:
         return found
 
     def _is_drivers(self, part: Switching) -> bool:
-        """Say whether an action is on the controller that the ego's driver is, or stands for."""
+        """Return whether an action is on the controller that the ego's driver is, or stands for."""
         if self.replaces:
             return True
         if isinstance(part, osc.AssignControllerAction):
@@ -131,7 +131,7 @@ class Controllers:
         return wanted is None or self._tables.text(wanted) in mine
 
     def _is_of_driver(self, part: Switching, entity: int) -> bool:
-        """Say whether an action is on the controller that is an entity's driver."""
+        """Return whether an action is on the controller that is an entity's driver."""
         if isinstance(part, osc.AssignControllerAction):
             return _names_driver(_controller(part))
         wanted = part.object_controller_ref or part.controller_ref

@@ -1,4 +1,4 @@
-"""What a file's properties declare: the time step, who drives, the key of the ego's noise."""
+"""Declarations in a file's properties: the time step, drivers, the key of the ego's noise."""
 
 from bridgegen.ego import DRIVERS, GUESTS, STORYBOARD, Driver, is_spec, split
 from bridgegen.ego.drivers import ATTENTIVE, OTHERS, SCRIPTED
@@ -45,13 +45,13 @@ def stands(scenario: osc.OpenScenario, place: str) -> bool:
     """Return whether bodies stand where their road ends, instead of leaving.
 
     Raises:
-        InputError: the header's property says something else.
+        InputError: the header's property has another value.
     """
     properties = scenario.file_header.properties
-    said = properties.get(ROAD_END) if properties else None
-    if said is not None and str(said) != STAND:
-        raise InputError(f"{place}: {ROAD_END} (FileHeader) must be '{STAND}', got '{said}'")
-    return said is not None
+    value = properties.get(ROAD_END) if properties else None
+    if value is not None and str(value) != STAND:
+        raise InputError(f"{place}: {ROAD_END} (FileHeader) must be '{STAND}', got '{value}'")
+    return value is not None
 
 
 def driver(controllers: Controllers, place: str) -> Driver:
@@ -91,13 +91,13 @@ def _refuse_two(controllers: Controllers, place: str) -> None:
     """Refuse an ego whose controllers name two drivers."""
     found = None
     for controller in controllers.of(0):
-        said = controller.properties.get(DRIVER) if controller.properties else None
-        if found is not None and said is not None and str(said) != found:
+        value = controller.properties.get(DRIVER) if controller.properties else None
+        if found is not None and value is not None and str(value) != found:
             raise UnsupportedError(
                 f"{place}, line {controller.line}: the ego has two drivers, '{found}' and "
-                f"'{said}' (choose one with --ego)"
+                f"'{value}' (choose one with --ego)"
             )
-        found = found if said is None else str(said)
+        found = found if value is None else str(value)
 
 
 def other_driver(controllers: Controllers, place: str, entity: int, name: str) -> int | None:
@@ -108,21 +108,21 @@ def other_driver(controllers: Controllers, place: str, entity: int, name: str) -
     """
     found: dict[str, osc.Controller] = {}
     for controller in controllers.of(entity):
-        said = controller.properties.get(DRIVER) if controller.properties else None
-        if said is None:
+        value = controller.properties.get(DRIVER) if controller.properties else None
+        if value is None:
             continue
         where = f"{place}, line {controller.line}: "
-        if str(said) not in OTHERS:
+        if str(value) not in OTHERS:
             known = ", ".join(OTHERS)
-            what = f"unknown driver '{said}' of '{name}'"
-            if str(said) in DRIVERS | GUESTS or is_spec(str(said)):
-                what = f"the driver '{said}' is for the ego, not for '{name}'"
+            what = f"unknown driver '{value}' of '{name}'"
+            if str(value) in DRIVERS | GUESTS or is_spec(str(value)):
+                what = f"the driver '{value}' is for the ego, not for '{name}'"
             raise UnsupportedError(f"{where}{what}; drivers of other participants: {known}")
-        if found and str(said) not in found:
+        if found and str(value) not in found:
             raise UnsupportedError(
-                f"{where}'{name}' has two drivers, '{next(iter(found))}' and '{said}'"
+                f"{where}'{name}' has two drivers, '{next(iter(found))}' and '{value}'"
             )
-        found[str(said)] = controller
+        found[str(value)] = controller
     if not found:
         return None
     return ATTENTIVE if "attentive" in found else SCRIPTED

@@ -52,7 +52,7 @@ class GlobalActions:
                 self.rows(action)
 
     def rows(self, action: Element) -> list[Row]:
-        """Return the rows of an action of an event; what cannot be run is taken down."""
+        """Return the rows of an action of an event; unsupported ones are reported."""
         match action:
             case osc.EnvironmentAction():
                 return self._environment(action)

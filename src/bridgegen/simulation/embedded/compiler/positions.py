@@ -34,7 +34,7 @@ RELATIVE_SINCE = 3
 
 
 def is_fixed(position: osc.Position) -> bool:
-    """Say whether a position is the same whatever rows and entities do, and is told by the file.
+    """Return whether a position is the same whatever rows and entities do, and is told by the file.
 
     One on a lane, by numbers, or one of the world.
     """

@@ -81,7 +81,7 @@ class Probe:
     """A row of ``Program.probes``; ``limit`` and ``within`` are values and not yet their slots."""
 
     kind: int
-    who: int = 0
+    entity: int = 0
     other: int = 0
     rule: int = 0
     limit: Value = 0.0
@@ -100,7 +100,7 @@ class Probe:
 
 
 class Probes:
-    """The probes of conditions; what cannot be looked at is taken down in ``tables``.
+    """The probes of conditions; unsupported ones are reported to ``tables``.
 
     Args:
         tables: the compiler's.
@@ -167,7 +167,7 @@ class Probes:
     def by_entity(self, condition: Element, entities: Sequence[int]) -> list[Probe]:
         """Return a condition's probes, one for each triggering entity."""
         probe = self._probe(condition)
-        return [replace(probe, who=e) for e in entities]
+        return [replace(probe, entity=e) for e in entities]
 
     def _probe(self, one: Element) -> Probe:
         """Return the probe of a condition on no entity in particular."""
@@ -265,7 +265,7 @@ class Probes:
         )  # fmt: skip
 
     def _measure(self, one: Pair) -> tuple[int, int]:
-        """Return which distance is meant, and in which system; 1.0 says ``alongRoute`` instead."""
+        """Return the kind of distance and the coordinate system; 1.0 has ``alongRoute`` instead."""
         if not isinstance(one, osc.RelativeDistanceCondition) and one.along_route is not None:
             along = self._tables.truth(one.along_route)
             return (codes.LONGITUDINAL, codes.PATH_SYSTEM) if along else (codes.EUCLIDIAN, 0)

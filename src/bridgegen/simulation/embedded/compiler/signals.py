@@ -58,7 +58,7 @@ class Signals:
         return number
 
     def controller(self, element: Element, name: object) -> int:
-        """Return the number of a controller; one that is not declared is taken down."""
+        """Return the number of a controller; report an undeclared one."""
         if str(name) not in self._names:
             what = f'trafficSignalControllerRef="{name}" (no such controller)'
             self._tables.unsupported(element, what)
@@ -66,7 +66,7 @@ class Signals:
         return self._names.index(str(name))
 
     def phase(self, element: Element, controller: int, name: object) -> int:
-        """Return the number of a controller's phase; one that it lacks is taken down."""
+        """Return the number of a controller's phase; report a missing one."""
         if controller >= 0:
             for i, phase in enumerate(self._found[controller].phases):
                 if self._tables.text(phase.name) == str(name):

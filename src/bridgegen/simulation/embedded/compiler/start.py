@@ -209,7 +209,7 @@ class Start:
 
 
 def _faces_ahead(turned: osc.Orientation | None) -> bool:
-    """Say whether an orientation on a lane is the lane's."""
+    """Return whether an orientation on a lane is the lane's."""
     if turned is None or turned.h is None:
         return True
     return turned.h == 0.0 and turned.type is not osc.ReferenceContext.ABSOLUTE

@@ -31,7 +31,7 @@ class Tables:
         names: their names.
         parameters: the numeric parameters with their declared values.
         problems: what the rollout cannot do, a sentence each.
-        culprits: the elements that say so.
+        culprits: the elements that cause it.
         fixed: parameters that rows may not vary, and what they are used for.
     """
 
@@ -59,7 +59,7 @@ class Tables:
         return self._slots.setdefault((type(key), key), len(self._slots))
 
     def entity(self, name: object) -> int:
-        """Return an entity's number; where several or none are named, that is taken down."""
+        """Return an entity's number; report a problem if several or none are named."""
         if str(name) not in self.names:
             self.problems.append(f"{self.place}: '{name}' where one entity is needed")
             return 0
@@ -92,7 +92,7 @@ class Tables:
         return next(i for i, kind in enumerate(_OBJECTS.values()) if isinstance(body, kind))
 
     def unsupported(self, element: Element, what: str) -> None:
-        """Take down what cannot be run, with its line."""
+        """Record an unsupported element, with its line."""
         line = f", line {element.line}" if element.line else ""
         self.problems.append(f"{self.place}{line}: {what} is not supported")
         self.culprits.append(element)
@@ -123,7 +123,7 @@ class Tables:
         return value
 
     def choice(self, enum: type[Choice], value: str | osc.ParameterRef) -> Choice:
-        """Return which of an enumeration's values is meant; a wrong one is taken down."""
+        """Return the number of an enumeration's value; report an unsupported one."""
         text = self.text(value)
         if text not in tuple(enum):
             known = ", ".join(enum)

@@ -24,7 +24,7 @@ Corner = tuple[float, float, float | None]
 
 
 def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> AlongTrajectory:
-    """Return the path of a trajectory; what cannot be run is taken down in ``tables``."""
+    """Return the path of a trajectory; unsupported elements are reported to ``tables``."""
     trajectory = action.trajectory_ref.trajectory
     if trajectory.closed is not False:
         tables.unsupported(trajectory, 'a Trajectory with closed="true"')
@@ -121,7 +121,7 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
 
 
 def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
-    """Return when who follows a trajectory by its times is where.
+    """Return the timed poses of an entity that follows a trajectory.
 
     Position is linear between two vertices. Heading turns the short way round between two that
     state one, and else is the direction of travel. Before the first vertex the entity stands.

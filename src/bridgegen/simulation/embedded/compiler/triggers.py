@@ -80,7 +80,7 @@ class Triggers:
         return list(found)
 
     def _condition(self, condition: osc.Condition) -> None:
-        """Append a condition; one that cannot be run is taken down and never true."""
+        """Append a condition; an unsupported one is reported and never true."""
         known = len(self._tables.problems)
         edge = _EDGES[self._tables.choice(osc.ConditionEdge, condition.condition_edge)]
         seconds = self._tables.literal(condition, "delay", condition.delay)
@@ -93,10 +93,14 @@ class Triggers:
             if isinstance(kind.condition, osc.SimulationTimeCondition):
                 self._note_end(kind.condition, delay)
         else:
-            who = kind.triggering_entities
-            rule = self._tables.choice(osc.TriggeringEntitiesRule, who.triggering_entities_rule)
+            triggering = kind.triggering_entities
+            rule = self._tables.choice(
+                osc.TriggeringEntitiesRule, triggering.triggering_entities_rule
+            )
             quantity = _QUANTITIES[rule]
-            entities = [e for ref in who.entity_refs for e in self._tables.members(ref.entity_ref)]
+            entities = [
+                e for ref in triggering.entity_refs for e in self._tables.members(ref.entity_ref)
+            ]
             probes = self.looks.by_entity(kind.entity_condition.condition, entities)
         if len(self._tables.problems) > known or not probes:
             probes, quantity = [Probe(codes.NEVER_TRUE)], codes.ANY
@@ -105,7 +109,7 @@ class Triggers:
             limit, within = self._tables.slot(probe.limit), self._tables.slot(probe.within)
             self.probes.append(
                 (
-                    probe.kind, probe.who, probe.other, probe.rule, limit, probe.place,
+                    probe.kind, probe.entity, probe.other, probe.rule, limit, probe.place,
                     probe.measure, probe.system, int(probe.freespace), within,
                     int(probe.looks_closely),
                 )
@@ -113,7 +117,7 @@ class Triggers:
         self.conditions.append((first, len(self.probes), quantity, edge, delay))
 
     def _note_end(self, clock: osc.SimulationTimeCondition, delay: int) -> None:
-        """Take down when the scenario ends at the latest, by the storyboard's own stop trigger."""
+        """Record the latest end of the scenario by the storyboard's own stop trigger."""
         if not self.triggers:  # it is the first
             end = self._tables.literal(clock, "value", clock.value) + delay * self._time_step
             if math.isfinite(end) and delay < MAX_STEPS:  # else it never comes

@@ -60,7 +60,7 @@ class Values:
         return value
 
     def is_ordered(self, what: str, name: str) -> bool:
-        """Say whether values of a parameter or variable can be greater or less."""
+        """Return whether values of a parameter or variable can be greater or less."""
         return self._declared.get((what, name), (Kind.STRING, ""))[0] is not Kind.STRING
 
     def _read(self, kind: Kind, value: Value) -> float | None:

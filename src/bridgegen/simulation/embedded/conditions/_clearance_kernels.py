@@ -97,10 +97,10 @@ def lane_at(node, x, y, scene):
 
 @kernel
 def is_clear(p, k, scene):
-    """Return whether nobody whom probe p asks for is near its entity, on the lanes that it names.
+    """Return whether none of probe p's entities is near its own entity, on the lanes that it names.
 
-    Near is as far as it says ahead and behind, along the entity's way. Where there is no such lane
-    beside it there is no clearance, nor is there for who is on no lane.
+    Near is within its distances ahead and behind, along the entity's path. Without such a lane, or
+    for an entity on no lane, there is no clearance.
     """
     e = scene.probes[p, WHO]
     row, path = scene.clearances[scene.probes[p, OTHER]], scene.along[p]

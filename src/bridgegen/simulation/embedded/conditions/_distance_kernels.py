@@ -89,8 +89,8 @@ def scene_of(plan, roads, state, record):
 def look_ahead(p, k, scene):
     """Return (whether it is defined, the distance [m], time to collision [s] or headway [s]).
 
-    Distances are absolute. A headway is defined for who moves towards what is not behind it, a time
-    to collision for who comes closer.
+    Distances are absolute. A headway is defined for an entity that moves towards a target not
+    behind it, a time to collision for one that approaches it.
     """
     kind, e, other = scene.probes[p, PROBE], scene.probes[p, WHO], scene.probes[p, OTHER]
     measure, free = scene.probes[p, MEASURE], scene.probes[p, BOXES] == 1

@@ -75,8 +75,8 @@ def look_at_pair(kind, rule, limit, dx, dy, v, h, other_v, other_h):
 def is_in_state(p, probes, phase, stamps, looked):
     """Return whether an element of the storyboard is in a state, or has passed a transition.
 
-    A transition is seen for one instant: by whom looks at it later in the one in which it happens,
-    else in the next one.
+    A transition is visible for one instant: the one in which it happens to conditions evaluated
+    later in that instant, else the next one.
     """
     x, wanted = probes[p, WHO], probes[p, OTHER]
     if wanted <= COMPLETE:

@@ -98,7 +98,7 @@ def compare_times(now, rule, limit):
 
 @kernel
 def look_closely(k, scene):
-    """Take down what the probes see at instant k that are seldom asked for."""
+    """Record the values of rarely used probes at instant k."""
     scene = borrow_scene(scene)
     for p in range(scene.probes.shape[0]):
         if scene.probes[p, CLOSELY]:

@@ -35,7 +35,7 @@ from bridgegen.simulation.embedded.places._place_kernels import pose_of, way_ahe
 
 @inlined_kernel
 def observe(k, plan, roads, state, record):
-    """Take down what all probes see at instant k, and which conditions that makes true."""
+    """Record the values of all probes at instant k, and which conditions are true."""
     for i in range(plan.marks.shape[0]):
         state.marks[i, 0], state.marks[i, 1], state.marks[i, 2] = pose_of(
             plan.marks[i], k, plan, roads, state, record
@@ -58,7 +58,7 @@ def observe(k, plan, roads, state, record):
 
 @kernel
 def conclude(c, k, conditions, observed, history):
-    """Take down whether condition c is true at instant k, by any or all of its probes."""
+    """Record whether condition c is true at instant k, by any or all of its probes."""
     first, last, count = conditions[c, PROBES], conditions[c, PROBES_END], 0
     for p in range(first, last):
         count += observed[p]
@@ -159,10 +159,10 @@ def fires(trigger, k, plan, state):
 
 @inlined_kernel
 def select(trigger, k, plan, state):
-    """Take down which entities made a trigger fire, for actions that select them.
+    """Record which entities made a trigger fire, for actions that select them.
 
-    They are those whose probes see it in a group that fires; where none does (the condition was
-    true a while ago, or has just ceased to be), all that the condition names.
+    They are those whose probes are true in a group that fires; if none is (the condition was true
+    earlier, or is no longer), all entities that the condition names.
     """
     for e in range(state.selected.shape[0]):
         state.selected[e] = False

@@ -15,10 +15,10 @@ from bridgegen.simulation.embedded.drivers._own_driver_kernels import (
     ANSWER,
     CURVATURE,
     EGO,
+    N_INPUTS,
     RETURNED,
-    TOLD,
     ask,
-    tell_rows,
+    fill_input_rows,
 )
 from bridgegen.simulation.embedded.drivers.demands import DEMANDS, code_of
 
@@ -28,8 +28,8 @@ __all__ = [
     "CURVATURE",
     "DEMANDS",
     "EGO",
+    "N_INPUTS",
     "RETURNED",
-    "TOLD",
     "ask",
     "begin_control",
     "begin_waiting",
@@ -37,6 +37,7 @@ __all__ = [
     "demand",
     "ego_is_through",
     "egos_are_through",
+    "fill_input_rows",
     "heed",
     "impose_rows",
     "is_steered",
@@ -44,5 +45,4 @@ __all__ = [
     "move_paced",
     "move_steered",
     "observe_rows",
-    "tell_rows",
 ]

@@ -1,7 +1,7 @@
-"""Who moves the ego: its driver, the storyboard, or one the speed and the other the way.
+"""Control of the ego: by its driver, by the storyboard, or by one each for speed and steering.
 
-``state.drives`` ``(2,)`` int64 says whether the driver steers and whether it sets the speed. What
-it does not do, the storyboard does as of anybody else.
+``state.drives`` ``(2,)`` int64 is whether the driver steers and whether it sets the speed. The
+storyboard does the rest, as for any other entity.
 """
 
 # mypy: allow-untyped-defs
@@ -70,7 +70,7 @@ def move_paced(k, demanded, plan, roads, state, record):
 def move_steered(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k as its driver steers; return its new x, y [m], heading.
 
-    Where it has been put somewhere, it is there then, as fast as it was.
+    If it has been teleported, it stays there for this instant, at its speed.
     """
     if state.placed[0]:
         move_paced(k, 0.0, plan, roads, state, record)

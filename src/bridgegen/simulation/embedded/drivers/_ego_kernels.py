@@ -24,7 +24,7 @@ def demand(k, plan, roads, state, record):
 
 @inlined_kernel
 def ego_is_through(plan, roads, state):
-    """Say whether an ego with a driver is at the end of its route, or of the road."""
+    """Return whether an ego with a driver is at the end of its route, or of the road."""
     p = state.on[0]
     if plan.is_driven == 0 or state.station[0] < (roads.counts[p] - 1) * roads.steps[p]:
         return False

@@ -1,4 +1,4 @@
-"""What another simulator says of a body at an instant, in the place of where it was moved here."""
+"""The state of a body by another simulator at an instant, which replaces its own motion."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.

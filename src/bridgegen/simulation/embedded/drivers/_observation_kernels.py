@@ -1,4 +1,4 @@
-"""What a driver of the user's own is told: the route ahead, the next light, and tracks."""
+"""Observations of a user's own driver: the route ahead, the next light, and tracks."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -43,7 +43,7 @@ def observe(k, plan, roads, state, record, step, route, tracks):
             bend = path[at, CURVATURE]
             route[p, 3] = bend + share * (path[at + 1, CURVATURE] - bend)
     stop, light = math.inf, 0
-    if on == 0:  # where the map's stop lines are along another way, nobody has looked
+    if on == 0:  # stop lines along other paths are unknown
         front = station + plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
         for one in range(roads.stops.shape[0]):
             ahead = roads.stops[one] - front

@@ -1,8 +1,8 @@
-"""Participants other than the ego that have a driver: what it lets them do of their script.
+"""Participants other than the ego that have a driver, which limits their script.
 
 The storyboard commands a speed, and when a change of lane begins; the driver
-(`bridgegen.ego._attentive_kernels`) has them go slower, and begin later. All drivers decide by the
-states at instant k, before anybody is moved on, so the order of the entities does not matter.
+(`bridgegen.ego._attentive_kernels`) may slow them, and delay the change. All drivers decide by the
+states at instant k, before any entity moves, so the order of the entities does not matter.
 """
 
 # mypy: allow-untyped-defs
@@ -75,8 +75,8 @@ def begin_waiting(k, plan, roads, state, record):
 def move_heeding(e, before, k, plan, roads, state, record):
     """Move an entity on from instant k as its driver allows; see ``_travel_kernels``.
 
-    ``before`` [m/s] is what was commanded an instant before. Who has fallen behind its script
-    catches up no faster than is comfortable; whatever happens, nobody exceeds the commanded speed.
+    ``before`` [m/s] is the command of the instant before. An entity behind its script catches up at
+    a comfortable acceleration at most, and never exceeds the commanded speed.
     """
     most, v, body = state.allowed[e], record.v[e, k], plan.bodies[e]
     if v < before - SAME_SPEED:
@@ -87,5 +87,5 @@ def move_heeding(e, before, k, plan, roads, state, record):
         state.command[e] = min(asked, max(v + most * plan.dt, 0.0))
     given = state.command[e]
     move_along_path(e, k, plan, roads, state, record)
-    if state.command[e] == given:  # its road goes on
+    if state.command[e] == given:  # its road continues
         state.command[e] = asked

@@ -51,7 +51,7 @@ the left; whether the offset is kept until another action moves the entity acros
 
 @inlined_kernel
 def stop_lateral(j, plan, state):
-    """Stop action j, which moves an entity across: it goes on as far aside as it is."""
+    """Stop action j, which moves an entity laterally: it keeps its offset."""
     e = plan.actions[j, WHOM]
     if state.lateral_action[e] == j:
         state.lateral_action[e] = state.to[e] = -1
@@ -190,7 +190,7 @@ def begin_lane_offset(j, k, plan, roads, state, record):
         return
     way, value = roads.nodes[node, WAY], state.slots[plan.actions[j, TARGET]]
     target = way * value
-    if row[OF] >= 0:  # as far to the left of another entity as it says
+    if row[OF] >= 0:  # relative to another entity
         other, its_t = _lane_of(row[OF], k, roads, state, record)
         if other < 0:
             return

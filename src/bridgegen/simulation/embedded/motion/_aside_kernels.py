@@ -34,7 +34,7 @@ from bridgegen.simulation.embedded.motion._pursuit_kernels import seen_at
 from bridgegen.simulation.embedded.places._place_kernels import end_lateral
 
 REACHED = 0.01  # m, a distance that is missed by less is reached
-CROSSING = 0.1  # who is turned from another by so little of a right angle has no side of it
+CROSSING = 0.1  # an entity turned from another by nearly a right angle is on no side of it
 MOST_ACROSS = 0.999  # of a step: some of it is always ahead
 MOST_ACROSS_ON_WHEELS = 0.5  # of a step: wheels turn a body by 30 degrees from its lane at most
 

@@ -1,7 +1,7 @@
-"""How a speed gets where it is to be: over a time or at a rate, by a profile, to a gap, in time.
+"""Speed control: over a time or at a rate, by a profile, to a gap, to arrive in time.
 
-Formulas of one body, without the storyboard; ``_speed_kernels`` says when which one is asked. What
-the standard leaves open, and what is chosen here, is in docs/decisions.md.
+Formulas of one body, without the storyboard; ``_speed_kernels`` selects between them. Choices that
+the standard leaves open are in docs/decisions.md.
 """
 
 # mypy: allow-untyped-defs
@@ -91,7 +91,7 @@ def meeting_speed(left, time, v, final, has_final, dt):
 
     Args:
         left: the way that is left [m], > 0.
-        time: the time that is left [s], > 0; inf: nobody knows.
+        time: the remaining time [s], > 0; inf: unknown.
         v: its speed now [m/s].
         final: its speed there [m/s].
         has_final: whether there is one.
@@ -204,8 +204,7 @@ def _one_change(time, acceleration, limits, out, profile):
 def _rounded(count, acceleration, limits, out, profile):
     """Write the first rows of ``profile`` with their corners rounded; return how many rows.
 
-    A corner is a parabola about the place where its lines meet, so that it leaves the one and
-    comes to the other. 0: there is no room for one.
+    A corner becomes a parabola that joins its lines smoothly. 0: there is no room for one.
     """
     v, slope = profile[0, V], acceleration
     jerk = limits[3] if profile[0, A] > slope else -limits[4]

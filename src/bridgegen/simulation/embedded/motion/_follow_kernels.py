@@ -1,4 +1,4 @@
-"""Where entities are told to be, and to go: teleports, routes, and trajectories with their times.
+"""Commanded positions and paths of entities: teleports, routes, and timed trajectories.
 
 A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the columns below.
 """
@@ -31,7 +31,7 @@ BEGINS, ENDS_AT, X, Y, X_END, Y_END, H, H_END, PASSED, PASSED_END = range(10)
 """When a segment begins and ends [s]; x, y [m] of both; the headings [rad]; metres travelled."""
 
 ABREAST = 5.0  # m, a position is passed so far aside at most
-NEAR = 0.1  # m, who is so close to a position is there
+NEAR = 0.1  # m, within which an entity has reached a position
 SAME_TIME = 1e-9  # s, an instant this close to a vertex's is the vertex's
 
 
@@ -125,7 +125,7 @@ def begin_follow(j, k, plan, roads, state):
 
 @kernel
 def stop_follow(j, k, plan, roads, state, record):
-    """Stop action j, a FollowTrajectoryAction: the entity goes on along the lane where it is."""
+    """Stop action j, a FollowTrajectoryAction: the entity continues along the lane where it is."""
     e = plan.actions[j, WHOM]
     if state.follow_action[e] == j:
         state.follow_action[e] = state.follow[e] = -1
@@ -156,9 +156,9 @@ def at_time(table, n, t):
 
 @kernel
 def move_by_timetable(e, k, plan, roads, state, record):
-    """Move an entity on from instant k to where its trajectory says that it is.
+    """Move an entity from instant k to its trajectory's next position.
 
-    After the end it goes on along the lane where it is, at the speed that it had.
+    After the end it continues along the lane where it is, at its speed.
     """
     m, t = state.follow[e], (k + 1) * plan.dt - state.follow_began[e]
     table, n = roads.timetables[m], roads.timetable_counts[m]
@@ -171,7 +171,7 @@ def move_by_timetable(e, k, plan, roads, state, record):
     record.a[e, k] = (v - record.v[e, k]) / plan.dt
     beyond = t - table[n - 1, ENDS_AT]
     over = k == record.x.shape[1] - 1 or state.ending[STOPS] != 0
-    if beyond > SAME_TIME and over:  # nothing says what would come next
+    if beyond > SAME_TIME and over:  # the file does not define what follows
         record.a[e, k] = record.a[e, k - 1] if k > 0 else 0.0
         return
     if beyond > SAME_TIME:

@@ -61,8 +61,8 @@ def least_length(shape, curvature, metres):
     """Return how many metres of road a body with wheels at full lock needs to move across [m].
 
     The steepest bend of a shape over a length L is 6/L² (cubic) or pi²/(2·L²) (sinusoidal) of the
-    way across, as in ``offset_lasts``; a linear one has kinks, and is given as long as a cubic one.
-    0 for who can go sideways (infinite curvature).
+    lateral distance, as in ``offset_lasts``; a linear one, which has kinks, is as long as a cubic.
+    0 for bodies that can move sideways (infinite curvature).
     """
     if curvature == math.inf:
         return 0.0

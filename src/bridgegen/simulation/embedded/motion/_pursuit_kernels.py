@@ -1,7 +1,7 @@
-"""Speeds that go by another entity, or by a profile: how they begin, and what they ask next.
+"""Speeds relative to another entity, or by a profile: their start and next command.
 
-The formulas are in ``_course_kernels``. Who is moved on before somebody else is seen by that one as
-it will be at the next instant, all others as they are now.
+The formulas are in ``_course_kernels``. An entity refers to those that are moved before it as they
+will be at the next instant, to all others as they are now.
 """
 
 # mypy: allow-untyped-defs
@@ -137,7 +137,7 @@ def start_at_speed(j, plan, state, record):
 
 @kernel
 def follow_course(j, k, plan, roads, state, record):
-    """Set the speed that action j asks of its entity at the instant after k; say if it is over."""
+    """Set the speed that action j commands for the instant after k; return whether it is over."""
     if state.ending[STATUS] != OK:  # its places are not known: the row ends, or begins again
         return
     e, kind = plan.actions[j, WHOM], plan.actions[j, DOES]
@@ -196,7 +196,7 @@ def _follow_speed(j, e, k, passed, plan, state, record):
 
 @kernel
 def _limits(row, e, plan, state):
-    """Return the most acceleration, deceleration, speed and rates of both: said, and possible."""
+    """Return the limits of acceleration, deceleration, speed and jerk, of file and body."""
     limits = np.empty(5)
     for i in range(5):
         limits[i] = state.slots[row[MOST + i]] if row[MOST + i] >= 0 else math.inf

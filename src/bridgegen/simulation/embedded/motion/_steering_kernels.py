@@ -1,4 +1,4 @@
-"""How a vehicle that is told speeds and places in its lane moves along its path.
+"""Motion along a path of a vehicle with commanded speeds and lateral positions.
 
 Its state is ``(5,)`` float64, the columns below; its course ``(·, 4)``: time [s], x, y [m], heading
 [rad] of the reference point.
@@ -17,7 +17,7 @@ STATION, ASIDE, SPEED, SLIDE, TURN = range(5)
 """Metres along the path and to its left; speed [m/s], its part across the lane; turn of the nose
 [rad] from the path's direction."""
 
-REACH = 1.0  # s, in which it would be where it is told to be
+REACH = 1.0  # s, in which it reaches its commanded position
 SLOPE = 0.15  # most of its speed that leads across the lane: it turns its nose by 9 degrees at most
 BEND = 0.15  # 1/m, of its way across the lane: a car turns tighter only to park
 SLIDE_RATE = 1.0  # m/s², of the speed across: comfortable lane keeping has half, evasion four times

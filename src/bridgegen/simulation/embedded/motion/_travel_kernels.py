@@ -1,4 +1,4 @@
-"""How bodies that the storyboard moves go on from one instant to the next."""
+"""Motion of bodies that the storyboard moves, from one instant to the next."""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
@@ -22,8 +22,8 @@ from bridgegen.simulation.embedded.places._place_kernels import (
 )
 
 ENDS, ASKS, LANDS = -1, -2, -3
-"""What ``roads.follows`` says of a path that no node goes on from: the road ends; the lanes of the
-road network are to be looked at; a trajectory ends, on whichever lane is there."""
+"""Values of ``roads.follows`` for a path without a following node: the road ends; the lanes of the
+road network are to be searched; a trajectory ends, on any lane that is there."""
 
 
 @inlined_kernel

@@ -30,8 +30,8 @@ def drive_in_lock_step(
         program: the compiled storyboard.
         setup: makes a batch of some of the rows.
         n: how many there are.
-        driver: of the user's own; its process is begun where it is not running.
-        is_stopped: whether somebody has ended it, and wants no more.
+        driver: the user's own; its process is started if it is not running.
+        is_stopped: returns whether it has been stopped from elsewhere.
 
     Raises:
         DriverError: it has been stopped.

@@ -136,7 +136,7 @@ class Seat:
         """Have the kernel of this name run there; return messages by row.
 
         Raises:
-            DriverError: the driver timed out or died; ``ending`` tells which rows had ended.
+            DriverError: the driver timed out or died; ``ending`` holds which rows had ended.
         """
         if self._roads is None:
             self._begin(plan, roads, state, record)
@@ -207,10 +207,10 @@ def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
     Raises:
         DriverError: it failed.
     """
-    batch.tell(k)
+    batch.fill_inputs(k)
     state = batch.state
     answer, memory, raised = process.call(
-        _answer, state.told[0], state.ahead[0], state.others[0], state.mind[0]
+        _answer, state.inputs[0], state.ahead[0], state.others[0], state.mind[0]
     )
     if answer[RETURNED] == 0.0:
         raise DriverError("raised", raised)
@@ -221,7 +221,7 @@ def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
 
 
 def _not_finite(answer: Float) -> str | None:
-    """Say what is wrong with an answer."""
+    """Return the problem with an answer."""
     for name, column in (("acceleration", ACCELERATION), ("curvature", CURVATURE)):
         if not np.isfinite(answer[column]):
             return f"{name} must be finite, got {answer[column]}"
@@ -259,14 +259,14 @@ def _simulate(
 
 
 def _answer(
-    address: int, told: Float, ahead: Float, others: Float, memory: Float
+    address: int, inputs: Float, ahead: Float, others: Float, memory: Float
 ) -> tuple[Float, Float, str]:
     """Ask the driver; return its answer, what it keeps, and what it raised."""
     answer = np.zeros(ANSWER)
     raised: list[str] = []
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
-        call_from_python(address, (told[EGO:], told[:EGO], ahead, others, memory, answer))
+        call_from_python(address, (inputs[EGO:], inputs[:EGO], ahead, others, memory, answer))
     finally:
         sys.unraisablehook = sys.__unraisablehook__
     return answer, memory, "".join(raised)

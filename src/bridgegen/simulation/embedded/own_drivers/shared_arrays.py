@@ -58,7 +58,7 @@ _mapped: dict[str, tuple[int, mmap.mmap]] = {}
 
 
 def seen(layout: Layout) -> list[np.ndarray]:
-    """Return, in the other process, the arrays that have been put."""
+    """Return, in the other process, the arrays of a layout."""
     size, mapped = _mapped.get(layout.path, (0, None))
     if mapped is None or size != layout.size:
         mapped = _map(layout.path, layout.size)

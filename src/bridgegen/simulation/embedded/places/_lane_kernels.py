@@ -22,8 +22,8 @@ STATION, LEAVE, S, S_LEAVE, NODE, T, T_LEAVE, LEFT, LEFT_LEAVE, RIGHT, RIGHT_LEA
 both places t of the lane's centre and how far left and right of it the carriageway goes [m]."""
 
 SLACK = 1e-6  # m, by which a place may lie beyond its road's end: the rounding of a file
-MARGIN = 1.0  # m, who is this far beside a lane is still taken to be on it
-MOST_TURN = math.pi / 3  # rad, who is turned more from a lane's direction is not on it
+MARGIN = 1.0  # m, up to which an entity beside a lane still counts as on it
+MOST_TURN = math.pi / 3  # rad, an entity turned more from a lane's direction is not on it
 AGAINST = 2.0  # m, by which a lane against whose traffic one is turned counts as farther
 PER_RADIAN = 1.0  # m, by which a lane counts as farther per radian of turn from it
 

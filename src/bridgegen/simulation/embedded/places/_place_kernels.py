@@ -1,4 +1,4 @@
-"""Where entities are put: what a position says, and the way that goes on from there.
+"""Placing entities: the pose of a position, and the path that continues from there.
 
 A way that is not planned yet is asked for: ``state.wanted`` names the route and the node where it
 begins, the row ends, and is run again from its start when it is there.
@@ -113,7 +113,7 @@ def way_from(route, node, roads, state):
 
 @kernel
 def way_ahead(e, roads, state):
-    """Return the path that an entity would take from its lane on if it were put there now.
+    """Return the path that an entity would take from its lane on if it were placed there now.
 
     Its own may end where lanes fork. -1: it is on no lane, or the path is asked for.
     """
@@ -151,9 +151,9 @@ def put_on_lane(e, node, s, aside, turn, roads, state):
 
 @kernel
 def put_in_world(e, x, y, h, roads, state):
-    """Put an entity at a place in the world: on the lane that it finds there, or on none.
+    """Place an entity in the world: on the lane that is there, or on none.
 
-    Who is on no lane goes straight ahead.
+    An entity on no lane goes straight ahead.
     """
     if roads.ground.shape[0] == 0:
         ask(0, GROUND, state)
@@ -202,7 +202,7 @@ def lane_place(c, plan, roads, state):
 def lane_place_by(c, plan, roads, state):
     """Return (node, s, aside) of a RelativeLane or RelativeRoad position, as ``lane_place``.
 
-    Ahead and left are those of the road, or of the lane's traffic where it says so.
+    Ahead and left are those of the road, or of the lane's traffic if the position defines that.
     """
     row = plan.places[c]
     e = row[WHOSE]
@@ -288,14 +288,11 @@ def place_at(number, k, plan, roads, state, record):
 
 @kernel
 def put(e, c, k, plan, roads, state, record):
-    """Put an entity at a position, as it is at instant k.
-
-    Where it is then, ``place_pose`` tells. It keeps its route.
-    """
+    """Place an entity at a position as of instant k, see ``place_pose``. It keeps its route."""
     kind, other = plan.places[c, PLACE_KIND], plan.places[c, WHOSE]
     is_there = other < 0 or state.present[other]
     if not is_there and not (other == e and record.present[e, :k].any()):
-        fail(NOT_THERE, state)  # who comes back may count from where it went
+        fail(NOT_THERE, state)  # an entity that reappears may refer to where it disappeared
         return
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)

@@ -1,7 +1,7 @@
 """The lanes of one road network as tables, and ways along them that are planned on demand.
 
-The rollout asks for a way by two numbers, a route and the node where the way begins; what comes of
-it depends on nothing else, so it does not matter when it is planned, by whom, or for which row.
+The rollout requests a way by two numbers, a route and the node where the way begins; the result
+depends on nothing else, so neither the time of planning nor the thread or row matters.
 """
 
 import math
@@ -39,7 +39,7 @@ class Path(NamedTuple):
         table: ``(L, 6)`` float64: x, y [m], heading [rad], its cosine and sine, curvature [1/m].
         step: between two samples [m].
         spans: ``(J, 11)`` float64, which lanes it leads along; see ``_lane_kernels``.
-        follows: the node that goes on where it ends; -1: the road ends there.
+        follows: the node that continues where it ends; -1: the road ends there.
     """
 
     table: Float

@@ -75,7 +75,7 @@ def _find_zones(zones: Float, one: int, program: Program, ways: Ways) -> None:
 
 
 def _follows(ways: Ways, one: int, other: int) -> bool:
-    """Say whether two paths begin on the same lane: then the one behind follows the other."""
+    """Return whether two paths begin on the same lane: then the one behind follows the other."""
     a, b = ways.routes[one], ways.routes[other]
     if a is None or b is None:
         return False

@@ -49,10 +49,10 @@ class Network:
         courses: Sequence[Mapping[str, Float]] = (),
     ) -> None:
         self._program = program
-        told = courses or [{}] * len(models)
+        given = courses or [{}] * len(models)
         self._ways = [
             Ways(program.on_course(course), model)
-            for model, course in zip(models, told, strict=True)
+            for model, course in zip(models, given, strict=True)
         ]
         self._lock = Lock()
         self._points = np.zeros((len(models), len(program.points), 2))
@@ -294,7 +294,7 @@ def _numbers(rows: Sequence[Sequence[int]]) -> Int:
 
 
 def _stacked(tables: Sequence[np.ndarray], least: int = 0) -> np.ndarray:
-    """Return tables as one array; shorter ones are filled up with rows of -1: nobody's."""
+    """Return tables as one array; shorter ones are padded with rows of -1."""
     longest = max(least, *map(len, tables))
     return np.stack(
         [

@@ -103,7 +103,7 @@ class Ways:
                 self.paths.append(path)
 
     def is_in_junction(self, road_id: str) -> bool:
-        """Say whether a road of the network is part of a junction."""
+        """Return whether a road of the network is part of a junction."""
         return self._model.road(road_id).is_connecting
 
     def _learn_lanes(self) -> None:

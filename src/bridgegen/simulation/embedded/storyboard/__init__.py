@@ -1,4 +1,4 @@
-"""Stories, acts, maneuvers, events and actions: how they begin, go on and end."""
+"""Stories, acts, maneuvers, events and actions: their start, execution and end."""
 
 from bridgegen.simulation.embedded.storyboard._start_kernels import start
 from bridgegen.simulation.embedded.storyboard._storyboard_kernels import decide, finish

@@ -73,7 +73,7 @@ def _end(status, state, record):
 
 @inlined_kernel
 def start_globals(plan, state):
-    """Set values, time of day, controllers and lights; what the start says of a light goes last."""
+    """Set values, time of day, controllers and lights; initial states of lights take precedence."""
     for i in range(state.values.shape[0]):
         state.values[i] = state.slots[plan.values[i]]
     state.clock[0] = math.nan

@@ -42,7 +42,7 @@ from bridgegen.simulation.embedded.storyboard._event_kernels import (
 
 @inlined_kernel
 def finish(k, plan, state):
-    """End what is over at instant k: an action that says so, an element whose children are.
+    """End what is complete at instant k: an action by its own state, an element by its children's.
 
     An event or a group that may run again goes back to standby.
     """
@@ -66,7 +66,7 @@ def finish(k, plan, state):
 
 @inlined_kernel
 def decide(k, plan, roads, state, record):
-    """Stop the scenario, start and stop elements, as the triggers say at instant k."""
+    """Stop the scenario, start and stop elements, by the triggers at instant k."""
     if fires(0, k, plan, state) or ego_is_through(plan, roads, state):
         state.ending[STOPS] = 1
     for x in range(plan.elements.shape[0]):
