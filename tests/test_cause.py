@@ -92,7 +92,7 @@ def test_labels_are_the_only_names():
 def test_a_cause_that_cannot_be_is_refused():
     with pytest.raises(InputError, match="'route-follower' can have it, only planning, control"):
         require(Cause.PERCEPTION, DRIVERS["route-follower"])
-    with pytest.raises(InputError, match="nobody drives"):
+    with pytest.raises(InputError, match="the ego has no driver"):
         require(Cause.UNAVOIDABLE, STORYBOARD)
     for one in CAUSES:
         require(one, WHOLE)

@@ -1,6 +1,6 @@
-"""Why a critical scenario comes to harm: it is replayed with one thing put right at a time.
+"""The quick cause of a critical scenario: it is replayed with one stage corrected at a time.
 
-The first of these after which the scenario is no longer critical is the cause:
+The first of these that makes the scenario uncritical is the cause:
 
 1. *perception*: the driver perceives ideally;
 2. *planning*: a careful and competent driver drives, who perceives ideally, too: that of UN R157
@@ -10,9 +10,8 @@ The first of these after which the scenario is no longer critical is the cause:
 
 Everything else is the same, the random numbers included, which depend on the parameters' values
 alone. A driver without one of these stages, or with one that is ideal already, skips its replay:
-the route follower sees nobody whatever its sensors could tell it, so where a careful driver would
-have seen, its cause is planning. Prediction is a part of planning: the careful drivers have their
-own.
+the route follower perceives nothing, so where a careful driver avoids harm, its cause is planning.
+Prediction is a part of planning: the careful drivers have their own.
 """
 
 from collections.abc import Callable
@@ -77,9 +76,9 @@ class Counterfactual:
 
 
 def counterfactuals(driver: Driver) -> tuple[Counterfactual, ...]:
-    """Return the replays that tell the cause of a driver's harm, in their order.
+    """Return the replays that determine the cause of a driver's harm, in their order.
 
-    None where the file's own actions move the ego: nobody drives it.
+    None where the file's own actions move the ego: it has no driver.
     """
     if driver == egos.STORYBOARD:
         return ()
@@ -99,16 +98,16 @@ def counterfactuals(driver: Driver) -> tuple[Counterfactual, ...]:
 
 
 def require(cause: Cause, driver: Driver) -> None:
-    """Refuse to seek a cause that a driver's harm cannot have.
+    """Check that a driver's harm can have a cause.
 
     Raises:
-        InputError: its perception is ideal, say, or it has none; or nobody drives.
+        InputError: it cannot: the stage is ideal, or missing; or the ego has no driver.
     """
     replays = counterfactuals(driver)
     known = [one for one in CAUSES if one in {replay.cause for replay in replays}]
     if not replays:
         raise InputError(
-            f"cause '{cause.label}': nobody drives the ego, the file's own actions move it"
+            f"cause '{cause.label}': the ego has no driver, the file's own actions move it"
         )
     if cause not in (*known, Cause.UNAVOIDABLE):
         others = ", ".join(one.label for one in (*known, Cause.UNAVOIDABLE))
@@ -121,12 +120,12 @@ def require(cause: Cause, driver: Driver) -> None:
 def causes(
     driver: Driver, critical: Bool, harmless: Callable[[Int, Counterfactual], Bool]
 ) -> npt.NDArray[np.int8]:
-    """Return the cause of each row's harm; NONE of what is not critical, or has nobody to drive.
+    """Return the cause of each row's harm; NONE of an uncritical row, and without a driver.
 
-    Only what is still unexplained is replayed; a row's cause depends on that row alone.
+    Only rows without a cause so far are replayed; a row's cause depends on that row alone.
 
     Args:
-        driver: who drove.
+        driver: of the ego.
         critical: ``(N,)`` bool.
         harmless: replays the rows at some positions, and says which succeed and are not critical
             then.

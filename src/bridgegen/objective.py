@@ -34,7 +34,7 @@ PAPER_FACTOR = {"v_d": 3.6}
 
 @dataclass(frozen=True)
 class Objective:
-    """The rule that turns metrics into F and tells which scenarios are critical.
+    """The rule that turns metrics into F and decides which scenarios are critical.
 
     Every metric is first positivised, x' = value where larger is more critical and −value where
     smaller is, values beyond the metric's cap counting as the cap. Then, on the scale

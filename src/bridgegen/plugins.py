@@ -36,7 +36,7 @@ class PlugIns:
             ours: the names that BridgeGen itself takes.
 
         Raises:
-            UnknownNameError: nobody offers it; names the nearest.
+            UnknownNameError: no package offers it; names the nearest.
             InputError: it cannot be loaded, or takes a name that is in use.
         """
         added = self._points().get(name, [])

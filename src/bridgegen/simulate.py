@@ -1,6 +1,6 @@
-"""One scenario file, whoever wrote it: read, rolled out and measured.
+"""One scenario file, of any origin: read, simulated and measured.
 
-The stages are the pipeline's; of its search, nothing is imported here, for this must start fast.
+The stages are the pipeline's, without imports of the search: this must start fast.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,10 +26,10 @@ from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
 
 @dataclass(frozen=True)
 class FileResult:
-    """What one scenario file came to.
+    """The result of one scenario file.
 
     Attributes:
-        driver: who drove the ego.
+        driver: of the ego, by name.
         status: "ok", or why there is no result.
         seconds: simulated until the stop trigger fired [s].
         parameters: the file's numeric parameters.
@@ -37,8 +37,8 @@ class FileResult:
         rollout: the motion, N = 1.
         conflicts: the conflict analysis, N = 1; `bridgegen.conflict.summary.summarise` gives the
             decisive conflict.
-        cause: what the search that handed the file over found its harm put down to, as its header
-            says; None where it says nothing, or another driver than the file's drives.
+        cause: of its harm, by the search that exported the file, as its header states; None where
+            it states none, or another driver than the file's drives.
     """
 
     driver: str
@@ -52,7 +52,7 @@ class FileResult:
 
     @property
     def incidents(self) -> tuple[Incident, ...]:
-        """What the simulator noticed by itself."""
+        """The incidents that the simulator itself reported."""
         return self.rollout.incidents.get(0, ())
 
 

@@ -16,7 +16,7 @@ from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 
 class AdversarySource:
-    """A `bridgegen.openx.source.Source` of scenarios in which an adversary drives somebody.
+    """A `bridgegen.openx.source.Source` of scenarios in which an adversary drives a participant.
 
     Args:
         inner: makes the scenarios without the adversary's course.

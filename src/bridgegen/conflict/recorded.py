@@ -20,8 +20,7 @@ NO_MAP = (
 """The basis of responsibility without a map."""
 NO_KINDS = "the recording does not say what the participants are: all are taken as cars"
 NO_OFFSET = (
-    "the recording does not tell the offset from the lane: a change of course is judged by the "
-    "motion alone"
+    "the recording has no offset from the lane: a change of course is judged by the motion alone"
 )
 
 

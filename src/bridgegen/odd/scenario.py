@@ -216,7 +216,7 @@ class LogicalScenario(SearchedScenario):
         """Return this scenario at a place where some parameters are what they are.
 
         Args:
-            values: by name, as a map tells them. They leave the search, and what limits them
+            values: by name, as a map has them. They leave the search, and what limits them
                 here has no say over a map; what they limit, they limit still.
         """
         parameters = {

@@ -89,7 +89,7 @@ class EventSection(ShapedSection):
     """Something that happens."""
 
     participant: Word | None = None
-    """Who acts; nobody where the weather changes."""
+    """The participant that acts; none where the weather changes."""
     speed: QuantityField | None = None
     """It takes up this speed [m/s]."""
     rate: QuantityField | None = None

@@ -239,7 +239,7 @@ class Storyboard:
                     path,
                 )
             if given.participant is not None:
-                self._report(f"{name}: the weather is nobody's, it has no participant", path)
+                self._report(f"{name}: the weather has no participant", path)
             yield WeatherChange(given.weather)
         elif given.participant is None:
             self._report(f"{name} must have a participant", path)

@@ -107,12 +107,12 @@ class Weather:
 
 @dataclass(frozen=True)
 class Sensed:
-    """What the ego's sensors made of the others, in the F instants with a frame.
+    """The ego's detections of the others, in the F instants with a frame.
 
     Attributes:
         steps: ``(F,)`` int64, these instants, ascending.
-        seen_by: ``(E, F)`` int64: -1 nobody asks (the ego; who is not there), 0 missed, then who
-            saw it, as `bridgegen.ego.detections` numbers it.
+        seen_by: ``(E, F)`` int64: -1 not applicable (the ego, an absent entity), 0 missed, then
+            the sensor, as `bridgegen.ego.detections` numbers it.
         counts: ``(E, F)`` bool, whether the metrics of perception count it: it is within the range
             of its class.
         x: ``(E, F)`` float64 [m], of the detected box's centre, NaN where nothing was detected.
@@ -151,7 +151,7 @@ class Course:
         steps: ``(P,)`` int64, the instants, ascending.
         way: ``(P,)`` int64, which of the ways; -1 where it follows none.
         station: ``(P,)`` float64, how far along it [m].
-        acceleration: ``(P,)`` float64 [m/s²], as planned; NaN where the driver does not tell.
+        acceleration: ``(P,)`` float64 [m/s²], as planned; NaN where unknown.
         shift: ``(P, 4)`` float64: how far left of the way it means to be [m] before and after a
             change of lanes, where that begins along the way, and its length [m].
     """
@@ -212,7 +212,7 @@ class Playback:
         a: ``(E, T)`` float64 [m/s²], forward acceleration from each instant on; None: not known.
         ttc: ``(T,)`` float64 [s], the ego's least time to collision; None: not known.
         sensed: what the ego's sensors made of the others; None where it perceives nothing.
-        course: where the ego means to go; None where nobody knows.
+        course: of the ego, as planned; None where unknown.
         weather: from the start on, and whenever it changes; empty: not known.
         street_lights: ``(n, 2)`` float64 [m].
         conflict: the decisive one; None if there is none, or it was not analysed.

@@ -40,8 +40,8 @@ ROAD_SCALE = 100
 
 def _line(points: Float, scale: int) -> list[int]:
     units = np.round(points * scale).astype(np.int64)
-    told: list[int] = np.diff(units, axis=0, prepend=0).ravel().tolist()
-    return told
+    steps: list[int] = np.diff(units, axis=0, prepend=0).ravel().tolist()
+    return steps
 
 
 def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, Any]:
@@ -94,16 +94,16 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
 
 
 def _series(p: Playback) -> dict[str, Any]:
-    told: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for name in "xyhva":
         rows = getattr(p, name)
         if rows is not None:
-            told[name] = [packed(row[: p.n_steps], SCALE[name]) for row in rows]
+            found[name] = [packed(row[: p.n_steps], SCALE[name]) for row in rows]
     for name in ("distance", "ttc"):
         row = getattr(p, name)
         if row is not None:
-            told[name] = packed(row[: p.n_steps], SCALE[name])
-    return told
+            found[name] = packed(row[: p.n_steps], SCALE[name])
+    return found
 
 
 def _lamp(lamp: Lamp, n_steps: int) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
 
     The numbers are the detected centre [cm from the true one], the heading [0.1 mrad from the true
     one], length and width [cm], confidence [%]; where it was taken for something else, what for.
-    The letter: ``-`` nobody asks, ``0`` missed, ``1`` to ``3`` who saw it; ``m``, ``a`` to ``c``
+    The letter: ``-`` not applicable, ``0`` missed, ``1`` to ``3`` the sensor; ``m``, ``a`` to ``c``
     the same beyond what the metrics count.
     """
     kept = s.steps < p.n_steps
@@ -141,19 +141,19 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
     entities = []
     for e, body in enumerate(p.entities):
         seen, counts = s.seen_by[e, kept], s.counts[e, kept]
-        told = np.flatnonzero(seen > 0)
-        k = steps[told]
+        detected = np.flatnonzero(seen > 0)
+        k = steps[detected]
         cos, sin = np.cos(p.h[e, k]), np.sin(p.h[e, k])
-        turn = s.h[e, kept][told] - p.h[e, k]
+        turn = s.h[e, kept][detected] - p.h[e, k]
         columns = [
-            (s.x[e, kept][told] - (p.x[e, k] + body.center_ahead * cos)) * SCALE["length"],
-            (s.y[e, kept][told] - (p.y[e, k] + body.center_ahead * sin)) * SCALE["length"],
+            (s.x[e, kept][detected] - (p.x[e, k] + body.center_ahead * cos)) * SCALE["length"],
+            (s.y[e, kept][detected] - (p.y[e, k] + body.center_ahead * sin)) * SCALE["length"],
             (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi))) * SCALE["h"],
-            s.length[e, kept][told] * SCALE["length"],
-            s.width[e, kept][told] * SCALE["width"],
-            s.confidence[e, kept][told] * SCALE["confidence"],
+            s.length[e, kept][detected] * SCALE["length"],
+            s.width[e, kept][detected] * SCALE["width"],
+            s.confidence[e, kept][detected] * SCALE["confidence"],
         ]
-        kind = s.kind[e, kept][told]
+        kind = s.kind[e, kept][detected]
         wrong = np.flatnonzero(kind != s.kind_of[e])
         letters = [
             "-" if by < 0 else ("0123" if counted else "mabc")[by]

@@ -1,4 +1,4 @@
-"""A recording by somebody else as a rollout, so that metrics are the same as of our own."""
+"""Another tool's recording as a rollout, so that the same metrics apply."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Recording:
 
     Attributes:
         rollout: N = 1; its ego is the entity that was asked for.
-        has_offset: whether the recording tells the offset from the lane's centre; else it is 0.
+        has_offset: whether the recording has the offset from the lane's centre; else it is 0.
         notes: what was not said by the recording, and what was taken instead.
     """
 
@@ -84,7 +84,7 @@ def read_recording(
 ) -> Recording:
     """Read a trace, another table of states, or the log of esmini.
 
-    Accelerations that are not told are forward differences of the speed.
+    Missing accelerations are forward differences of the speed.
 
     Args:
         path: the file.

@@ -1,4 +1,4 @@
-"""What a simulator hands on: the recorded motion of every entity of every scenario of a batch."""
+"""The result of a simulator: the motion of every entity of every scenario of a batch."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -36,17 +36,17 @@ SIMULATOR_FAILURES = {"raised": 40, "died": 41, "timed out": 42}
 """The status of a row whose simulator failed, by `CallError.kind`."""
 
 WORKER_ENDED = 30
-"""The status of a row that took whoever simulated it with it, twice."""
+"""The status of a row whose simulation ended its worker, twice."""
 
 
 @dataclass(frozen=True)
 class Incident:
-    """Something that the simulator itself noticed.
+    """An event that the simulator itself reported.
 
     Attributes:
         step: the instant.
         kind: "collision", "lane invasion" or "red light".
-        what: with whom, over which marking, which light.
+        what: the other entity, the marking, the light.
     """
 
     step: int
@@ -59,8 +59,8 @@ class Rollout:
     """N simulated scenarios of E entities over T recorded instants; the ego is entity 0.
 
     A position is the OpenSCENARIO reference point: the rear axle's centre on the ground.
-    After a scenario has stopped, its arrays repeat the last recorded state; ``n_steps`` tells
-    how many instants are real.
+    After a scenario has stopped, its arrays repeat the last recorded state; ``n_steps``
+    counts the real instants.
 
     Attributes:
         time_step: seconds between two recorded instants; instant k is at k · time_step.
@@ -81,10 +81,10 @@ class Rollout:
         lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
         event_names: of the V events of the storyboard, in the order of the file.
         began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
-        present: ``(N, E, T)`` bool, who is there at which instant; where somebody is not, the
-            states are finite but meaningless. ``(0, 0, 0)`` where everybody always is.
+        present: ``(N, E, T)`` bool, which entity is present at which instant; where one is
+            absent, its states are finite but meaningless. ``(0, 0, 0)`` where all always are.
         kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
-            nobody says.
+            unknown.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
             instant, in the columns of `bridgegen.ego.detections`; rows of the ego itself
             are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
@@ -98,10 +98,10 @@ class Rollout:
             the centre [m], the route's heading [rad], half the extent along and across the route
             [m]; NaN where a road network has fewer.
         friction: ``(N,)`` float64 [m/s²], what the tyres could give (mu g) as the scenario ended;
-            ``(0,)`` where nobody says.
-        messages: by row, what else there is to say of its failure.
-        incidents: by row, what the simulator noticed by itself, if it does: metrics know more.
-        derived: what several metrics start from, worked out once; see `metrics.metric.shared`.
+            ``(0,)`` where unknown.
+        messages: details of failures, by row.
+        incidents: by row, those that the simulator itself reported.
+        derived: intermediate results that several metrics share; see `metrics.metric.shared`.
     """
 
     time_step: float
@@ -194,8 +194,8 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
                 array if len(array) else np.ones(one.shape, np.bool_)
                 for array, (_, one) in zip(arrays, parts, strict=True)
             ]
-        if len(arrays[0]):  # else nobody records it
+        if len(arrays[0]):  # else it is not recorded
             whole[name] = np.concatenate(arrays)[order]
     messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}
-    incidents = {int(each[row]): told for each, one in parts for row, told in one.incidents.items()}
+    incidents = {int(each[row]): what for each, one in parts for row, what in one.incidents.items()}
     return replace(parts[0][1], **whole, messages=messages, incidents=incidents)

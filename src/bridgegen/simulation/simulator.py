@@ -58,9 +58,8 @@ class Simulator(Protocol[Roads]):
 
         Args:
             models: the road networks.
-            courses: who is where when on each of them, ``(V, 4)`` time [s], x, y [m], heading [rad]
-                by the name of an entity, instead of the timed trajectory that the file has the
-                entity follow; nobody by default.
+            courses: timed trajectories on each of them, ``(V, 4)`` time [s], x, y [m], heading
+                [rad] by the name of an entity, in place of those in the file; none by default.
 
         Raises:
             InputError: a position that is not on a road, or a route that no lane leads along.

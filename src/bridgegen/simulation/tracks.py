@@ -1,7 +1,7 @@
-"""What a recording by somebody else says: a table of states, or the log of esmini, line by line.
+"""The states in another tool's recording: a table, or the log of esmini, line by line.
 
 A table has a header that names its columns: those of a trace (`trace.COLUMNS`), in any order, and
-of `trace.MORE` what is known. A line is the state of one entity at one instant.
+any of `trace.MORE`. A line is the state of one entity at one instant.
 """
 
 import csv

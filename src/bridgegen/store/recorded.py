@@ -123,7 +123,7 @@ class Recorded:
         return self._store.at(_positions(at, self._n))
 
     def digest(self) -> str:
-        """Return what tells these evaluations from others; see `Rows.digest`."""
+        """Return the digest of these evaluations; see `Rows.digest`."""
         return self._digest
 
     @cached_property

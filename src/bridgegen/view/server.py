@@ -79,7 +79,7 @@ class Answer:
 def answer(site: Site, target: str) -> Answer:
     """Return the answer to a GET request for a path with its query.
 
-    What goes wrong inside is told in the answer, as the command line would tell it.
+    An error is the answer, in the words of the command line.
     """
     try:
         return _answer(site, target)
@@ -137,7 +137,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(self._found(), body=False)
 
     def _found(self) -> Answer | None:
-        """Return the answer; None if nobody waits for it any more."""
+        """Return the answer; None if the browser has hung up."""
         if self.headers.get_all("Host", []) not in ([name] for name in self.server.names):
             text = b"This server is for the machine that it runs on.\n"
             return Answer(HTTPStatus.MISDIRECTED_REQUEST, "text/plain", text)

@@ -24,7 +24,7 @@ RED, RED_AND_YELLOW = 1, 2  # of Rollout.lights
 
 
 class Incidents:
-    """Notes what the ego's collision sensor and lane detector tell in one row.
+    """Records the events of the ego's collision sensor and lane detector in one row.
 
     Args:
         stage: with the ego; the sensors are attached to it.

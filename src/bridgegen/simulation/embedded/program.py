@@ -242,7 +242,7 @@ class Program:
         first_time: slot of the start's date [s], -1 if it states none.
         time_passes: whether that date passes.
         absent: ``(E,)`` 1 for who is not there before it is added, else 0.
-        comes_and_goes: whether there are such, or somebody is deleted or leaves.
+        comes_and_goes: whether there are such, or an entity is deleted or leaves.
         leaves: whether others than the ego are gone where their road ends; else they stand there.
         drives: ``(2,)`` whether the driver steers, and sets the speed, at the start.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,

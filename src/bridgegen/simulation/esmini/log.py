@@ -7,7 +7,7 @@ _LONGEST = 300
 
 
 def error_in(log: Path) -> str | None:
-    """Return the first error that a log tells of; None if there is none, or no log.
+    """Return the first error in a log; None if there is none, or no log.
 
     Warnings are ignored: esmini warns of missing 3D models, for example.
     """

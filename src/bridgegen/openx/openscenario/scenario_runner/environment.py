@@ -86,7 +86,7 @@ def _originals(environment: osc.Environment) -> dict[str, float]:
         try:
             found[str(one.name)] = float(str(one.value))
         except ValueError:
-            continue  # a property of somebody else's
+            continue  # another tool's property
     return found
 
 

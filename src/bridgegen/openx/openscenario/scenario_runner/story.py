@@ -59,7 +59,7 @@ def act(
     if events := list(_light_events(recording, roads)):
         groups.append(_group("traffic_lights", HERO, events))
     later = list(changes[1:])
-    if not courses:  # nobody keeps the act alive to its end: the weather, stated again, does
+    if not courses:  # nothing keeps the act alive to its end: stating the weather again does
         later.append((_duration(recording), changes[-1][1]))
     if events := [
         _event(

@@ -93,7 +93,7 @@ class Environments:
             try:
                 percent = min(max(float(said), 0.0), 100.0)
             except ValueError:
-                return None  # somebody else's property of that name
+                return None  # another tool's property of that name
             return float(parse(one.law.formula).evaluate({"x": percent}))
         return None
 
