@@ -6,6 +6,7 @@ import shutil
 import signal
 import sys
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
 
@@ -86,3 +87,21 @@ def browser() -> Iterator[Any]:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def declare_entry_points(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Pretend that an installed package declares entry points in a test's module."""
+
+    def declare(registry: Any, group: str, module: str, **points: str) -> None:
+        found = EntryPoints(
+            EntryPoint(name, f"{module}:{value}", group) for name, value in points.items()
+        )
+
+        def entry_points(**which: str) -> EntryPoints:
+            return found.select(**which)
+
+        monkeypatch.setattr(registry, "_loaded", {})
+        monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
+
+    return declare

@@ -1,7 +1,7 @@
 """Metrics that installed packages add."""
 
 import sys
-from importlib.metadata import EntryPoint, EntryPoints
+from functools import partial
 
 import numpy as np
 import pytest
@@ -29,23 +29,9 @@ ALL_NAN = made("all_nan", lambda rollout: np.full(rollout.shape[0], np.nan))
 
 
 @pytest.fixture
-def installed(monkeypatch):
-    """Pretend that a package declares these entry points."""
+def installed(declare_entry_points):
     sys.modules.setdefault(__name__, sys.modules[__name__])
-    monkeypatch.setattr(metrics.METRICS, "_loaded", {})
-
-    def declare(**points: str) -> None:
-        found = EntryPoints(
-            EntryPoint(name, f"{__name__}:{value}", "bridgegen.metrics")
-            for name, value in points.items()
-        )
-
-        def entry_points(**which: str) -> EntryPoints:
-            return found.select(**which)
-
-        monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
-
-    return declare
+    return partial(declare_entry_points, metrics.METRICS, "bridgegen.metrics", __name__)
 
 
 def test_a_package_adds_its_own(installed, driven):

@@ -1,7 +1,7 @@
 """Simulators that installed packages add."""
 
 import sys
-from importlib.metadata import EntryPoint, EntryPoints
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,23 +20,9 @@ OURS = Kind(
 
 
 @pytest.fixture
-def installed(monkeypatch):
-    """Pretend that a package declares these entry points."""
+def installed(declare_entry_points):
     sys.modules.setdefault(__name__, sys.modules[__name__])
-    monkeypatch.setattr(choice.SIMULATORS, "_loaded", {})
-
-    def declare(**points: str) -> None:
-        found = EntryPoints(
-            EntryPoint(name, f"{__name__}:{value}", "bridgegen.simulators")
-            for name, value in points.items()
-        )
-
-        def entry_points(**which: str) -> EntryPoints:
-            return found.select(**which)
-
-        monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
-
-    return declare
+    return partial(declare_entry_points, choice.SIMULATORS, "bridgegen.simulators", __name__)
 
 
 def test_a_search_runs_in_a_package_s_simulator(installed, tmp_path):
