@@ -1,6 +1,7 @@
 """``bridgegen --help`` shows every command, in a panel, with a summary that is not cut."""
 
 import re
+from importlib.metadata import version
 
 import pytest
 from typer.main import get_command
@@ -27,3 +28,13 @@ def test_a_group_s_summaries_are_not_cut(cli, monkeypatch, group):
     _, out, _ = cli(group, "--help")
     assert all(f"\n  {name}  " in out for name in ROOT.commands[group].commands)
     assert "..." not in out.partition("Commands:")[2]
+
+
+def test_a_bare_call_is_the_help(cli):
+    code, out, _ = cli()
+    assert code == 0
+    assert out.strip() == cli("--help")[1].strip()
+
+
+def test_the_version(cli):
+    assert cli("--version") == (0, f"bridgegen {version('bridgegen')}\n", "")

@@ -4,7 +4,8 @@ import errno
 import os
 import sys
 from contextlib import suppress
-from typing import Any
+from importlib.metadata import version
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -40,7 +41,7 @@ app = typer.Typer(
     cls=PanelledGroup,
     name="bridgegen",
     help="Search an operational design domain for scenarios in which a driving stack fails.",
-    no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -54,6 +55,28 @@ app.add_typer(listing, name="list", rich_help_panel=SEARCH)
 
 ontology = typer.Typer(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"bridgegen {version('bridgegen')}")
+        raise typer.Exit
+
+
+@app.callback()
+def without_command(
+    context: typer.Context,
+    show_version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version and exit.",
+            callback=_print_version, is_eager=True,
+        ),
+    ] = False,
+) -> None:  # fmt: skip
+    """Print the help if no command is given."""
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
