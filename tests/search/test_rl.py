@@ -232,7 +232,7 @@ def test_what_is_no_state_is_refused_and_changes_nothing(name, learners):
         and not key.startswith("memory")
     )  # fmt: skip
     wrong = {
-        "no state": [b"", b"{}\n", state[:50], b"\x80\x04" + state],
+        "not a state": [b"", b"{}\n", state[:50], b"\x80\x04" + state],
         "longer or shorter": [state[:-1], state + b"0"],
         "NaN": [state[:at] + nan + state[at + 4 :]],
     }
