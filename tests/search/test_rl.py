@@ -233,7 +233,7 @@ def test_what_is_no_state_is_refused_and_changes_nothing(name, learners):
     )  # fmt: skip
     wrong = {
         "not a state": [b"", b"{}\n", state[:50], b"\x80\x04" + state],
-        "longer or shorter": [state[:-1], state + b"0"],
+        "wrong length": [state[:-1], state + b"0"],
         "NaN": [state[:at] + nan + state[at + 4 :]],
     }
     for message, states in wrong.items():
@@ -242,7 +242,7 @@ def test_what_is_no_state_is_refused_and_changes_nothing(name, learners):
                 search.restore(one)
             assert search.state() == state
     other = get(name)(PROBLEM, 5, **{**SMALL, "width": 9})
-    with pytest.raises(ValueError, match=f"no state of {name} with these settings and metrics"):
+    with pytest.raises(ValueError, match=f"not a state of {name} with these settings and metrics"):
         other.restore(state)
 
 

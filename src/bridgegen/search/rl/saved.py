@@ -31,9 +31,9 @@ class Saved:
         """
         header, arrays = self._header(), self._arrays.values()
         if not state.startswith(header):
-            raise ValueError(f"not a state of {self.name} with these settings and metrics")
+            raise ValueError(f"it is not a state of {self.name} with these settings and metrics")
         if len(state) != len(header) + sum(array.nbytes for array in arrays):
-            raise ValueError("wrong length")
+            raise ValueError("it has the wrong length")
         parts, at = [], len(header)
         for array in arrays:
             part = np.frombuffer(state, array.dtype, array.size, at).reshape(array.shape)
