@@ -28,6 +28,8 @@ from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
 
 PACKAGE = Path(__file__).parent
+KEPT = "kernels-"
+"""The names of folders begin so that later processes use, too."""
 
 IMPORTED = re.compile(r"^ *from bridgegen\.([\w.]+) import", re.MULTILINE)
 """A module of ours that another one imports from."""
@@ -45,7 +47,7 @@ def cache_folder() -> Path:
     digest = hashlib.sha256(" ".join(versions).encode())
     for source in sorted(_sources()):
         digest.update(source.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:16]}"
+    name = f"{KEPT}{digest.hexdigest()[:16]}"
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         folder = Path(chosen) / name
@@ -76,6 +78,11 @@ def _sources() -> set[Path]:
 def is_compiled() -> bool:
     """Return whether compiled kernels of an earlier run exist, so that this run starts at once."""
     return any(cache_folder().rglob("*.nbi"))
+
+
+def is_kept(folder: Path) -> bool:
+    """Return whether a cache folder outlives this process."""
+    return folder.name.startswith(KEPT)
 
 
 def _for_this_process() -> Path:

@@ -1,7 +1,17 @@
 """The command line: parse, call, print; no logic. Commands are in the order of these imports."""
 
 # ruff: noqa: I001
-from bridgegen.cli import runs, confirmations, comparisons, reproductions, files, lists
+from bridgegen.cli import runs, confirmations, comparisons, reproductions, files, lists, doctor
 from bridgegen.cli.app import app, main
 
-__all__ = ["app", "comparisons", "confirmations", "files", "lists", "main", "reproductions", "runs"]
+__all__ = [
+    "app",
+    "comparisons",
+    "confirmations",
+    "doctor",
+    "files",
+    "lists",
+    "main",
+    "reproductions",
+    "runs",
+]

@@ -16,8 +16,10 @@ FAILED = 3
 """The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,
 130 Ctrl-C."""
 
-SEARCH, RESULTS, FILES, ONTOLOGY = PANELS = ("Search", "Results", "Files", "Ontology")
+PANELS = ("Search", "Results", "Files", "Ontology", "Setup")
 """The panels in which ``bridgegen --help`` lists the commands."""
+
+SEARCH, RESULTS, FILES, ONTOLOGY, SETUP = PANELS
 
 
 class PanelledGroup(TyperGroup):

@@ -1,0 +1,22 @@
+"""The command that examines the installation."""
+
+import typer
+
+from bridgegen.cli import options
+from bridgegen.cli.app import SETUP, app
+
+
+@app.command(rich_help_panel=SETUP)
+def doctor(as_json: options.Json = False) -> None:
+    """Examine this installation: versions, cache, extras.
+
+    Ends with status 2 if something keeps a search from working, or compiles at each start.
+    """
+    from bridgegen.installation import examine
+    from bridgegen.screen.tables import print_table
+
+    found = list(examine())
+    rows = [(one.subject, one.value, one.advice) for one in found]
+    print_table(("subject", "value", "advice"), rows, as_json=as_json)
+    if any(one.is_problem for one in found):
+        raise typer.Exit(2)

@@ -1,0 +1,71 @@
+"""What ``bridgegen doctor`` says of an installation."""
+
+import json
+import re
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from bridgegen import installation, kernel_cache
+from bridgegen.installation import EXTRAS, Finding, examine
+
+PROJECT = Path(__file__).parents[1] / "pyproject.toml"
+
+
+def by_subject() -> dict[str, Finding]:
+    return {one.subject: one for one in examine()}
+
+
+def test_the_command_prints_what_is_installed(cli, monkeypatch, tmp_path):
+    monkeypatch.delenv("ESMINI_LIB", raising=False)
+    code, out, _ = cli("doctor", "--json")
+    assert code == 0
+    rows = {row["subject"]: row for row in json.loads(out)}
+    assert rows["bridgegen"]["value"] == version("bridgegen")
+    assert rows["numba"]["value"] == version("numba")
+    assert rows["esmini"]["advice"].startswith("name libesminiLib.so")
+    code, out, _ = cli("doctor")
+    assert code == 0
+    assert all(subject in out for subject in rows)
+
+
+def test_its_extras_are_those_of_the_project_that_users_install():
+    """Those for developers are left out."""
+    project = tomllib.loads(PROJECT.read_text("utf-8"))["project"]
+    declared = project["optional-dependencies"]
+    assert set(EXTRAS) == set(declared) - {"test", "docs", "browser"}
+    modules = {"jpype1": "jpype"}  # its module has another name
+    for extra, (module, _) in EXTRAS.items():
+        named = {re.match(r"[\w-]+", one)[0] for one in declared[extra]}
+        assert module in {modules.get(one, one) for one in named}
+
+
+def test_what_is_missing_is_a_problem_with_its_remedy(monkeypatch, tmp_path, cli):
+    monkeypatch.setenv("ESMINI_LIB", str(tmp_path / "gone.so"))
+    monkeypatch.setattr(installation, "LIBRARIES", ("numpy", "not-there"))
+    found = by_subject()
+    assert found["esmini"].is_problem
+    assert found["esmini"].value == f"{tmp_path / 'gone.so'}: no such file"
+    assert found["not-there"].advice == "pip install 'not-there'"
+    assert not found["numpy"].is_problem
+    assert cli("doctor")[0] == 2
+
+
+@pytest.mark.parametrize("name", ["numpy", "numba"])
+def test_the_requirement_of_a_package(name):
+    assert re.fullmatch(rf"{name}[<>=].*", installation._requirement(name))
+
+
+def test_a_cache_that_cannot_be_kept_is_a_problem(monkeypatch, tmp_path):
+    kept, lost = tmp_path / "kernels-1", tmp_path / "bridgegen-1"
+    monkeypatch.setattr(kernel_cache, "cache_folder", lambda: lost)
+    assert by_subject()["compiled code"].is_problem
+    monkeypatch.setattr(kernel_cache, "cache_folder", lambda: kept)
+    empty = by_subject()["compiled code"]
+    assert not empty.is_problem
+    assert empty.value == f"{kept}, empty"
+    kept.mkdir()
+    (kept / "a.nbi").touch()
+    assert by_subject()["compiled code"] == Finding("compiled code", str(kept))
