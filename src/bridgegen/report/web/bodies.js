@@ -45,7 +45,7 @@ export function drawBody(c, entity, state, colour, scale) {
   c.restore();
 }
 
-// People, cycles and things: seen from afar they are a few pixels, so they are told by their shape.
+// People, cycles and things: seen from afar they are a few pixels, so their shape identifies them.
 function drawSmall(c, { shape, length, width }, colour, scale) {
   const half = Math.max(0.5 * Math.max(length, width), 2.5 / scale);
   c.beginPath();

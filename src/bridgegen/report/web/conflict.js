@@ -36,19 +36,19 @@ export function fillConflict(kept) {
 export function conflictLines(found) {
   if (!found) return [];
   const line = (name, value, title = "") => element("div", { title }, element("span", { class: "name" }, name), element("b", {}, value));
-  const told = (name) => quantity(...found.numbers[name], 3);
+  const figure = (name) => quantity(...found.numbers[name], 3);
   const lines = [element("h3", {}, "Its conflict"), line("conflict", found.conflict)];
   if (ZONED.includes(found.conflict)) {
     lines.push(
       line("type", found.type, found.type_source), line("partner", found.partner), line("responsible", found.responsible, found.rule_says ?? ""),
-      line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", told("decided")),
+      line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", figure("decided")),
       line("preventable (UN R157)", found.preventable ? "yes" : "no", "whether the careful driver of UN R157 would have avoided it"),
       line("where the ego is met", found.zone_ego), line(`where ${found.partner} is met`, found.zone_other),
     );
   }
-  if (found.conflict === "contact") lines.push(line("severity", shareText(found.numbers.severity[0]), "probability of a MAIS3+ injury"), line("delta-v of the ego", told("delta_v_ego")), line(`delta-v of ${found.partner}`, told("delta_v_other")));
-  else lines.push(line("least TTC", told("ttc")), line("needed deceleration", told("needed_deceleration")));
-  lines.push(line("closing speed", told("closing_normal"), "across the surfaces that meet"), line("harm", told("harm")));
+  if (found.conflict === "contact") lines.push(line("severity", shareText(found.numbers.severity[0]), "probability of a MAIS3+ injury"), line("delta-v of the ego", figure("delta_v_ego")), line(`delta-v of ${found.partner}`, figure("delta_v_other")));
+  else lines.push(line("least TTC", figure("ttc")), line("needed deceleration", figure("needed_deceleration")));
+  lines.push(line("closing speed", figure("closing_normal"), "across the surfaces that meet"), line("harm", figure("harm")));
   return lines;
 }
 

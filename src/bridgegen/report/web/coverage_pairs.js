@@ -30,8 +30,8 @@ export class Pairs {
 
   // The pair that the scatter plot opens with, where both of it are searched.
   telling() {
-    const told = data.rows.telling.slice(0, 2).map((name) => this.parameters.findIndex((parameter) => parameter.name === name));
-    return Math.max(0, this.pairs.findIndex(({ of }) => told.includes(of[0]) && told.includes(of[1])));
+    const leading = data.rows.telling.slice(0, 2).map((name) => this.parameters.findIndex((parameter) => parameter.name === name));
+    return Math.max(0, this.pairs.findIndex(({ of }) => leading.includes(of[0]) && leading.includes(of[1])));
   }
 
   // On the diagonal: right of its row, on top of its column.

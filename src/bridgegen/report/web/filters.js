@@ -27,23 +27,23 @@ class Filters {
     if (!this.values(name)) return;
     if (low === null && high === null) this.ranges.delete(name);
     else this.ranges.set(name, [low ?? -Infinity, high ?? Infinity]);
-    this.tell();
+    this.notify();
   }
 
   inMode(mode) {
     this.mode = mode;
-    this.tell();
+    this.notify();
   }
 
   inRegion(region) {
     this.region = region;
-    this.tell();
+    this.notify();
   }
 
   clear() {
     this.ranges.clear();
     this.region = this.mode = null;
-    this.tell();
+    this.notify();
   }
 
   passes(i) {
@@ -55,7 +55,7 @@ class Filters {
     return this.region === null || isInRegion(i, this.region);
   }
 
-  tell() {
+  notify() {
     document.dispatchEvent(new CustomEvent("filters", { detail: this.ranges }));
   }
 }

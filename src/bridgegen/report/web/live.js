@@ -31,13 +31,13 @@ class Live {
   async fetch() {
     try {
       const response = await fetch(`news?after=${rows.n}`);
-      const told = await response.json();
-      if (told.error) throw new Error(told.error.join("; "));
-      this.finished = told.finished;
-      if (told.rows) this.take(told);
+      const news = await response.json();
+      if (news.error) throw new Error(news.error.join("; "));
+      this.finished = news.finished;
+      if (news.rows) this.take(news);
       const done = `${number(rows.n)} of ${number(data.summary.budget)} evaluations`;
       this.say(this.finished ? `The search has ended: ${done}` : `Live: ${done}`);
-      this.offer(told);
+      this.offer(news);
     } catch (error) {
       this.say(error instanceof TypeError ? "No longer served: this is what was known last" : `Cannot be read: ${error.message}`, "lost");
     }
@@ -51,27 +51,27 @@ class Live {
     if (what) $("live-reload").textContent = `Show ${what}`;
   }
 
-  take(told) {
+  take(news) {
     const shape = () => [rows.critical.includes(1), Boolean(rows.findings), Boolean(data.triage), rows.cause === null, data.regions === null, data.confirmations.map(({ simulator }) => simulator)].join();
     const before = shape();
-    if (told.whole) ["evaluation", "iteration", "critical", "cause"].forEach((name) => { if (rows[name]) rows[name].length = 0; });
-    for (const name of ["evaluation", "iteration", "critical"]) append(rows[name], told.rows[name]);
-    const first = rows.evaluation.length - told.rows.evaluation.length;
-    if (told.rows.cause) rows.cause = append(rows.cause ?? new Array(first).fill(0), told.rows.cause);
-    else if (rows.cause) append(rows.cause, new Array(told.rows.evaluation.length).fill(0));
-    for (const { name, values } of told.rows.columns) {
+    if (news.whole) ["evaluation", "iteration", "critical", "cause"].forEach((name) => { if (rows[name]) rows[name].length = 0; });
+    for (const name of ["evaluation", "iteration", "critical"]) append(rows[name], news.rows[name]);
+    const first = rows.evaluation.length - news.rows.evaluation.length;
+    if (news.rows.cause) rows.cause = append(rows.cause ?? new Array(first).fill(0), news.rows.cause);
+    else if (rows.cause) append(rows.cause, new Array(news.rows.evaluation.length).fill(0));
+    for (const { name, values } of news.rows.columns) {
       const column = columns.get(name);
-      if (told.whole) column.values.length = 0;
+      if (news.whole) column.values.length = 0;
       append(column.values, values);
     }
-    takeFindings(told);
-    const { n, n_failed, n_critical, rank, front } = told.rows;
+    takeFindings(news);
+    const { n, n_failed, n_critical, rank, front } = news.rows;
     Object.assign(rows, { n, n_failed, n_critical, rank, front });
-    Object.assign(data, { summary: told.summary, implausible: told.implausible, ...told.sections });
+    Object.assign(data, { summary: news.summary, implausible: news.implausible, ...news.sections });
     if (shape() !== before) location.reload(); // there is something that the page has no place for yet
     else {
       document.dispatchEvent(new CustomEvent("grown"));
-      filters.tell();
+      filters.notify();
     }
   }
 }

@@ -6,8 +6,8 @@ import { playbacks } from "./playbacks.js";
 // The motion of an evaluation from the server; null if it cannot be had after all.
 async function askMotion(evaluation) {
   try {
-    const told = await (await fetch(`motion/${evaluation}`)).json();
-    return told.playback ? taken({ ...told, playbacks: [told.playback] })[0] : null;
+    const answer = await (await fetch(`motion/${evaluation}`)).json();
+    return answer.playback ? taken({ ...answer, playbacks: [answer.playback] })[0] : null;
   } catch {
     return null;
   }

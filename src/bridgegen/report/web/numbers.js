@@ -26,7 +26,7 @@ export function unitText(unit) {
 // A measured value keeps its decimals when they are zero; a count has none.
 export function measured(value, unit, digits = 4) {
   if (value === null || value === undefined || unit === "count" || Math.abs(value) >= 1e6) return number(value, digits);
-  if (unitText(unit) && Math.abs(value) < 5e-4) return (0).toFixed(digits - 1); // nobody measures a nanometre
+  if (unitText(unit) && Math.abs(value) < 5e-4) return (0).toFixed(digits - 1); // a nanometre is not measured
   if (value < 0) return `−${measured(-value, unit, digits)}`;
   if (!Number.isInteger(value)) return number(value, digits);
   return value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(Math.max(1, Math.abs(value))))));

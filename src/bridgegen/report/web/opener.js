@@ -55,7 +55,7 @@ export class Opener {
     $("no-motion").hidden = true;
     $("player").classList.remove("still");
     this.player.show(playback, play);
-    this.told(playback);
+    this.detail(playback);
   }
 
   // The figures, and how to see the motion.
@@ -66,10 +66,10 @@ export class Opener {
     $("no-motion-name").textContent = `Evaluation ${number(facts.evaluation + 1)}`;
     $("no-motion-command").textContent = `${data.summary.view} --evaluation ${facts.evaluation + 1}`;
     history.replaceState(null, "", `#evaluation-${facts.evaluation + 1}`);
-    this.told(facts);
+    this.detail(facts);
   }
 
-  told(one) {
+  detail(one) {
     fillDetails(one);
     showPicture(one);
     document.dispatchEvent(new CustomEvent("shown", { detail: one.evaluation }));

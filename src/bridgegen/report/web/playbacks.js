@@ -4,7 +4,7 @@ import { data } from "./data.js";
 import { Packed } from "./inflate.js";
 
 export const SOURCES = {
-  kept: "Handed over as files; play it",
+  kept: "Exported as files; play it",
   packed: "Play it",
   served: "Play it: it is simulated when asked for",
   none: "Its motion is not in this page; show its figures, and the command that plays it",

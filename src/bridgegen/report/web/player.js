@@ -19,7 +19,7 @@ export class Player {
   constructor(hook) {
     this.hook = hook;
     this.playing = false;
-    this.toldAt = 0; // [ms], when it was told in words
+    this.describedAt = 0; // [ms], of the last description
     this.position = 0; // in steps; whole on a recorded instant
     this.scene = new Scene($("scene"), () => this.redraw());
     this.curves = new Curves($("curves"), (k) => this.seek(k));
@@ -38,7 +38,7 @@ export class Player {
   show(kept, andPlay = false) {
     this.pause();
     this.kept = unpack(kept);
-    this.chosen = data.kept.indexOf(kept); // −1 of one that was not handed over
+    this.chosen = data.kept.indexOf(kept); // −1 of one that was not exported
     $("scrub").max = this.last;
     $("scene-name").textContent = `${this.kept.name}`;
     $("to-contact").hidden = !this.kept.contacts.length;
@@ -71,7 +71,7 @@ export class Player {
     clearTimeout(this.linking);
     this.linking = setTimeout(() => {
       history.replaceState(null, "", this.address());
-      $("said").textContent = $("now").textContent; // once it rests: who listens is not told every frame
+      $("said").textContent = $("now").textContent; // once it rests: a screen reader does not read every frame
     }, 250);
   }
 
@@ -155,7 +155,7 @@ export class Player {
     this.drawFlag(state);
     $("scrub").value = Math.round(this.position);
     const weather = weatherAt(this.kept, state.index);
-    this.tell(state, weather);
+    this.describe(state, weather);
     this.drawn = {
       scenario: this.kept.name, chosen: this.chosen, position: this.position, ...state,
       screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
@@ -167,9 +167,9 @@ export class Player {
   }
 
   // In words; while it plays, as often as one can read.
-  tell(state, weather) {
-    if (this.playing && performance.now() - this.toldAt < 250) return;
-    this.toldAt = performance.now();
+  describe(state, weather) {
+    if (this.playing && performance.now() - this.describedAt < 250) return;
+    this.describedAt = performance.now();
     const now = stateWords(this.kept, state);
     $("now").textContent = now;
     $("scrub").setAttribute("aria-valuetext", now);
@@ -181,10 +181,10 @@ export class Player {
     const flag = $("flag");
     const contact = this.kept.contacts.some((k) => state.index >= k && state.index < k + 1 / this.kept.time_step);
     const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
-    const told = contact ? "collision" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "smallest gap" : "";
-    flag.hidden = !told;
+    const label = contact ? "collision" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "smallest gap" : "";
+    flag.hidden = !label;
     flag.className = contact ? "" : "near";
-    flag.textContent = told;
+    flag.textContent = label;
   }
 
   connect() {

@@ -1,4 +1,4 @@
-// What the ego's sensors made of the others, over the truth: told apart by shape, not by colour alone.
+// What the ego's sensors made of the others, over the truth: distinguished by shape, not by colour alone.
 
 import { palette } from "./colours.js";
 import { boxCentre, isPlaced } from "./geometry.js";

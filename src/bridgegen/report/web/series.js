@@ -2,11 +2,11 @@
 
 export function unpackSeries(runs, n, scale) {
   const values = new Array(n).fill(null);
-  for (const [first, length, start, ...told] of runs) {
+  for (const [first, length, start, ...rest] of runs) {
     let value = start, step = 0;
     for (let i = 0; i < length; i++) {
       values[first + i] = value / scale;
-      step += told[i] ?? 0;
+      step += rest[i] ?? 0;
       value += step;
     }
   }

@@ -19,7 +19,7 @@ const ROW_HEIGHT = 32; // as in table.css
 const SPARE = 6; // rows above and below those in sight
 
 export class Table {
-  // open(i, play): told the row of the page to be shown.
+  // open(i, play): called with the row of the page to be shown.
   constructor(open) {
     this.open = open;
     this.sorting = { by: "rank", down: false };
@@ -39,8 +39,8 @@ export class Table {
     const listed = (data.summary.harm ? LISTED_OF_HARM : [...LISTED, "severity", "harm"]).filter((name) => metrics.includes(name));
     const chosen = listed.length ? listed : metrics.slice(0, 4), texts = rows.findings ? TEXTS : [];
     if (this.only && !chosen.includes(this.only)) chosen.push(this.only);
-    const told = data.summary.harm ? [...texts, ...chosen] : [...chosen, ...texts];
-    return ["rank", ...told, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : []), ...elsewhere.map(({ column }) => column)];
+    const names = data.summary.harm ? [...texts, ...chosen] : [...chosen, ...texts];
+    return ["rank", ...names, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : []), ...elsewhere.map(({ column }) => column)];
   }
 
   value(name, i) {
@@ -68,8 +68,8 @@ export class Table {
     const { by, down } = this.sorting, sign = down ? -1 : 1, kept = $("only-kept").checked;
     const there = [];
     for (let i = 0; i < rows.critical.length; i++) {
-      const handed = playbacks.keptAt.has(rows.evaluation[i]);
-      if ((rows.critical[i] || handed) && (handed || !kept) && filters.passes(i)) there.push(i);
+      const exported = playbacks.keptAt.has(rows.evaluation[i]);
+      if ((rows.critical[i] || exported) && (exported || !kept) && filters.passes(i)) there.push(i);
     }
     const key = new Map(there.map((i) => [i, this.value(by, i)]));
     const order = (a, b) => {

@@ -41,7 +41,7 @@ export class TableTools {
   verdict(value) {
     const [k, which] = value.split(":").map(Number);
     elsewhere.forEach(({ column }) => filters.ranges.delete(column));
-    if (value === "") filters.tell();
+    if (value === "") filters.notify();
     else filters.set(elsewhere[k].column, which - 0.3, which + 0.3);
   }
 

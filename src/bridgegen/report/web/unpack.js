@@ -13,13 +13,13 @@ const running = (differences) => { let sum = 0; return differences.map((d) => (s
  * x, y of a line's points [m], from the differences in whole units.
  * @returns {[number, number][]}
  */
-export function unpackLine(told) {
+export function unpackLine(packed) {
   /** @type {[number, number][]} */
   const points = [];
   let x = 0, y = 0;
-  for (let i = 0; i < told.length; i += 2) {
-    x += told[i];
-    y += told[i + 1];
+  for (let i = 0; i < packed.length; i += 2) {
+    x += packed[i];
+    y += packed[i + 1];
     points.push([x / data.scale.road, y / data.scale.road]);
   }
   return points;
@@ -46,9 +46,9 @@ function holding(steps, n) {
   return at;
 }
 
-function unpackSensed(told, n) {
-  const steps = running(told.steps), scale = data.scale;
-  const entities = told.entities.map(({ seen, numbers, taken_for }) => {
+function unpackSensed(packed, n) {
+  const steps = running(packed.steps), scale = data.scale;
+  const entities = packed.entities.map(({ seen, numbers, taken_for }) => {
     const kinds = new Map(taken_for);
     let next = 0;
     return [...seen].map((letter) => {
@@ -58,30 +58,30 @@ function unpackSensed(told, n) {
       const [dx, dy, dh, length, width, confidence] = numbers.map((column) => column[i]);
       return {
         by, counts, dx: dx / scale.length, dy: dy / scale.length, dh: dh / scale.h, length: length / scale.length,
-        width: width / scale.width, confidence: confidence / scale.confidence, kind: kinds.has(i) ? told.kinds[kinds.get(i)] : null,
+        width: width / scale.width, confidence: confidence / scale.confidence, kind: kinds.has(i) ? packed.kinds[kinds.get(i)] : null,
       };
     });
   });
-  return { steps, frame: holding(steps, n), entities, tolerance: told.tolerance };
+  return { steps, frame: holding(steps, n), entities, tolerance: packed.tolerance };
 }
 
-function unpackCourse(told, n) {
-  const steps = running(told.steps), p = steps.length, scale = data.scale;
+function unpackCourse(packed, n) {
+  const steps = running(packed.steps), p = steps.length, scale = data.scale;
   const held = (changes, nothing) => {
     const values = new Array(p).fill(nothing);
     changes.forEach(([i, ...value]) => values.fill(value, i));
     return values;
   };
   return {
-    steps, at: holding(steps, n), ways: told.ways.map(unpackLine),
-    way: held(told.way, [-1]).map(([number]) => number),
-    station: unpackSeries(told.station, p, scale.station),
-    acceleration: unpackSeries(told.acceleration, p, scale.a),
-    shift: held(told.shift, [0, 0, 0, 0]),
+    steps, at: holding(steps, n), ways: packed.ways.map(unpackLine),
+    way: held(packed.way, [-1]).map(([number]) => number),
+    station: unpackSeries(packed.station, p, scale.station),
+    acceleration: unpackSeries(packed.acceleration, p, scale.a),
+    shift: held(packed.shift, [0, 0, 0, 0]),
   };
 }
 
-// What the ego's sensors made of an entity in the latest frame; null where nobody asks, or where it is
+// What the ego's sensors made of an entity in the latest frame; null where it does not apply, or where it is
 // too far away for a miss to count.
 export function detectionAt(kept, e, index) {
   const frame = kept.sensed?.frame[index] ?? -1;

@@ -24,25 +24,25 @@ function intentionWords(kept, state) {
 // All that the picture and the curves show now, in sentences.
 export function stateWords(kept, state) {
   const value = (v, unit, places) => (v === null || v === undefined ? "none" : `${v.toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−")} ${unit}`);
-  const told = [`${state.time.toFixed(2)} s`];
+  const parts = [`${state.time.toFixed(2)} s`];
   const [ego] = state.entities;
-  if (kept.contacts.some((k) => state.index >= k && state.index < k + 1 / kept.time_step)) told.push("collision");
-  told.push(`${ego.name} ${value(ego.v, "m/s", 1)}, acceleration ${value(state.a?.[0], "m/s²", 1)}`);
+  if (kept.contacts.some((k) => state.index >= k && state.index < k + 1 / kept.time_step)) parts.push("collision");
+  parts.push(`${ego.name} ${value(ego.v, "m/s", 1)}, acceleration ${value(state.a?.[0], "m/s²", 1)}`);
   const plans = intentionWords(kept, state);
-  if (plans) told.push(plans);
-  told.push(`gap ${value(state.distance, "m", 2)}, time to collision ${value(state.ttc, "s", 1)}`);
+  if (plans) parts.push(plans);
+  parts.push(`gap ${value(state.distance, "m", 2)}, time to collision ${value(state.ttc, "s", 1)}`);
   for (const e of playersOf(kept)) {
     const s = state.entities[e];
     if (e === 0 || !isPlaced(s)) continue;
     const seen = detectionWords(detectionAt(kept, e, state.index));
-    told.push(`${s.name} ${value(s.v, "m/s", 1)}${seen ? `, ${seen}` : ""}`);
+    parts.push(`${s.name} ${value(s.v, "m/s", 1)}${seen ? `, ${seen}` : ""}`);
   }
   state.entities.forEach((s, e) => {
     const off = elsewhereWords(kept, state, e);
-    if (off) told.push(`${s.name} ${off}`);
+    if (off) parts.push(`${s.name} ${off}`);
   });
-  for (const lamp of kept.lamps) told.push(`light ${lamp.name} ${SIGNALS[lightAt(lamp, state.index)] ?? "other"}`);
+  for (const lamp of kept.lamps) parts.push(`light ${lamp.name} ${SIGNALS[lightAt(lamp, state.index)] ?? "other"}`);
   const weather = weatherAt(kept, state.index);
-  if (weather) told.push(weather.words);
-  return `${told.join("; ")}.`;
+  if (weather) parts.push(weather.words);
+  return `${parts.join("; ")}.`;
 }
