@@ -8,6 +8,7 @@ from lxml import etree
 
 from bridgegen.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import versions
 from bridgegen.openx.openscenario.element import references, rewritten, walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.versions import VERSIONS, to_version
@@ -123,3 +124,10 @@ def test_what_1_2_cannot_say_is_refused_with_its_line(s4):
         to_version(scenario, "1.2", "s4")
     assert len(e.value.problems) == 3
     assert to_version(scenario, "1.3", "s4").file_header.rev_minor == 3
+
+
+@pytest.mark.parametrize("name", ["wheel", ""])
+def test_a_controller_s_reference_has_another_name_in_1_2(s4, name):
+    action = osc.ActivateControllerAction(lateral=True, object_controller_ref=name)
+    made = versions._complete(action)
+    assert (made.object_controller_ref, made.controller_ref) == (None, name)

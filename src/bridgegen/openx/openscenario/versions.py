@@ -121,10 +121,10 @@ def _complete(element: Element) -> Element:
         return replace(element, stop_trigger=osc.Trigger())
     if isinstance(element, osc.ObjectController):
         return replace(element, name=None)
-    if isinstance(element, osc.ActivateControllerAction) and element.object_controller_ref:
-        return replace(
-            element, object_controller_ref=None, controller_ref=element.object_controller_ref
-        )
+    if isinstance(element, osc.ActivateControllerAction):
+        named = element.object_controller_ref
+        if named is not None:  # an empty name is one, too
+            return replace(element, object_controller_ref=None, controller_ref=named)
     owners = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.Controller
     if isinstance(element, owners) and element.properties is None:
         return replace(element, properties=osc.Properties())
