@@ -1,4 +1,4 @@
-"""Every figure of Section V, drawn of what the runs came to, for pages of both kinds and papers."""
+"""Every figure of Section V, drawn from the results of the runs, for both pages and for papers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial

@@ -58,7 +58,7 @@ class ReproductionCallbacks:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What a reproduction came to.
+    """The result of a reproduction.
 
     Attributes:
         folder: of all its files.

@@ -114,7 +114,7 @@ class Results:
 
 
 def results_of(protocol: Protocol, runs: Runs, scenario: str) -> Results:
-    """Return what the methods came to in a scenario, with the driver of Section V.
+    """Return the methods' results in a scenario, with the driver of Section V.
 
     T_critic is a run's number of evaluations until the k-th critical scenario, divided by the
     least median of the group's methods; NaN where no method's median run found as many.

@@ -34,7 +34,7 @@ class Run:
         v_d: ``(n,)`` float64 [km/h], likewise.
         fitness: ``(n,)`` float64, the paper's, likewise; larger is more critical.
         critical: ``(n,)`` bool.
-        collision: ``(n,)`` bool, whether the ego touched anybody.
+        collision: ``(n,)`` bool, whether the ego collided.
         cause: ``(n,)`` int8, a `bridgegen.cause.Cause` each.
         seconds: [s] of search.
         seconds_at: ``(n,)`` float64 [s], when each was done.

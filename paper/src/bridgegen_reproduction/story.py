@@ -43,7 +43,7 @@ FEW = 50
 
 @dataclass(frozen=True)
 class Found:
-    """All that the runs came to.
+    """The results of all runs.
 
     Attributes:
         protocol: what was run.
@@ -75,7 +75,7 @@ def tell(found: Found, pictures: Mapping[str, Picture]) -> Document:
     """Return the document.
 
     Args:
-        found: what the runs came to.
+        found: the results of the runs.
         pictures: by name; one that is not there is left out.
     """
     protocol = found.protocol
