@@ -117,8 +117,8 @@ def confirm(
     here = pipeline_of(run, command, ego=ego)
     stage("compile")
     here.warm_up()
-    with open_workers(workers) as crew:
-        there = pipeline_of(run, command, ego=ego, elsewhere=simulator, workers=crew)
+    with open_workers(workers) as pool:
+        there = pipeline_of(run, command, ego=ego, elsewhere=simulator, workers=pool)
         empty = _empty(here, there, simulator, run)
         known = {} if again else _known(place, empty, every)
         todo = [k for k in asked if k not in known or known[k].there is None]

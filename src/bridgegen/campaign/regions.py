@@ -87,8 +87,8 @@ def regions_of(
         raise InputError(f"0 <= seed <= {MAX_SEED} must hold, got {seed}")
     run = Run(folder)
     rows, settings, place = run.rows(), run.settings, run.folder
-    with open_workers(workers) as crew:
-        pipeline = pipeline_of(run, "regions", ego=ego, simulator=simulator, workers=crew)
+    with open_workers(workers) as pool:
+        pipeline = pipeline_of(run, "regions", ego=ego, simulator=simulator, workers=pool)
         space, ok = pipeline.space, rows.status == 0
         check(space, rows.critical[ok], samples, at_least)
         stage("compile")
