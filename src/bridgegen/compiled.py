@@ -2,6 +2,7 @@
 
 import ctypes
 import gc
+import hashlib
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -11,9 +12,11 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, event
 from numba.core.imputils import lower_getattr_generic
+from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
-from bridgegen.kernel_cache import KernelCache, compiling
+from bridgegen.compilation.cache import KernelCache
+from bridgegen.compilation.passes import KernelCompiler, for_kernel, is_for_kernel
 
 
 class _RelaxGarbageCollection(event.Listener):  # type: ignore[misc]
@@ -44,27 +47,42 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """
     compiled = _compile(function)
     if not numba.config.DISABLE_JIT:
-        compiled._cache = KernelCache(function)
-        compile_or_load = compiled.compile
-
-        def compile_alone(signature: Any) -> Any:
-            with compiling():
-                return compile_or_load(signature)
-
-        compiled.compile = compile_alone
+        _compile_by_ourselves(compiled)
     return cast(Callable[..., Any], compiled)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a part of a kernel: as ``kernel`` does, but into each kernel that calls it.
 
-    For what runs at every instant and takes many arrays, whose descriptions a call would copy.
+    For what takes or returns tuples of many arrays, which a call would copy.
     """
     return cast(Callable[..., Any], _compile(function, inline="always"))
 
 
-def _compile(function: Callable[..., Any], **options: bool | str) -> Any:
+def _compile_by_ourselves(compiled: Any) -> None:
+    """Have a kernel's code cached, and callable from Python only where Python calls it."""
+    compiled._cache = KernelCache(compiled.py_func)
+    compile_or_load, add = compiled.compile, compiled.add_overload
+
+    def compile_alone(signature: Any) -> Any:
+        with compiled._cache.compiling():
+            known = compiled.overloads.get(normalize_signature(signature)[0])
+            if known and known.library.inner and not is_for_kernel():
+                del compiled.overloads[known.signature.args]  # Python needs a wrapper
+            return compile_or_load(signature)
+
+    def add_overload(result: Any) -> None:
+        if result.library.inner:
+            compiled.overloads[result.signature.args] = result
+        else:
+            add(result)
+
+    compiled.compile, compiled.add_overload = compile_alone, add_overload
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
     options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    options["pipeline_class"] = KernelCompiler
     compiled: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:
         resolve = compiled.get_call_template
@@ -72,7 +90,8 @@ def _compile(function: Callable[..., Any], **options: bool | str) -> Any:
         def resolve_alike(given: Any, named: Any) -> Any:
             """Compile a function once for any number, not once more for every constant given."""
             plain = numba.types.unliteral
-            return resolve([plain(a) for a in given], {k: plain(a) for k, a in named.items()})
+            with for_kernel():
+                return resolve([plain(a) for a in given], {k: plain(a) for k, a in named.items()})
 
         compiled.get_call_template = resolve_alike
     return compiled
@@ -102,7 +121,8 @@ class Bundle(numba.types.Type):  # type: ignore[misc]
 
     def __init__(self, held: Any) -> None:
         self.held = held
-        super().__init__(name=f"Bundle({held})")
+        digest = hashlib.sha256(str(held).encode()).hexdigest()[:12]  # a symbol names all its types
+        super().__init__(name=f"Bundle({held.instance_class.__name__}-{digest})")
 
 
 @numba.extending.register_model(Bundle)
@@ -215,9 +235,10 @@ def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
             _INTERPRETED.append(function)
         return 1 + _INTERPRETED.index(function)
     compiled: Any = function
-    compiled.compile(kinds)
-    found = compiled.overloads[kinds]
-    address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    with compiled._cache.compiling(), for_kernel():
+        compiled.compile(kinds)
+        found = compiled.overloads[kinds]
+        address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
     return address
 
 

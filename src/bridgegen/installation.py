@@ -79,7 +79,8 @@ def _requirement(name: str) -> str:
 
 
 def _cache() -> Finding:
-    from bridgegen.kernel_cache import cache_folder, is_compiled, is_kept
+    from bridgegen.compilation.cache import is_compiled
+    from bridgegen.compilation.folder import cache_folder, is_kept
 
     folder = cache_folder()
     if not is_kept(folder):

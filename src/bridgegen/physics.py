@@ -1,6 +1,6 @@
 """Physical constants that several stages share, each stated once, with its unit and source.
 
-Kernels freeze them; ``kernel_cache`` counts this module as a source of theirs.
+Kernels freeze them; ``compilation.sources`` counts this module as a source of theirs.
 """
 
 GRAVITY = 9.81

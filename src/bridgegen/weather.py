@@ -7,7 +7,7 @@ What a quantity does to sensors and tyres is a law of its own, in ``ego._weather
 A new quantity needs besides its entries here: its part and property in ``bridgegen.owl``; its
 parameter in ``catalogue/weather.yaml``; if it is simulated, the name of its column in
 ``ego._weather_columns`` and its effect. Kernels read their columns from this module:
-``kernel_cache`` counts it as a source of theirs.
+``compilation.sources`` counts it as a source of theirs.
 
 CARLA publishes no units for its percentages. The laws that make physical quantities of them are
 ours.

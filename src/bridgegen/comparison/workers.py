@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from bridgegen.comparison.runs import RunCallbacks, Task, attempt
-from bridgegen.kernel_cache import is_compiled
+from bridgegen.compilation.cache import is_compiled
 from bridgegen.workers.process import Process, Said
 from bridgegen.workers.processes import ending
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 
 OTHERS_COLLIDE, OVERLAP_AT_START, SIDEWAYS, ACCELERATION, DECELERATION = 1, 2, 3, 4, 5
 CURVATURE, LATERAL_ACCELERATION, JUMP = 6, 7, 8
@@ -47,7 +47,7 @@ def overlap_depth(box_a, box_b, dx, dy, cos_a, sin_a, cos_b, sin_b):
     )
 
 
-@inlined_kernel
+@kernel
 def _first_contact(distance, n):
     """Return the last instant that is judged: that of the ego's first contact, else the last."""
     last = n - 1

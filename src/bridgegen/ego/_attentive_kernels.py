@@ -28,7 +28,7 @@ Sources: UN Regulation 157, 01 series of amendments, annex 3 (reaction, braking,
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._careful_kernels import EASY_TO_STOP
 from bridgegen.ego._control_kernels import EMERGENCY_FROM
 from bridgegen.ego._following_kernels import (
@@ -108,7 +108,7 @@ def straight_to(path, n, ds, s):
     return math.inf if j > last and last == n - 1 else (j - stride) * ds
 
 
-@inlined_kernel
+@kernel
 def keep_to_leaders(
     e, path, n, ds, p, s, v, right, left, present, seen, far, bodies, kinds, mind
 ):  # fmt: skip
@@ -178,7 +178,7 @@ def keep_to_leaders(
     return asked
 
 
-@inlined_kernel
+@kernel
 def look(
     e, pace, stop, grip, paths, path_n, path_ds, station, on, aside, target, present, seen, far,
     bodies, kinds, meets, zones, claims, stops, halts, lights, mind,

@@ -56,7 +56,7 @@ class Live:
 
     def say_compiling(self) -> None:
         """Explain the delay, once, if the kernels are not compiled yet."""
-        from bridgegen.kernel_cache import is_compiled
+        from bridgegen.compilation.cache import is_compiled
 
         if not self._told and not is_compiled():
             self._told = True

@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -36,7 +36,7 @@ from bridgegen.simulation.embedded.storyboard import decide, finish
 from bridgegen.simulation.embedded.world import run_controllers
 
 
-@inlined_kernel
+@kernel
 def before_driver(k, plan, roads, state, record):
     """Execute the storyboard at instant k, up to its commands for the ego."""
     run_controllers(
@@ -57,7 +57,7 @@ def before_driver(k, plan, roads, state, record):
         record.lights[i, k] = state.lights[i]
 
 
-@inlined_kernel
+@kernel
 def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move all entities to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
@@ -98,7 +98,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         state.ending[N_STEPS] = k + 1
 
 
-@inlined_kernel
+@kernel
 def _repeat(k, record):
     """Repeat instant k up to the end of the record."""
     for array in (record.x, record.y, record.h, record.v, record.a, record.offset):

@@ -85,7 +85,7 @@ def scene_of(plan, roads, state, record):
     )  # fmt: skip
 
 
-@inlined_kernel
+@kernel
 def look_ahead(p, k, scene):
     """Return (whether it is defined, the distance [m], time to collision [s] or headway [s]).
 

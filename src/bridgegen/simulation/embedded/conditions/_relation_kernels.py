@@ -8,7 +8,7 @@ One function, for the code of all instants would grow by it.
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ACCELERATING,
@@ -105,7 +105,7 @@ def look_closely(k, scene):
             scene.observed[p] = look_one(p, k, scene)
 
 
-@inlined_kernel
+@kernel
 def look_one(p, k, scene):
     """Return whether probe p sees at instant k what its condition asks for."""
     kind, e, other = scene.probes[p, PROBE], scene.probes[p, WHO], scene.probes[p, OTHER]
@@ -163,7 +163,7 @@ def look_one(p, k, scene):
     return compare(scene.v[e, k] if measure == LONGITUDINAL else 0.0, rule, limit)  # SPEED
 
 
-@inlined_kernel
+@kernel
 def touch(e, other, k, scene):
     """Return whether the boxes of two entities touch."""
     return (
@@ -176,7 +176,7 @@ def touch(e, other, k, scene):
     )  # fmt: skip
 
 
-@inlined_kernel
+@kernel
 def lasts(p, k, seen, limit, scene):
     """Return whether a probe has seen so long [s] what it sees now."""
     seen = seen and scene.present[scene.probes[p, WHO]]
@@ -185,7 +185,7 @@ def lasts(p, k, seen, limit, scene):
     return seen and scene.held[p] >= limit - AT_END
 
 
-@inlined_kernel
+@kernel
 def angle_of(p, k, scene):
     """Return (whether it is defined, the heading that a condition looks at [rad]).
 
@@ -203,7 +203,7 @@ def angle_of(p, k, scene):
     return defined, (scene.h[other, k] - other_axis) - (h - axis)
 
 
-@inlined_kernel
+@kernel
 def axis_of(e, k, system, scene):
     """Return the heading of an entity's path, or of the reference line of its road [rad].
 
@@ -227,7 +227,7 @@ def axis_of(e, k, system, scene):
     return h - math.asin(min(max(slope, -1.0), 1.0)) - (0.0 if way > 0 else math.pi)
 
 
-@inlined_kernel
+@kernel
 def accelerations(e, k, scene):
     """Return an entity's acceleration forward and to its left [m/s²], over the last step."""
     if k == 0:

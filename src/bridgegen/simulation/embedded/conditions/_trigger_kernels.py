@@ -33,7 +33,7 @@ from bridgegen.simulation.embedded.motion import leave_out_absent
 from bridgegen.simulation.embedded.places._place_kernels import pose_of, way_ahead
 
 
-@inlined_kernel
+@kernel
 def observe(k, plan, roads, state, record):
     """Record the values of all probes at instant k, and which conditions are true."""
     for i in range(plan.marks.shape[0]):
@@ -120,7 +120,7 @@ def checks_of(plan, state):
     )  # fmt: skip
 
 
-@inlined_kernel
+@kernel
 def group_fires(g, k, checks):
     """Return whether a condition group is met as a whole.
 
@@ -151,13 +151,13 @@ def fires_by(trigger, k, checks):
     return False
 
 
-@inlined_kernel
+@kernel
 def fires(trigger, k, plan, state):
     """Return whether a trigger fires at instant k; one that is missing (-1) always does."""
     return trigger < 0 or fires_by(trigger, k, checks_of(plan, state))
 
 
-@inlined_kernel
+@kernel
 def select(trigger, k, plan, state):
     """Record which entities made a trigger fire, for actions that select them.
 

@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import CURVATURE, locate, pose
 from bridgegen.ego._perception_kernels import perceive
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -17,7 +17,7 @@ from bridgegen.simulation.embedded._memory_kernels import (
 )
 
 
-@inlined_kernel
+@kernel
 def observe(k, plan, roads, state, record, step, route, tracks):
     """Let the sensors look, and fill the route ahead ``(P, 4)`` and the tracks ``(M, 12)``.
 

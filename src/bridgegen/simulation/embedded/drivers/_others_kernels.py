@@ -10,7 +10,7 @@ states at instant k, before any entity moves, so the order of the entities does 
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._attentive_kernels import ASKED, LOOK, look, react, see
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION
 from bridgegen.ego._weather_columns import FRICTION
@@ -71,7 +71,7 @@ def begin_waiting(k, plan, roads, state, record):
             begin_lane_change(j, k, plan, roads, state, record)
 
 
-@inlined_kernel
+@kernel
 def move_heeding(e, before, k, plan, roads, state, record):
     """Move an entity on from instant k as its driver allows; see ``_travel_kernels``.
 

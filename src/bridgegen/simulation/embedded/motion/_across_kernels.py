@@ -6,7 +6,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._attentive_kernels import gap_is_free
 from bridgegen.ego._conflict_kernels import LEAST_PACE
 from bridgegen.ego._path_kernels import project
@@ -49,7 +49,7 @@ OF, COUNT, CONTINUOUS = 0, 1, 2
 the left; whether the offset is kept until another action moves the entity across."""
 
 
-@inlined_kernel
+@kernel
 def stop_lateral(j, plan, state):
     """Stop action j, which moves an entity laterally: it keeps its offset."""
     e = plan.actions[j, WHOM]
@@ -59,7 +59,7 @@ def stop_lateral(j, plan, state):
         state.waits[e] = -1
 
 
-@inlined_kernel
+@kernel
 def take_lane(e, k, roads, state, record):
     """Return (node, s, t) of the lane that an entity is on; it follows no trajectory any more.
 
@@ -77,7 +77,7 @@ def take_lane(e, k, roads, state, record):
     return node, s, t
 
 
-@inlined_kernel
+@kernel
 def _lane_of(e, k, roads, state, record):
     """Return (node, t) of the lane that another entity is on, as ``take_lane``."""
     node, _, t = node_under(e, roads, state)

@@ -9,7 +9,7 @@ fast it moves to its left [m/s].
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     BY_BODY,
@@ -99,12 +99,12 @@ def keep_aside(j, k, step, plan, roads, state, record):
     return math.sqrt(step * step - across * across), math.asin(across / step), over
 
 
-@inlined_kernel
+@kernel
 def _limit(row, i, state):
     return state.slots[row[MOST + i]] if row[MOST + i] >= 0 else math.inf
 
 
-@inlined_kernel
+@kernel
 def _beside(e, row, station, seen, roads, state, record):
     """Return how far left of its path an entity is level with another one [m], and a factor.
 

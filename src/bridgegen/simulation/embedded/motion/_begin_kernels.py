@@ -6,7 +6,7 @@ What they do from then on: ``_speed_kernels`` and ``_travel_kernels``.
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     ACQUIRE,
     ADD_ENTITY,
@@ -42,7 +42,7 @@ from bridgegen.simulation.embedded.motion._speed_kernels import (
 )
 
 
-@inlined_kernel
+@kernel
 def begin_motion(j, k, plan, roads, state, record):
     """Begin action j, which moves an entity, at instant k."""
     kind = plan.actions[j, DOES]
@@ -66,7 +66,7 @@ def begin_motion(j, k, plan, roads, state, record):
         begin_follow(j, k, plan, roads, state)
 
 
-@inlined_kernel
+@kernel
 def stop_motion(j, k, plan, roads, state, record):
     """Stop action j, which has not ended: whoever it moved goes on as it is."""
     kind = plan.actions[j, DOES]
@@ -80,7 +80,7 @@ def stop_motion(j, k, plan, roads, state, record):
         stop_route(j, plan, state)
 
 
-@inlined_kernel
+@kernel
 def steers(j, plan):
     """Return whether action j steers its entity, as a driver does."""
     kind = plan.actions[j, DOES]

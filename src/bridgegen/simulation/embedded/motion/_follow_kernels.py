@@ -8,7 +8,7 @@ A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the colu
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import ACQUIRE, DETAIL, DOES, ROW, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
 from bridgegen.simulation.embedded._motion_kernels import standing
@@ -78,7 +78,7 @@ def begin_route(j, k, plan, roads, state, record):
         state.action_ended[j] = True
 
 
-@inlined_kernel
+@kernel
 def end_quest(e, state):
     """End the action that sends an entity to a position, if any."""
     if state.goal_action[e] >= 0:
@@ -86,14 +86,14 @@ def end_quest(e, state):
     state.goal_action[e] = -1
 
 
-@inlined_kernel
+@kernel
 def stop_route(j, plan, state):
     """Stop action j, an AcquirePositionAction: the entity keeps its route."""
     if state.goal_action[plan.actions[j, WHOM]] == j:
         state.goal_action[plan.actions[j, WHOM]] = -1
 
 
-@inlined_kernel
+@kernel
 def arrive(k, plan, state, record):
     """End the actions that send entities to positions which they pass, or stand at, at instant k.
 

@@ -8,7 +8,7 @@ not, its states are those of its last instant, and its actions are over before t
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._prediction_kernels import LOST
 from bridgegen.ego._tracking_kernels import forget
 from bridgegen.simulation.embedded._codes import (
@@ -41,7 +41,7 @@ from bridgegen.simulation.embedded.motion._speed_kernels import stop_longitudina
 from bridgegen.simulation.embedded.places._place_kernels import body_pose, end_follow, put
 
 
-@inlined_kernel
+@kernel
 def goes_by(j, plan):
     """Return the entity by which action j moves its own, -1 if none."""
     kind = plan.actions[j, DOES]
@@ -52,7 +52,7 @@ def goes_by(j, plan):
     return -1
 
 
-@inlined_kernel
+@kernel
 def is_pointless(j, plan, state):
     """Return whether action j is of, or goes by, an entity that is not there."""
     kind, other = plan.actions[j, DOES], goes_by(j, plan)
@@ -117,7 +117,7 @@ def leave(gone, plan, roads, state):
         state.feet[first[gone] : first[gone + 1]] = LOST
 
 
-@inlined_kernel
+@kernel
 def stay_away(e, k, record):
     """Let an entity that is not there keep its states at the instant after k."""
     keep_place(e, k, record)

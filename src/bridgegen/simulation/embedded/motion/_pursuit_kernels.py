@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ACCELERATION,
@@ -158,7 +158,7 @@ def follow_course(j, k, plan, roads, state, record):
         state.speed_action[e] = -1
 
 
-@inlined_kernel
+@kernel
 def seen_at(e, other, k, plan, state, record):
     """Return the instant at which an entity sees another one: the next, if that is known."""
     first = e == 0 and plan.is_driven
@@ -166,7 +166,7 @@ def seen_at(e, other, k, plan, state, record):
     return min(k + 1, record.v.shape[1] - 1) if known else k
 
 
-@inlined_kernel
+@kernel
 def _wanted(j, e, v, plan, state):
     """Return the speed that a relative one is, by the other's."""
     value = state.slots[plan.actions[j, TARGET]]
@@ -311,6 +311,6 @@ def _synchronise(j, e, k, plan, roads, state, record):
     return False
 
 
-@inlined_kernel
+@kernel
 def _slot(slot, state):
     return state.slots[slot] if slot >= 0 else 0.0

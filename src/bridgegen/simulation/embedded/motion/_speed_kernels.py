@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     DIMENSION,
     DOES,
@@ -20,7 +20,7 @@ from bridgegen.simulation.embedded.motion._course_kernels import change_time, ch
 from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course, follow_course
 
 
-@inlined_kernel
+@kernel
 def begin_longitudinal(j, k, plan, roads, state, record):
     """Begin action j, which moves an entity along its path; an earlier one ends."""
     e = plan.actions[j, WHOM]
@@ -33,7 +33,7 @@ def begin_longitudinal(j, k, plan, roads, state, record):
         begin_speed_change(j, k, plan, state)
 
 
-@inlined_kernel
+@kernel
 def begin_speed_change(j, k, plan, state):
     """Begin action j, a SpeedAction to a speed of its own."""
     e, shape, dimension = plan.actions[j, WHOM], plan.actions[j, SHAPE], plan.actions[j, DIMENSION]
@@ -51,7 +51,7 @@ def begin_speed_change(j, k, plan, state):
             state.rate[e] = abs(after - before) / state.speed_lasts[e]
 
 
-@inlined_kernel
+@kernel
 def stop_longitudinal(j, plan, state):
     """Stop action j: its entity keeps the speed that it has."""
     e = plan.actions[j, WHOM]
@@ -60,7 +60,7 @@ def stop_longitudinal(j, plan, state):
         state.rate[e] = math.inf
 
 
-@inlined_kernel
+@kernel
 def command_speed(e, k, plan, roads, state, record):
     """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
     j = state.speed_action[e]

@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import shrinks
 from bridgegen.simulation.embedded._codes import DIMENSION, DOES, KEEP_ASIDE, ROW, SHAPE
 from bridgegen.simulation.embedded._motion_kernels import SAME_TIME, standing
@@ -26,7 +26,7 @@ ENDS, ASKS, LANDS = -1, -2, -3
 road network are to be searched; a trajectory ends, on any lane that is there."""
 
 
-@inlined_kernel
+@kernel
 def move_along_path(e, k, plan, roads, state, record):
     """Move an entity on from instant k at the commanded speed, along its path and across it."""
     dt, before = plan.dt, record.v[e, k]

@@ -9,7 +9,7 @@ begins, the row ends, and is run again from its start when it is there.
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ABSOLUTE,
@@ -61,14 +61,14 @@ LANES, GROUND = -1, -2
 """What is asked for instead of a node: the lanes of the road network; and where they all are."""
 
 
-@inlined_kernel
+@kernel
 def ask(route, node, state):
     """End the row: it needs a way that is not planned yet."""
     state.wanted[0], state.wanted[1] = route, node
     state.ending[STATUS], state.ending[STOPS] = UNPLANNED, 1
 
 
-@inlined_kernel
+@kernel
 def fail(status, state):
     """End the row with a status, unless it has one."""
     if state.ending[STATUS] == 0:
@@ -76,7 +76,7 @@ def fail(status, state):
     state.ending[STOPS] = 1
 
 
-@inlined_kernel
+@kernel
 def end_lateral(e, state):
     """End the action that moves an entity across its path, if any."""
     if state.lateral_action[e] >= 0:
@@ -86,7 +86,7 @@ def end_lateral(e, state):
     state.lateral_action[e] = state.to[e] = state.waits[e] = -1
 
 
-@inlined_kernel
+@kernel
 def end_follow(e, state):
     """End the action that leads an entity along a trajectory, if any."""
     if state.follow_action[e] >= 0:
@@ -94,7 +94,7 @@ def end_follow(e, state):
     state.follow_action[e] = state.follow[e] = -1
 
 
-@inlined_kernel
+@kernel
 def way_from(route, node, roads, state):
     """Return the path that begins with a node and follows a route, or goes straight on.
 
@@ -126,7 +126,7 @@ def way_ahead(e, roads, state):
     return path if path != -2 else state.on[e]
 
 
-@inlined_kernel
+@kernel
 def node_under(e, roads, state):
     """Return (node, s, t) of an entity's place on its path; node -1 if it is on no lane."""
     p = state.on[e]
@@ -321,7 +321,7 @@ def put(e, c, k, plan, roads, state, record):
     put_on_lane(e, node, s, aside, turn, roads, state)
 
 
-@inlined_kernel
+@kernel
 def body_pose(e, roads, state):
     """Return (x, y, heading) of an entity by its place on its path."""
     p = state.on[e]

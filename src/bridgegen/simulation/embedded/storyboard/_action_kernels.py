@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     CONTROL,
     DOES,
@@ -26,7 +26,7 @@ from bridgegen.simulation.embedded.places._place_kernels import body_pose
 from bridgegen.simulation.embedded.world import begin_global
 
 
-@inlined_kernel
+@kernel
 def begin(j, k, plan, roads, state, record):
     """Begin action j at instant k; what is over at once says so."""
     kind = plan.actions[j, DOES]

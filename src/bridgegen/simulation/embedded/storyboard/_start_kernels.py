@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS, STOPS
@@ -21,7 +21,7 @@ from bridgegen.simulation.embedded.world import (
 )
 
 
-@inlined_kernel
+@kernel
 def start(plan, roads, state, record):
     """Set the state and the record's first instant."""
     set_clear(state.weather)
@@ -62,7 +62,7 @@ def start(plan, roads, state, record):
     begin_initially(plan, roads, state, record)
 
 
-@inlined_kernel
+@kernel
 def _end(status, state, record):
     """End a row at its first instant."""
     for array in (record.x, record.y, record.h, record.v, record.a, record.offset):
@@ -71,7 +71,7 @@ def _end(status, state, record):
     state.ending[N_STEPS], state.ending[STATUS] = 1, status
 
 
-@inlined_kernel
+@kernel
 def start_globals(plan, state):
     """Set values, time of day, controllers and lights; initial states of lights take precedence."""
     for i in range(state.values.shape[0]):

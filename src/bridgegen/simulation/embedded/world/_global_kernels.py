@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._weather_kernels import change
 from bridgegen.simulation.embedded._codes import (
     DOES,
@@ -24,7 +24,7 @@ from bridgegen.simulation.embedded._codes import (
 from bridgegen.simulation.embedded.world._signal_kernels import DURATION, enter_phase
 
 
-@inlined_kernel
+@kernel
 def begin_global(j, k, plan, state):
     """Begin action j, which is over at once."""
     which, kind = plan.actions[j, WHOM], plan.actions[j, DOES]
@@ -51,13 +51,13 @@ def begin_global(j, k, plan, state):
     state.action_ended[j] = True
 
 
-@inlined_kernel
+@kernel
 def set_clock(seconds, passes, now, clock):
     """Set the time of day to a date [s], from which it passes or not."""
     clock[0], clock[1], clock[2] = seconds, 1.0 if passes else 0.0, now
 
 
-@inlined_kernel
+@kernel
 def time_of_day(now, clock):
     """Return the date now [s]; NaN where no environment states one."""
     return clock[0] + clock[1] * (now - clock[2])

@@ -1,0 +1,1 @@
+"""Compiling kernels: how they are compiled, and where their code is kept."""
