@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.compiled import borrowed, bundled, pasted_kernel
+from bridgegen.compiled import borrowed, bundled, inlined_kernel
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
@@ -319,7 +319,7 @@ def view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:
         for name, type_ in kind.__annotations__.items()
     )
     code = f"lambda rows{', i' if at else ''}: bundled(kind({items}))"
-    return pasted_kernel(eval(code, {"kind": kind, "borrowed": borrowed, "bundled": bundled}))
+    return inlined_kernel(eval(code, {"kind": kind, "borrowed": borrowed, "bundled": bundled}))
 
 
 plan_of = view(Plan)
