@@ -3,7 +3,7 @@
 import ctypes
 import gc
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import numba
@@ -51,14 +51,6 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return cast(Callable[..., Any], compiled)
 
 
-def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a part of a kernel: as ``kernel`` does, but into each kernel that calls it.
-
-    For what takes or returns tuples of many arrays, which a call would copy.
-    """
-    return cast(Callable[..., Any], _compile(function, inline="always"))
-
-
 def _compile_by_ourselves(compiled: Any) -> None:
     """Have a kernel's code cached, and callable from Python only where Python calls it."""
     compiled._cache = KernelCache(compiled.py_func)
@@ -95,21 +87,6 @@ def _compile(function: Callable[..., Any], **options: Any) -> Any:
 
         compiled.get_call_template = resolve_alike
     return compiled
-
-
-def _borrowed(_: Any, array: Any) -> Any:
-    """In a kernel: the same array, not counted as a reference to its memory.
-
-    Its owner must outlive it. Every reading of an array out of a tuple counts a reference up and
-    down, atomically; with one that is borrowed, the compiler sees that there is nothing to count.
-    """
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        view = context.make_array(signature.args[0])(context, builder, arguments[0])
-        view.meminfo = view.meminfo.type(None)
-        return view._getvalue()
-
-    return array(array), generate
 
 
 class Bundle(numba.types.Type):  # type: ignore[misc]
@@ -176,6 +153,39 @@ def _bundled(_: Any, value: Any) -> Any:
     return Bundle(value)(value), generate
 
 
+def _bundled_row(_: Any, rows: Any, i: Any) -> Any:
+    """In a kernel: a bundle of row i of a named tuple of N rows' arrays; see `bundled`.
+
+    Numbers in the tuple are all rows'.
+    """
+    row = _row_tuple(rows.types, rows.instance_class, 1)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = cgutils.alloca_once(builder, context.get_value_type(row))
+        for at, member in enumerate(rows.types):
+            part = builder.extract_value(arguments[0], at)
+            slot = cgutils.gep_inbounds(builder, place, 0, at)
+            if not isinstance(member, numba.types.Array):
+                builder.store(part, slot)
+                continue
+            here = context.make_array(member)(context, builder, part)
+            there = context.make_array(row.types[at])(context, builder, ref=slot)
+            shape = cgutils.unpack_tuple(builder, here.shape)
+            strides = cgutils.unpack_tuple(builder, here.strides)
+            count = context.get_constant(numba.types.intp, 1)
+            for size in shape[1:]:
+                count = builder.mul(count, size)
+            start = builder.bitcast(here.data, cgutils.voidptr_t)
+            start = builder.gep(start, [builder.mul(arguments[1], strides[0])])
+            there.data = builder.bitcast(start, here.data.type)
+            there.nitems, there.itemsize = count, here.itemsize
+            there.shape = cgutils.pack_array(builder, shape[1:])
+            there.strides = cgutils.pack_array(builder, strides[1:])
+        return builder.bitcast(place, cgutils.voidptr_t)
+
+    return Bundle(row)(rows, numba.types.intp), generate
+
+
 def _called_at(_: Any, address: Any, arrays: Any) -> Any:
     """In a kernel: call the machine code at an address with where each array lies, and how long.
 
@@ -223,6 +233,19 @@ def _kernel_called_at(_: Any, address: Any, arguments: Any) -> Any:
     return DEMAND(address, arguments), generate
 
 
+def compile_for_kernels(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+    """Compile a kernel for other kernels to call, if need be; return its code.
+
+    Args:
+        function: a ``kernel``.
+        kinds: Numba's types of its arguments; see ``row_type`` for those of bundles.
+    """
+    compiled: Any = function
+    with for_kernel():
+        compiled.compile(kinds)
+    return compiled.overloads[kinds]
+
+
 def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
     """Compile a kernel for arguments of some types, if need be; return where its code lies.
 
@@ -235,9 +258,8 @@ def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
             _INTERPRETED.append(function)
         return 1 + _INTERPRETED.index(function)
     compiled: Any = function
-    with compiled._cache.compiling(), for_kernel():
-        compiled.compile(kinds)
-        found = compiled.overloads[kinds]
+    with compiled._cache.compiling():
+        found = compile_for_kernels(function, kinds)
         address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
     return address
 
@@ -251,10 +273,13 @@ def row_type(rows: Any, axes: int = 1) -> Any:
     """
     if numba.config.DISABLE_JIT:
         return None
-    kinds = (numba.typeof(one) for one in rows)
+    return Bundle(_row_tuple([numba.typeof(one) for one in rows], type(rows), axes))
+
+
+def _row_tuple(kinds: Sequence[Any], named: type, axes: int) -> Any:
     arrays = numba.types.Array
-    one_row = (one.copy(ndim=one.ndim - axes) if isinstance(one, arrays) else one for one in kinds)
-    return Bundle(numba.types.NamedTuple(tuple(one_row), type(rows)))
+    row = (one.copy(ndim=one.ndim - axes) if isinstance(one, arrays) else one for one in kinds)
+    return numba.types.NamedTuple(tuple(row), named)
 
 
 _INTERPRETED: list[Callable[..., Any]] = []
@@ -265,8 +290,12 @@ def _interpreted_at(address: int, arguments: tuple[Any, ...]) -> Any:
     return _INTERPRETED[address - 1](*arguments)
 
 
-def _itself(array: Any) -> Any:
-    return array
+def _itself(value: Any) -> Any:
+    return value
+
+
+def _row(rows: Any, i: int) -> Any:
+    return type(rows)(*(one[i] if isinstance(one, np.ndarray) else one for one in rows))
 
 
 def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
@@ -277,9 +306,9 @@ def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
 
 
 if numba.config.DISABLE_JIT:
-    borrowed = bundled = _itself
+    bundled, bundled_row = _itself, _row
     call_at, call_kernel_at = call_from_python, _interpreted_at
 else:
-    borrowed, bundled, call_at, call_kernel_at = map(
-        numba.extending.intrinsic, (_borrowed, _bundled, _called_at, _kernel_called_at)
+    bundled, bundled_row, call_at, call_kernel_at = map(
+        numba.extending.intrinsic, (_bundled, _bundled_row, _called_at, _kernel_called_at)
     )

@@ -35,6 +35,7 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
+from bridgegen.workers.compile_ahead import compiled_ahead
 
 FAR_ROWS = 8
 """Rows per chunk if only the workers' machines have the simulator."""
@@ -131,10 +132,13 @@ class Pipeline:
     @cached_property
     def recipe(self) -> Recipe:
         """Builds this pipeline in a worker, without the objective, which is sent with the rows."""
+        return self._recipe_of(_remade)
+
+    def _recipe_of(self, make: Callable[..., Any]) -> Recipe:
         ego = self._options.ego
         carried = CarriedDriver.of(ego) if ego else None
         options = replace(self._options, ego=None)
-        return Recipe.of(_remade, carried, options, recorded=self.metrics, **self._made_with)
+        return Recipe.of(make, carried, options, recorded=self.metrics, **self._made_with)
 
     @property
     def rows_at_once(self) -> int:
@@ -212,9 +216,21 @@ class Pipeline:
         """
         nominal = self.space.row({})[np.newaxis]
         if self._workers.are_here:
-            self.measure_rows(nominal)
+            with compiled_ahead(self._recipe_of(_compile_ahead)):
+                self.measure_rows(nominal)
         else:
             self._map(type(self).measure_rows, nominal)
+
+    def compile_ahead(self) -> None:
+        """Compile what ``warm_up`` and ``evaluate`` do, beginning with what they need last."""
+        nominal = self.space.row({})[np.newaxis]
+        columns = {name: nominal[:, i] for i, name in enumerate(self.space.names)}
+        roads, rows = self._roads_of(nominal)
+        embedded = self.simulator.embedded
+        still = embedded.batch(roads, rows, columns).compile_ahead()
+        quantities.evaluate(still, self.metrics)
+        for fix in self.fixes:
+            embedded.batch(roads, rows, columns, driver=fix.driver, dry=fix.dry)
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
@@ -443,6 +459,16 @@ def _remade(ego: CarriedDriver | None, options: PipelineOptions, **made_with: An
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
     return pipeline
+
+
+def _compile_ahead(ego: CarriedDriver | None, options: PipelineOptions, **made_with: Any) -> None:
+    """Compile what a pipeline will need; a driver of the user's own is not made for it."""
+    if ego and egos.is_spec(ego.name):
+        options = replace(options, ego=None, ideal=(), metrics=())
+        made_with["recorded"] = None
+    else:
+        options = replace(options, ego=ego.name if ego else None)
+    Pipeline(options=options, **made_with, workers=Threads(1)).compile_ahead()
 
 
 def _harmless(rollout: Rollout, objective: Objective) -> Bool:

@@ -72,6 +72,9 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         callees: symbols of the kernels that it calls, those of linked kernels among them.
     """
 
+    _linking_libraries: list[Any]
+    _final_module: Any
+
     store: ClassVar[CodeStore]
     by_symbol: ClassVar[dict[str, "KernelLibrary"]] = {}
     """Of this process."""

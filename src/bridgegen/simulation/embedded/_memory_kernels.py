@@ -1,21 +1,20 @@
 """Inputs, state and outputs of the compiled rollout: named arrays.
 
 ``Plan`` is the same for all rows. ``Roads`` holds P road networks, ``State`` and ``Record`` N rows;
-``roads_of``, ``state_of`` and ``record_of`` return one, without its first axis, for all other
-kernels. ``State`` is all that a row carries from one instant to the next.
+all kernels but the outermost take a bundle of one, without its first axis (see
+`compiled.bundled_row`). ``State`` is all that a row carries from one instant to the next.
 """
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.compiled import borrowed, bundled, inlined_kernel
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
@@ -310,17 +309,3 @@ def states(n: int, sizes: Mapping[str, int], given: Mapping[str, np.ndarray]) ->
             shape = (one if isinstance(one, int) else sizes[one] for one in axes)
             arrays[name] = np.zeros((n, *shape), dtype=number)
     return State(**arrays)
-
-
-def view(kind: type[NamedTuple], at: str = "") -> Callable[..., Any]:
-    """Return the kernel that bundles a tuple's arrays; of N rows' those of row i if at="[i]"."""
-    items = ", ".join(
-        f"rows.{name}" if type_ in (int, float) else f"borrowed(rows.{name}{at})"
-        for name, type_ in kind.__annotations__.items()
-    )
-    code = f"lambda rows{', i' if at else ''}: bundled(kind({items}))"
-    return inlined_kernel(eval(code, {"kind": kind, "borrowed": borrowed, "bundled": bundled}))
-
-
-plan_of = view(Plan)
-roads_of, state_of, record_of = (view(kind, "[i]") for kind in (Roads, State, Record))

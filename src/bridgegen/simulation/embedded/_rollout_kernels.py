@@ -6,14 +6,12 @@ Both ways run the same functions on the same arrays, so they give the same bits.
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from numba import float64, int64
+
+from bridgegen.compiled import bundled, bundled_row, kernel
 from bridgegen.simulation.embedded._instant_kernels import after_driver, before_driver
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
-    plan_of,
-    record_of,
-    roads_of,
-    state_of,
 )
 from bridgegen.simulation.embedded.drivers import demand
 from bridgegen.simulation.embedded.storyboard import start
@@ -22,10 +20,10 @@ from bridgegen.simulation.embedded.storyboard import start
 @kernel
 def simulate_rows(plan, networks, rows, states, records):
     """Roll out N rows, one after the other; ``rows`` is the road network of each."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
-        roads = roads_of(networks, rows[i])
-        state, record = state_of(states, i), record_of(records, i)
+        roads = bundled_row(networks, rows[i])
+        state, record = bundled_row(states, i), bundled_row(records, i)
         start(plan, roads, state, record)
         for k in range(record.x.shape[1]):
             if state.ending[N_STEPS] > 0:
@@ -35,42 +33,46 @@ def simulate_rows(plan, networks, rows, states, records):
             after_driver(k, demanded, curvature, plan, roads, state, record)
 
 
+PARTS = ((after_driver, (int64, float64, float64)), (before_driver, (int64,)))
+"""Parts of `simulate_rows`, the last first, with the types of what they take before bundles."""
+
+
 @kernel
 def start_rows(plan, networks, rows, states, records):
     """Set the first instant of N rows."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
-        start(plan, roads_of(networks, rows[i]), state_of(states, i), record_of(records, i))
+        start(plan, bundled_row(networks, rows[i]), bundled_row(states, i), bundled_row(records, i))
 
 
 @kernel
 def before_drivers(k, plan, networks, rows, states, records):
     """Do the first half of instant k of the rows that still run."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
-            roads = roads_of(networks, rows[i])
-            before_driver(k, plan, roads, state_of(states, i), record_of(records, i))
+            roads = bundled_row(networks, rows[i])
+            before_driver(k, plan, roads, bundled_row(states, i), bundled_row(records, i))
 
 
 @kernel
 def demand_rows(k, plan, networks, rows, states, records, demanded, curvature):
     """Ask the compiled driver of the rows that still run; fill ``(N,)`` arrays."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
-            roads = roads_of(networks, rows[i])
+            roads = bundled_row(networks, rows[i])
             demanded[i], curvature[i] = demand(
-                k, plan, roads, state_of(states, i), record_of(records, i)
+                k, plan, roads, bundled_row(states, i), bundled_row(records, i)
             )
 
 
 @kernel
 def after_drivers(k, demanded, curvature, plan, networks, rows, states, records):
     """Do the second half of instant k of the rows that still run."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
-            roads = roads_of(networks, rows[i])
-            state, record = state_of(states, i), record_of(records, i)
+            roads = bundled_row(networks, rows[i])
+            state, record = bundled_row(states, i), bundled_row(records, i)
             after_driver(k, demanded[i], curvature[i], plan, roads, state, record)

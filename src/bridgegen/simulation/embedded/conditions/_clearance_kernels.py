@@ -78,89 +78,89 @@ def is_in_ranges(count, first, last, ranges):
 
 
 @kernel
-def node_at(path, station, scene):
+def node_at(path, station, plan, roads, state, record):
     """Return the node that a path leads along at a station."""
-    spans = scene.spans[path]
-    return int(spans[span_at(spans, scene.span_counts[path], station), NODE])
+    spans = roads.spans[path]
+    return int(spans[span_at(spans, roads.span_counts[path], station), NODE])
 
 
 @kernel
-def lane_at(node, x, y, scene):
+def lane_at(node, x, y, plan, roads, state, record):
     """Return the id of the lane of a node's road that a place is on; the node's own if on none."""
-    i = find_cell(scene.cells, 0, x, y)
+    i = find_cell(roads.cells, 0, x, y)
     while i >= 0:
-        if scene.nodes[scene.cell_nodes[i], ROAD] == scene.nodes[node, ROAD]:
-            return scene.nodes[scene.cell_nodes[i], LANE]
-        i = find_cell(scene.cells, i + 1, x, y)
-    return scene.nodes[node, LANE]
+        if roads.nodes[roads.cell_nodes[i], ROAD] == roads.nodes[node, ROAD]:
+            return roads.nodes[roads.cell_nodes[i], LANE]
+        i = find_cell(roads.cells, i + 1, x, y)
+    return roads.nodes[node, LANE]
 
 
 @kernel
-def is_clear(p, k, scene):
+def is_clear(p, k, plan, roads, state, record):
     """Return whether none of probe p's entities is near its own entity, on the lanes that it names.
 
     Near is within its distances ahead and behind, along the entity's path. Without such a lane, or
     for an entity on no lane, there is no clearance.
     """
-    e = scene.probes[p, WHO]
-    row, path = scene.clearances[scene.probes[p, OTHER]], scene.along[p]
+    e = plan.probes[p, WHO]
+    row, path = plan.clearances[plan.probes[p, OTHER]], state.along[p]
     if path < 0:
         return False
-    x, y = scene.x[e, k], scene.y[e, k]
-    table, n, ds = scene.paths[path], scene.counts[path], scene.steps[path]
+    x, y = record.x[e, k], record.y[e, k]
+    table, n, ds = roads.paths[path], roads.counts[path], roads.steps[path]
     s, _ = project(table, n, ds, nearest(table, n, ds, x, y), x, y)
-    node = node_at(path, s, scene)
-    way, lane = scene.nodes[node, WAY], lane_at(node, x, y, scene)
-    traffic, exists = scene.nodes[node, TRAFFIC], False
-    for i in range(scene.nodes[node, FIRST], scene.nodes[node, PAST]):
-        if scene.nodes[i, LANE] == lane:
-            traffic = scene.nodes[i, TRAFFIC]
-    for i in range(scene.nodes[node, FIRST], scene.nodes[node, PAST]):
-        count = lanes_left(lane, scene.nodes[i, LANE], way)
-        counts = row[OPPOSITE] == 1 or scene.nodes[i, TRAFFIC] == traffic
+    node = node_at(path, s, plan, roads, state, record)
+    way, lane = roads.nodes[node, WAY], lane_at(node, x, y, plan, roads, state, record)
+    traffic, exists = roads.nodes[node, TRAFFIC], False
+    for i in range(roads.nodes[node, FIRST], roads.nodes[node, PAST]):
+        if roads.nodes[i, LANE] == lane:
+            traffic = roads.nodes[i, TRAFFIC]
+    for i in range(roads.nodes[node, FIRST], roads.nodes[node, PAST]):
+        count = lanes_left(lane, roads.nodes[i, LANE], way)
+        counts = row[OPPOSITE] == 1 or roads.nodes[i, TRAFFIC] == traffic
         exists = exists or (
-            counts and is_in_ranges(count, row[RANGES], row[RANGES_END], scene.ranges)
+            counts and is_in_ranges(count, row[RANGES], row[RANGES_END], plan.ranges)
         )
     if not exists:
         return False
-    shift = lanes_left(scene.nodes[node, LANE], lane, way)
+    shift = lanes_left(roads.nodes[node, LANE], lane, way)
     with_traffic = way == traffic
-    for other in range(scene.x.shape[0]):
+    for other in range(record.x.shape[0]):
         if (
             other != e
-            and scene.present[other]
+            and state.present[other]
             and row[COUNTS + other] == 1
-            and is_near(p, k, other, s, scene)
-            and is_on_lanes(p, k, other, path, shift, with_traffic, scene)
+            and is_near(p, k, other, s, plan, roads, state, record)
+            and is_on_lanes(p, k, other, path, shift, with_traffic, plan, roads, state, record)
         ):
             return False
     return True
 
 
 @kernel
-def is_near(p, k, other, station, scene):
+def is_near(p, k, other, station, plan, roads, state, record):
     """Return whether a body, or its reference point, is as near along the way as probe p asks."""
-    e, path = scene.probes[p, WHO], scene.along[p]
+    e, path = plan.probes[p, WHO], state.along[p]
     along, _, _, turn = along_path(
-        scene.paths[path], scene.counts[path], scene.steps[path], station, scene.x[e, k],
-        scene.y[e, k], scene.h[e, k], scene.x[other, k], scene.y[other, k], scene.h[other, k],
+        roads.paths[path], roads.counts[path], roads.steps[path], station, record.x[e, k],
+        record.y[e, k], record.h[e, k], record.x[other, k], record.y[other, k], record.h[other, k],
     )  # fmt: skip
     reach = 0.0
-    if scene.probes[p, BOXES] == 1:
-        c, sine, body = math.cos(turn), math.sin(turn), scene.bodies[other]
+    if plan.probes[p, BOXES] == 1:
+        c, sine, body = math.cos(turn), math.sin(turn), plan.bodies[other]
         along += body[2] * c
         reach = 0.5 * (abs(c) * body[0] + abs(sine) * body[1])
-    forward = scene.slots[scene.probes[p, LIMIT]]
-    backward = scene.slots[scene.probes[p, WITHIN]]
+    forward = state.slots[plan.probes[p, LIMIT]]
+    backward = state.slots[plan.probes[p, WITHIN]]
     return along - reach <= forward and along + reach >= -backward
 
 
 @kernel
-def is_on_lanes(p, k, other, path, shift, with_traffic, scene):
+def is_on_lanes(p, k, other, path, shift, with_traffic, plan, roads, state, record):
     """Return whether a body touches, or its reference point is on, the lanes that probe p names."""
-    x, y, h, body = scene.x[other, k], scene.y[other, k], scene.h[other, k], scene.bodies[other]
-    if scene.probes[p, BOXES] == 0:
-        return is_on_lane(p, x, y, path, shift, with_traffic, scene)
+    x, y, h, body = record.x[other, k], record.y[other, k], record.h[other, k], plan.bodies[other]
+    if plan.probes[p, BOXES] == 0:
+        return is_on_lane(p, x, y, path, shift, with_traffic, plan, roads, state, record)
     c, s = math.cos(h), math.sin(h)
     n, m = max(math.ceil(body[0] / SAMPLE), 1), max(math.ceil(body[1] / SAMPLE), 1)
     for i in range(n + 1):
@@ -168,28 +168,28 @@ def is_on_lanes(p, k, other, path, shift, with_traffic, scene):
         for j in range(m + 1):
             w = body[1] * (j / m - 0.5)
             at_x, at_y = x + u * c - w * s, y + u * s + w * c
-            if is_on_lane(p, at_x, at_y, path, shift, with_traffic, scene):
+            if is_on_lane(p, at_x, at_y, path, shift, with_traffic, plan, roads, state, record):
                 return True
     return False
 
 
 @kernel
-def is_on_lane(p, x, y, path, shift, with_traffic, scene):
+def is_on_lane(p, x, y, path, shift, with_traffic, plan, roads, state, record):
     """Return whether a place is on one of the lanes that probe p names, along a path.
 
     ``shift`` is how many lanes to the left of the path's the entity itself is.
     """
-    row = scene.clearances[scene.probes[p, OTHER]]
-    table, n, ds = scene.paths[path], scene.counts[path], scene.steps[path]
-    node = node_at(path, nearest(table, n, ds, x, y), scene)
-    way = scene.nodes[node, WAY]
-    i = find_cell(scene.cells, 0, x, y)
+    row = plan.clearances[plan.probes[p, OTHER]]
+    table, n, ds = roads.paths[path], roads.counts[path], roads.steps[path]
+    node = node_at(path, nearest(table, n, ds, x, y), plan, roads, state, record)
+    way = roads.nodes[node, WAY]
+    i = find_cell(roads.cells, 0, x, y)
     while i >= 0:
-        there = scene.cell_nodes[i]
-        if scene.nodes[there, ROAD] == scene.nodes[node, ROAD]:
-            count = lanes_left(scene.nodes[node, LANE], scene.nodes[there, LANE], way) - shift
-            counts = row[OPPOSITE] == 1 or (scene.nodes[there, TRAFFIC] == way) == with_traffic
-            if counts and is_in_ranges(count, row[RANGES], row[RANGES_END], scene.ranges):
+        there = roads.cell_nodes[i]
+        if roads.nodes[there, ROAD] == roads.nodes[node, ROAD]:
+            count = lanes_left(roads.nodes[node, LANE], roads.nodes[there, LANE], way) - shift
+            counts = row[OPPOSITE] == 1 or (roads.nodes[there, TRAFFIC] == way) == with_traffic
+            if counts and is_in_ranges(count, row[RANGES], row[RANGES_END], plan.ranges):
                 return True
-        i = find_cell(scene.cells, i + 1, x, y)
+        i = find_cell(roads.cells, i + 1, x, y)
     return False

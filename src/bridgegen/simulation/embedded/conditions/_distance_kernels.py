@@ -4,13 +4,8 @@
 # Numba infers what kernels take; their wrappers are typed.
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from bridgegen.arrays import Bool, Float, Int
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import COS, SIN, X, Y, pose, project
 from bridgegen.simulation._box_kernels import box_gap
 from bridgegen.simulation.embedded._codes import (
@@ -28,89 +23,35 @@ from bridgegen.simulation.embedded._codes import (
     TIME_HEADWAY,
     WHO,
 )
-from bridgegen.simulation.embedded._memory_kernels import view
 from bridgegen.simulation.embedded._motion_kernels import nearest
 
 
-class Scene(NamedTuple):
-    """What the probes read that are seldom asked for, by a function of its own."""
-
-    probes: Int
-    slots: Float
-    values: Float
-    clock: Float
-    held: Float
-    lights: npt.NDArray[np.int8]
-    phase_now: Int
-    bodies: Float
-    objects: Int
-    on: Int
-    station: Float
-    paths: Float
-    counts: Int
-    steps: Float
-    points: Float
-    marks: Float
-    along: Int
-    spans: Float
-    span_counts: Int
-    nodes: Int
-    cells: Float
-    cell_nodes: Int
-    clearances: Int
-    ranges: Float
-    x: Float
-    y: Float
-    h: Float
-    v: Float
-    a: Float
-    observed: Bool
-    present: Bool
-    dt: float
-
-
-borrow_scene = view(Scene)
-
-
-@inlined_kernel
-def scene_of(plan, roads, state, record):
-    """Return what these probes read."""
-    return Scene(
-        plan.probes, state.slots, state.values, state.clock, state.held, state.lights,
-        state.phase_now, plan.bodies, plan.objects, state.on, state.station, roads.paths,
-        roads.counts, roads.steps, roads.points, state.marks, state.along, roads.spans,
-        roads.span_counts, roads.nodes, roads.cells, roads.cell_nodes, plan.clearances,
-        plan.ranges, record.x, record.y, record.h, record.v, record.a, state.observed,
-        state.present, plan.dt,
-    )  # fmt: skip
-
-
 @kernel
-def look_ahead(p, k, scene):
+def look_ahead(p, k, plan, roads, state, record):
     """Return (whether it is defined, the distance [m], time to collision [s] or headway [s]).
 
     Distances are absolute. A headway is defined for an entity that moves towards a target not
     behind it, a time to collision for one that approaches it.
     """
-    kind, e, other = scene.probes[p, PROBE], scene.probes[p, WHO], scene.probes[p, OTHER]
-    measure, free = scene.probes[p, MEASURE], scene.probes[p, BOXES] == 1
-    x, y, h, v = scene.x[e, k], scene.y[e, k], scene.h[e, k], scene.v[e, k]
-    own = scene.bodies[e]
+    kind, e, other = plan.probes[p, PROBE], plan.probes[p, WHO], plan.probes[p, OTHER]
+    measure, free = plan.probes[p, MEASURE], plan.probes[p, BOXES] == 1
+    x, y, h, v = record.x[e, k], record.y[e, k], record.h[e, k], record.v[e, k]
+    own = plan.bodies[e]
     if other >= 0:
         ox, oy, oh, w = (
-            scene.x[other, k],
-            scene.y[other, k],
-            scene.h[other, k],
-            scene.v[other, k],
+            record.x[other, k],
+            record.y[other, k],
+            record.h[other, k],
+            record.v[other, k],
         )
         length, width, ahead = (
-            scene.bodies[other, 0],
-            scene.bodies[other, 1],
-            scene.bodies[other, 2],
+            plan.bodies[other, 0],
+            plan.bodies[other, 1],
+            plan.bodies[other, 2],
         )
     else:
-        at = scene.marks if other == AT_MARK else scene.points
-        ox, oy = at[scene.probes[p, PLACE], 0], at[scene.probes[p, PLACE], 1]
+        at = state.marks if other == AT_MARK else roads.points
+        ox, oy = at[plan.probes[p, PLACE], 0], at[plan.probes[p, PLACE], 1]
         if math.isnan(ox):  # there is no such place
             return False, 0.0
         oh = w = length = width = ahead = 0.0
@@ -121,10 +62,10 @@ def look_ahead(p, k, scene):
     else:
         turn, other_turn = 0.0, oh - h
         along, aside = in_frame(ox - x, oy - y, h)
-        path = scene.on[e]
-        if scene.probes[p, SYSTEM] != ENTITY_SYSTEM and path >= 0:
+        path = state.on[e]
+        if plan.probes[p, SYSTEM] != ENTITY_SYSTEM and path >= 0:
             along, aside, turn, other_turn = along_path(
-                scene.paths[path], scene.counts[path], scene.steps[path], scene.station[e],
+                roads.paths[path], roads.counts[path], roads.steps[path], state.station[e],
                 x, y, h, ox, oy, oh,
             )  # fmt: skip
         gap = aside if measure == LATERAL else along

@@ -3,10 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from typing import NamedTuple
-
-from bridgegen.arrays import Bool, Int
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     ALL,
     ANY,
@@ -25,8 +22,7 @@ from bridgegen.simulation.embedded._codes import (
     RISING,
     WHO,
 )
-from bridgegen.simulation.embedded._memory_kernels import TICKS, view
-from bridgegen.simulation.embedded.conditions._distance_kernels import scene_of
+from bridgegen.simulation.embedded._memory_kernels import TICKS
 from bridgegen.simulation.embedded.conditions._probe_kernels import is_in_state, look
 from bridgegen.simulation.embedded.conditions._relation_kernels import look_closely
 from bridgegen.simulation.embedded.motion import leave_out_absent
@@ -44,7 +40,7 @@ def observe(k, plan, roads, state, record):
         for p in range(plan.probes.shape[0]):
             if plan.probes[p, PROBE] == CLEARANCE:
                 state.along[p] = way_ahead(plan.probes[p, WHO], roads, state)
-        look_closely(k, scene_of(plan, roads, state, record))
+        look_closely(k, plan, roads, state, record)
     for p in range(plan.probes.shape[0]):
         if plan.probes[p, CLOSELY] == 0:
             state.looked[p, 0] = state.looked[p, 1]
@@ -93,60 +89,30 @@ def holds(c, k, conditions, history):
     return (edge != FALLING and rises) or (edge != RISING and falls)
 
 
-class Checks(NamedTuple):
-    """What a trigger reads: a few arrays, for it is a function of its own and called often."""
-
-    triggers: Int
-    groups: Int
-    conditions: Int
-    probes: Int
-    observed: Bool
-    history: Bool
-    phase: Int
-    stamps: Int
-    looked: Int
-    ending: Int
-
-
-borrow_checks = view(Checks)
-
-
-@inlined_kernel
-def checks_of(plan, state):
-    """Return what triggers read."""
-    return Checks(
-        plan.triggers, plan.groups, plan.conditions, plan.probes, state.observed, state.history,
-        state.phase, state.stamps, state.looked, state.ending,
-    )  # fmt: skip
-
-
 @kernel
-def group_fires(g, k, checks):
+def group_fires(g, k, plan, state):
     """Return whether a condition group is met as a whole.
 
     What it asks of the storyboard's elements is looked at anew: they may have changed since.
     """
-    conditions, probes = checks.conditions, checks.probes
-    for c in range(checks.groups[g, 0], checks.groups[g, 1]):
+    conditions, probes = plan.conditions, plan.probes
+    for c in range(plan.groups[g, 0], plan.groups[g, 1]):
         first = conditions[c, PROBES]
         if probes[first, PROBE] == ELEMENT_STATE:
             for p in range(first, conditions[c, PROBES_END]):
-                checks.observed[p] = is_in_state(
-                    p, probes, checks.phase, checks.stamps, checks.looked
-                )
-                checks.looked[p, 1] = checks.ending[TICKS]
-            conclude(c, k, conditions, checks.observed, checks.history)
-        if not holds(c, k, conditions, checks.history):
+                state.observed[p] = is_in_state(p, probes, state.phase, state.stamps, state.looked)
+                state.looked[p, 1] = state.ending[TICKS]
+            conclude(c, k, conditions, state.observed, state.history)
+        if not holds(c, k, conditions, state.history):
             return False
-    return checks.groups[g, 1] > checks.groups[g, 0]
+    return plan.groups[g, 1] > plan.groups[g, 0]
 
 
 @kernel
-def fires_by(trigger, k, checks):
+def fires_by(trigger, k, plan, state):
     """Return whether any condition group of a trigger is met."""
-    checks = borrow_checks(checks)
-    for g in range(checks.triggers[trigger, 0], checks.triggers[trigger, 1]):
-        if group_fires(g, k, checks):
+    for g in range(plan.triggers[trigger, 0], plan.triggers[trigger, 1]):
+        if group_fires(g, k, plan, state):
             return True
     return False
 
@@ -154,7 +120,7 @@ def fires_by(trigger, k, checks):
 @kernel
 def fires(trigger, k, plan, state):
     """Return whether a trigger fires at instant k; one that is missing (-1) always does."""
-    return trigger < 0 or fires_by(trigger, k, checks_of(plan, state))
+    return trigger < 0 or fires_by(trigger, k, plan, state)
 
 
 @kernel
@@ -168,7 +134,7 @@ def select(trigger, k, plan, state):
         state.selected[e] = False
     if trigger >= 0:
         for g in range(plan.triggers[trigger, 0], plan.triggers[trigger, 1]):
-            if group_fires(g, k, checks_of(plan, state)):
+            if group_fires(g, k, plan, state):
                 for c in range(plan.groups[g, 0], plan.groups[g, 1]):
                     select_by(c, plan.conditions, plan.probes, state.observed, state.selected)
 

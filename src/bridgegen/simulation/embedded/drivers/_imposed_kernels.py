@@ -5,14 +5,10 @@
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import bundled, bundled_row, kernel
 from bridgegen.ego._path_kernels import project
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
-    plan_of,
-    record_of,
-    roads_of,
-    state_of,
 )
 from bridgegen.simulation.embedded._motion_kernels import STANDS
 from bridgegen.simulation.embedded.drivers._ego_kernels import ego_is_through
@@ -59,11 +55,11 @@ def impose(e, k, x, y, h, v, plan, roads, state, record):
 @kernel
 def impose_rows(k, bodies, imposed, plan, networks, rows, states, records):
     """Impose ``(N, B, 4)`` x, y [m], h [rad], v [m/s] of the bodies ``(B,)`` on rows that run."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
-            roads, state = roads_of(networks, rows[i]), state_of(states, i)
-            record = record_of(records, i)
+            roads, state = bundled_row(networks, rows[i]), bundled_row(states, i)
+            record = bundled_row(records, i)
             for b in range(len(bodies)):
                 x, y, h, v = imposed[i, b]
                 impose(bodies[b], k, x, y, h, v, plan, roads, state, record)
@@ -72,6 +68,6 @@ def impose_rows(k, bodies, imposed, plan, networks, rows, states, records):
 @kernel
 def egos_are_through(plan, networks, rows, states, through):
     """Fill ``(N,)`` bool: whether a driven ego is at the end of its route, or of the road."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
-        through[i] = ego_is_through(plan, roads_of(networks, rows[i]), state_of(states, i))
+        through[i] = ego_is_through(plan, bundled_row(networks, rows[i]), bundled_row(states, i))

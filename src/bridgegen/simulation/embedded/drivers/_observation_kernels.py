@@ -5,15 +5,11 @@
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import bundled, bundled_row, kernel
 from bridgegen.ego._path_kernels import CURVATURE, locate, pose
 from bridgegen.ego._perception_kernels import perceive
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
-    plan_of,
-    record_of,
-    roads_of,
-    state_of,
 )
 
 
@@ -58,10 +54,10 @@ def observe_rows(k, plan, networks, rows, states, records, step, route, tracks, 
 
     ``route (N, P, 4)``, ``tracks (N, M, 12)``, ``stop (N,)`` and ``light (N,)`` int8.
     """
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
-            roads, state = roads_of(networks, rows[i]), state_of(states, i)
+            roads, state = bundled_row(networks, rows[i]), bundled_row(states, i)
             stop[i], light[i] = observe(
-                k, plan, roads, state, record_of(records, i), step, route[i], tracks[i]
+                k, plan, roads, state, bundled_row(records, i), step, route[i], tracks[i]
             )

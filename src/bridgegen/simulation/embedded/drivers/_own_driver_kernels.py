@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import call_at, kernel
+from bridgegen.compiled import bundled, bundled_row, call_at, kernel
 from bridgegen.ego.interface import ROUTE_STEP
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
@@ -13,10 +13,6 @@ from bridgegen.simulation.embedded._memory_kernels import (
     RAISED,
     STATUS,
     STOPS,
-    plan_of,
-    record_of,
-    roads_of,
-    state_of,
 )
 from bridgegen.simulation.embedded.drivers._observation_kernels import observe
 
@@ -67,8 +63,8 @@ def ask(k, plan, roads, state, record):
 @kernel
 def fill_input_rows(k, plan, networks, rows, states, records):
     """Fill its inputs at instant k for the running rows."""
-    plan = plan_of(plan)
+    plan = bundled(plan)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
-            roads = roads_of(networks, rows[i])
-            fill_inputs(k, plan, roads, state_of(states, i), record_of(records, i))
+            roads = bundled_row(networks, rows[i])
+            fill_inputs(k, plan, roads, bundled_row(states, i), bundled_row(records, i))

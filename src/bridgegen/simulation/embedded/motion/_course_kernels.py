@@ -159,7 +159,8 @@ def lay_out(v, acceleration, speeds, times, n, follow, limits, profile):
     else:
         rows = _rounded(count, acceleration, limits, profile[count:], profile)
     for i in range(rows):
-        profile[i] = profile[count + i]
+        for column in range(profile.shape[1]):  # a whole row would compile the text of an error
+            profile[i, column] = profile[count + i, column]
     return rows if rows > 0 else count
 
 

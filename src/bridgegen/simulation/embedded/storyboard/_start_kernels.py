@@ -27,7 +27,8 @@ def start(plan, roads, state, record):
     set_clear(state.weather)
     change(state.weather, plan.weathers, 0, state.slots)
     start_globals(plan, state)
-    state.drives[:] = plan.drives
+    for i in range(plan.drives.shape[0]):  # all at once would compile the text of an error
+        state.drives[i] = plan.drives[i]
     for e in range(record.x.shape[0]):
         state.on[e], state.to[e], state.route[e] = e, -1, plan.routes[e]
         state.lateral_action[e] = state.speed_action[e] = state.follow_action[e] = -1

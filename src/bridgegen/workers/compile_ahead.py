@@ -1,0 +1,38 @@
+"""A process that compiles kernels while this one compiles others."""
+
+import os
+import queue
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numba
+
+from bridgegen.compilation.cache import is_compiled
+from bridgegen.workers.process import Process, Said
+from bridgegen.workers.recipe import Recipe
+
+
+@contextmanager
+def compiled_ahead(recipe: Recipe) -> Iterator[None]:
+    """Have another process follow a recipe meanwhile, if nothing is compiled and a core is free.
+
+    Both put what they compile into the cache, and neither compiles what the other one does.
+
+    Args:
+        recipe: of a call that compiles what will be needed, the last first.
+    """
+    if is_compiled() or numba.config.DISABLE_JIT or (os.cpu_count() or 1) == 1:
+        yield
+        return
+    said: Said = queue.SimpleQueue()
+    with open(os.devnull, "wb") as nowhere:
+        helper = Process(said, errors=nowhere)
+    helper.call(_follow, recipe)
+    try:
+        yield
+    finally:
+        helper.end()
+
+
+def _follow(recipe: Recipe) -> None:
+    recipe.make()
