@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen import installation, kernel_cache
+from bridgegen import installation
+from bridgegen.compilation import folder
 from bridgegen.installation import EXTRAS, Finding, examine
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
@@ -60,9 +61,9 @@ def test_the_requirement_of_a_package(name):
 
 def test_a_cache_that_cannot_be_kept_is_a_problem(monkeypatch, tmp_path):
     kept, lost = tmp_path / "kernels-1", tmp_path / "bridgegen-1"
-    monkeypatch.setattr(kernel_cache, "cache_folder", lambda: lost)
+    monkeypatch.setattr(folder, "cache_folder", lambda: lost)
     assert by_subject()["compiled code"].is_problem
-    monkeypatch.setattr(kernel_cache, "cache_folder", lambda: kept)
+    monkeypatch.setattr(folder, "cache_folder", lambda: kept)
     empty = by_subject()["compiled code"]
     assert not empty.is_problem
     assert empty.value == f"{kept}, empty"

@@ -12,8 +12,8 @@ import pytest
 import bridgegen
 
 FOLDER = """
-from bridgegen import kernel_cache
-print(kernel_cache.cache_folder())
+from bridgegen.compilation import folder
+print(folder.cache_folder())
 """
 COMPILES = """
 import sys
@@ -58,12 +58,6 @@ def test_the_cache_lies_in_the_user_s_cache_folder(tmp_path):
     assert folder(HOME=str(tmp_path)).is_relative_to(tmp_path / ".cache" / "bridgegen")
 
 
-SOURCES = """
-from bridgegen import kernel_cache
-print(*sorted(one.name for one in kernel_cache._sources()))
-"""
-
-
 FULL = """
 import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -81,23 +75,11 @@ def test_a_full_disk_costs_the_cache_only(tmp_path):
     assert result(begin(FULL + COMPILES, tmp_path, **environment)) == "1"
 
 
-def test_a_constant_that_kernels_take_from_elsewhere_counts(tmp_path):
-    """Numba bakes it into the code: with another value, the code is another."""
+def test_the_folder_is_the_same_whatever_the_source(tmp_path):
+    """What of it is used depends on the source: see test_sources."""
     shutil.copytree(Path(bridgegen.__file__).parent, tmp_path / "bridgegen")
     environment = {"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)}
-    named = result(begin(SOURCES, **environment)).split()
-    assert {"_rollout_kernels.py", "_codes.py", "kinds.py"} <= set(named)
-    assert {"detections.py", "physics.py", "weather.py"} <= set(named)
-    before = folder(**environment)
-    for name in ("ego/detections.py", "physics.py", "weather.py"):
-        source = tmp_path / "bridgegen" / name
-        source.write_text(source.read_text("utf-8") + "\nANOTHER = 1.0\n", "utf-8")
-        after = folder(**environment)
-        assert after != before, name
-        before = after
-    elsewhere = tmp_path / "bridgegen" / "cli" / "app.py"
-    elsewhere.write_text(elsewhere.read_text("utf-8") + "\n", "utf-8")
-    assert folder(**environment) == after
+    assert folder(**environment) == folder(HOME=str(tmp_path))
 
 
 def test_the_user_may_say_where(tmp_path):
