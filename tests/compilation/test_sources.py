@@ -2,7 +2,9 @@
 
 from bridgegen.compilation.sources import PACKAGE, digest
 
-ALL = "from bridgegen._high_kernels import high; high(1.0)\n    from bridgegen._other_kernels import other; other(1.0)"
+ALL = """from bridgegen._high_kernels import high
+    from bridgegen._other_kernels import other
+    high(1.0), other(1.0)"""
 
 
 def test_a_constant_from_elsewhere_counts_and_other_kernels_do_not(package, compiled_by):

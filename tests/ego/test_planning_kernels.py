@@ -82,7 +82,7 @@ def test_a_short_gap_to_somebody_as_fast_is_no_reason_to_brake_hard() -> None:
 
 @given(
     gap=st.floats(5.0, 200.0), v=st.floats(0.0, 40.0), w=st.floats(0.0, 40.0),
-    slowing=st.floats(-8.0, 0.0),
+    slowing=st.floats(-8.0, 0.0, allow_subnormal=False),
 )  # fmt: skip
 def test_a_leader_that_brakes_never_lets_one_go_faster(
     gap: float, v: float, w: float, slowing: float

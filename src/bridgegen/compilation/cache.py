@@ -20,10 +20,20 @@ from bridgegen.compilation.sources import PACKAGE, digest
 MAIN = PACKAGE / "simulation" / "embedded" / "_rollout_kernels.py"
 """What every search calls."""
 
+OF_A_SEARCH = 170
+"""About how many kernels are compiled for the first search."""
+
 
 def is_compiled() -> bool:
     """Return whether compiled kernels of an earlier run exist, so that this run starts at once."""
     return any(_folder_of(MAIN).glob("*.nbi"))
+
+
+def n_compiled() -> int:
+    """Return how many kernels the cache holds that other kernels call, whatever their source."""
+    with suppress(OSError):
+        return sum(one.suffix == ".bc" for one in (cache_folder() / "code").iterdir())
+    return 0
 
 
 def _folder_of(source: Path) -> Path:

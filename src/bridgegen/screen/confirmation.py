@@ -21,7 +21,6 @@ class ConfirmationScreen(Live):
         """Show the stage that begins."""
         if stage == "compile":
             self.say_compiling()
-            self.show(what="compiling")
         if stage == "confirm":
             self.show(what="confirming")
         if stage == "report":

@@ -1,5 +1,6 @@
 """Progress bars on stderr."""
 
+import threading
 import time
 from types import TracebackType
 from typing import Any, Self
@@ -34,7 +35,7 @@ class Live:
             transient=True,
         )
         self._task: TaskID = self._progress.add_task("starting", total=total, facts="")
-        self._told = False
+        self._total, self._count = total, threading.Event()
         self._began = time.perf_counter()
 
     @property
@@ -51,19 +52,29 @@ class Live:
         facts: str | None = None,
     ) -> None:
         """Show changes."""
+        self._count.set()  # the stage that compiles is over
         fields: dict[str, Any] = {} if facts is None else {"facts": facts}
         self._progress.update(self._task, description=what, completed=done, total=total, **fields)
 
     def say_compiling(self) -> None:
-        """Explain the delay, once, if the kernels are not compiled yet."""
+        """Explain the delay if the kernels are not compiled yet, and count them until ``show``."""
         from bridgegen.compilation.cache import is_compiled
 
-        if not self._told and not is_compiled():
-            self._told = True
-            self.console.print(
-                "First run: compiling the simulator, which takes a minute or two; later runs start "
-                "at once."
+        if self._count.is_set() or is_compiled():
+            return
+        self.console.print("First run: compiling the simulator; later runs start at once.")
+        threading.Thread(target=self._count_kernels, daemon=True).start()
+
+    def _count_kernels(self) -> None:
+        from bridgegen.compilation.cache import OF_A_SEARCH, n_compiled
+
+        before = n_compiled()
+        while not self._count.wait(0.2):
+            done = min(n_compiled() - before, OF_A_SEARCH)
+            self._progress.update(
+                self._task, description="compiling kernels", completed=done, total=OF_A_SEARCH
             )
+        self._progress.update(self._task, completed=0, total=self._total)
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -75,4 +86,5 @@ class Live:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._count.set()
         self._progress.stop()

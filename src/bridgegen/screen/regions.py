@@ -20,7 +20,6 @@ class RegionsScreen(Live):
         """Show the stage that begins."""
         if stage == "compile":
             self.say_compiling()
-            self.show(what="compiling")
         if stage == "report":
             self.show(what="writing the report")
 

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from bridgegen.workers import Workers
 
 _STAGES = {
-    "compile": "compiling",
     "search": "",  # the bar shows it; a terminal has only 80 columns
     "triage": "testing the findings",
     "export": "writing the critical scenarios",
@@ -51,7 +50,8 @@ class SearchScreen(Live):
     def _stage(self, stage: str) -> None:
         if stage == "compile":
             self.say_compiling()
-        self.show(what=_STAGES[stage])
+        else:
+            self.show(what=_STAGES[stage])
 
     def _by(self) -> str:
         """Return the number of workers, unless they are threads; a cluster's may change."""
