@@ -213,24 +213,29 @@ DEMAND = numba.types.UniTuple(numba.types.float64, 2)
 """What a kernel returns that is called by its address."""
 
 
-def _kernel_called_at(_: Any, address: Any, arguments: Any) -> Any:
-    """In a kernel: call another one by its address; see ``address_of``.
+def _calls_kernel(returns: Any) -> Callable[..., Any]:
+    """Return an intrinsic that calls a kernel by its address, see ``address_of``.
 
     So that what calls it is compiled without it, and it only where it is called.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        kinds, convention = signature.args[1].types, context.call_conv
-        values = [builder.extract_value(given[1], i) for i in range(len(kinds))]
-        code = convention.get_function_type(DEMAND, kinds)
-        answer = cgutils.alloca_once(builder, convention.get_return_type(DEMAND).pointee)
-        error = cgutils.alloca_once_value(builder, ir.Constant(code.args[1].pointee, None))
-        packed = context.get_arg_packer(kinds).as_arguments(builder, values)
-        callee = builder.inttoptr(given[0], code.as_pointer())
-        builder.call(callee, [answer, error, *packed])
-        return context.get_returned_value(builder, DEMAND, builder.load(answer))
+    def call(_: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            kinds, convention = signature.args[1].types, context.call_conv
+            values = [builder.extract_value(given[1], i) for i in range(len(kinds))]
+            code = convention.get_function_type(returns, kinds)
+            answer = cgutils.alloca_once(builder, convention.get_return_type(returns).pointee)
+            error = cgutils.alloca_once_value(builder, ir.Constant(code.args[1].pointee, None))
+            packed = context.get_arg_packer(kinds).as_arguments(builder, values)
+            callee = builder.inttoptr(given[0], code.as_pointer())
+            builder.call(callee, [answer, error, *packed])
+            if returns == numba.types.none:
+                return context.get_dummy_value()
+            return context.get_returned_value(builder, returns, builder.load(answer))
 
-    return DEMAND(address, arguments), generate
+        return returns(address, arguments), generate
+
+    return call
 
 
 def compile_for_kernels(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
@@ -250,7 +255,8 @@ def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
     """Compile a kernel for arguments of some types, if need be; return where its code lies.
 
     Args:
-        function: a ``kernel`` that returns two float64.
+        function: a ``kernel``; `call_kernel_at` calls one that returns two float64, and
+            `run_kernel_at` one that returns nothing.
         kinds: Numba's types of its arguments; see ``row_type`` for those of bundles.
     """
     if numba.config.DISABLE_JIT:
@@ -307,8 +313,12 @@ def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
 
 if numba.config.DISABLE_JIT:
     bundled, bundled_row = _itself, _row
-    call_at, call_kernel_at = call_from_python, _interpreted_at
+    call_at, call_kernel_at, run_kernel_at = call_from_python, _interpreted_at, _interpreted_at
 else:
-    bundled, bundled_row, call_at, call_kernel_at = map(
-        numba.extending.intrinsic, (_bundled, _bundled_row, _called_at, _kernel_called_at)
-    )
+    bundled, bundled_row, call_at, call_kernel_at, run_kernel_at = map(
+        numba.extending.intrinsic,
+        (
+            _bundled, _bundled_row, _called_at, _calls_kernel(DEMAND),
+            _calls_kernel(numba.types.none),
+        ),
+    )  # fmt: skip

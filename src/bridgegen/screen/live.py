@@ -35,7 +35,7 @@ class Live:
             transient=True,
         )
         self._task: TaskID = self._progress.add_task("starting", total=total, facts="")
-        self._total, self._count = total, threading.Event()
+        self._items, self._count = total, threading.Event()
         self._began = time.perf_counter()
 
     @property
@@ -74,7 +74,7 @@ class Live:
             self._progress.update(
                 self._task, description="compiling kernels", completed=done, total=OF_A_SEARCH
             )
-        self._progress.update(self._task, completed=0, total=self._total)
+        self._progress.update(self._task, completed=0, total=self._items)
 
     def __enter__(self) -> Self:
         self._progress.start()

@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -17,8 +17,6 @@ from bridgegen.simulation.embedded._memory_kernels import (
 )
 from bridgegen.simulation.embedded.conditions import observe
 from bridgegen.simulation.embedded.drivers import (
-    begin_waiting,
-    heed,
     is_steered,
     move_heeding,
     move_paced,
@@ -48,7 +46,7 @@ def before_driver(k, plan, roads, state, record):
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)
     if plan.attends:
-        begin_waiting(k, plan, roads, state, record)
+        run_kernel_at(plan.begins_waiting, (k, plan, roads, state, record))
     command_speed(0, k, plan, roads, state, record)
     drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
     if plan.is_driven and drives and state.on[0] < 0:  # drivers keep to lanes
@@ -63,7 +61,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
     if plan.attends:
-        heed(k, plan, roads, state, record)
+        run_kernel_at(plan.heeds, (k, plan, roads, state, record))
     if is_steered(plan, state):
         x, y, h = move_steered(k, demanded, curvature, plan, roads, state, record)
         first = 1

@@ -50,6 +50,8 @@ class Plan(NamedTuple):
     order: Int
     initial: Int
     actions: Int
+    begins: Int
+    follows_courses: int
     laterals: Int
     values: Int
     first_states: npt.NDArray[np.int8]
@@ -67,6 +69,8 @@ class Plan(NamedTuple):
     scene: Float
     others: Int
     attends: int
+    heeds: int
+    begins_waiting: int
     is_driven: int
     driver_code: int
     own_code: int

@@ -25,6 +25,7 @@ from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
 from bridgegen.simulation.embedded import drivers
 from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
+from bridgegen.simulation.embedded.addresses import addressed
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
@@ -80,16 +81,25 @@ class Batch:
         state = _state(program, roads, rows, slots, key, own_memory)
         self._block, self.state = _packed(state)
         self.record = _record(program, n)
-        if demands := DEMANDS.get(program.driver.name):
-            code = code_of(demands, self._plan, roads.tables, self.state, self.record)
-            self._plan = self._plan._replace(driver_code=code)
         self._messages: dict[int, str] = {}
+        self._has_addresses = False
 
     @property
     def running(self) -> Bool:
         """``(N,)`` which rows have not ended."""
         running: Bool = self.state.ending[:, memory.N_STEPS] == 0
         return running
+
+    def _take_addresses(self) -> None:
+        """Compile what this plan needs and others do not, once."""
+        if self._has_addresses:
+            return
+        self._has_addresses = True
+        rows = (self._roads.tables, self.state, self.record)
+        self._plan = addressed(self._plan, *rows)
+        if demands := DEMANDS.get(self._program.driver.name):
+            code = code_of(demands, self._plan, *rows)
+            self._plan = self._plan._replace(driver_code=code)
 
     def run(self, simulate_rows: Callable[..., Any] = kernels.simulate_rows) -> Rollout:
         """Roll all rows out with the compiled driver; runs without the GIL.
@@ -114,6 +124,7 @@ class Batch:
 
     def demand(self, k: int) -> tuple[Float, Float]:
         """Return what the compiled driver demands: ``(N,)`` [m/s²] and ``(N,)`` [1/m]."""
+        self._take_addresses()
         demanded, curvature = np.zeros((2, len(self._rows)))
         tables = self._roads.tables
         kernels.demand_rows(
@@ -140,6 +151,7 @@ class Batch:
         kinds = (row_type(self._plan, 0), *map(row_type, rows))
         for function, first in kernels.PARTS:
             compile_for_kernels(function, (*first, *kinds))
+        self._take_addresses()
         for array in self.record:
             array[...] = 0
         self.record.x[:, :, :] = FAR_APART * np.arange(self.record.x.shape[1])[:, np.newaxis]
@@ -148,6 +160,7 @@ class Batch:
 
     def _do(self, kernel: Callable[..., Any], *arguments: int | Float) -> None:
         """Call a kernel; rows for which a way is not planned yet do the same again when it is."""
+        self._take_addresses()
         before = self._block.copy(), self.record.began.copy()
         messages = kernel(
             *arguments, self._plan, self._roads.tables, self._rows, self.state, self.record
@@ -281,6 +294,10 @@ def _plan(program: Program) -> memory.Plan:
         "leaves": int(program.leaves),
         "scene": _scene(program),
         "attends": int(program.attends.size > 0),
+        "begins": np.zeros(len(program.actions), dtype=np.int64),
+        "follows_courses": 0,
+        "heeds": 0,
+        "begins_waiting": 0,
         "is_driven": int(program.driver != STORYBOARD),
         "driver_code": 0,
         "own_code": 0,

@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     ALL,
     ANY,
@@ -24,7 +24,6 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._memory_kernels import TICKS
 from bridgegen.simulation.embedded.conditions._probe_kernels import is_in_state, look
-from bridgegen.simulation.embedded.conditions._relation_kernels import look_closely
 from bridgegen.simulation.embedded.motion import leave_out_absent
 from bridgegen.simulation.embedded.places._place_kernels import pose_of, way_ahead
 
@@ -40,7 +39,7 @@ def observe(k, plan, roads, state, record):
         for p in range(plan.probes.shape[0]):
             if plan.probes[p, PROBE] == CLEARANCE:
                 state.along[p] = way_ahead(plan.probes[p, WHO], roads, state)
-        look_closely(k, plan, roads, state, record)
+        run_kernel_at(plan.looks_closely, (k, plan, roads, state, record))
     for p in range(plan.probes.shape[0]):
         if plan.probes[p, CLOSELY] == 0:
             state.looked[p, 0] = state.looked[p, 1]

@@ -1,7 +1,12 @@
 """How entities move along and across their paths, and how the actions that move them begin."""
 
 from bridgegen.simulation.embedded.motion._across_kernels import begin_lane_change
-from bridgegen.simulation.embedded.motion._begin_kernels import begin_motion, steers, stop_motion
+from bridgegen.simulation.embedded.motion._begin_kernels import (
+    BEGINS,
+    begin_motion,
+    steers,
+    stop_motion,
+)
 from bridgegen.simulation.embedded.motion._follow_kernels import (
     arrive,
     at_time,
@@ -13,18 +18,20 @@ from bridgegen.simulation.embedded.motion._presence_kernels import (
     leave_out_absent,
     stay_away,
 )
-from bridgegen.simulation.embedded.motion._pursuit_kernels import start_at_speed
+from bridgegen.simulation.embedded.motion._pursuit_kernels import follow_course, start_at_speed
 from bridgegen.simulation.embedded.motion._speed_kernels import command_speed, stop_longitudinal
 from bridgegen.simulation.embedded.motion._steering_kernels import note, steer
 from bridgegen.simulation.embedded.motion._travel_kernels import ENDS, move_along_path, pass_end
 
 __all__ = [
+    "BEGINS",
     "ENDS",
     "arrive",
     "at_time",
     "begin_lane_change",
     "begin_motion",
     "command_speed",
+    "follow_course",
     "is_pointless",
     "leave_out_absent",
     "move_along_path",

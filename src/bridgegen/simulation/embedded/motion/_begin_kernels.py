@@ -1,4 +1,4 @@
-"""How the actions that move an entity begin and stop: a branch per kind.
+"""How the actions that move an entity begin and stop, by kind.
 
 What they do from then on: ``_speed_kernels`` and ``_travel_kernels``.
 """
@@ -6,7 +6,10 @@ What they do from then on: ``_speed_kernels`` and ``_travel_kernels``.
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from collections.abc import Callable
+from typing import Any
+
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     ACQUIRE,
     ADD_ENTITY,
@@ -18,8 +21,13 @@ from bridgegen.simulation.embedded._codes import (
     FIRST_GLOBAL,
     FOLLOW,
     KEEP_ASIDE,
+    KEEP_DISTANCE,
     LANE_CHANGE,
     LANE_OFFSET,
+    RELATIVE_SPEED,
+    SPEED_CHANGE,
+    SPEED_PROFILE,
+    SYNCHRONIZE,
     TELEPORT,
 )
 from bridgegen.simulation.embedded.motion._across_kernels import (
@@ -36,34 +44,34 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     stop_route,
 )
 from bridgegen.simulation.embedded.motion._presence_kernels import begin_add, begin_delete
+from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course
 from bridgegen.simulation.embedded.motion._speed_kernels import (
-    begin_longitudinal,
+    begin_speed_change,
     stop_longitudinal,
+    take_speed,
 )
+
+BEGINS: dict[int, Callable[..., Any]] = {
+    SPEED_CHANGE: begin_speed_change,
+    **dict.fromkeys((RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE), begin_course),
+    LANE_CHANGE: begin_lane_change,
+    LANE_OFFSET: begin_lane_offset,
+    KEEP_ASIDE: begin_lateral_distance,
+    ADD_ENTITY: begin_add,
+    DELETE_ENTITY: begin_delete,
+    TELEPORT: begin_teleport,
+    **dict.fromkeys((ASSIGN_ROUTE, ACQUIRE), begin_route),
+    FOLLOW: begin_follow,
+}
+"""How each kind of action begins; compiled where a storyboard has one, see `addresses`."""
 
 
 @kernel
 def begin_motion(j, k, plan, roads, state, record):
     """Begin action j, which moves an entity, at instant k."""
-    kind = plan.actions[j, DOES]
-    if FIRST_ALONG <= kind < FIRST_ACROSS:
-        begin_longitudinal(j, k, plan, roads, state, record)
-    elif kind == LANE_CHANGE:
-        begin_lane_change(j, k, plan, roads, state, record)
-    elif kind == LANE_OFFSET:
-        begin_lane_offset(j, k, plan, roads, state, record)
-    elif kind == KEEP_ASIDE:
-        begin_lateral_distance(j, k, plan, roads, state, record)
-    elif kind == ADD_ENTITY:
-        begin_add(j, k, plan, roads, state, record)
-    elif kind == DELETE_ENTITY:
-        begin_delete(j, k, plan, roads, state, record)
-    elif kind == TELEPORT:
-        begin_teleport(j, k, plan, roads, state, record)
-    elif kind in (ASSIGN_ROUTE, ACQUIRE):
-        begin_route(j, k, plan, roads, state, record)
-    elif kind == FOLLOW:
-        begin_follow(j, k, plan, roads, state)
+    if FIRST_ALONG <= plan.actions[j, DOES] < FIRST_ACROSS:
+        take_speed(j, plan, state)
+    run_kernel_at(plan.begins[j], (j, k, plan, roads, state, record))
 
 
 @kernel

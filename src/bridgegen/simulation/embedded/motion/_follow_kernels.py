@@ -110,7 +110,7 @@ def arrive(k, plan, state, record):
 
 
 @kernel
-def begin_follow(j, k, plan, roads, state):
+def begin_follow(j, k, plan, roads, state, record):
     """Begin action j, a FollowTrajectoryAction."""
     e, m = plan.actions[j, WHOM], plan.actions[j, ROW]
     end_lateral(e, state)

@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     DIMENSION,
     DOES,
@@ -17,24 +17,19 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._motion_kernels import LINEAR, RATE, SAME_SPEED, STEP, ramped
 from bridgegen.simulation.embedded.motion._course_kernels import change_time, changed
-from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course, follow_course
 
 
 @kernel
-def begin_longitudinal(j, k, plan, roads, state, record):
-    """Begin action j, which moves an entity along its path; an earlier one ends."""
+def take_speed(j, plan, state):
+    """Let action j, which moves an entity along its path, end an earlier one."""
     e = plan.actions[j, WHOM]
     if state.speed_action[e] >= 0:
         state.action_ended[state.speed_action[e]] = True
     state.speed_action[e] = j
-    if plan.actions[j, DOES] >= RELATIVE_SPEED:
-        begin_course(j, k, plan, roads, state, record)
-    else:
-        begin_speed_change(j, k, plan, state)
 
 
 @kernel
-def begin_speed_change(j, k, plan, state):
+def begin_speed_change(j, k, plan, roads, state, record):
     """Begin action j, a SpeedAction to a speed of its own."""
     e, shape, dimension = plan.actions[j, WHOM], plan.actions[j, SHAPE], plan.actions[j, DIMENSION]
     value = state.slots[plan.actions[j, LASTS]]
@@ -65,7 +60,7 @@ def command_speed(e, k, plan, roads, state, record):
     """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
     j = state.speed_action[e]
     if j >= 0 and plan.actions[j, DOES] >= RELATIVE_SPEED:
-        follow_course(j, k, plan, roads, state, record)
+        run_kernel_at(plan.follows_courses, (j, k, plan, roads, state, record))
         return
     if j >= 0 and plan.actions[j, SHAPE] > LINEAR:
         passed = k * plan.dt + plan.dt - state.speed_began[e]

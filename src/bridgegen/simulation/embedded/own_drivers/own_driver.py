@@ -29,6 +29,7 @@ from bridgegen.simulation.embedded._memory_kernels import (
     State,
 )
 from bridgegen.simulation.embedded._rollout_kernels import simulate_rows
+from bridgegen.simulation.embedded.addresses import addressed
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.drivers import (
     ACCELERATION,
@@ -245,6 +246,7 @@ def _simulate(
     raised: list[str] = []
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
+        plan = addressed(plan, _roads[0], state, record)
         code = code_of(ask, plan, _roads[0], state, record)
         plan = plan._replace(driver_code=code, own_code=address)
         simulate_rows(plan, _roads[0], rows, state, record)
