@@ -51,6 +51,17 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return cast(Callable[..., Any], compiled)
 
 
+def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a part of a kernel: as ``kernel`` does, but into each kernel that calls it.
+
+    For what runs at every instant, where a call is felt.
+    """
+    compiled = _compile(function, forceinline=True)
+    if not numba.config.DISABLE_JIT:
+        _compile_by_ourselves(compiled)
+    return cast(Callable[..., Any], compiled)
+
+
 def _compile_by_ourselves(compiled: Any) -> None:
     """Have a kernel's code cached, and callable from Python only where Python calls it."""
     compiled._cache = KernelCache(compiled.py_func)

@@ -68,6 +68,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     Attributes:
         inner: whether only kernels call it, not Python.
+        is_inlined: whether it is linked and inlined however large it is.
         symbol: of the kernel, where it is in the store; else "".
         callees: symbols of the kernels that it calls, those of linked kernels among them.
     """
@@ -81,7 +82,8 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
-        self.inner, self.is_stored, self.symbol = False, False, ""
+        self.inner = self.is_inlined = self.is_stored = False
+        self.symbol = ""
         self.callees: tuple[str, ...] = ()
         self._bitcode, self._object = b"", b""
         self._is_loaded = False
@@ -100,7 +102,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
                 raise MissingCodeError(symbol)
             self = cls(codegen, symbol)
             self.inner, self.symbol, self._finalized = True, symbol, True
-            self.callees, self._bitcode = found
+            self.callees, self._bitcode, self.is_inlined = found
             for callee in self.callees:
                 cls.find(codegen, callee)
             cls.by_symbol[symbol] = self
@@ -109,7 +111,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     @property
     def is_large(self) -> bool:
         """Whether it is called, not linked."""
-        return bool(self.symbol) and len(self._bitcode) > LARGE
+        return bool(self.symbol) and len(self._bitcode) > LARGE and not self.is_inlined
 
     def _optimize_functions(self, ll_module: Any) -> None:
         # The module's passes do all that Numba's passes over each function do.
@@ -137,7 +139,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         if self.is_stored:
             (self.symbol,) = (one.name for one in self._final_module.functions if _is_own(one))
             self.by_symbol[self.symbol] = self
-            self.store.write(self.symbol, "bc", (self.callees, self._bitcode))
+            self.store.write(self.symbol, "bc", (self.callees, self._bitcode, self.is_inlined))
 
     def _get_module_for_linking(self) -> Any:
         self._parse()

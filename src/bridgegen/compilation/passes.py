@@ -40,6 +40,7 @@ class _MakeLibrary(AnalysisPass):  # type: ignore[misc]
     def run_pass(self, state: Any) -> bool:
         library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         library.inner = state.flags.no_cpython_wrapper = is_for_kernel()
+        library.is_inlined = state.flags.forceinline
         state.library = library
         function = state.func_id.func
         if function.__module__.startswith("bridgegen.") and "<" not in function.__qualname__:

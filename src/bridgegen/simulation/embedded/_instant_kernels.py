@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import kernel, run_kernel_at
+from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
 from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -34,7 +34,7 @@ from bridgegen.simulation.embedded.storyboard import decide, finish
 from bridgegen.simulation.embedded.world import run_controllers
 
 
-@kernel
+@inlined_kernel
 def before_driver(k, plan, roads, state, record):
     """Execute the storyboard at instant k, up to its commands for the ego."""
     run_controllers(
@@ -55,7 +55,7 @@ def before_driver(k, plan, roads, state, record):
         record.lights[i, k] = state.lights[i]
 
 
-@kernel
+@inlined_kernel
 def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move all entities to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]

@@ -9,7 +9,7 @@ of ``_relation_kernels``, where all is that is seldom asked for.
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import (
     COMPLETE,
     DISTANCE,
@@ -33,7 +33,7 @@ from bridgegen.simulation.embedded.conditions._relation_kernels import (
 )
 
 
-@kernel
+@inlined_kernel
 def look(p, k, plan, state, record):
     """Return whether probe p sees at instant k what its condition asks for."""
     kind, e, other = plan.probes[p, PROBE], plan.probes[p, WHO], plan.probes[p, OTHER]

@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel, run_kernel_at
+from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     ALL,
     ANY,
@@ -28,7 +28,7 @@ from bridgegen.simulation.embedded.motion import leave_out_absent
 from bridgegen.simulation.embedded.places._place_kernels import pose_of, way_ahead
 
 
-@kernel
+@inlined_kernel
 def observe(k, plan, roads, state, record):
     """Record the values of all probes at instant k, and which conditions are true."""
     for i in range(plan.marks.shape[0]):
@@ -51,7 +51,7 @@ def observe(k, plan, roads, state, record):
         conclude(c, k, plan.conditions, state.observed, state.history)
 
 
-@kernel
+@inlined_kernel
 def conclude(c, k, conditions, observed, history):
     """Record whether condition c is true at instant k, by any or all of its probes."""
     first, last, count = conditions[c, PROBES], conditions[c, PROBES_END], 0

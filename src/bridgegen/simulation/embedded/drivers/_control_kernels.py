@@ -7,7 +7,7 @@ storyboard does the rest, as for any other entity.
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY, SETS_SPEED, STEERS
@@ -49,7 +49,7 @@ def begin_control(j, k, plan, roads, state, record):
             state.command[0] = state.target[0] = record.v[0, k]
 
 
-@kernel
+@inlined_kernel
 def is_steered(plan, state):
     """Return whether the ego's driver steers it."""
     return plan.is_driven and state.drives[LATERALLY] == 1
@@ -66,7 +66,7 @@ def move_paced(k, demanded, plan, roads, state, record):
     state.command[0], state.target[0] = asked, target
 
 
-@kernel
+@inlined_kernel
 def move_steered(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k as its driver steers; return its new x, y [m], heading.
 

@@ -3,14 +3,14 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import call_kernel_at, kernel
+from bridgegen.compiled import call_kernel_at, inlined_kernel, kernel
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle, standing
 from bridgegen.simulation.embedded.motion import ENDS, pass_end
 
 
-@kernel
+@inlined_kernel
 def demand(k, plan, roads, state, record):
     """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m].
 
@@ -31,7 +31,7 @@ def ego_is_through(plan, roads, state):
     return (p == 0 and state.route[0] > 0) or roads.follows[p] == ENDS
 
 
-@kernel
+@inlined_kernel
 def move_ego(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k; return its new x, y [m] and heading [rad]."""
     v, dt, p = record.v[0, k], plan.dt, state.on[0]

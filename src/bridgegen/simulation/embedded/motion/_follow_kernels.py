@@ -8,7 +8,7 @@ A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the colu
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import ACQUIRE, DETAIL, DOES, ROW, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
 from bridgegen.simulation.embedded._motion_kernels import standing
@@ -93,7 +93,7 @@ def stop_route(j, plan, state):
         state.goal_action[plan.actions[j, WHOM]] = -1
 
 
-@kernel
+@inlined_kernel
 def arrive(k, plan, state, record):
     """End the actions that send entities to positions which they pass, or stand at, at instant k.
 

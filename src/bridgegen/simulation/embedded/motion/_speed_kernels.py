@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import kernel, run_kernel_at
+from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     DIMENSION,
     DOES,
@@ -55,7 +55,7 @@ def stop_longitudinal(j, plan, state):
         state.rate[e] = math.inf
 
 
-@kernel
+@inlined_kernel
 def command_speed(e, k, plan, roads, state, record):
     """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
     j = state.speed_action[e]

@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import (
     ACTION,
     ADD_ENTITY,
@@ -35,7 +35,7 @@ from bridgegen.simulation.embedded.motion import stop_motion
 from bridgegen.simulation.embedded.storyboard._action_kernels import begin
 
 
-@kernel
+@inlined_kernel
 def enter(x, transition, state):
     """Take down that an element passes a transition, and in which order."""
     state.ending[TICKS] += 1

@@ -8,7 +8,7 @@ before children). Source: ASAM OpenSCENARIO XML 1.3.1, 8.4, storyboard element e
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import inlined_kernel
 from bridgegen.simulation.embedded._codes import (
     ACT,
     ACTION,
@@ -40,7 +40,7 @@ from bridgegen.simulation.embedded.storyboard._event_kernels import (
 )
 
 
-@kernel
+@inlined_kernel
 def finish(k, plan, state):
     """End what is complete at instant k: an action by its own state, an element by its children's.
 
@@ -64,7 +64,7 @@ def finish(k, plan, state):
             enter(x, ENDED, state)
 
 
-@kernel
+@inlined_kernel
 def decide(k, plan, roads, state, record):
     """Stop the scenario, start and stop elements, by the triggers at instant k."""
     if fires(0, k, plan, state) or ego_is_through(plan, roads, state):
