@@ -15,6 +15,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from bridgegen.compilation.folder import cache_folder
 from bridgegen.compilation.library import CodeStore, KernelLibrary
 from bridgegen.compilation.passes import is_for_kernel
+from bridgegen.compilation.shipped import shipped
 from bridgegen.compilation.sources import PACKAGE, digest
 
 MAIN = PACKAGE / "simulation" / "embedded" / "_rollout_kernels.py"
@@ -25,8 +26,9 @@ OF_A_SEARCH = 230
 
 
 def is_compiled() -> bool:
-    """Return whether compiled kernels of an earlier run exist, so that this run starts at once."""
-    return any(_folder_of(MAIN).glob("*.nbi"))
+    """Return whether compiled kernels exist, so that this run starts at once."""
+    folders = [cache_folder(), *([carried.folder] if (carried := shipped()) else [])]
+    return any(any((one / _folder_of(MAIN)).glob("*.nbi")) for one in folders)
 
 
 def n_compiled() -> int:
@@ -36,9 +38,9 @@ def n_compiled() -> int:
     return 0
 
 
-def _folder_of(source: Path) -> Path:
+def _folder_of(source: Path) -> str:
     name = ".".join(source.relative_to(PACKAGE).with_suffix("").parts)
-    return cache_folder() / f"{name}-{digest(source)}"
+    return f"{name}-{digest(source)}"
 
 
 class _Locator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
@@ -50,8 +52,8 @@ class _Locator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
         if path.is_relative_to(PACKAGE):
             folder = _folder_of(path)
         else:
-            folder = cache_folder() / f"{self.get_suitable_cache_subpath(file)}-{digest(path)}"
-        self._cache_path = str(folder)
+            folder = f"{self.get_suitable_cache_subpath(file)}-{digest(path)}"
+        self._cache_path = str(cache_folder() / folder)
 
     def ensure_cache_path(self) -> None:
         """Leave it to `KernelCache.save_overload`: most functions are compiled in others only."""
@@ -91,7 +93,7 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         """Return the compiled code of a signature, or None; damaged files are ignored."""
         if not hasattr(KernelLibrary, "store"):
             KernelLibrary.store = CodeStore(cache_folder(), context.codegen().magic_tuple())
-        found = self._load(signature, context)
+        found = self._load(signature, context) or self._load_shipped(signature, context)
         if found is None and self._acquire():  # another process may have compiled it meanwhile
             found = self._load(signature, context)
         return found
@@ -139,4 +141,21 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         except Exception:  # a file that is truncated, zeroed or of another machine
             with suppress(OSError):
                 self.flush()
+            return None
+
+    def _load_shipped(self, signature: Any, context: Any) -> Any:
+        """Return the code that came with this installation, or None."""
+        carried = shipped()
+        if carried is None:
+            return None
+        folder = carried.folder / Path(self.cache_path).name
+        key = super()._index_key(signature, context.codegen())
+        key = (key[0], carried.machine, *key[2:], is_for_kernel())
+        try:
+            file = caching.IndexDataCacheFile(
+                str(folder), self._impl.filename_base, self._impl.locator.get_source_stamp()
+            )
+            data = file.load(key)
+            return None if data is None else self._impl.rebuild(context, data)
+        except Exception:  # of another release of Numba, or damaged
             return None

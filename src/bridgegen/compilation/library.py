@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Self
 from llvmlite import binding as llvm
 from numba.core.codegen import JITCodeLibrary
 
+from bridgegen.compilation.shipped import shipped
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
 
@@ -30,7 +31,7 @@ WRAPPER = "_ZN7cpython"
 
 
 class CodeStore:
-    """Bitcode and machine code of kernels in a folder, by symbol.
+    """Bitcode and machine code of kernels in a folder, by symbol; else in the wheel's.
 
     Args:
         folder: of the cache; only its owner can write to it.
@@ -38,13 +39,16 @@ class CodeStore:
     """
 
     def __init__(self, folder: Path, machine: tuple[str, ...]) -> None:
-        self._folder = folder / "code"
-        self._machine = " ".join(machine)
+        self._folder, self._machine = folder, machine
 
     def read(self, symbol: str, kind: str) -> Any:
         """Return what is stored, or None."""
-        with suppress(OSError, pickle.UnpicklingError, EOFError):
-            return pickle.loads(self._path(symbol, kind).read_bytes())
+        paths = [self._path(symbol, kind)]
+        if carried := shipped():
+            paths.append(_path(carried.folder, carried.machine, symbol, kind))
+        for path in paths:
+            with suppress(OSError, pickle.UnpicklingError, EOFError):
+                return pickle.loads(path.read_bytes())
         return None
 
     def write(self, symbol: str, kind: str, content: Any) -> None:
@@ -55,8 +59,12 @@ class CodeStore:
             write_whole(path, [pickle.dumps(content)])
 
     def _path(self, symbol: str, kind: str) -> Path:
-        digest = hashlib.sha256(f"{symbol} {self._machine}".encode()).hexdigest()[:24]
-        return self._folder / f"{digest}.{kind}"
+        return _path(self._folder, self._machine, symbol, kind)
+
+
+def _path(folder: Path, machine: tuple[str, ...], symbol: str, kind: str) -> Path:
+    digest = hashlib.sha256(" ".join((symbol, *machine)).encode()).hexdigest()[:24]
+    return folder / "code" / f"{digest}.{kind}"
 
 
 class MissingCodeError(Exception):
