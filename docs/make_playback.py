@@ -1,6 +1,6 @@
 """Write docs/playback.gif: the playback of one exported scenario, as README shows it.
 
-It needs the extras ``browser`` and ``test``, a Chromium and Pillow, and a run that was searched before:
+It needs the extra ``browser``, Chromium, Pillow and a run:
 
     bridgegen search cyclist-right-turn --ego un-r157 --budget 400 --out runs/cyclist \\
         --fix sun_altitude_angle=50 --fix fog_density=0 --fix precipitation=0 --fix cloudiness=0
@@ -62,9 +62,8 @@ def main() -> None:
     palette = small[len(small) // 2].quantize(COLOURS)
     images = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in small]
     durations = [round(1000 / FRAMES_PER_SECOND)] * (count - 1) + [2000]
-    images[0].save(
-        given.out, save_all=True, append_images=images[1:], duration=durations, loop=0, optimize=True
-    )
+    rest = images[1:]
+    images[0].save(given.out, save_all=True, append_images=rest, duration=durations, loop=0)
     print(f"{given.out}: {count} frames, {given.out.stat().st_size / 1e6:.2f} MB")
 
 
