@@ -145,10 +145,18 @@ def test_the_algorithm_of_the_documentation_is_found_and_searches(tmp_path, monk
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
 
 
-@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
+def anchors(path: Path) -> set[str]:
+    """Return the anchors of a page's headings, as GitHub and MyST make them."""
+    found = re.findall(r"^#{1,3} (.+)$", path.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in found}
+
+
+@pytest.mark.parametrize("path", [*PAGES, DOCS.parent / "README.md"], ids=lambda path: path.stem)
 def test_links_lead_somewhere(path):
-    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text("utf-8")):
-        assert (path.parent / target).exists() or target.startswith("generated/"), target
+    for page, anchor in re.findall(r"\]\(([^)#:]*)(?:#([^)]*))?\)", path.read_text("utf-8")):
+        target = path.parent / page if page else path
+        assert target.exists() or page.startswith("generated/"), page
+        assert not anchor or anchor in anchors(target), f"{page}#{anchor}"
 
 
 def test_decisions_are_listed_by_theme_and_each_has_a_title_of_its_own():
