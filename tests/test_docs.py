@@ -142,10 +142,32 @@ def test_the_algorithm_of_the_documentation_is_found_and_searches(tmp_path, monk
         bg.run_search("crossroads-s1", algorithm="neighbours", settings={"step": 7}, out=tmp_path)
 
 
-@pytest.mark.parametrize("path", sorted(DOCS.glob("*.md")), ids=lambda path: path.stem)
+PAGES = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
+
+
+def anchors(path: Path) -> set[str]:
+    """Return the anchors of a page's headings, as GitHub and MyST make them."""
+    found = re.findall(r"^#{1,3} (.+)$", path.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in found}
+
+
+@pytest.mark.parametrize("path", [*PAGES, DOCS.parent / "README.md"], ids=lambda path: path.stem)
 def test_links_lead_somewhere(path):
-    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text("utf-8")):
-        assert (DOCS / target).exists() or target.startswith("generated/"), target
+    for page, anchor in re.findall(r"\]\(([^)#:]*)(?:#([^)]*))?\)", path.read_text("utf-8")):
+        target = path.parent / page if page else path
+        assert target.exists() or page.startswith("generated/"), page
+        assert not anchor or anchor in anchors(target), f"{page}#{anchor}"
+
+
+def test_decisions_are_listed_by_theme_and_each_has_a_title_of_its_own():
+    index = (DOCS / "decisions.md").read_text("utf-8")
+    pages = sorted((DOCS / "decisions").glob("*.md"))
+    assert [page.stem for page in pages if index.count(f"decisions/{page.stem}") != 2] == []
+    titles = [
+        title for page in pages for title in re.findall(r"^## (.+)$", page.read_text("utf-8"), re.M)
+    ]
+    assert len(titles) > 150
+    assert len(set(titles)) == len(titles)
 
 
 def test_the_architecture_has_a_paragraph_for_each_folder():

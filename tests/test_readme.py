@@ -2,12 +2,13 @@
 
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 from typer.main import get_command
 
-from bridgegen.cli import app
+from bridgegen.cli import app, main
 
 README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
 
@@ -20,16 +21,26 @@ def test_the_python_runs(tmp_path, monkeypatch):
 
 
 def commands() -> list[str]:
-    (block,) = re.findall(r"```text\n(bridgegen search.*?)```", README, re.DOTALL)
-    found = []
-    for line in block.splitlines():
-        text = line.partition("#")[0].strip()
-        if "|" in text:
-            head, _, names = text.rpartition(" ")
-            found += [f"{head} {name}" for name in names.split("|")]
-        else:
-            found.append(text)
-    return found
+    return re.findall(r"`(bridgegen [^`]+)`", README)
+
+
+def test_readme_is_short_and_says_what_a_command_prints():
+    assert len(README.splitlines()) <= 100
+    assert len(commands()) >= 10
+
+
+def test_the_output_is_what_the_main_job_prints(tmp_path, monkeypatch, capsys):
+    """But for the times of this machine."""
+    (shown,) = re.findall(r"```text\n(scenario .*?)```", README, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["bridgegen", "search", "crossroads-s4"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    printed = capsys.readouterr().out.splitlines()
+    kept = [line for line in shown.splitlines() if not line.startswith("wall time")]
+    assert len(kept) > 8
+    assert [line for line in kept if line not in printed] == []
 
 
 @pytest.mark.parametrize("line", commands())
@@ -43,5 +54,5 @@ def test_every_command_line_parses(line):
 
 
 def test_links_lead_somewhere():
-    for target in re.findall(r"\]\(([^)#:]+)\)", README):
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", README):
         assert (Path(__file__).parents[1] / target).exists(), target
