@@ -1,9 +1,11 @@
 // Distance, time to collision, speeds and accelerations over time; a click or a drag jumps to an instant.
 
+import { ticks } from "./axes.js";
 import { DASHES, palette } from "./colours.js";
 import { ZONED } from "./conflict.js";
 import { data } from "./data.js";
 import { colourOf, playersOf } from "./geometry.js";
+import { drawMarker } from "./markers.js";
 import { number } from "./numbers.js";
 import { Strip } from "./strip.js";
 import { FONT, fitCanvas } from "./view.js";
@@ -12,17 +14,6 @@ import { FONT, fitCanvas } from "./view.js";
 const FAR = 20; // m
 const LATE = 10; // s
 const CURVE_FONT = FONT.replace("600 12px", "11.5px");
-
-export function roundStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((m) => m * power).find((step) => step >= least * 0.999);
-}
-
-function ticks(low, high, wanted) {
-  const step = roundStep((high - low) / wanted), list = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + step * 1e-4; i++) list.push(i * step || 0); // no −0
-  return list;
-}
 
 const present = (values) => values.filter((value) => value !== null);
 
@@ -242,12 +233,7 @@ export class Curves {
     const hit = contacts.length > 0;
     const [px, py] = [x(closest), y(Math.min(distance[closest], panel.high))];
     c.fillStyle = hit ? palette.hit : palette.ink;
-    c.beginPath();
-    if (hit) { // a diamond for a contact, a disc for a near miss
-      [[0, -6], [6, 0], [0, 6], [-6, 0]].forEach(([a, b], i) => c[i ? "lineTo" : "moveTo"](px + a, py + b));
-      c.closePath();
-    } else c.arc(px, py, 4.5, 0, 2 * Math.PI);
-    c.fill();
+    drawMarker(c, { shape: hit ? "diamond" : "disc", radius: 4.8, colour: c.fillStyle }, px, py); // a diamond for a contact
     c.lineWidth = 1;
     c.setLineDash([2, 3]);
     c.strokeStyle = c.fillStyle;
