@@ -128,7 +128,7 @@ GLOBALS = {*re.findall(r"\w+", """
     IntersectionObserver JSON Map Math Number Object Path2D ResizeObserver Response Set
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout
     decodeURIComponent document encodeURIComponent fetch getComputedStyle history innerHeight
-    innerWidth location matchMedia navigator performance requestAnimationFrame setTimeout
+    innerWidth location matchMedia navigator performance Promise requestAnimationFrame setTimeout
     window
 """)}  # fmt: skip
 TOKEN = re.compile(

@@ -41,8 +41,8 @@ def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
     """
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
     connect = b"'self'" if live else b"'none'"
-    text = to_json(data, live=live)
     script, style = _bundled(SERVED if live else REPORT)
+    text = to_json(data, live=live, code=len(script) + len(style) + len(_own("page.html")))
     return filled(
         "page.html", title, style, data=text.encode("ascii"), script=script, connect=connect
     )

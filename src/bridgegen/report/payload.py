@@ -27,18 +27,23 @@ from bridgegen.report.rounding import significant
 from bridgegen.report.sections import sections_payload
 from bridgegen.search.dominance import by_merit, non_dominated
 
+SIZE, SIZE_OF_ROW = 950_000, 500
+"""Maximum number of characters of a page with 1000 evaluations, and how many more it may have for
+each further one: motions fill what the rest leaves. Exported scenarios have their place anyway."""
+
 ROWS = 20_000
 """Maximum number of rows on the page, evenly spread; the iterations include all rows."""
 
 
-def to_json(data: ReportData, *, live: bool = False) -> str:
+def to_json(data: ReportData, *, live: bool = False, code: int = 0) -> str:
     """Return the page's data as JSON that is safe inside a ``<script>`` element.
 
     Args:
         data: of the report.
         live: whether the page may request updates from its server.
+        code: see `payload`.
     """
-    return script_json({**payload(data), "live": live})
+    return script_json({**payload(data, code), "live": live})
 
 
 def script_json(value: Any) -> str:
@@ -52,9 +57,13 @@ def script_json(value: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def payload(data: ReportData) -> dict[str, Any]:
-    """Return the page's data as plain dicts, lists, numbers and strings."""
-    harm = data.summary.harm
+def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
+    """Return the page's data as plain dicts, lists, numbers and strings.
+
+    Args:
+        data: of the report.
+        code: characters that the page has besides its data.
+    """
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
@@ -66,26 +75,35 @@ def payload(data: ReportData) -> dict[str, Any]:
             index[key] = len(roads)
             roads.append(road_payload(playback))
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
-    motions = packed_motions(data.more, index)
-    wanted = [*(one.evaluation for one in data.kept), *motions["evaluations"]]
+    wanted = [one.evaluation for one in data.kept]
     wanted += [one.evaluation for each in data.confirmations for one in each.scenarios]
     modes = data.triage.modes if data.triage else ()
     wanted += [one.shown for one in modes]
     shown = _shown(data.evaluations, wanted)
-    return {
+    page = {
         "live": False,
         "summary": _summary(data),
-        "rows": _rows(data.evaluations, shown, harm=harm),
-        "minimal": packed_motions(data.minimal, index),
+        **_of_rows(data, shown),
+        "minimal": packed_motions(data.minimal, index, SIZE, of_rows=False),
         "implausible": implausible_payload(data.evaluations.findings),
-        **sections_payload(data, shown),
         "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
         "kept": kept,
-        "packed": motions,
         "files": packed_files(data.files),
         "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
     }
+    most = SIZE + SIZE_OF_ROW * max(0, data.evaluations.status.size - 1000)
+    room = max(0, most - code - len(script_json(page)))
+    page["packed"] = motions = packed_motions(data.more, index, room, of_rows=True)
+    if not shown[motions["evaluations"]].all():  # of a long run
+        page |= _of_rows(data, _shown(data.evaluations, wanted + motions["evaluations"]))
+    return page
+
+
+def _of_rows(data: ReportData, shown: Bool) -> dict[str, Any]:
+    """Return what the page holds of some rows, and the sections."""
+    rows = _rows(data.evaluations, shown, harm=data.summary.harm)
+    return {"rows": rows, **sections_payload(data, shown)}
 
 
 def news(data: ReportData, after: int) -> dict[str, Any]:
