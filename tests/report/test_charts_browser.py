@@ -334,3 +334,23 @@ def test_names_of_the_parallel_coordinates_do_not_overlap_on_a_phone(report, sho
         ends = sorted({(a, b) for at, a, b in texts if at == y})
         assert all(b < c for (_, b), (c, _) in pairwise(ends))
     page.close()
+
+
+def test_a_participant_that_stops_dead_does_not_rule_the_acceleration(report, show):
+    p = report.kept[0]
+    a = np.zeros((2, 401))
+    a[0, 20:40] = -4.3
+    a[1, 60] = -170.0
+    v = p.v.copy()
+    v[1, 30] = 400.0
+    page = show(replace(report, kept=(replace(p, a=a, v=v), *report.kept[1:])))
+    panels = page.evaluate(
+        "bridgegen.curves.panels.map((p) => ({ name: p.title, low: p.low, beyond: p.beyond }))"
+    )
+    found = {one["name"]: one for one in panels}
+    assert -6.0 < found["acceleration"]["low"] < -4.3  # the ego's braking is most of the axis
+    peak = {"name": "bv", "value": -170.0, "index": 60}
+    assert [{k: one[k] for k in peak} for one in found["acceleration"]["beyond"]] == [peak]
+    assert [one["value"] for one in found["speed"]["beyond"]] == [400.0]
+    assert found["distance"]["beyond"] == []
+    page.close()

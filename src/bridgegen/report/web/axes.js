@@ -29,7 +29,7 @@ function core(sorted) {
  * The range of ascending values without those few at the ends that would rule it.
  * @param {Float64Array} sorted
  */
-function unruled(sorted) {
+export function unruled(sorted) {
   const low = sorted[0], high = sorted[sorted.length - 1], [from, to] = core(sorted), width = to - from;
   if (!width || high - low <= RULED * width) return [low, high];
   return [low < from - width ? from - width / 4 : low, high > to + width ? to + width / 4 : high];
