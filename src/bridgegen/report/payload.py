@@ -13,7 +13,7 @@ import numpy as np
 from bridgegen.arrays import Bool
 from bridgegen.physics import HARD_BRAKING
 from bridgegen.report import convergence, sentences
-from bridgegen.report.data import Column, Evaluations, ReportData
+from bridgegen.report.data import WHOLE, Column, Evaluations, ReportData
 from bridgegen.report.findings_payload import findings_payload, implausible_payload
 from bridgegen.report.packed import packed_files, packed_motions, road_key
 from bridgegen.report.picture_payload import pictures_payload
@@ -181,8 +181,8 @@ def _rows(e: Evaluations, ok: Bool, *, harm: str = "") -> dict[str, Any]:
 def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
     """Return each row's place among all critical ones, 1 for the most critical; 0 for others.
 
-    By harm, so that no near miss is above a collision of the ego's responsibility, where harm makes
-    a scenario critical; else by the objectives.
+    No near miss is above a contact: by harm where that makes a scenario critical, else by whether
+    there is a collision. Then the severity decides, then the objectives.
     """
     critical = np.flatnonzero(e.critical & (e.status == 0))
     rank = np.zeros(e.critical.size, dtype=np.int64)
@@ -191,10 +191,14 @@ def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
         if e.objectives
         else np.zeros((critical.size, 1))
     )
-    order = critical[by_merit(F)]
-    for column in e.metrics:
-        if column.name == harm:
-            order = order[np.argsort(-column.whole[order], kind="stable")]
+    measured = {c.name: c.whole[critical] for c in e.metrics if c.name in WHOLE}
+    if not harm and "n_collision" in measured:
+        measured["n_collision"] = np.minimum(measured["n_collision"], 1.0)  # whether, not how many
+    order = by_merit(F)
+    for name in ("severity", harm or "n_collision"):
+        if name in measured:
+            order = order[np.argsort(-measured[name][order], kind="stable")]
+    order = critical[order]
     rank[order] = np.arange(1, critical.size + 1)
     shown: list[int] = rank[ok].tolist()
     return shown

@@ -5,7 +5,7 @@ import { Chart } from "./chart.js";
 import { palette } from "./colours.js";
 import { columns, data, rows } from "./data.js";
 import { filters } from "./filters.js";
-import { findingOf } from "./findings.js";
+import { conflictWord, findingOf } from "./findings.js";
 import { frontSeries } from "./front.js";
 import { hook } from "./hook.js";
 import { Stamp, drawMarker } from "./markers.js";
@@ -166,7 +166,7 @@ export class ScatterChart extends Chart {
     return [
       `${kept ? `Scenario ${kept.name}, evaluation` : "Evaluation"} ${number(evaluation + 1)}`,
       ...new Set(this.names.map(value)),
-      [rows.critical[i] ? `critical, rank ${number(rows.rank[i])}` : "not critical", ...(finding?.[0] ? [finding.slice(0, 2).join(": ")] : [])].join("; "),
+      [rows.critical[i] ? `critical, rank ${number(rows.rank[i])}` : "not critical", ...(finding?.[0] ? [`${conflictWord(finding[0])}: ${finding[1]}`] : [])].join("; "),
       ...(rows.front.includes(i) ? ["on the Pareto front"] : []),
       ...(hook.show ? [PLAYS[source]] : []),
     ];
