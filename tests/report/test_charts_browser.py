@@ -354,3 +354,29 @@ def test_a_participant_that_stops_dead_does_not_rule_the_acceleration(report, sh
     assert [one["value"] for one in found["speed"]["beyond"]] == [400.0]
     assert found["distance"]["beyond"] == []
     page.close()
+
+
+def test_of_a_searched_parameter_every_value_is_in_its_place(report, show):
+    e = report.evaluations
+    values = np.append(np.linspace(5.0, 5.1, e.critical.size - 1), 8.9)
+    first = replace(e.parameters[0], values=values)
+    page = show(replace(report, evaluations=replace(e, parameters=(first, *e.parameters[1:]))))
+    page.select_option("#axis-x", first.name)
+    x = page.evaluate("bridgegen.scatter.x")
+    assert x["low"] < 5.0 < 8.9 < x["high"]
+    assert x["above"] == 0
+    page.close()
+
+
+def test_without_critical_scenarios_a_click_gives_the_command(report, show):
+    e = report.evaluations
+    none = replace(e, critical=np.zeros_like(e.critical))
+    page = show(replace(report, kept=(), evaluations=none))
+    assert page.is_hidden("#kept")
+    page.focus("#scatter .chart-stage canvas")
+    page.keyboard.press("End")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#no-motion", state="visible")
+    evaluation = int(column(report, page.input_value("#axis-x")).argmax())
+    assert page.inner_text("#no-motion-command").endswith(f"--evaluation {evaluation + 1}")
+    page.close()

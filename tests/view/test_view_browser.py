@@ -94,6 +94,21 @@ def test_any_row_plays_and_its_address_brings_it_back(opened, growing):
     assert page.complaints == []
 
 
+def test_any_point_of_the_scatter_plot_plays(opened, growing):
+    page, _ = opened
+    page.locator("#scatter").scroll_into_view_if_needed()
+    page.wait_for_function("bridgegen.scatter.points")
+    plain = page.evaluate("bridgegen.data.rows.critical.indexOf(0)")
+    evaluation = page.evaluate(f"bridgegen.data.rows.evaluation[{plain}]")
+    lines = page.evaluate(f"bridgegen.scatter.linesOf({plain})")
+    assert lines[-1] == "Click to simulate and play it"
+    page.evaluate(f"bridgegen.scatter.choose({{ item: {plain} }})")
+    page.wait_for_function(f"bridgegen.state()?.scenario === 'evaluation {evaluation + 1}'")
+    page.wait_for_function("bridgegen.state().playing")
+    assert page.is_hidden("#no-motion")
+    assert page.complaints == []
+
+
 def test_a_server_that_is_gone_is_told(opened):
     page, _ = opened
     page.context.set_offline(True)

@@ -3,7 +3,7 @@
 import { number, turned } from "./numbers.js";
 
 const RULED = 4; // times the range of nearly all values: a longer one is ruled by a few of them
-const FEW = 0.02; // of all values, at either end
+const FEW = 0.005; // of all values, at either end
 const ENOUGH = 8; // values, of fewer all are shown
 const MAGNITUDES = 300; // times the smallest of nearly all values: their largest on a logarithmic axis, at least
 const PADDING = 0.03;
@@ -21,8 +21,8 @@ export function ticks(low, high, wanted) {
 
 // Nearly all of the ascending values: from which to which.
 function core(sorted) {
-  const few = sorted.length < ENOUGH ? 0 : Math.max(1, Math.floor(sorted.length * FEW));
-  return [sorted[few], sorted[sorted.length - 1 - few]];
+  const n = sorted.length, few = n < ENOUGH ? 0 : Math.max(n < 20 ? 1 : 2, Math.floor(n * FEW));
+  return [sorted[few], sorted[n - 1 - few]];
 }
 
 /**

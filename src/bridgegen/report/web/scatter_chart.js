@@ -51,7 +51,7 @@ export class ScatterChart extends Chart {
     const passing = Array.from(rows.evaluation.keys()).filter((i) => filters.passes(i)), seen = passing.filter(there);
     this.missing = passing.length - seen.length;
     const axis = (name, key) => Object.assign(
-      new Axis(seen.map((i) => this.values[key][i]), { column: columns.get(name), whole: this.whole, ends: this.zoom.ends?.[key] ?? null }),
+      new Axis(seen.map((i) => this.values[key][i]), { column: columns.get(name), whole: this.whole || Boolean(columns.get(name)?.searched), ends: this.zoom.ends?.[key] ?? null }),
       { title: titled(name) },
     );
     const kept = seen.filter((i) => playbacks.keptAt.has(rows.evaluation[i]));
