@@ -81,6 +81,11 @@ export class ScatterChart extends Chart {
 
   paintSeries(c, ratio) {
     this.paintRegions(c);
+    if (!this.shown.some(({ items }) => items.length)) {
+      c.textAlign = "center";
+      c.fillStyle = palette.muted;
+      c.fillText(this.missing ? "No evaluation has values on both axes" : "No evaluation to show", (this.box.left + this.box.right) / 2, (this.box.top + this.box.bottom) / 2);
+    }
     for (const { items, marker, alpha = 1, line, ranks } of this.shown) {
       const places = items.map((i) => this.placeOf(i)).filter(Boolean);
       if (line) this.paintSteps(c, places, line);

@@ -108,6 +108,10 @@ export class Table {
       return element("tr", { class: "room", "aria-hidden": "true" }, cell);
     };
     const drawn = this.order.slice(first, last).map((i, k) => this.row(i, first + k));
+    if (!this.order.length) {
+      const empty = element("td", { colspan: this.columns.length }, "No critical scenario passes the filter.");
+      return void this.body.replaceChildren(element("tr", { class: "none" }, empty));
+    }
     this.body.replaceChildren(...(first ? [room(first)] : []), ...drawn, ...(last < this.order.length ? [room(this.order.length - last)] : []));
     if (focused !== null) this.buttonOf(focused)?.focus({ preventScroll: true });
   }
