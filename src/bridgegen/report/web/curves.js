@@ -62,14 +62,16 @@ export class Curves {
       });
     }
     this.panels = panels;
-    for (const panel of panels) panel.beyond = panel.peaks ? panel.lines.flatMap((one) => this.peakOf(one, panel)) : [];
+    for (const panel of panels) panel.beyond = panel.peaks ? panel.lines.flatMap((one) => this.peaksOf(one, panel)) : [];
   }
 
-  // The largest value of a line beyond its panel, with the instant.
-  peakOf({ values, name, colour }, { low, high, steps }) {
-    const out = (value) => (value === null ? 0 : Math.max(value - high, low - value));
-    const all = steps ? values.slice(0, -1) : values, index = all.reduce((best, value, k) => (out(value) > out(all[best]) ? k : best), 0);
-    return out(all[index]) > 0 ? [{ name, colour, index, value: all[index] }] : [];
+  // The largest and the least value of a line where they are beyond its panel, with their instants.
+  peaksOf({ values, name, colour }, { low, high, steps }) {
+    const all = steps ? values.slice(0, -1) : values;
+    return [(value) => value - high, (value) => low - value].flatMap((excess) => {
+      const out = (value) => (value === null ? -Infinity : excess(value)), index = all.reduce((best, value, k) => (out(value) > out(all[best]) ? k : best), 0);
+      return out(all[index]) > 0 ? [{ name, colour, index, value: all[index] }] : [];
+    });
   }
 
   // Places the panels, two beside each other where there is room; in CSS pixels.
