@@ -112,9 +112,12 @@ def test_news_are_the_rows_that_the_page_lacks(growing):
     ranks = np.array(told["rows"]["rank"])
     assert len(ranks) == 100
     order = np.flatnonzero(ranks)[np.argsort(ranks[ranks > 0])]
-    assert order.tolist() == [
-        i for i in np.argsort(rows.F[:100, 0], kind="stable") if rows.critical[i]
-    ]
+    collisions, severity = (
+        rows.metrics[:100, view._pipeline.metrics.index(name)]
+        for name in ("n_collision", "severity")
+    )
+    best_first = np.lexsort((rows.F[:100, 0], -severity, collisions <= 0))
+    assert order.tolist() == [i for i in best_first if rows.critical[i]]
     x = next(one for one in told["rows"]["columns"] if one["name"] == "ego_speed")["values"]
     column = view._pipeline.space.names.index("ego_speed")
     assert x == pytest.approx(rows.X[70:100, column], rel=1e-4)
