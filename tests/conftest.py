@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -77,6 +78,19 @@ def checkers() -> Any:
 OPTIONS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update"]
 
 
+def wait_for(page: Any, condition: str, *, seconds: float = 30.0) -> None:
+    """Wait until an expression is true on a page.
+
+    Playwright's own ``wait_for_function`` evaluates text inside of the page, which the pages'
+    Content-Security-Policy forbids; ``evaluate`` asks from outside.
+    """
+    end = time.monotonic() + seconds
+    while not page.evaluate(condition):
+        if time.monotonic() > end:
+            pytest.fail(f"never true within {seconds:g} s: {condition}")
+        page.wait_for_timeout(20)
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -85,7 +99,9 @@ def browser() -> Iterator[Any]:
         pytest.skip("chromium is not installed")
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
-        yield browser
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(sync_api.Page, "wait_for_function", wait_for)
+            yield browser
         browser.close()
 
 

@@ -44,11 +44,13 @@ def test_a_button_puts_the_objectives_on_the_axes_and_draws_the_front(browser, m
     page = browser.new_page()
     page.goto((tmp_path / "report.html").as_uri())
     page.locator("#scatter").scroll_into_view_if_needed()
-    page.wait_for_function("document.getElementById('scatter').data")
+    page.wait_for_function("bridgegen.scatter.points")
     page.click("#show-front")
     assert [page.input_value("#axis-x"), page.input_value("#axis-y")] == ["F of d_min", "F of v_d"]
-    trace = "document.getElementById('scatter').data.find((t) => t.name.startsWith('Pareto'))"
-    x, y = page.evaluate(f"[[...{trace}.x], [...{trace}.y]]")
+    front = "bridgegen.scatter.series.find((one) => one.name === 'front').items"
+    x, y = page.evaluate(
+        f"'xy'.split('').map((a) => {front}.map((i) => bridgegen.scatter.values[a][i]))"
+    )
     e = many.evaluations
     F = np.stack([c.values[e.status == 0][front_of(many)] for c in e.objectives], axis=1)
     order = np.lexsort((-F[:, 1], F[:, 0]))

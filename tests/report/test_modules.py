@@ -124,11 +124,11 @@ KEYWORDS = {*re.findall(r"\w+", """
 CONTEXTUAL = {"as", "async", "from", "get", "of", "static"}
 """Those that may be names as well."""
 GLOBALS = {*re.findall(r"\w+", """
-    Array Blob Boolean CSS CustomEvent DecompressionStream Error Infinity Int32Array
-    IntersectionObserver JSON Map Math Number Object Path2D Plotly ResizeObserver Response Set
+    Array Blob Boolean CSS CustomEvent DecompressionStream Error Float64Array Infinity Int32Array
+    IntersectionObserver JSON Map Math Number Object Path2D ResizeObserver Response Set
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout
     decodeURIComponent document encodeURIComponent fetch getComputedStyle history innerHeight
-    innerWidth location matchMedia navigator performance requestAnimationFrame setTimeout
+    innerWidth location matchMedia navigator performance Promise requestAnimationFrame setTimeout
     window
 """)}  # fmt: skip
 TOKEN = re.compile(

@@ -8,14 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridgegen.report import packed
+from bridgegen.report import payload as payloads
 from bridgegen.report.data import Column, Evaluations
 from bridgegen.report.page import report_page, write_report
 from bridgegen.report.payload import payload
 from bridgegen.report.playback_payload import playback_payload, road_payload
 
-LIMIT = 15_000_000
+LIMIT = 6_000_000
 
 
 def chunks(told):
@@ -36,6 +39,8 @@ def test_motions_are_as_in_the_page_s_own_data(more):
     (chunk,) = chunks(told)
     assert told["evaluations"] == [p.evaluation for p in more.more]
     want = [playback_payload(p, 0, None) for p in more.more]  # on the road that the page has
+    for one in want:
+        del one["parameters"], one["metrics"]  # of its row, which the page has
     assert chunk == {"playbacks": json.loads(json.dumps(want)), "roads": []}
 
 
@@ -43,26 +48,58 @@ def test_a_road_that_the_page_has_not_got_comes_once_a_chunk(more):
     road = more.kept[0].lanes
     moved = tuple(replace(one, points=one.points + 1.0) for one in road)
     some = [replace(more.more[0], lanes=lanes) for lanes in (moved, road, moved)]
-    told = packed.packed_motions(some, {packed.road_key(more.kept[0]): 0})
+    told = packed.packed_motions(some, {packed.road_key(more.kept[0]): 0}, 10**6, of_rows=True)
     (chunk,) = chunks(told)
     assert [one["road"] for one in chunk["playbacks"]] == [-1, 0, -1]
     assert chunk["roads"] == [road_payload(some[0])]
 
 
-def test_there_is_room_for_the_first_only(more, monkeypatch):
-    some = [more.more[0]] * 50
-    whole = packed.packed_motions(some, {})
-    assert [len(chunk["playbacks"]) for chunk in chunks(whole)] == [20, 20, 10]
-    monkeypatch.setattr(packed, "MOST_MOTION", len(whole["texts"][0]) + 10)
-    told = packed.packed_motions(some, {})
-    assert len(told["evaluations"]) == 20
+def test_there_is_room_for_the_first_motions_only(more):
+    some = [more.more[0]] * 100
+    whole = packed.packed_motions(some, {}, 10**6, of_rows=True)
+    assert [len(chunk["playbacks"]) for chunk in chunks(whole)] == [40, 40, 20]
+    told = packed.packed_motions(some, {}, len(whole["texts"][0]) + 10, of_rows=True)
+    assert len(told["evaluations"]) == 40
     assert len(told["texts"]) == 1
-    monkeypatch.setattr(packed, "MOST_FILES", 30)
-    files = {"a": b"x" * 100, "b": bytes(range(100)), "c": b""}
-    assert list(packed.packed_files(files)) == ["a"]
 
 
-def test_motions_that_find_no_room_are_not_asked_for(more, monkeypatch):
+def files_of(told):
+    """Return the files again, from their lines."""
+    lines = zlib.decompress(b64decode(told["lines"])).split(b"\n")
+    runs = json.loads(zlib.decompress(b64decode(told["runs"])))
+    return {
+        name: b"\n".join(
+            line for first, n in zip(run[::2], run[1::2], strict=True) for line in lines[first:][:n]
+        )
+        for name, run in zip(told["names"], runs, strict=True)
+    }
+
+
+@given(st.lists(st.lists(st.sampled_from([b"", b"a", b"b", b"\r", b"\xff\x00"]), min_size=1)))
+def test_files_are_the_same_bytes_again(contents):
+    files = {f"{k}.owl": b"\n".join(lines) for k, lines in enumerate(contents)}
+    told = packed.packed_files(files)
+    assert files_of(told) == files
+    held = zlib.decompress(b64decode(told["lines"])).split(b"\n")
+    assert len(set(held)) == len(held)  # every line once
+
+
+def test_there_is_room_for_the_first_files_only(monkeypatch):
+    monkeypatch.setattr(packed, "MOST_FILES", 60)
+    files = {"a": b"x\n" * 100, "b": bytes(range(100)), "c": b"x\n"}
+    told = packed.packed_files(files)
+    assert files_of(told) == {"a": files["a"]}
+
+
+def test_files_that_are_alike_take_the_room_of_one():
+    rng = np.random.default_rng(0)
+    lines = [rng.bytes(30).hex().encode() for _ in range(1000)]
+    files = {f"{k}.owl": b"\n".join([*lines[:k], b"own %d" % k, *lines[k:]]) for k in range(10)}
+    size = [len(packed.packed_files(some)["lines"]) for some in (dict([*files.items()][:1]), files)]
+    assert size[1] < 1.01 * size[0]
+
+
+def test_motions_that_find_no_room_are_not_asked_for(more):
     asked = []
 
     def endless():
@@ -70,8 +107,7 @@ def test_motions_that_find_no_room_are_not_asked_for(more, monkeypatch):
             asked.append(more.more[0])
             yield asked[-1]
 
-    monkeypatch.setattr(packed, "MOST_MOTION", 1000)
-    assert packed.packed_motions(endless(), {})["evaluations"] == []
+    assert packed.packed_motions(endless(), {}, 1000, of_rows=True)["evaluations"] == []
     assert len(asked) == packed.CHUNK
 
 
@@ -106,12 +142,28 @@ def long(report):
 
 
 def test_a_page_of_10_000_rows_is_not_too_large(long, monkeypatch):
-    told = payload(long)
-    room = packed.MOST_MOTION - sum(map(len, told["packed"]["texts"]))
-    # The motions that are left out for want of room would not have fit; so with the files.
-    assert 0 < len(told["files"]) < 20
-    size = sum(map(len, report_page(long))) + max(0, room)
+    assert 0 < len(payload(long)["files"]["names"]) < 20
+    size = sum(map(len, report_page(long)))
     assert size <= LIMIT
+    # The motions that are left out for want of room would not have fit.
+    monkeypatch.setattr(payloads, "SIZE_OF_ROW", (size - 400_000 - payloads.SIZE) // 9000)
+    assert 0 < len(payload(long)["packed"]["evaluations"]) < len(long.more)
+    assert size - 700_000 < sum(map(len, report_page(long))) <= size - 400_000
+
+
+def test_a_page_of_1000_rows_is_smaller_than_a_megabyte(long):
+    e = long.evaluations
+    first = replace(
+        e, iteration=e.iteration[:1000], critical=e.critical[:1000], status=e.status[:1000],
+        cause=e.cause[:1000],
+        **{
+            group: tuple(replace(c, values=c.values[:1000]) for c in getattr(e, group))
+            for group in ("parameters", "metrics", "objectives")
+        },
+    )  # fmt: skip
+    data = replace(long, evaluations=first)
+    assert payload(data)["packed"]["evaluations"]
+    assert sum(map(len, report_page(data))) <= 1_000_000
 
 
 @pytest.mark.browser

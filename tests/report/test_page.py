@@ -92,6 +92,7 @@ def test_nothing_is_fetched(written):
     assert policy.startswith("default-src 'none';")
     assert "http" not in policy
     assert "connect-src 'none'" in policy
+    assert "unsafe-eval" not in policy
     parts = [page._own(name) for name in (*PAGES, "scenario.css")]
     for entries in (page.REPORT, ("show.js",)):
         parts += page._bundled(entries)
@@ -148,7 +149,7 @@ def test_a_hostile_title_is_text(tmp_path, with_summary, title):
     shown = title.encode("utf-8", "replace").decode()
     assert Page(text).text["title"].strip() == f"{shown}: {shown} – BridgeGen"
     assert json.loads(embedded(text))["summary"]["title"] == title
-    assert sum(tag == "script" for tag, _ in Page(text).elements) == 4
+    assert sum(tag == "script" for tag, _ in Page(text).elements) == 2
 
 
 @pytest.mark.parametrize(("n", "kept"), [(0, 0), (1, 1), (2, 0), (41, 3)])
@@ -162,12 +163,12 @@ def test_small_runs_make_a_page(tmp_path, build, n, kept):
 
 def test_the_size_stays_in_bounds(tmp_path, build):
     write_report(tmp_path / "r.html", build(400, 10))
-    assert (tmp_path / "r.html").stat().st_size < 7e6
+    assert (tmp_path / "r.html").stat().st_size < 1e6
 
 
-def test_plotly_is_read_but_not_imported(tmp_path):
+def test_a_page_needs_no_heavy_package():
     code = (
-        "import sys; from bridgegen.report import page; assert b'Plotly' in page._plotly();"
+        "import sys; from bridgegen.report import page;"
         "heavy = {'plotly', 'pandas', 'pymoo', 'numba'} & set(sys.modules); assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -190,7 +191,7 @@ def test_a_full_disk_keeps_the_old_report_and_leaves_no_part(tmp_path, report, w
     path = tmp_path / "report.html"
     path.write_text("old")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, hard))  # writing on fails, as when full
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))  # writing on fails, as when full
     try:
         with pytest.raises(StorageError, match="cannot be written"):
             write_report(path, report)

@@ -116,16 +116,20 @@ def test_the_page_tells_draws_and_filters(page, found):
     page.locator("#scatter").scroll_into_view_if_needed()
     page.select_option("#axis-x", "bv_speed")
     page.select_option("#axis-y", "fog_density")
-    shapes = "document.getElementById('scatter').layout.shapes.map((s) => [s.x0, s.x1, s.yref])"
-    page.wait_for_function(f"{shapes}[0][0] === 3")
-    assert page.evaluate(shapes) == [[3, 6, "y domain"]]  # only what holds
+    page.wait_for_function("bridgegen.scatter.points?.length")
+    drawn = "bridgegen.scatter.projections.map(({ x, y }) => [x, y].flat())"
+    x, y = (page.evaluate(f"(({{ from, to }}) => [from, to])(bridgegen.scatter.{a})") for a in "xy")
+    low, high = page.evaluate("[3, 6].map((value) => bridgegen.scatter.x.within(value))")
+    assert x[0] < low < high <= x[1]
+    assert page.evaluate(drawn) == [[low, high, *y]]  # only what holds, over all of the other axis
 
     page.select_option("#list-region", "1")
     held = inside(found, fog_density=(0.0, 50.0))
     critical = (held & found.evaluations.critical).sum()
-    page.wait_for_function(f"{shapes}[0][2] === 'y'")  # the chosen one instead
-    counts = "document.getElementById('scatter').data.slice(0, 2).map((t) => t.x.length)"
-    assert page.evaluate(counts) == [held.sum() - critical, critical]
+    counts = "bridgegen.scatter.series.slice(0, 2).map(({ items }) => items.length)"
+    page.wait_for_function(f"String({counts}) === '{held.sum() - critical},{critical}'")
+    ends = page.evaluate("[0, 50].map((value) => bridgegen.scatter.y.within(value))")
+    assert page.evaluate(f"{drawn}[0].slice(2)") == ends  # the chosen one instead
     assert set(page.locator("#list-body td:last-child").all_inner_texts()) <= {"1", "2"}
     pressed = page.locator("#regions-body button[aria-pressed=true]")
     assert pressed.get_attribute("aria-label") == "Show region 2 only"

@@ -12,6 +12,7 @@ from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.starter import start_scenario
 from bridgegen.pipeline import Pipeline
+from bridgegen.report import page
 from bridgegen.report.playbacks import playbacks
 from bridgegen.report.scenario_words import story_lines
 from bridgegen.report.show import show_scenario
@@ -32,6 +33,11 @@ def test_the_picture_shows_everybody_who_matters(name):
     assert len(list(root.iter(f"{SVG}polygon"))) >= 1  # asphalt
     assert "nan" not in text
     assert len(text) < 60_000
+    # The page gives every colour its counterpart of the dark theme; lamps are lit in both.
+    style = page._own("scenario.css").decode()
+    lamps = {"#ff4d4d", "#ffd23f", "#38d39f", "#3a434e"}
+    drawn = {colour for _, colour in re.findall(r'(fill|stroke)="(#\w+)"', text)} - lamps
+    assert [colour for colour in sorted(drawn) if f'="{colour}"]' not in style] == []
 
 
 def test_bodies_are_drawn_where_they_are():

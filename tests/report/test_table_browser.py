@@ -124,3 +124,14 @@ def test_what_is_shown_from_elsewhere_is_brought_into_sight(page):
 
 def test_nothing_complained_so_far(page):
     assert page.complaints == []
+
+
+def test_a_filter_that_nothing_passes_says_so(browser, report, tmp_path):
+    write_report(tmp_path / "report.html", report)
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.goto((tmp_path / "report.html").as_uri())
+    page.fill("#list-low", "100000")
+    assert page.inner_text("#list-body").strip() == "No critical scenario passes the filter."
+    page.click("#list-clear")
+    assert page.locator("#list-body tr[data-i]").count() > 3
+    page.close()

@@ -9,7 +9,7 @@ import numpy as np
 from bridgegen.campaign import Run
 from bridgegen.campaign.restored import pipeline_of
 from bridgegen.campaign.settings import Settings
-from bridgegen.report import packed, payload
+from bridgegen.report import payload
 from bridgegen.store import Store
 from bridgegen.view.run_view import RunView
 
@@ -46,7 +46,7 @@ def peak(run):
 
 def test_memory_a_row_of_a_page(finished, tmp_path, monkeypatch):
     monkeypatch.setattr(payload, "ROWS", 500)
-    monkeypatch.setattr(packed, "MOST_MOTION", 1000)
+    monkeypatch.setattr(payload, "SIZE_OF_ROW", 0)  # no motions
     peak(repeated(finished, tmp_path / "first", 500))  # what is made once
     sizes = (10_000, 30_000)
     (small, page), (large, same) = (peak(repeated(finished, tmp_path / str(n), n)) for n in sizes)

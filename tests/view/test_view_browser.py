@@ -12,8 +12,8 @@ from bridgegen.view.server import Server
 
 pytestmark = pytest.mark.browser
 
-COUNTS = """[bridgegen.data.rows.n, document.getElementById("scatter").data?.slice(0, 2)
-  .reduce((sum, trace) => sum + trace.x.length, 0)]"""
+COUNTS = """[bridgegen.data.rows.n, bridgegen.scatter.series.slice(0, 2)
+  .reduce((sum, { items }) => sum + items.length, 0)]"""
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_it_grows_with_its_run_and_says_so(opened, growing):
     critical = growing.rows.critical
     assert critical[:60].sum() != critical[:100].sum()
     page.locator("#scatter").scroll_into_view_if_needed()
-    page.wait_for_function("document.getElementById('scatter').data")
+    page.wait_for_function("bridgegen.scatter.points")
     page.fill("#list-low", "0")  # a filter stays
     page.locator("#scatter").scroll_into_view_if_needed()  # it is drawn where it is seen
     before = page.evaluate("bridgegen.state().position")
@@ -59,8 +59,9 @@ def test_it_grows_with_its_run_and_says_so(opened, growing):
     assert page.inner_text("#list-note") == f"{n} of {n} critical scenarios"
     assert "100 concrete scenarios" in page.inner_text("#sentences")
     assert page.evaluate("bridgegen.state().position") == before
-    last = "Math.max(...document.querySelector('#trend-plots .plot').data[2].x)"
-    assert page.evaluate(last) == page.evaluate("bridgegen.data.batches.last.at(-1)")
+    page.locator("#trend-plots").scroll_into_view_if_needed()
+    last = "(({ x, points }) => x.valueAt(points.at(-1).x))(bridgegen.trends[0])"
+    assert page.evaluate(last) == pytest.approx(page.evaluate("bridgegen.data.batches.last.at(-1)"))
 
     growing.grow(20)
     growing.end()
@@ -90,6 +91,21 @@ def test_any_row_plays_and_its_address_brings_it_back(opened, growing):
     page.goto(address)
     page.wait_for_function(f"bridgegen.state()?.scenario === '{told['name']}'")
     assert page.evaluate("bridgegen.state().index") == 20
+    assert page.complaints == []
+
+
+def test_any_point_of_the_scatter_plot_plays(opened, growing):
+    page, _ = opened
+    page.locator("#scatter").scroll_into_view_if_needed()
+    page.wait_for_function("bridgegen.scatter.points")
+    plain = page.evaluate("bridgegen.data.rows.critical.indexOf(0)")
+    evaluation = page.evaluate(f"bridgegen.data.rows.evaluation[{plain}]")
+    lines = page.evaluate(f"bridgegen.scatter.linesOf({plain})")
+    assert lines[-1] == "Click to simulate and play it"
+    page.evaluate(f"bridgegen.scatter.choose({{ item: {plain} }})")
+    page.wait_for_function(f"bridgegen.state()?.scenario === 'evaluation {evaluation + 1}'")
+    page.wait_for_function("bridgegen.state().playing")
+    assert page.is_hidden("#no-motion")
     assert page.complaints == []
 
 

@@ -1,6 +1,6 @@
 """From a run's rows to the report's data."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import comb
 from pathlib import Path
 from typing import Any
@@ -27,24 +27,16 @@ from bridgegen.report.data import (
     RunSummary,
 )
 from bridgegen.report.findings_payload import MOST_MODES
+from bridgegen.report.further import further_playbacks
 from bridgegen.report.notes import tables
 from bridgegen.report.playback import Playback
 from bridgegen.report.playbacks import minimal_playbacks, playbacks
-from bridgegen.search.dominance import by_merit
 from bridgegen.store import Recorded, Rows
 from bridgegen.store.summary import Summary
 from bridgegen.triage.record import Mode, Triage
 
 SAMPLE = 50_000
 """Random scenarios that estimate feasibility: fewer than `bridgegen coverage` draws, for speed."""
-
-MOTIONS, MOTIONS_OF_THEIR_OWN = 200, 20
-"""Maximum number of further scenarios whose motion the page holds: half a second's work. At most a
-tenth of the rows. Fewer where each has a road, or an adversary's course, of its own, which take ten
-times as long; none with a user's own driver, which may be slow."""
-
-AT_A_TIME = 40
-"""Scenarios that are simulated together for it: a long one with many participants takes 2 MB."""
 
 INDEPENDENT = "random"
 """The algorithm whose rows are independent draws."""
@@ -156,7 +148,7 @@ def build_report(
         _coverage(pipeline, rows) if coverage else None,
         tables(notes, pipeline.space),
         regions,
-        more=_more(pipeline, rows, {evaluation for _, evaluation, _ in kept}, first)
+        more=further_playbacks(pipeline, rows, {evaluation for _, evaluation, _ in kept}, first)
         if more
         else (),
         files=files or {},
@@ -242,42 +234,6 @@ def _minimal(
         if one.minimal is not None
     ]
     return () if pipeline.driver.is_own else minimal_playbacks(pipeline, wanted)
-
-
-def _more(
-    pipeline: Pipeline, rows: Rows | Recorded, kept: set[int], wanted: Sequence[int]
-) -> "_More":
-    """Return the playbacks of scenarios besides the exported ones.
-
-    First the requested ones, then the most critical ones.
-    """
-    critical = np.flatnonzero(rows.critical & (rows.status == 0))
-    best = critical[by_merit(rows.F[critical])]
-    best = best[~np.isin(best, list(kept))]
-    space = pipeline.space
-    own = space.decisions or {*pipeline.source.static_names} & {*space.variables}
-    most = MOTIONS_OF_THEIR_OWN if own else max(MOTIONS, len(rows) // 10)
-    first = [evaluation for evaluation in wanted if evaluation not in kept]
-    order = list(dict.fromkeys([*first, *best[:most].tolist()]))[:most]
-    if pipeline.driver.is_own:
-        order = []
-    return _More(pipeline, rows, order)
-
-
-class _More:
-    """Playbacks of some evaluations, simulated a few at a time on iteration.
-
-    A long run has more of them than the page can hold.
-    """
-
-    def __init__(self, pipeline: Pipeline, rows: Rows | Recorded, order: Sequence[int]) -> None:
-        self._pipeline, self._rows, self._order = pipeline, rows, order
-
-    def __iter__(self) -> Iterator[Playback]:
-        for start in range(0, len(self._order), AT_A_TIME):
-            numbers = self._order[start : start + AT_A_TIME]
-            some = [(f"evaluation {i + 1}", i, ()) for i in numbers]
-            yield from playbacks(self._pipeline, self._rows, some, brief=True)
 
 
 def _coverage(pipeline: Pipeline, rows: Rows | Recorded) -> CoverageMap:

@@ -1,14 +1,12 @@
-"""Assembles the page: template, style, scripts, Plotly and the data, in one file."""
+"""Assembles the page: template, style, scripts and the data, in one file."""
 
 import html
-import importlib.util
 import re
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from bridgegen.disk import write_whole
-from bridgegen.errors import BridgeGenError
 from bridgegen.report.data import ReportData
 from bridgegen.report.modules import bundle
 from bridgegen.report.payload import to_json
@@ -43,12 +41,11 @@ def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
     """
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
     connect = b"'self'" if live else b"'none'"
-    text = to_json(data, live=live)
     script, style = _bundled(SERVED if live else REPORT)
+    text = to_json(data, live=live, code=len(script) + len(style) + len(_own("page.html")))
     return filled(
-        "page.html", title, style, data=text.encode("ascii"), script=script, plotly=_plotly(),
-        connect=connect,
-    )  # fmt: skip
+        "page.html", title, style, data=text.encode("ascii"), script=script, connect=connect
+    )
 
 
 def write_page(path: Path, entry: str, title: str, data: str) -> None:
@@ -111,19 +108,3 @@ def _text(name: str) -> str | None:
 
 def _own(name: str) -> bytes:
     return WEB.joinpath(name).read_bytes()
-
-
-@cache
-def _plotly() -> bytes:
-    """Return Plotly's JavaScript from the installed package, without importing the package."""
-    spec = importlib.util.find_spec("plotly")
-    origin = spec.origin if spec else None
-    script = Path(origin or "plotly").parent / "package_data" / "plotly.min.js"
-    try:
-        text = script.read_bytes()
-    except OSError as error:
-        raise BridgeGenError(
-            f"the report needs plotly's plotly.min.js, but {script}: {error.strerror}; "
-            "reinstall plotly"
-        ) from None
-    return text.replace(b"</script", rb"<\/script")

@@ -13,7 +13,7 @@ import numpy as np
 from bridgegen.arrays import Bool
 from bridgegen.physics import HARD_BRAKING
 from bridgegen.report import convergence, sentences
-from bridgegen.report.data import Column, Evaluations, ReportData
+from bridgegen.report.data import WHOLE, Column, Evaluations, ReportData
 from bridgegen.report.findings_payload import findings_payload, implausible_payload
 from bridgegen.report.packed import packed_files, packed_motions, road_key
 from bridgegen.report.picture_payload import pictures_payload
@@ -27,18 +27,23 @@ from bridgegen.report.rounding import significant
 from bridgegen.report.sections import sections_payload
 from bridgegen.search.dominance import by_merit, non_dominated
 
+SIZE, SIZE_OF_ROW = 950_000, 500
+"""Maximum number of characters of a page with 1000 evaluations, and how many more it may have for
+each further one: motions fill what the rest leaves. Exported scenarios have their place anyway."""
+
 ROWS = 20_000
 """Maximum number of rows on the page, evenly spread; the iterations include all rows."""
 
 
-def to_json(data: ReportData, *, live: bool = False) -> str:
+def to_json(data: ReportData, *, live: bool = False, code: int = 0) -> str:
     """Return the page's data as JSON that is safe inside a ``<script>`` element.
 
     Args:
         data: of the report.
         live: whether the page may request updates from its server.
+        code: see `payload`.
     """
-    return script_json({**payload(data), "live": live})
+    return script_json({**payload(data, code), "live": live})
 
 
 def script_json(value: Any) -> str:
@@ -52,9 +57,13 @@ def script_json(value: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def payload(data: ReportData) -> dict[str, Any]:
-    """Return the page's data as plain dicts, lists, numbers and strings."""
-    harm = data.summary.harm
+def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
+    """Return the page's data as plain dicts, lists, numbers and strings.
+
+    Args:
+        data: of the report.
+        code: characters that the page has besides its data.
+    """
     drawn = [playback for playback in data.kept if playback.picture is not None]
     number = {playback.name: k for k, playback in enumerate(drawn)}
     roads: list[list[dict[str, Any]]] = []
@@ -66,26 +75,35 @@ def payload(data: ReportData) -> dict[str, Any]:
             index[key] = len(roads)
             roads.append(road_payload(playback))
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
-    motions = packed_motions(data.more, index)
-    wanted = [*(one.evaluation for one in data.kept), *motions["evaluations"]]
+    wanted = [one.evaluation for one in data.kept]
     wanted += [one.evaluation for each in data.confirmations for one in each.scenarios]
     modes = data.triage.modes if data.triage else ()
     wanted += [one.shown for one in modes]
     shown = _shown(data.evaluations, wanted)
-    return {
+    page = {
         "live": False,
         "summary": _summary(data),
-        "rows": _rows(data.evaluations, shown, harm=harm),
-        "minimal": packed_motions(data.minimal, index),
+        **_of_rows(data, shown),
+        "minimal": packed_motions(data.minimal, index, SIZE, of_rows=False),
         "implausible": implausible_payload(data.evaluations.findings),
-        **sections_payload(data, shown),
         "scale": {**SCALE, "road": ROAD_SCALE},
         "roads": roads,
         "kept": kept,
-        "packed": motions,
         "files": packed_files(data.files),
         "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
     }
+    most = SIZE + SIZE_OF_ROW * max(0, data.evaluations.status.size - 1000)
+    room = max(0, most - code - len(script_json(page)))
+    page["packed"] = motions = packed_motions(data.more, index, room, of_rows=True)
+    if not shown[motions["evaluations"]].all():  # of a long run
+        page |= _of_rows(data, _shown(data.evaluations, wanted + motions["evaluations"]))
+    return page
+
+
+def _of_rows(data: ReportData, shown: Bool) -> dict[str, Any]:
+    """Return what the page holds of some rows, and the sections."""
+    rows = _rows(data.evaluations, shown, harm=data.summary.harm)
+    return {"rows": rows, **sections_payload(data, shown)}
 
 
 def news(data: ReportData, after: int) -> dict[str, Any]:
@@ -163,8 +181,8 @@ def _rows(e: Evaluations, ok: Bool, *, harm: str = "") -> dict[str, Any]:
 def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
     """Return each row's place among all critical ones, 1 for the most critical; 0 for others.
 
-    By harm, so that no near miss is above a collision of the ego's responsibility, where harm makes
-    a scenario critical; else by the objectives.
+    No near miss is above a contact: by harm where that makes a scenario critical, else by whether
+    there is a collision. Then the severity decides, then the objectives.
     """
     critical = np.flatnonzero(e.critical & (e.status == 0))
     rank = np.zeros(e.critical.size, dtype=np.int64)
@@ -173,10 +191,14 @@ def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
         if e.objectives
         else np.zeros((critical.size, 1))
     )
-    order = critical[by_merit(F)]
-    for column in e.metrics:
-        if column.name == harm:
-            order = order[np.argsort(-column.whole[order], kind="stable")]
+    measured = {c.name: c.whole[critical] for c in e.metrics if c.name in WHOLE}
+    if not harm and "n_collision" in measured:
+        measured["n_collision"] = np.minimum(measured["n_collision"], 1.0)  # whether, not how many
+    order = by_merit(F)
+    for name in ("severity", harm or "n_collision"):
+        if name in measured:
+            order = order[np.argsort(-measured[name][order], kind="stable")]
+    order = critical[order]
     rank[order] = np.arange(1, critical.size + 1)
     shown: list[int] = rank[ok].tolist()
     return shown

@@ -2,6 +2,7 @@
 
 import { palette } from "./colours.js";
 import { $, element } from "./common.js";
+import { conflictWord } from "./findings.js";
 import { boxCentre, isPlaced } from "./geometry.js";
 import { quantity, shareText } from "./numbers.js";
 
@@ -12,7 +13,7 @@ const ZONES = {
 };
 
 const ZONE_SHOWN = 1; // s, before and after the instant
-const INSTANTS = { contact: "contact", "near miss": "least time to collision", "collision course": "least time to collision" };
+const INSTANTS = { contact: "collision", "near miss": "least time to collision", "collision course": "least time to collision" };
 export const ZONED = ["contact", "near miss"];
 
 export function fillConflict(kept) {
@@ -37,7 +38,7 @@ export function conflictLines(found) {
   if (!found) return [];
   const line = (name, value, title = "") => element("div", { title }, element("span", { class: "name" }, name), element("b", {}, value));
   const figure = (name) => quantity(...found.numbers[name], 3);
-  const lines = [element("h3", {}, "Its conflict"), line("conflict", found.conflict)];
+  const lines = [element("h3", {}, "Its conflict"), line("conflict", conflictWord(found.conflict))];
   if (ZONED.includes(found.conflict)) {
     lines.push(
       line("type", found.type, found.type_source), line("partner", found.partner), line("responsible", found.responsible, found.rule_says ?? ""),

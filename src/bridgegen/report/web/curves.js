@@ -1,7 +1,8 @@
 // Distance, time to collision, speeds and accelerations over time; a click or a drag jumps to an instant.
 
+import { ticks, unruled } from "./axes.js";
 import { DASHES, palette } from "./colours.js";
-import { ZONED } from "./conflict.js";
+import { drawMark, drawMoments, drawPeaks } from "./curve_marks.js";
 import { data } from "./data.js";
 import { colourOf, playersOf } from "./geometry.js";
 import { number } from "./numbers.js";
@@ -11,18 +12,8 @@ import { FONT, fitCanvas } from "./view.js";
 // What is beyond runs out of its panel, where what is near would be flat otherwise.
 const FAR = 20; // m
 const LATE = 10; // s
+const HARDEST = 15; // m/s²: more than tyres can give; a participant that stops dead has hundreds
 const CURVE_FONT = FONT.replace("600 12px", "11.5px");
-
-export function roundStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((m) => m * power).find((step) => step >= least * 0.999);
-}
-
-function ticks(low, high, wanted) {
-  const step = roundStep((high - low) / wanted), list = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + step * 1e-4; i++) list.push(i * step || 0); // no −0
-  return list;
-}
 
 const present = (values) => values.filter((value) => value !== null);
 
@@ -47,13 +38,13 @@ export class Curves {
       values, colour: () => (e === null ? palette.ink : colourOf(kept, e)), dashes: e === null ? [] : DASHES[players.indexOf(e) % DASHES.length],
       name: e === null ? "" : kept.entities[e].name,
     });
-    const gaps = present(kept.distance), least = Math.min(...gaps, Infinity), speeds = present(players.flatMap((e) => kept.v[e]));
+    const gaps = present(kept.distance), least = Math.min(...gaps, Infinity), speeds = Float64Array.from(present(players.flatMap((e) => kept.v[e]))).sort();
     /** @type {any[]} */
     const panels = [{
       title: "distance", unit: "m", lines: [line(kept.distance)], low: 0, high: least < 8 ? Math.min(Math.max(1, ...gaps) * 1.05, FAR) : Math.max(1, ...gaps) * 1.05,
       mark: critical === null ? null : [critical, `critical below ${number(critical, 3)} m`],
     }, {
-      title: "speed", unit: "m/s", lines: players.map((e) => line(kept.v[e], e)), low: 0, high: Math.max(1, ...speeds) * 1.15,
+      title: "speed", unit: "m/s", lines: players.map((e) => line(kept.v[e], e)), low: 0, high: Math.max(1, speeds.length ? unruled(speeds)[1] : 0) * 1.15, peaks: true,
     }];
     if (kept.ttc) {
       const finite = present(kept.ttc);
@@ -63,14 +54,24 @@ export class Curves {
       });
     }
     if (kept.a) {
-      const all = present(players.flatMap((e) => kept.a[e].slice(0, -1)));
+      const all = present(players.flatMap((e) => kept.a[e].slice(0, -1))).filter((value) => Math.abs(value) <= HARDEST);
       const low = Math.min(-1, ...all) * 1.1, high = Math.max(1, ...all) * 1.1;
       panels.push({
-        title: "acceleration", unit: "m/s²", lines: players.map((e) => line(kept.a[e], e)), low, high, steps: true,
+        title: "acceleration", unit: "m/s²", lines: players.map((e) => line(kept.a[e], e)), low, high, steps: true, peaks: true,
         mark: low < -hard ? [-hard, `hard braking below −${hard} m/s²`] : null,
       });
     }
     this.panels = panels;
+    for (const panel of panels) panel.beyond = panel.peaks ? panel.lines.flatMap((one) => this.peaksOf(one, panel)) : [];
+  }
+
+  // The largest and the least value of a line where they are beyond its panel, with their instants.
+  peaksOf({ values, name, colour }, { low, high, steps }) {
+    const all = steps ? values.slice(0, -1) : values;
+    return [(value) => value - high, (value) => low - value].flatMap((excess) => {
+      const out = (value) => (value === null ? -Infinity : excess(value)), index = all.reduce((best, value, k) => (out(value) > out(all[best]) ? k : best), 0);
+      return out(all[index]) > 0 ? [{ name, colour, index, value: all[index] }] : [];
+    });
   }
 
   // Places the panels, two beside each other where there is room; in CSS pixels.
@@ -136,10 +137,11 @@ export class Curves {
       c.beginPath();
       c.rect(left, top - 1, right - left, bottom - top + 2);
       c.clip();
-      if (panel.mark && panel.mark[0] < high && panel.mark[0] > low) this.drawMark(c, panel, y);
+      if (panel.mark && panel.mark[0] < high && panel.mark[0] > low) drawMark(c, panel, y);
       for (const line of panel.lines) this.drawLine(c, line, x, y, panel.steps);
       c.restore();
-      this.drawMoments(c, panel, x, y);
+      drawMoments(c, this.kept, panel, panel === this.panels[0], x, y);
+      drawPeaks(c, panel, x);
     }
   }
 
@@ -183,21 +185,6 @@ export class Curves {
     }
   }
 
-  drawMark(c, { left, right, mark: [value, text] }, y) {
-    const at = y(value);
-    c.strokeStyle = c.fillStyle = palette.hit;
-    c.lineWidth = 1;
-    c.setLineDash([5, 4]);
-    c.beginPath();
-    c.moveTo(left, at);
-    c.lineTo(right, at);
-    c.stroke();
-    c.setLineDash([]);
-    c.textAlign = "left";
-    c.textBaseline = "bottom";
-    c.fillText(text, left + 6, at - 1);
-  }
-
   // A gap where there is no value; an acceleration lasts from one instant to the next.
   drawLine(c, { values, colour, dashes }, x, y, steps) {
     c.strokeStyle = colour();
@@ -215,59 +202,6 @@ export class Curves {
     });
     c.stroke();
     c.setLineDash([]);
-  }
-
-  // The contacts in every panel; the smallest gap in that of the distance.
-  drawMoments(c, panel, x, y) {
-    const { closest, contacts, distance, time_step: step } = this.kept, { left, right, top, bottom } = panel;
-    c.lineWidth = 1.5;
-    c.strokeStyle = palette.hit;
-    for (const k of contacts) {
-      c.beginPath();
-      c.moveTo(x(k), top);
-      c.lineTo(x(k), bottom);
-      c.stroke();
-    }
-    const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
-    for (const [k, colour] of found ? [[found.decided, palette.ink], ...(contacts.length ? [] : [[found.instant, palette.hit]])] : []) {
-      c.strokeStyle = colour;
-      c.setLineDash([4, 3]);
-      c.beginPath();
-      c.moveTo(x(k), top);
-      c.lineTo(x(k), bottom);
-      c.stroke();
-      c.setLineDash([]);
-    }
-    if (closest === null || panel !== this.panels[0]) return;
-    const hit = contacts.length > 0;
-    const [px, py] = [x(closest), y(Math.min(distance[closest], panel.high))];
-    c.fillStyle = hit ? palette.hit : palette.ink;
-    c.beginPath();
-    if (hit) { // a diamond for a contact, a disc for a near miss
-      [[0, -6], [6, 0], [0, 6], [-6, 0]].forEach(([a, b], i) => c[i ? "lineTo" : "moveTo"](px + a, py + b));
-      c.closePath();
-    } else c.arc(px, py, 4.5, 0, 2 * Math.PI);
-    c.fill();
-    c.lineWidth = 1;
-    c.setLineDash([2, 3]);
-    c.strokeStyle = c.fillStyle;
-    c.beginPath();
-    c.moveTo(px, py - 6);
-    c.lineTo(px, top + 8);
-    c.stroke();
-    c.setLineDash([]);
-    const text = `${hit ? "collision" : `d_min ${distance[closest].toFixed(2)} m`} at ${(closest * step).toFixed(2)} s`;
-    c.textBaseline = "middle";
-    c.textAlign = "left";
-    const w = c.measureText(text).width;
-    const at = Math.max(left, px + 10 + w > right ? px - w - 10 : px + 10);
-    const middle = top + 8;
-    c.save();
-    c.fillStyle = palette.card;
-    c.globalAlpha = 0.75;
-    c.fillRect(at - 3, middle - 8, w + 6, 16);
-    c.restore();
-    c.fillText(text, at, middle);
   }
 
   now(values, state) {

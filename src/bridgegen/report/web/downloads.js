@@ -7,19 +7,30 @@ import { inflated } from "./inflate.js";
 export function fileLink(name) {
   // Always relative: a path with a scheme or a leading slash cannot lead elsewhere.
   const href = `./${name.split("/").map(encodeURIComponent).join("/")}`, short = name.split("/").at(-1);
-  const held = Object.hasOwn(data.files, name), title = held ? "Saved from this page" : "Beside this page, in the run's folder";
+  const held = data.files.names.includes(name), title = held ? "Saved from this page" : "Beside this page, in the run's folder";
   const link = element("a", { href, download: short, title }, name);
   if (held) {
     link.addEventListener("click", (event) => {
       event.preventDefault();
-      save(data.files[name], short);
+      save(name, short);
     });
   }
   return link;
 }
 
-async function save(text, name) {
-  const url = URL.createObjectURL(new Blob([await inflated(text)], { type: "application/octet-stream" }));
-  element("a", { href: url, download: name }).click();
+// The bytes of a file that the page holds, see packed.py: runs of lines out of those of all files.
+async function bytesOf(name) {
+  const [lines, runs] = await Promise.all([data.files.lines, data.files.runs].map(inflated));
+  const starts = [0];
+  lines.forEach((byte, i) => { if (byte === 10) starts.push(i + 1); });
+  starts.push(lines.length + 1);
+  const run = JSON.parse(new TextDecoder().decode(runs))[data.files.names.indexOf(name)], parts = [];
+  for (let i = 0; i < run.length; i += 2) parts.push(...(i ? ["\n"] : []), lines.subarray(starts[run[i]], starts[run[i] + run[i + 1]] - 1));
+  return new Blob(parts, { type: "application/octet-stream" });
+}
+
+async function save(name, short) {
+  const url = URL.createObjectURL(await bytesOf(name));
+  element("a", { href: url, download: short }).click();
   setTimeout(() => URL.revokeObjectURL(url), 10000);
 }

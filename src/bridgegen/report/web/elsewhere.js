@@ -18,7 +18,7 @@ class Elsewhere {
 
   card(one) {
     const byHarm = one.rule === "harm";
-    const head = ["Scenario", "There", ...(byHarm ? ["harm", "d_min"] : ["d_min", "v_d"]), "First contact", "Parts first"];
+    const head = ["Scenario", "There", ...(byHarm ? ["harm", "d_min"] : ["d_min", "v_d"]), "First collision", "Diverges first"];
     const units = ["", "", ...(byHarm ? ["", "m"] : ["m", "m/s"]), "s", `by over ${one.parted_at} m`];
     const cells = head.map((name, k) => element("th", { scope: "col" }, name, element("small", {}, units[k] || "\u00a0")));
     const table = element("table", {}, element("caption", { class: "hidden" }, `Scenarios in ${one.label}`),

@@ -17,6 +17,11 @@ export function isInMode(i, k) {
   return conflict === mode.conflict && type === mode.conflict_type && responsible === mode.responsible && rule === mode.rule && Boolean(rows.critical[i]);
 }
 
+// The page has one word for it: collision.
+export function conflictWord(conflict) {
+  return conflict === "contact" ? "collision" : conflict;
+}
+
 // Conflict, type, responsible, rule and partner of a row of the page; null where none are recorded.
 export function findingOf(i) {
   return rows.findings ? rows.findings.keys[rows.findings.at[i]] : null;

@@ -3,9 +3,6 @@
 import { palette } from "./colours.js";
 import { $ } from "./common.js";
 import { rows } from "./data.js";
-import { filters } from "./filters.js";
-import { number, titled } from "./numbers.js";
-import { plain } from "./plots.js";
 
 const objectives = () => rows.columns.filter((column) => column.group === "objective").map((column) => column.name);
 
@@ -15,21 +12,12 @@ function showsObjectives(nameX, nameY) {
   return names.includes(nameX) && names.includes(nameY);
 }
 
-// In the order in which a line leads along two objectives; of more it would not be a line.
-function frontRows(x, y) {
-  const there = rows.front.filter((i) => filters.passes(i) && x[i] !== null && y[i] !== null);
-  return there.sort((a, b) => x[a] - x[b] || y[b] - y[a]);
-}
-
-export function frontTrace(nameX, nameY, x, y) {
-  const part = frontRows(x, y), line = objectives().length === 2 && showsObjectives(nameX, nameY);
-  return {
-    type: "scatter", mode: line ? "lines+markers" : "markers", name: `Pareto front (${number(part.length)})`,
-    x: part.map((i) => x[i]), y: part.map((i) => y[i]), customdata: part.map((i) => rows.evaluation[i] + 1),
-    line: { color: palette.accent, width: 1.5, shape: "hv" },
-    marker: { color: palette.accent, size: 9, symbol: "square-open", line: { width: 2 } },
-    hovertemplate: `${plain(titled(nameX))} %{x}<br>${plain(titled(nameY))} %{y}<br>evaluation %{customdata}, not dominated<extra></extra>`,
-  };
+// Of the rows that are drawn, in the order in which a line leads along two objectives; of more it would not be a line.
+export function frontSeries(nameX, nameY, seen, { x, y }) {
+  if (!rows.front.length) return [];
+  const drawn = new Set(seen), items = rows.front.filter((i) => drawn.has(i)).sort((a, b) => x[a] - x[b] || y[b] - y[a]);
+  const line = objectives().length === 2 && showsObjectives(nameX, nameY) ? palette.accent : null;
+  return [{ name: "front", text: "Pareto front", items, line, marker: { shape: "square", radius: 4.5, colour: palette.accent, open: true } }];
 }
 
 // A button that puts two objectives on the axes; the next two when they are there.

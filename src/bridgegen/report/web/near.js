@@ -8,28 +8,24 @@ class NearScreen {
     this.charts = new Map(); // element → what draws it
     this.near = new Set();
     this.stale = new Set();
+    this.watch = new IntersectionObserver((entries) => {
+      for (const { isIntersecting, target } of entries) {
+        this.near[isIntersecting ? "add" : "delete"](target);
+        if (isIntersecting && this.stale.has(target)) this.draw(target);
+      }
+    }, { rootMargin: "500px" });
+    addEventListener("beforeprint", () => {
+      for (const plot of [...this.stale]) this.draw(plot); // paper shows what no screen has shown
+    });
+    darkScheme.addEventListener("change", () => this.all());
+    document.addEventListener("grown", () => this.all());
   }
 
   add(plot, draw) {
     this.charts.set(plot, draw);
     this.stale.add(plot);
     hook.charts = this.charts.size;
-  }
-
-  // Draws from now on: what draws with Plotly must wait until Plotly is there.
-  begin() {
-    const watch = new IntersectionObserver((entries) => {
-      for (const { isIntersecting, target } of entries) {
-        this.near[isIntersecting ? "add" : "delete"](target);
-        if (isIntersecting && this.stale.has(target)) this.draw(target);
-      }
-    }, { rootMargin: "500px" });
-    for (const plot of this.charts.keys()) watch.observe(plot);
-    addEventListener("beforeprint", () => {
-      for (const plot of [...this.stale]) this.draw(plot); // paper shows what no screen has shown
-    });
-    darkScheme.addEventListener("change", () => this.all());
-    document.addEventListener("grown", () => this.all());
+    this.watch.observe(plot);
   }
 
   draw(plot) {
@@ -50,4 +46,3 @@ class NearScreen {
 }
 
 export const near = new NearScreen();
-hook.drawCharts = () => near.begin();

@@ -45,6 +45,10 @@ export class Opener {
     if (playbacks.keptAt.has(evaluation)) return this.kept(playbacks.keptAt.get(evaluation), play);
     $("player").setAttribute("aria-busy", "true");
     const playback = playbacks.source(evaluation) ? await playbacks.get(evaluation) : null;
+    if (playback && !playback.metrics) { // one in the page's data, which has them by row
+      const { parameters, metrics } = factsOf(i);
+      Object.assign(playback, { parameters, metrics });
+    }
     $("player").removeAttribute("aria-busy");
     if (this.wanted !== evaluation) return; // another was chosen meanwhile
     if (playback) this.show(playback, play);

@@ -1,7 +1,5 @@
 // What the page's modules find beside the browser's own, for their type check (jsconfig.json).
 
-declare const Plotly: any; // beside the script, from its package
-
 interface Window {
   bridgegen: any;
 }

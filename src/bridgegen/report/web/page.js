@@ -21,7 +21,6 @@ function listScenarios() {
   const opener = new Opener(hook);
   new TableTools(new Table((i, play) => opener.row(i, play)));
   begin(opener);
-  $("copy-no-motion").addEventListener("click", (event) => copy($("no-motion-command").textContent, event.currentTarget));
 }
 
 function playNearest() {
@@ -29,13 +28,18 @@ function playNearest() {
   $("kept").hidden = $("made-of").hidden = nearest === null;
   $("no-scenarios").hidden = false;
   $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.${nearest === null ? "" : " Below is the scenario that came nearest to harm."}`;
-  if (nearest === null) return;
   $("kept").classList.add("alone");
   $("list").hidden = true;
-  begin(new Opener(hook));
+  if (nearest !== null) return void begin(new Opener(hook));
+  hook.show = (...asked) => { // a point of the scatter plot was chosen
+    $("kept").hidden = $("made-of").hidden = false;
+    begin(new Opener(hook));
+    hook.show(...asked);
+  };
 }
 
 function begin(opener) {
   opener.begin();
+  $("copy-no-motion").addEventListener("click", (event) => copy($("no-motion-command").textContent, event.currentTarget));
   darkScheme.addEventListener("change", () => opener.made?.redraw());
 }

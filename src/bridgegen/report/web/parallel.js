@@ -1,8 +1,8 @@
 // Parallel coordinates on a canvas: one line per evaluation, a filter on any axis.
 
+import { roundStep } from "./axes.js";
 import { palette } from "./colours.js";
 import { $, NARROW, element } from "./common.js";
-import { roundStep } from "./curves.js";
 import { columns, data, rows } from "./data.js";
 import { filters } from "./filters.js";
 import { near } from "./near.js";
@@ -13,6 +13,8 @@ import { subsample } from "./subsample.js";
 import { FONT, fitCanvas } from "./view.js";
 
 const MOST_LINES = 1500;
+const EDGE = 46; // px beside the outermost axes
+const TITLE_GAP = 10; // px between two names
 const QUICK_LINES = 400; // while a filter is on its way
 const least = (values) => values.reduce((a, b) => Math.min(a, b), Infinity);
 
@@ -24,8 +26,22 @@ class Parallel {
     const chosen = rows.columns.filter((c) => rows.telling.includes(c.name) || c.name in data.batches.trends);
     this.names = chosen.map((column) => column.name);
     this.rescale();
+    this.widen();
     this.connect();
     this.note();
+  }
+
+  // As wide as the axes' names need, which take turns on two rows; the box around it scrolls.
+  widen() {
+    const c = this.canvas.getContext("2d", { willReadFrequently: true });
+    c.font = FONT;
+    const widths = this.axes.map((axis) => c.measureText(this.titleOf(axis)).width);
+    const least = widths.slice(2).map((width, a) => ((width + widths[a]) / 2 + TITLE_GAP) / 2 + (a === 0 || a === widths.length - 3 ? EDGE / 4 : 0));
+    this.canvas.style.minWidth = `${Math.ceil(Math.max(0, ...least) * (this.axes.length - 1) + 2 * EDGE)}px`;
+  }
+
+  titleOf({ name, unit }) {
+    return unitText(unit) ? `${name} [${unitText(unit)}]` : name;
   }
 
   // The axes, as far as the rows go.
@@ -76,7 +92,7 @@ class Parallel {
 
   frame() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    const left = 46, right = width - 46;
+    const left = EDGE, right = width - EDGE;
     return { top: 52, bottom: height - 16, x: (a) => left + ((right - left) * a) / Math.max(1, this.axes.length - 1) };
   }
 
@@ -165,12 +181,11 @@ class Parallel {
     }
     // Names take turns on two rows, so that long ones have room.
     const ends = a === 0 ? "left" : a === this.axes.length - 1 ? "right" : "center";
-    const unit = unitText(axis.unit);
     c.font = FONT;
     c.textAlign = ends;
     c.textBaseline = "middle";
     c.fillStyle = range ? palette.accent : palette.ink;
-    c.fillText(unit ? `${axis.name} [${unit}]` : axis.name, x + { left: -40, right: 40, center: 0 }[ends], a % 2 ? 28 : 11);
+    c.fillText(this.titleOf(axis), x + { left: -40, right: 40, center: 0 }[ends], a % 2 ? 28 : 11);
     c.font = FONT.replace("600 12px", "11px");
     c.textAlign = "center";
     c.lineJoin = "round";

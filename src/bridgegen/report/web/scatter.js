@@ -1,38 +1,14 @@
-// The scatter plot of the parameter space.
+// The scatter plot of the parameter space: its axes are chosen, it follows the filters, its points play.
 
-import { palette } from "./colours.js";
 import { $, element } from "./common.js";
-import { columns, data, rows } from "./data.js";
-import { connectFront, frontTrace } from "./front.js";
+import { rows } from "./data.js";
+import { connectFront } from "./front.js";
 import { hook } from "./hook.js";
 import { near } from "./near.js";
 import { number, titled } from "./numbers.js";
-import { CONFIG, layout, plain } from "./plots.js";
-import { drawnRegions } from "./regions.js";
+import { colourChoices } from "./point_colours.js";
+import { NOT_SEARCHED, ScatterChart } from "./scatter_chart.js";
 import { addSection } from "./sections.js";
-import { subsample } from "./subsample.js";
-
-const MOST_GL = 50000;
-const MOST_SVG = 3000; // points that stay fluid
-
-const hasGl = (() => {
-  let answer = null;
-  return () => {
-    if (answer === null) {
-      const context = document.createElement("canvas").getContext("webgl");
-      answer = Boolean(context);
-      context?.getExtension("WEBGL_lose_context")?.loseContext();
-    }
-    return answer;
-  };
-})();
-
-const NOT_SEARCHED = { evaluation: "Evaluation", iteration: "Iteration" };
-
-function valuesOf(name) {
-  if (name === "evaluation") return rows.evaluation.map((i) => i + 1);
-  return name === "iteration" ? rows.iteration : columns.get(name).values;
-}
 
 function fillAxes() {
   const varies = (column) => column.values.some((v) => v !== null && v !== column.values.find((w) => w !== null));
@@ -50,80 +26,38 @@ function fillAxes() {
   const [x, y] = [...rows.telling, ...names, "evaluation", "iteration"];
   $("axis-x").value = x;
   $("axis-y").value = y;
+  const choices = colourChoices();
+  $("colour-by").append(...choices.map(([value, text]) => element("option", { value }, text)));
+  $("colour-by").closest("label").hidden = choices.length < 2;
 }
 
-const keptOn = (name) => {
-  const at = new Map(rows.evaluation.map((evaluation, i) => [evaluation, i]));
-  const values = valuesOf(name);
-  return data.kept.map((kept) => (at.has(kept.evaluation) ? values[at.get(kept.evaluation)] : null));
-};
+// What is drawn and what is not, and the buttons that apply to it.
+function noteDrawn(chart) {
+  const all = rows.n - rows.n_failed, drawn = chart.series.filter(({ name }) => name !== "front" && name !== "kept").reduce((sum, { items }) => sum + items.length, 0);
+  const parts = drawn < all ? [`${number(drawn)} of ${number(all)} evaluations`] : [];
+  if (chart.missing) parts.push(`${number(chart.missing)} have no value on these axes`);
+  $("space-note").textContent = drawn ? parts.join("; ") : "No evaluation passes the filter.";
+  $("regions-drawn").hidden = !chart.projections.length;
+  $("scatter-reset").hidden = !chart.zoom.ends;
+  const beyond = [chart.x, chart.y].some(({ above, below }) => above + below > 0);
+  $("scatter-whole").hidden = Boolean(chart.zoom.ends) || (!beyond && !chart.whole);
+  $("scatter-whole").textContent = chart.whole ? "Clip outliers" : "Show all values";
+}
 
-function scatterFigure() {
-  const gl = hasGl();
-  const { hits, others } = subsample(gl ? MOST_GL : MOST_SVG);
-  const [nameX, nameY] = [$("axis-x").value, $("axis-y").value];
-  const [x, y] = [valuesOf(nameX), valuesOf(nameY)];
-  const shown = hits.length + others.length;
-  $("space-note").textContent = shown < rows.n - rows.n_failed ? `${number(shown)} of ${number(rows.n - rows.n_failed)} evaluations drawn` : "";
-  const hover = `${plain(titled(nameX))} %{x}<br>${plain(titled(nameY))} %{y}<br>evaluation %{customdata}<extra></extra>`;
-  const trace = (part, name, marker) => ({
-    type: gl ? "scattergl" : "scatter", mode: "markers", name: `${name} (${number(part.length)})`, marker, hovertemplate: hover,
-    x: part.map((i) => x[i]), y: part.map((i) => y[i]), customdata: part.map((i) => rows.evaluation[i] + 1),
+// The chart as a picture on the page's ground, twice as sharp as the screen needs.
+function savePicture(chart) {
+  const { clientWidth: width, clientHeight: height } = chart.canvas, ratio = 2;
+  const picture = Object.assign(document.createElement("canvas"), { width: width * ratio, height: height * ratio });
+  const c = picture.getContext("2d");
+  c.fillStyle = getComputedStyle(chart.host.closest(".card")).backgroundColor;
+  c.fillRect(0, 0, picture.width, picture.height);
+  c.setTransform(ratio, 0, 0, ratio, 0, 0);
+  chart.paint(c, width, height, ratio);
+  picture.toBlob((blob) => {
+    const href = URL.createObjectURL(blob);
+    element("a", { href, download: "parameter-space.png" }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 10000);
   });
-  const chosen = hook.state()?.chosen;
-  const crowd = Math.min(1, Math.sqrt(1500 / Math.max(1, shown))); // smaller and fainter where there are many
-  return [
-    trace(others, "not critical", { color: palette.plain, size: 3 + 3 * crowd, opacity: 0.25 + 0.35 * crowd, symbol: "circle" }),
-    trace(hits, "critical", {
-      color: palette.critical, size: 5 + 3 * crowd, opacity: 0.5 + 0.3 * crowd, symbol: "diamond",
-      line: { width: 0.5, color: palette.card },
-    }),
-    ...(rows.front.length ? [frontTrace(nameX, nameY, x, y)] : []),
-    {
-      type: "scatter", mode: "markers+text", name: "kept (click to play)", x: keptOn(nameX), y: keptOn(nameY),
-      text: data.kept.map((kept) => `${kept.rank}`), textposition: "top right", textfont: { size: 11, color: palette.ink },
-      customdata: data.kept.map((_, i) => i), hovertemplate: hover.replace("evaluation %{customdata}", "scenario %{text}: click to play"),
-      marker: {
-        symbol: "circle-open", size: data.kept.map((_, i) => (i === chosen ? 19 : 13)), color: palette.ink,
-        line: { width: data.kept.map((_, i) => (i === chosen ? 3.5 : 1.5)) },
-      },
-      showlegend: data.kept.length > 0,
-    },
-  ];
-}
-
-// The shadows of the regions on the two axes; one that names neither would cover everything.
-function regionShapes(nameX, nameY) {
-  const shapes = [], annotations = [];
-  for (const region of drawnRegions()) {
-    const x = region.box[nameX], y = region.box[nameY];
-    if (!x && !y) continue;
-    const [x0, x1] = x ?? [0, 1], [y0, y1] = y ?? [0, 1], xref = x ? "x" : "x domain", yref = y ? "y" : "y domain";
-    const line = { color: palette.accent, width: 2, dash: region.confirmed ? "solid" : "dot" };
-    shapes.push({ type: "rect", xref, yref, x0, x1, y0, y1, line, fillcolor: palette.band, layer: "below" });
-    annotations.push({
-      xref, yref, x: x0, y: y1, text: `${region.number}`, showarrow: false, xanchor: "left", yanchor: "top",
-      font: { size: 12, color: palette.accent }, bgcolor: palette.card, borderpad: 2,
-    });
-  }
-  return { shapes, annotations };
-}
-
-function drawScatter() {
-  const plot = $("scatter"), narrow = innerWidth < 700;
-  const axis = (id) => ({ title: { text: plain(titled($(id).value)), standoff: 8 }, zeroline: false });
-  const boxes = regionShapes($("axis-x").value, $("axis-y").value);
-  $("regions-drawn").hidden = !boxes.shapes.length;
-  const extra = { ...boxes, xaxis: axis("axis-x"), yaxis: axis("axis-y"), dragmode: narrow ? false : "zoom", hovermode: "closest" };
-  // Only these buttons: Plotly's own set has one that hands the data to a website.
-  const config = {
-    ...CONFIG, displayModeBar: narrow ? false : "hover", modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]],
-    toImageButtonOptions: { filename: "parameter-space", scale: 2 },
-  };
-  Plotly.react(plot, scatterFigure(), layout(extra), config);
-  if (plot.listening) return;
-  plot.listening = true;
-  plot.on("plotly_click", ({ points: [point] }) => { if (point.data.mode === "markers+text") hook.select(point.customdata); });
 }
 
 function connectScatter(found, host) {
@@ -131,20 +65,30 @@ function connectScatter(found, host) {
   if (host.hidden) return;
   const plot = $("scatter");
   fillAxes();
-  near.add(plot, drawScatter);
-  for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", drawScatter);
-  connectFront(drawScatter);
+  const chart = new ScatterChart(plot, () => ({ x: $("axis-x").value, y: $("axis-y").value, colours: $("colour-by").value }), noteDrawn);
+  hook.scatter = chart;
+  const anew = () => { chart.zoom.ends = null; chart.draw(); };
+  near.add(plot, () => chart.draw());
+  for (const id of ["axis-x", "axis-y"]) $(id).addEventListener("change", anew);
+  $("colour-by").addEventListener("change", () => chart.draw());
+  connectFront(anew);
   $("swap").addEventListener("click", () => {
     [$("axis-x").value, $("axis-y").value] = [$("axis-y").value, $("axis-x").value];
-    drawScatter();
+    anew();
   });
+  $("scatter-reset").addEventListener("click", () => chart.zoom.reset());
+  $("scatter-whole").addEventListener("click", () => { chart.whole = !chart.whole; chart.draw(); });
+  $("scatter-save").addEventListener("click", () => savePicture(chart));
   let waiting = null;
   const again = (after) => () => {
     clearTimeout(waiting);
     waiting = setTimeout(() => near.again(plot), after);
   };
   document.addEventListener("filters", again(200)); // dragging must not wait for the scatter plot
-  document.addEventListener("shown", again(0));
+  document.addEventListener("shown", ({ detail }) => {
+    chart.played = detail;
+    again(0)();
+  });
 }
 
 addSection({ id: "space", key: "rows", draw: connectScatter });

@@ -3,7 +3,7 @@
 import { $, element } from "./common.js";
 import { columns, data, rows } from "./data.js";
 import { filters } from "./filters.js";
-import { findingOf } from "./findings.js";
+import { conflictWord, findingOf } from "./findings.js";
 import { measured, number, shareText, turned, unitText, worded } from "./numbers.js";
 import { SOURCES, playbacks } from "./playbacks.js";
 import { regionOf } from "./region_rows.js";
@@ -13,7 +13,7 @@ export const LISTED = ["d_min", "v_d", "n_collision", "ttc"];
 const LISTED_OF_HARM = ["severity", "harm", "d_min", "v_d"];
 const TEXTS = ["conflict", "type", "responsible", "partner"]; // of a row's finding
 const PLACE_OF = { conflict: 0, type: 1, responsible: 2, partner: 4 };
-const SHORT = { n_collision: "hits", responsible: "by", cause: "cause" };
+const SHORT = { n_collision: "collisions", responsible: "by", cause: "cause" };
 const UNDER = { cause: "quick label", responsible: "responsible", severity: "MAIS3+" };
 const ROW_HEIGHT = 32; // as in table.css
 const SPARE = 6; // rows above and below those in sight
@@ -46,7 +46,7 @@ export class Table {
   value(name, i) {
     if (name === "rank") return rows.rank[i] || null;
     if (name === "cause") return rows.cause[i];
-    if (name in PLACE_OF) return findingOf(i)[PLACE_OF[name]] || null;
+    if (name in PLACE_OF) return conflictWord(findingOf(i)[PLACE_OF[name]]) || null;
     return name === "region" ? regionOf(i) : (columns.get(name) ?? elsewhereBy(name)).values[i];
   }
 
@@ -108,6 +108,10 @@ export class Table {
       return element("tr", { class: "room", "aria-hidden": "true" }, cell);
     };
     const drawn = this.order.slice(first, last).map((i, k) => this.row(i, first + k));
+    if (!this.order.length) {
+      const empty = element("td", { colspan: this.columns.length }, "No critical scenario passes the filter.");
+      return void this.body.replaceChildren(element("tr", { class: "none" }, empty));
+    }
     this.body.replaceChildren(...(first ? [room(first)] : []), ...drawn, ...(last < this.order.length ? [room(this.order.length - last)] : []));
     if (focused !== null) this.buttonOf(focused)?.focus({ preventScroll: true });
   }
