@@ -57,7 +57,7 @@ class FileResult:
 
 
 def simulate_file(
-    path: Path,
+    path: Path | str,
     *,
     ego: str | None = None,
     ideal: Iterable[str] | None = None,
@@ -93,6 +93,7 @@ def simulate_file(
         UnsupportedError: an element that the simulator cannot run, by name and line.
         UnknownNameError: no such driver, stage or metric.
     """
+    path = Path(path)
     driver = egos.get(ego, time_limit=time_limit) if ego else None
     if others is not None and others not in egos.OTHERS:
         raise UnknownNameError("driver of other participants", others, egos.OTHERS)
