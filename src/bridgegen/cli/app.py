@@ -5,57 +5,33 @@ import os
 import sys
 from contextlib import suppress
 from importlib.metadata import version
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
+from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup
 from bridgegen.errors import BridgeGenError, Interrupted
 
 FAILED = 3
 """The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,
 130 Ctrl-C."""
 
-PANELS = ("Search", "Results", "Files", "Ontology", "Setup")
-"""The panels in which ``bridgegen --help`` lists the commands."""
-
-SEARCH, RESULTS, FILES, ONTOLOGY, SETUP = PANELS
-
-
-class PanelledGroup(TyperGroup):
-    """Commands whose help lists them by panel, which typer does with rich's markup only."""
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the panels, each command with its summary."""
-        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
-        width = max(len(name) for name in commands)
-        for panel in PANELS:
-            rows = [
-                (name.ljust(width), one.get_short_help_str(formatter.width - width - 4))
-                for name, one in commands.items()
-                if getattr(one, "rich_help_panel", "") == panel
-            ]
-            with formatter.section(panel):
-                formatter.write_dl(rows)
-
-
-app = typer.Typer(
+app = Application(
     cls=PanelledGroup,
     name="bridgegen",
     help="Search an operational design domain for scenarios in which a driving stack fails.",
     invoke_without_command=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-listing = typer.Typer(
+listing = Application(
     help="List scenarios, algorithms, drivers, metrics …",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 app.add_typer(listing, name="list", rich_help_panel=SEARCH)
 
-ontology = typer.Typer(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
+ontology = Application(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)
 
 

@@ -7,7 +7,9 @@ from typing import Annotated, Literal
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import FILES, ONTOLOGY, RESULTS, app, ontology
+from bridgegen.cli.app import app, ontology
+from bridgegen.cli.completion import completing
+from bridgegen.cli.groups import FILES, ONTOLOGY, RESULTS
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_names
 
@@ -21,7 +23,8 @@ def export(
         str,
         typer.Option(
             help="1.2 or 1.3: with parameters; resolved: without; recorded: timed trajectories; "
-            "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego."
+            "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego.",
+            autocompletion=completing("flavour"),
         ),
     ],
     scenario: Annotated[
@@ -169,7 +172,10 @@ def schema(
 def show(
     what: Annotated[
         str,
-        typer.Argument(help="A scenario's ontology (.owl), a catalogue name, or a YAML file."),
+        typer.Argument(
+            help="A scenario's ontology (.owl), a catalogue name, or a YAML file.",
+            autocompletion=completing("scenario"),
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(help="The page (.html); beside the file by default.")

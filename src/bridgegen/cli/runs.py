@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, FILES, RESULTS, SEARCH, app
+from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import (
     NO_CONNECTION,
     Connection,
@@ -18,9 +19,11 @@ from bridgegen.cli.connection import (
     with_connection_options,
 )
 from bridgegen.cli.declared import with_declared_options
+from bridgegen.cli.groups import FILES, RESULTS, SEARCH
 from bridgegen.ego import split
 from bridgegen.options import SearchOptions
 from bridgegen.options.forms import read_names
+from bridgegen.options.option import DRIVER, OUTPUT
 from bridgegen.simulation.choice import EMBEDDED
 
 if TYPE_CHECKING:
@@ -33,7 +36,10 @@ if TYPE_CHECKING:
 def search(
     scenario: Annotated[
         str,
-        typer.Argument(help="A catalogue name, or the path of a YAML or an OpenSCENARIO file."),
+        typer.Argument(
+            help="A catalogue name, or the path of a YAML or an OpenSCENARIO file.",
+            autocompletion=completing("scenario"),
+        ),
     ],
     options: SearchOptions,
     simulator: common.Simulator = None,
@@ -42,7 +48,11 @@ def search(
     workers: common.Workers = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the run, new.", show_default="runs/SCENARIO-ALGORITHM-SEED"),
+        typer.Option(
+            help="Folder of the run, new.",
+            show_default="runs/SCENARIO-ALGORITHM-SEED",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
@@ -70,7 +80,11 @@ def new(
         typer.Argument(help="Name of the new scenario; writes NAME.yaml and its JSON schema."),
     ],
     like: Annotated[
-        str | None, typer.Option(help="Start from a copy of this catalogue scenario.")
+        str | None,
+        typer.Option(
+            help="Start from a copy of this catalogue scenario.",
+            autocompletion=completing("scenario"),
+        ),
     ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
@@ -214,7 +228,12 @@ def regions(
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[
-        str | None, typer.Option(help="Driver of the ego; the file's by default.")
+        str | None,
+        typer.Option(
+            help="Driver of the ego; the file's by default.",
+            rich_help_panel=DRIVER,
+            autocompletion=completing("driver"),
+        ),
     ] = None,
     ideal: common.Ideal = None,
     others: common.Others = None,
@@ -225,7 +244,9 @@ def simulate(
     ] = None,
     trace: Annotated[
         Path | None,
-        typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
+        typer.Option(
+            help="A new .csv of every entity's time, x, y, h and speed.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     metrics: common.OnlyMetrics = None,
     simulator: common.Simulator = None,
@@ -294,7 +315,11 @@ def check_driver(
     ],
     scenario: Annotated[
         list[str] | None,
-        typer.Option(help="Try it in this one; may be repeated.", show_default="four that ship"),
+        typer.Option(
+            help="Try it in this one; may be repeated.",
+            show_default="four that ship",
+            autocompletion=completing("scenario"),
+        ),
     ] = None,
     time_limit: common.TimeLimit = None,
     as_json: common.Json = False,
