@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -12,8 +12,6 @@ from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import FILES, ONTOLOGY, RESULTS
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_names
-
-SchemaKind = Literal["scenario", "fragment"]
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -149,22 +147,30 @@ def validate(
 @app.command(rich_help_panel=FILES)
 def schema(
     kind: Annotated[
-        SchemaKind, typer.Argument(help="Of which files: scenario or fragment.")
-    ] = "scenario",
+        str | None,
+        typer.Argument(help="Of which files: scenario, fragment or run.", show_default="scenario"),
+    ] = None,
+    of: Annotated[
+        str | None, typer.Option(help="The same: scenario, fragment or run.", show_default=False)
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="A file for it, new or an earlier schema; else printed.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenario or run files.
 
-    Editors complete and check scenario files with it.
+    Editors complete and check scenario files and run files with it.
     """
-    from bridgegen.odd.json_schema import schema_text, write_schema
+    from bridgegen.cli.runs import run_file_schema
+    from bridgegen.odd.json_schema import as_text, schema_of, write_schema
 
+    if None not in (kind, of) and kind != of:
+        raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
+    made = run_file_schema() if (name := kind or of or "scenario") == "run" else schema_of(name)
     if out is None:
-        print(schema_text(kind), end="")
+        print(as_text(made), end="")
         return
-    write_schema(out, kind)
+    write_schema(out, made)
     print(out)
 
 
