@@ -2,6 +2,7 @@
 
 import errno
 import os
+import signal
 import sys
 from contextlib import suppress
 from importlib.metadata import version
@@ -57,11 +58,35 @@ def without_command(
         print(context.get_help())
 
 
+INTERRUPTED, TERMINATED = 130, 143
+"""The exit statuses after Ctrl-C and after SIGTERM: 128 and the number of the signal."""
+
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def main() -> None:
-    """Run the command line; a user's error is one message on stderr and exit status 2."""
+    """Run the command line; a user's error is one message on stderr and exit status 2.
+
+    SIGTERM ends it as Ctrl-C does, what is computed kept, with another exit status.
+    """
+    terminations: list[int] = []
+
+    def terminate(number: int, frame: object) -> None:
+        terminations.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        _run()
+    except SystemExit as end:
+        if terminations and end.code:
+            raise SystemExit(TERMINATED) from None
+        raise
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _run() -> None:
     try:
         try:
             app()
@@ -70,7 +95,7 @@ def main() -> None:
             raise
     except Interrupted as stop:
         print(f"bridgegen: {stop}", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except BridgeGenError as error:
         for problem in error.problems:
             print(f"bridgegen: error: {problem}", file=sys.stderr)

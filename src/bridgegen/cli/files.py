@@ -132,7 +132,7 @@ def validate(
 
     The exit status is 2 if one breaks any.
     """
-    from bridgegen.campaign.validate import validate_file
+    from bridgegen.campaign.validate import name_note, validate_file
 
     broken: list[str] = []
     for file in files:
@@ -140,6 +140,8 @@ def validate(
         broken += problems
         if not problems:
             print(f"{file}: valid")
+            if note := name_note(file):
+                print(f"bridgegen: note: {note}", file=sys.stderr)
     if broken:
         raise InputError(*broken)
 

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from bridgegen.errors import InputError
 from bridgegen.options.option import GROUPS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -38,6 +39,37 @@ class PanelledGroup(TyperGroup):
 
 class GroupedCommand(TyperCommand):
     """A command whose help lists its options by their groups, in the order of `GROUPS`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words of a command line; an option that takes one value may be given once.
+
+        Raises:
+            InputError: one is given again.
+        """
+        single = {
+            spelling: one
+            for one in self.params
+            if one.param_type_name == "option"
+            and not one.multiple
+            and not getattr(one, "is_flag", False)
+            for spelling in one.opts
+        }
+        values: dict[str, list[str]] = {}
+        words = iter(args)
+        for word in words:
+            if word == "--":
+                break
+            spelling, equals, value = word.partition("=")
+            if spelling in single:
+                name = single[spelling].opts[0]
+                values.setdefault(name, []).append(value if equals else next(words, ""))
+        if twice := [
+            f"{name} takes one value, and is given {len(found)}: {', '.join(found)}"
+            for name, found in values.items()
+            if len(found) > 1
+        ]:
+            raise InputError(*twice)
+        return list(super().parse_args(ctx, args))
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments, then the groups that the command has options of."""

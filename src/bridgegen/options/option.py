@@ -109,5 +109,8 @@ def range_problems(options: object) -> list[str]:
         value = getattr(options, one.name)
         if one.limits and value is not None and not one.limits[0] <= value <= one.limits[1]:
             low, high = one.limits
-            problems.append(f"{low} <= {one.name} <= {high} must hold, got {value}")
+            problems.append(
+                f"{low} <= {one.name} <= {high} must hold, got {value} "
+                f"({one.spelling}: {one.help[0].lower()}{one.help[1:].rstrip('.')})"
+            )
     return problems

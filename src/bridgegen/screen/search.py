@@ -43,7 +43,14 @@ class SearchScreen(Live):
         """The callbacks for a campaign."""
         from bridgegen.campaign import SearchCallbacks
 
-        return SearchCallbacks(stage=self._stage, workers=self._set_workers, batch=self._batch)
+        return SearchCallbacks(
+            stage=self._stage,
+            workers=self._set_workers,
+            batch=self._batch,
+            warning=lambda text: self.console.print(
+                f"bridgegen: warning: {text}", soft_wrap=True, markup=False, highlight=False
+            ),
+        )
 
     def _set_workers(self, workers: "Workers") -> None:
         self._workers = workers
