@@ -1,10 +1,13 @@
 """A run as a figure: its critical scenarios in parameter space, and the worst one over time."""
 
+import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.ego import is_spec
 from bridgegen.errors import BridgeGenError
 from bridgegen.metrics.metric import distance
@@ -14,7 +17,6 @@ from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from bridgegen.campaign.run import Run
 
@@ -24,12 +26,19 @@ MOST_POINTS = 5000
 GREY, RED, BLUE = "#9aa5b1", "#d55e00", "#0072b2"
 
 
-def draw(run: "Run") -> "Figure":
-    """Return the figure of a run; see `bridgegen.Run.plot`."""
-    from matplotlib.figure import Figure
+class ShownFigure(Figure):
+    """A figure that a notebook shows, whether it has set up matplotlib or not."""
 
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=100)
+        return image.getvalue()
+
+
+def draw(run: "Run") -> ShownFigure:
+    """Return the figure of a run; see `bridgegen.Run.plot`."""
     worst = worst_rollout(run)
-    figure = Figure(figsize=(9.0 if worst else 5.0, 3.8), layout="constrained")
+    figure = ShownFigure(figsize=(9.0 if worst else 5.0, 3.8), layout="constrained")
     axes = figure.subplots(1, 2 if worst else 1, squeeze=False)[0]
     _draw_space(run, axes[0])
     if worst is not None:
@@ -52,11 +61,11 @@ def worst_rollout(run: "Run") -> Rollout | None:
 
 
 def _draw_space(run: "Run", axes: "Axes") -> None:
-    """Draw the evaluations over the two parameters in which critical ones differ most."""
+    """Draw the evaluations over the two parameters that matter most for their failures."""
     rows = run.rows()
     names = [name for name in run.frame().columns if name in run.parameters]
     X = rows.X[:, [run.parameters.index(name) for name in names]]
-    first, second = _telling(X, rows.critical)
+    first, second = _telling(X, rows.critical, [names.index(name) for name in _needed(run)])
     for chosen, colour, label in (
         (~rows.critical, GREY, "not critical"),
         (rows.critical, RED, "critical"),
@@ -70,15 +79,25 @@ def _draw_space(run: "Run", axes: "Axes") -> None:
     axes.legend(fontsize="small", frameon=False)
 
 
-def _telling(X: Float, critical: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> tuple[int, int]:
-    """Return the two columns in which critical rows and the others differ most, by their means."""
+def _needed(run: "Run") -> list[str]:
+    """Return the parameters that the worst failure mode needs, most important first."""
+    if not run.modes:
+        return []
+    worst = max(run.modes, key=lambda one: (one.severity, one.harm))
+    return [] if worst.minimal is None else [one.name for one in worst.minimal.conditions]
+
+
+def _telling(X: Float, critical: Bool, needed: Sequence[int]) -> tuple[int, int]:
+    """Return two columns: those needed; then those whose critical values' mean differs most."""
     spread = X.std(axis=0)
     score = np.where(spread > 0.0, 0.0, -1.0)
     if critical.any() and not critical.all():
         apart = np.abs(X[critical].mean(axis=0) - X[~critical].mean(axis=0))
         score = np.where(spread > 0.0, apart / np.where(spread > 0.0, spread, 1.0), -1.0)
-    order = np.argsort(-score, kind="stable")
-    return int(order[0]), int(order[min(1, len(order) - 1)])
+    score[needed] = np.inf
+    first = [*needed, *np.argsort(-score, kind="stable").tolist()]
+    columns = list(dict.fromkeys(first))
+    return columns[0], columns[min(1, len(columns) - 1)]
 
 
 def _draw_worst(rollout: Rollout, name: str, axes: "Axes") -> None:
@@ -89,6 +108,6 @@ def _draw_worst(rollout: Rollout, name: str, axes: "Axes") -> None:
     gap = distance(rollout)[0, 1:, :n].min(axis=0, initial=np.inf)
     if np.isfinite(gap).any():
         axes.plot(time, np.where(np.isfinite(gap), gap, np.nan), color=RED, label="distance [m]")
-    axes.set(xlabel="time [s]", ylim=(0.0, None))
+    axes.set(xlabel="time [s]", ylim=(0.0, 1.5 * max(float(rollout.v[0, 0, :n].max()), 5.0)))
     axes.set_title(f"the worst scenario, {name}", fontsize="medium")
     axes.legend(fontsize="small", frameon=False)

@@ -2,13 +2,13 @@
 
 import base64
 import html
-import io
 import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bridgegen.campaign.drawing import draw, worst_rollout
+from bridgegen.metrics.metric import distance
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
@@ -27,10 +27,12 @@ div{display:flex;gap:.6em;align-items:center;padding:.4em}input{flex:1}
 <script>
 const d=DATA,c=document.getElementById("c"),g=c.getContext("2d"),t=document.getElementById("t");
 const b=document.getElementById("b"),s=document.getElementById("s"),n=d.frames.length;
-t.max=n-1;let timer=0;
+t.max=n-1;t.value=d.first;let timer=0;
 function paint(){const k=+t.value,f=d.frames[k],w=c.clientWidth,h=c.clientHeight;
 const r=devicePixelRatio||1;c.width=w*r;c.height=h*r;g.setTransform(r,0,0,r,0,0);
 const z=h/d.metres;g.font="11px system-ui";
+g.strokeStyle="#b8c2cf";f.forEach((e,i)=>{g.beginPath();d.frames.forEach(o=>{if(o[i])
+g.lineTo(w/2+(o[i][0]-f[0][0])*z,h/2-(o[i][1]-f[0][1])*z)});g.stroke()});
 f.forEach((e,i)=>{if(!e)return;const[l,q,a]=d.box[i];
 const X=w/2+(e[0]-f[0][0])*z,Y=h/2-(e[1]-f[0][1])*z;
 g.save();g.translate(X,Y);g.rotate(-e[2]);g.fillStyle=i?"#d55e00":"#0072b2";
@@ -55,9 +57,7 @@ def run_html(run: "Run") -> str:
         parts.append(f"<p>{html.escape(headline(found))}</p>")
         modes = [f"<li>{html.escape(shortly(one))}</li>" for one in found.modes[:10]]
         parts.append(f"<ul>{''.join(modes)}</ul>" if modes else "")
-    image = io.BytesIO()
-    draw(run).savefig(image, format="png", dpi=100)
-    data = base64.b64encode(image.getvalue()).decode()
+    data = base64.b64encode(draw(run)._repr_png_()).decode()
     parts.append(f'<img alt="The run in figures" src="data:image/png;base64,{data}">')
     worst = worst_rollout(run)
     if worst is not None:
@@ -91,6 +91,12 @@ def player(rollout: Rollout) -> str:
         "box": np.round(rollout.box[: len(names)], 3).tolist(),
         "frames": frames,
         "step": stride * rollout.time_step,
-        "metres": 60.0,
+        "metres": 40.0,
+        "first": int(np.argmin(np.abs(steps - _closest(rollout, n)))),
     }
     return _PLAYER.replace("DATA", json.dumps(data).replace("</", "<\\/"))
+
+
+def _closest(rollout: Rollout, n: int) -> int:
+    """Return the instant at which another participant is closest to the ego."""
+    return int(distance(rollout)[0, 1:, :n].min(axis=0, initial=np.inf).argmin())

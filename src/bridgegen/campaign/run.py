@@ -140,9 +140,10 @@ class Run:
     def plot(self) -> "Figure":
         """Return a figure: critical scenarios in parameter space, and the worst one over time.
 
-        The space is drawn over the two parameters in which critical scenarios differ most from the
-        others. The worst exported scenario is simulated again for its speed and distance, unless
-        that would import a driver of your own, or needs another simulator.
+        The space is drawn over the first two parameters that the worst failure mode's simplest
+        scenario needs; else over those in which critical scenarios differ most from the others.
+        The worst exported scenario is simulated again for its speed and distance, unless that
+        would import a driver of your own, or needs another simulator.
         """
         from bridgegen.campaign.drawing import draw
 
