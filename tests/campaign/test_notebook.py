@@ -43,3 +43,13 @@ def test_nothing_critical(tmp_path):
     )  # fmt: skip
     assert len(run.plot().axes) == 1
     assert "srcdoc" not in run._repr_html_()
+
+
+def test_a_comparison_is_its_table(tmp_path):
+    found = bg.compare(
+        ["crossroads-s4"], algorithms=["random", "pso"], seeds=2, budget=40, workers=1,
+        out=tmp_path / "<c>",
+    )  # fmt: skip
+    shown = found._repr_html_()
+    assert shown.count("<tr") == 1 + min(len(found.summary()), 61)
+    assert "&lt;c&gt;" in shown
