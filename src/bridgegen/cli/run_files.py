@@ -10,16 +10,17 @@ from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import typer
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
-from bridgegen.odd.parameters import nearest
-from bridgegen.odd.plain_yaml import MAX_BYTES, Document, read_plain_yaml
 from bridgegen.options import SearchOptions, file_forms, options_of
 from bridgegen.options.file_forms import FileForm
+
+if TYPE_CHECKING:  # the command line starts without them
+    from bridgegen.odd.plain_yaml import Document
 
 Values = Mapping[str, Any]
 """Of parameters of the command ``search``, by name, as its parser returns them."""
@@ -108,12 +109,14 @@ def is_run_file(scenario: str) -> bool:
     return isinstance(data, dict) and bool(_HEADS & {*data}) and SCENARIO not in data
 
 
-def read_run_document(path: Path) -> Document:
+def read_run_document(path: Path) -> "Document":
     """Return the contents of a YAML file.
 
     Raises:
         FileFormatError: it cannot be read, or is no plain YAML.
     """
+    from bridgegen.odd.plain_yaml import MAX_BYTES, read_plain_yaml
+
     try:
         with path.open("rb") as file:
             return read_plain_yaml(file.read(MAX_BYTES + 1), str(path))
@@ -127,6 +130,8 @@ def read_runs(path: Path, keys: Mapping[str, Key]) -> list[FiledRun]:
     Raises:
         InputError: it breaks rules; all of them, with file and line.
     """
+    from bridgegen.odd.parameters import nearest
+
     document = read_run_document(path)
     data = document.data if isinstance(document.data, dict) else {}
     problems = [
@@ -158,12 +163,14 @@ def read_runs(path: Path, keys: Mapping[str, Key]) -> list[FiledRun]:
 
 
 def _read_run(
-    document: Document,
+    document: "Document",
     place: tuple[str, ...],
     data: object,
     keys: Mapping[str, Key],
     problems: list[str],
 ) -> Values:
+    from bridgegen.odd.parameters import nearest
+
     label = ".".join(place)
     if not isinstance(data, dict):
         problems.append(f"{label} must be a mapping ({document.at(place)})")
@@ -233,6 +240,8 @@ def is_recorded(out: Path, values: Values, keys: Mapping[str, Key]) -> bool:
     Raises:
         StorageError: it is recorded with other options.
     """
+    from bridgegen.odd.plain_yaml import read_plain_yaml
+
     record = out.parent / f"{out.name}.yaml"
     text = _text(record, values, keys)
     if record.is_file():
