@@ -39,7 +39,7 @@ def command_line() -> str:
         "What `bridgegen COMMAND --help` says, all of it.\n",
         "Exit status: 0 is success; 1 a driver that `check-driver` finds fault with, or a run of "
         "`reproduce` that failed (or a bug of ours); 2 a mistake in what was given, with one line "
-        "on stderr for each; 3 a criterion of `--fail-if` that is met; 130 Ctrl-C.\n",
+        "on stderr for each; 3 a criterion of `--fail-if` that is met; 130 Ctrl-C, 143 SIGTERM.\n",
     ]
     for path, command in sorted(commands(get_command(app), ("bridgegen",))):
         words = " ".join(path)

@@ -7,9 +7,13 @@ import pytest
 from typer.main import get_command
 
 from bridgegen.cli import app
-from bridgegen.cli.app import PANELS
+from bridgegen.cli.groups import PANELS
+from bridgegen.options.option import GROUPS
 
 ROOT = get_command(app)
+SEARCH_GROUPS = (
+    "What to search", "Search", "Objective", "Driver", "Simulator", "Output",
+)  # fmt: skip
 
 
 def test_every_command_is_in_a_panel(cli, monkeypatch):
@@ -38,3 +42,30 @@ def test_a_bare_call_is_the_help(cli):
 
 def test_the_version(cli):
     assert cli("--version") == (0, f"bridgegen {version('bridgegen')}\n", "")
+
+
+def test_the_panels_of_the_commands(cli):
+    _, out, _ = cli("--help")
+    titles = re.findall(r"^(\S.*):$", out, re.MULTILINE)
+    assert titles == ["Options", "Search", "Look at results", "Files", "Ontology", "Advanced"]
+
+
+def test_the_options_of_a_search_are_in_groups(cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = cli("search", "--help")
+    titles = re.findall(r"^(\S.*):$", out, re.MULTILINE)
+    assert titles == ["Arguments", *SEARCH_GROUPS, "Options"]
+    assert max(len(line) for line in out.splitlines()) <= 80
+    driver = out.partition("\nDriver:\n")[2].partition("\nSimulator:\n")[0]
+    assert re.findall(r"^  (--[a-z-]+)", driver, re.MULTILINE) == [
+        "--adversary", "--others", "--ego", "--ideal", "--time-limit",
+    ]  # fmt: skip
+    assert re.findall(r"^  (--[a-z-]+)", out.partition("\nOptions:\n")[2], re.MULTILINE) == [
+        "--help"
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(ROOT.commands))
+def test_a_group_is_one_of_those_declared(name):
+    groups = {getattr(one, "rich_help_panel", None) for one in ROOT.commands[name].params}
+    assert groups <= {None, *GROUPS}

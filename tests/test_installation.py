@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from bridgegen import installation
-from bridgegen.compilation import folder
+from bridgegen.compilation import cache, folder
+from bridgegen.compilation.sources import digest
 from bridgegen.installation import EXTRAS, Finding, examine
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
@@ -64,9 +65,11 @@ def test_a_cache_that_cannot_be_kept_is_a_problem(monkeypatch, tmp_path):
     monkeypatch.setattr(folder, "cache_folder", lambda: lost)
     assert by_subject()["compiled code"].is_problem
     monkeypatch.setattr(folder, "cache_folder", lambda: kept)
+    monkeypatch.setattr(cache, "cache_folder", lambda: kept)
     empty = by_subject()["compiled code"]
     assert not empty.is_problem
     assert empty.value == f"{kept}, empty"
-    kept.mkdir()
-    (kept / "a.nbi").touch()
+    main = kept / f"simulation.embedded._rollout_kernels-{digest(cache.MAIN)}"
+    main.mkdir(parents=True)
+    (main / "a.nbi").touch()
     assert by_subject()["compiled code"] == Finding("compiled code", str(kept))

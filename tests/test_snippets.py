@@ -30,6 +30,8 @@ from typer.main import get_command
 
 from bridgegen.campaign.exported import NOT_EXPORTED
 from bridgegen.cli import app, main
+from bridgegen.cli.run_files import keys_of, read_runs
+from bridgegen.cli.runs import search
 from bridgegen.odd.json_schema import schema
 from bridgegen.odd.plain_yaml import read_plain_yaml
 from bridgegen.odd.reader import load
@@ -154,6 +156,10 @@ class Page:
             yaml.safe_load(block.text)
             return
         path = Path("a_scenario.yaml")
+        if re.match("runs?:", block.text):
+            path.write_text(block.text, "utf-8")
+            read_runs(path, keys_of(search))
+            return
         if "scenario:" not in block.text:  # parts of one: they take the place of the starter's
             whole = yaml.safe_load(start_scenario("made").read_text("utf-8"))
             for key, value in yaml.safe_load(block.text).items():

@@ -166,6 +166,7 @@ def connect(
         at_end: is called when the parent process has ended; then this process ends at once.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     lock = threading.Lock()
     nothing = os.open(os.devnull, os.O_RDWR)

@@ -57,7 +57,7 @@ class FileResult:
 
 
 def simulate_file(
-    path: Path,
+    path: Path | str,
     *,
     ego: str | None = None,
     ideal: Iterable[str] | None = None,
@@ -93,6 +93,12 @@ def simulate_file(
         UnsupportedError: an element that the simulator cannot run, by name and line.
         UnknownNameError: no such driver, stage or metric.
     """
+    path = Path(path)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        raise FileFormatError(
+            f"{path}: one OpenSCENARIO file (.xosc) is simulated; a YAML file describes many "
+            f"scenarios, and is searched: bridgegen search {path}"
+        )
     driver = egos.get(ego, time_limit=time_limit) if ego else None
     if others is not None and others not in egos.OTHERS:
         raise UnknownNameError("driver of other participants", others, egos.OTHERS)

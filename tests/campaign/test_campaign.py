@@ -65,7 +65,7 @@ def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, 
     for path in run.scenarios:
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         result = bg.simulate_file(path)
-        recorded = rows.metrics[facts["evaluation"]]
+        recorded = rows.metrics[facts["row"]]
         assert [result.metrics[name] for name in facts["metrics"]] == recorded.tolist()
         assert result.driver == run.settings.ego
         assert facts["critical"]

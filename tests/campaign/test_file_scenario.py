@@ -73,7 +73,7 @@ def test_what_is_found_is_handed_over_as_the_user_s_own_file(tmp_path, ego, body
     for path in run.scenarios:
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         result = bg.simulate_file(path)
-        kept = recorded(run.folder, facts["evaluation"])
+        kept = recorded(run.folder, facts["row"])
         assert {name: result.metrics[name] for name in kept} == kept
         assert result.driver == run.settings.ego
         found = {name: one["value"] for name, one in facts["parameters"].items()}
@@ -197,7 +197,7 @@ def test_a_file_of_ours_keeps_its_units_its_formulas_and_its_ontology(tmp_path):
         assert path.with_suffix(".owl").exists()
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         assert facts["parameters"]["bv_speed"]["unit"] == "m/s"
-        kept, found = recorded(run.folder, facts["evaluation"]), bg.simulate_file(path).metrics
+        kept, found = recorded(run.folder, facts["row"]), bg.simulate_file(path).metrics
         assert {name: found[name] for name in kept} == kept
 
 

@@ -46,7 +46,7 @@ def test_exported_files_name_the_value_and_are_valid(run):
         assert validate_file(file) == []
         assert validate_file(file.with_suffix(".owl")) == []
         facts = json.loads(file.with_suffix(".json").read_text("utf-8"))
-        x = dict(zip(store.parameters, found.X[facts["evaluation"]].tolist(), strict=True))
+        x = dict(zip(store.parameters, found.X[facts["row"]].tolist(), strict=True))
         word = NAMES[int(x["manner"])]
         assert facts["parameters"]["manner"] == {"value": word, "unit": "1"}
         wind = facts["parameters"]["wind_from"]["value"]

@@ -35,7 +35,7 @@ def test_the_file_that_is_searched_is_the_file_that_is_handed_over(run):
         assert 'value="attentive"' in path.read_text(encoding="utf-8")
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         result = bg.simulate_file(path)
-        recorded = rows.metrics[facts["evaluation"]]
+        recorded = rows.metrics[facts["row"]]
         assert [result.metrics[name] for name in facts["metrics"]] == recorded.tolist()
 
 

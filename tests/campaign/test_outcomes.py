@@ -190,7 +190,7 @@ def test_the_cause_is_in_every_file_and_comes_back(tmp_path):
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         cause = facts["cause"]  # tested by neighbours, so that it may be another than the quick one
         individuals = load_owl(path.with_suffix(".owl"))
-        assert facts["quick_cause"] == frame.loc[facts["evaluation"], "cause"]
+        assert facts["quick_cause"] == frame.loc[facts["row"], "cause"]
         assert cause in {one.label for one in CAUSES}
         assert individuals.text(individuals.one("Scenario"), "has_cause") == cause
         assert read(path).file_header.properties.get("cause") == cause

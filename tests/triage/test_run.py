@@ -73,10 +73,10 @@ def test_the_worst_of_each_mode_is_exported_first(run):
     robust = [one["robustness"] >= 0.5 for one in found]
     assert robust == sorted(robust, reverse=True)
     shown = {one.shown for one in run.modes}
-    assert found[0]["evaluation"] == run.modes[0].shown
-    assert {one["evaluation"] for one in found[: len(shown)]} <= shown or len(shown) < 4
+    assert found[0]["row"] == run.modes[0].shown
+    assert {one["row"] for one in found[: len(shown)]} <= shown or len(shown) < 4
     for one in found:
-        near = run.triage.neighbourhood(one["evaluation"])
+        near = run.triage.neighbourhood(one["row"])
         assert one["robustness"] == near.robustness
         assert near.rows == 32
         assert one["cause"] == near.cause
@@ -136,14 +136,20 @@ def test_rows_are_driven_again_as_they_were(run, pipeline):
     assert (came.findings.rule == rows.findings.rule).all()
 
 
-def test_the_summary_leads_with_the_modes(run, capsys):
+def test_the_summary_ends_with_what_matters(run, capsys):
     from bridgegen.screen.search import print_summary
 
     print_summary(run, 1.0)
     out = capsys.readouterr().out
-    first, second, *_ = out.splitlines()
-    assert first.startswith(f"route-follower comes to harm in {len(run.modes)} ways: ")
-    assert second.startswith(f"{run.modes[0].count:>5} × {run.modes[0].title}; MAIS3+ ")
+    *_, verdict, worst, where, page = out.splitlines()
+    assert verdict.startswith(
+        f"{'verdict':<22}route-follower comes to harm in {len(run.modes)} ways: "
+    )
+    severest = max(run.modes, key=lambda one: (one.severity, one.harm))
+    assert worst.startswith(f"{'worst':<22}{severest.title}: {severest.count} evaluation")
+    assert where.startswith(f"{'where':<22}")
+    assert page.split() == ["page", str(run.report)]
+    assert f"\n{run.modes[0].count:>5} × {run.modes[0].title}; MAIS3+ " in out
     assert "quick causes" in out
     assert "simplest: " in out
 
@@ -172,7 +178,11 @@ def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, 
     assert run.scenarios == run.minimal_scenarios == ()
     assert run.triage.bound.space.high == pytest.approx(1.0 - 0.025 ** (1 / 60))
     print_summary(run, 1.0)
-    assert capsys.readouterr().out.startswith("No failure found in 60 evaluations: least margin ")
+    verdict, page = capsys.readouterr().out.splitlines()[-2:]
+    assert verdict.startswith(
+        "verdict               No failure found in 60 evaluations: least margin "
+    )
+    assert page.split() == ["page", str(run.report)]
     assert figures_of(run)["modes"] == 0
 
 
@@ -187,10 +197,10 @@ def test_with_the_paper_s_rule_its_scenarios_are_kept_behind_the_failures(tmp_pa
     assert len(found) == 8
     assert all(one["critical"] for one in found)
     assert run.settings.optimised["rule"] == "thresholds"
-    harmful = [bool(frame.loc[one["evaluation"], "harm"] >= NEAR_MISS) for one in found]
+    harmful = [bool(frame.loc[one["row"], "harm"] >= NEAR_MISS) for one in found]
     assert harmful == sorted(harmful, reverse=True)
     shown = {one.shown for one in run.modes if frame.loc[one.shown, "critical"]}
-    assert shown <= {one["evaluation"] for one in found}
+    assert shown <= {one["row"] for one in found}
     print_summary(run, 1.0)
     out = capsys.readouterr().out
     assert out.startswith("scenario")

@@ -39,12 +39,14 @@ class SearchCallbacks:
         workers: with the workers, before they evaluate anything.
         batch: with the progress, after each batch.
         exported: with the number of scenarios exported so far.
+        warning: with what the user should know about the search that begins.
     """
 
     stage: Callable[[str], None] = lambda stage: None
     workers: Callable[[Workers], None] = lambda workers: None
     batch: Callable[[Progress], None] = lambda progress: None
     exported: Callable[[int], None] = lambda count: None
+    warning: Callable[[str], None] = lambda text: None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +113,12 @@ def run_search(given: SearchArguments) -> Run:
         refuse_standstill(logical)
     n_obj = 1 if columns == "one" else len(spec.terms)
     values = resolve(method, Problem(space.variables, n_obj=n_obj), seed, given.settings)
+    population = values.get("population")
+    if isinstance(population, int) and population > budget:
+        callbacks.warning(
+            f"population {population} is greater than the budget, {budget} evaluations: the search "
+            "ends within its first, random batch"
+        )
     name = f"{logical.name}-{given.algorithm}-{seed}"
     folder = Path(given.out) if given.out is not None else Path("runs") / name
     refuse_used(folder)

@@ -194,7 +194,8 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, objec
     """Return one scenario's parameters and metrics; what is infinite or NaN is None."""
     return {
         "name": name,
-        "evaluation": int(rows.id[i]),
+        "evaluation": int(rows.id[i]) + 1,
+        "row": int(rows.id[i]),
         "scenario": pipeline.scenario.name,
         "ego": pipeline.driver.label,
         "critical": bool(rows.critical[i]),

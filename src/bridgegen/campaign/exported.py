@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from bridgegen.errors import StorageError
 from bridgegen.records import parse_json, read_bytes
@@ -71,9 +71,30 @@ class ParameterValue(BaseModel):
 
 
 class _Origin(BaseModel):
-    """The evaluation that a scenario's ``.json`` is of."""
+    """The evaluation that a scenario's ``.json`` is of.
 
-    evaluation: Annotated[int, Field(ge=0)]
+    Attributes:
+        row: in the store, counted from 0.
+        evaluation: counted from 1, as in the report; files of earlier versions, which state no
+            row, count it from 0.
+    """
+
+    row: Annotated[int, Field(ge=0)]
+    evaluation: Annotated[int, Field(ge=1)]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_earlier_version(cls, data: Any) -> Any:
+        first = data.get("evaluation") if isinstance(data, dict) and "row" not in data else None
+        if isinstance(first, int) and not isinstance(first, bool):
+            return {**data, "row": first, "evaluation": first + 1}
+        return data
+
+    @model_validator(mode="after")
+    def _counts_alike(self) -> Self:
+        if self.evaluation != self.row + 1:
+            raise ValueError(f"evaluation must be row + 1, got {self.evaluation}, row {self.row}")
+        return self
 
 
 class Facts(_Origin):
@@ -131,12 +152,12 @@ def exported_scenarios(folder: Path, evaluations: int | None = None) -> tuple[Ex
     """
     kept = []
     for path in sorted((folder / FOLDER).glob("[0-9]*.json")):
-        evaluation = _read(path, _Origin).evaluation
-        if evaluations is not None and evaluation >= evaluations:
-            raise _not_written(path, f"the run has no evaluation {evaluation}")
+        row = _read(path, _Origin).row
+        if evaluations is not None and row >= evaluations:
+            raise _not_written(path, f"the run has no evaluation {row + 1}")
         files = (path.with_suffix(f".{kind}") for kind in ("owl", "xodr", "xosc", "json"))
         names = tuple(f"{FOLDER}/{file.name}" for file in files if file.is_file())
-        kept.append(Exported(path.stem, evaluation, names))
+        kept.append(Exported(path.stem, row, names))
     return tuple(kept)
 
 

@@ -24,6 +24,7 @@ from bridgegen.triage.record import JSON_FILE, Mode, Triage, read_record
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 REPORT = "report.html"
 
@@ -36,6 +37,7 @@ class Run:
         settings: with which it was made.
         finished: whether it has ended.
         metrics: names of the metrics that it records.
+        parameters: names of its parameters, the columns of X.
         version: of BridgeGen that made it.
         notes: of the algorithm, by title; empty where it takes none. nsga2-dt: its trees' critical
             boxes.
@@ -69,6 +71,7 @@ class Run:
         self.settings = Settings.from_dict(store.settings, store.folder)
         self.finished = store.finished is not None
         self.metrics, self.version, self.notes = store.metrics, store.version, store.notes
+        self.parameters = store.parameters
 
     @cached_property
     def summary(self) -> Summary:
@@ -133,6 +136,24 @@ class Run:
     def report(self) -> Path:
         """The report page; written when the run finishes."""
         return self.folder / REPORT
+
+    def plot(self) -> "Figure":
+        """Return a figure: critical scenarios in parameter space, and the worst one over time.
+
+        The space is drawn over the first two parameters that the worst failure mode's simplest
+        scenario needs; else over those in which critical scenarios differ most from the others.
+        The worst exported scenario is simulated again for its speed and distance, unless that
+        would import a driver of your own, or needs another simulator.
+        """
+        from bridgegen.campaign.drawing import draw
+
+        return draw(self)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: figures, failure modes, the worst scenario's playback."""
+        from bridgegen.campaign.notebook import run_html
+
+        return run_html(self)
 
     def __repr__(self) -> str:
         s = self.summary

@@ -55,6 +55,19 @@ def validate_file(path: Path, *, reason: bool = False) -> list[str]:
         return [_placed(path, problem) for problem in error.problems]
 
 
+def name_note(path: Path) -> str | None:
+    """Return what is odd about a valid scenario file's name; None where nothing is."""
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        return None
+    name = load_scenario(path).name
+    if name == path.stem:
+        return None
+    return (
+        f"{path}: its key 'scenario' is '{name}', which names its runs; the file is called "
+        f"'{path.stem}'"
+    )
+
+
 def _placed(path: Path, problem: str) -> str:
     return problem if str(path) in problem else f"{path}: {problem}"
 

@@ -1,13 +1,23 @@
 """The command line: parse, call, print; no logic. Commands are in the order of these imports."""
 
 # ruff: noqa: I001
-from bridgegen.cli import runs, confirmations, comparisons, reproductions, files, lists, doctor
+from bridgegen.cli import (
+    demo,
+    runs,
+    confirmations,
+    comparisons,
+    reproductions,
+    files,
+    lists,
+    doctor,
+)
 from bridgegen.cli.app import app, main
 
 __all__ = [
     "app",
     "comparisons",
     "confirmations",
+    "demo",
     "doctor",
     "files",
     "lists",

@@ -2,60 +2,37 @@
 
 import errno
 import os
+import signal
 import sys
 from contextlib import suppress
 from importlib.metadata import version
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
+from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup
 from bridgegen.errors import BridgeGenError, Interrupted
 
 FAILED = 3
 """The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,
 130 Ctrl-C."""
 
-PANELS = ("Search", "Results", "Files", "Ontology", "Setup")
-"""The panels in which ``bridgegen --help`` lists the commands."""
-
-SEARCH, RESULTS, FILES, ONTOLOGY, SETUP = PANELS
-
-
-class PanelledGroup(TyperGroup):
-    """Commands whose help lists them by panel, which typer does with rich's markup only."""
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the panels, each command with its summary."""
-        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
-        width = max(len(name) for name in commands)
-        for panel in PANELS:
-            rows = [
-                (name.ljust(width), one.get_short_help_str(formatter.width - width - 4))
-                for name, one in commands.items()
-                if getattr(one, "rich_help_panel", "") == panel
-            ]
-            with formatter.section(panel):
-                formatter.write_dl(rows)
-
-
-app = typer.Typer(
+app = Application(
     cls=PanelledGroup,
     name="bridgegen",
     help="Search an operational design domain for scenarios in which a driving stack fails.",
     invoke_without_command=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-listing = typer.Typer(
+listing = Application(
     help="List scenarios, algorithms, drivers, metrics …",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 app.add_typer(listing, name="list", rich_help_panel=SEARCH)
 
-ontology = typer.Typer(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
+ontology = Application(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)
 
 
@@ -81,11 +58,35 @@ def without_command(
         print(context.get_help())
 
 
+INTERRUPTED, TERMINATED = 130, 143
+"""The exit statuses after Ctrl-C and after SIGTERM: 128 and the number of the signal."""
+
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def main() -> None:
-    """Run the command line; a user's error is one message on stderr and exit status 2."""
+    """Run the command line; a user's error is one message on stderr and exit status 2.
+
+    SIGTERM ends it as Ctrl-C does, what is computed kept, with another exit status.
+    """
+    terminations: list[int] = []
+
+    def terminate(number: int, frame: object) -> None:
+        terminations.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        _run()
+    except SystemExit as end:
+        if terminations and end.code:
+            raise SystemExit(TERMINATED) from None
+        raise
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _run() -> None:
     try:
         try:
             app()
@@ -94,7 +95,7 @@ def main() -> None:
             raise
     except Interrupted as stop:
         print(f"bridgegen: {stop}", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except BridgeGenError as error:
         for problem in error.problems:
             print(f"bridgegen: error: {problem}", file=sys.stderr)

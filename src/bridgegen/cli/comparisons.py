@@ -6,10 +6,14 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import SEARCH, app
+from bridgegen.cli.app import app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.declared import with_declared_options
+from bridgegen.cli.groups import SEARCH
 from bridgegen.options import CommonOptions
 from bridgegen.options.forms import read_names
+from bridgegen.options.option import OUTPUT
+from bridgegen.options.option import SEARCH as HOW
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -17,27 +21,49 @@ from bridgegen.options.forms import read_names
 def compare(
     scenarios: Annotated[
         list[str],
-        typer.Argument(help="Catalogue names, or paths of YAML or OpenSCENARIO files."),
+        typer.Argument(
+            help="Catalogue names, or paths of YAML or OpenSCENARIO files.",
+            autocompletion=completing("scenario"),
+        ),
     ],
     *,
     algorithms: Annotated[
-        str, typer.Option(help="See 'bridgegen list algorithms'; separated by commas.")
+        str,
+        typer.Option(
+            help="See 'bridgegen list algorithms'; separated by commas.",
+            rich_help_panel=HOW,
+            autocompletion=completing("algorithm"),
+        ),
     ] = "random,pso",
-    seeds: Annotated[int, typer.Option(help="Runs of each, with the seeds 0, 1, 2 …")] = 10,
-    budget: Annotated[int, typer.Option(help="Evaluations of each run, exactly.")] = 1000,
+    seeds: Annotated[
+        int, typer.Option(help="Runs of each, with the seeds 0, 1, 2 …", rich_help_panel=HOW)
+    ] = 10,
+    budget: Annotated[
+        int, typer.Option(help="Evaluations of each run, exactly.", rich_help_panel=HOW)
+    ] = 1000,
     baseline: Annotated[
         str | None,
-        typer.Option(help="Baseline of the tests.", show_default="the first algorithm"),
+        typer.Option(
+            help="Baseline of the tests.",
+            show_default="the first algorithm",
+            rich_help_panel=OUTPUT,
+            autocompletion=completing("algorithm"),
+        ),
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", help="ALGORITHM.NAME=VALUE; may be repeated."),
+        typer.Option(
+            "--set",
+            help="ALGORITHM.NAME=VALUE; may be repeated.",
+            rich_help_panel=HOW,
+        ),
     ] = None,
     distinct: Annotated[
         float,
         typer.Option(
             help="Critical scenarios are different if their searched parameters differ by this "
-            "share of their ranges, in root mean square."
+            "share of their ranges, in root mean square.",
+            rich_help_panel=OUTPUT,
         ),
     ] = 0.1,
     options: CommonOptions,
@@ -47,6 +73,7 @@ def compare(
         typer.Option(
             help="The comparison's folder; a stopped comparison is resumed.",
             show_default="comparisons/SCENARIOS",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
 ) -> None:

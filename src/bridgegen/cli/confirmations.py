@@ -6,8 +6,11 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import FAILED, RESULTS, app
+from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.groups import RESULTS
+from bridgegen.options.option import SIMULATOR
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -15,7 +18,12 @@ from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_
 def confirm(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
     simulator: Annotated[
-        str, typer.Option(help="The other simulator: see 'bridgegen list simulators'.")
+        str,
+        typer.Option(
+            help="The other simulator: see 'bridgegen list simulators'.",
+            rich_help_panel=SIMULATOR,
+            autocompletion=completing("simulator"),
+        ),
     ],
     simulator_set: options.SimulatorSettings = None,
     connection: Connection = NO_CONNECTION,

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from bridgegen.cli.expansion import expand
+from bridgegen.options.option import SIMULATOR
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Connection = Mapping[str, Value]
@@ -19,39 +20,57 @@ OPTIONS: Mapping[str, Any] = {
     "esmini_lib": Annotated[
         Path | None,
         typer.Option(
+            rich_help_panel=SIMULATOR,
             help="esmini's library, libesminiLib.so, for --simulator esmini.",
             show_default="ESMINI_LIB of the environment",
         ),
     ],
     "host": Annotated[
         str | None,
-        typer.Option(help="The server's machine, for --simulator carla.", show_default="localhost"),
+        typer.Option(
+            rich_help_panel=SIMULATOR,
+            help="The server's machine, for --simulator carla.",
+            show_default="localhost",
+        ),
     ],
     "port": Annotated[
         int | None,
-        typer.Option(help="The server's port, for --simulator carla.", show_default="2000"),
+        typer.Option(
+            rich_help_panel=SIMULATOR,
+            help="The server's port, for --simulator carla.",
+            show_default="2000",
+        ),
     ],
     "carla_command": Annotated[
         str | None,
         typer.Option(
-            help="Command that starts a CARLA server, also after a crash.", show_default="none"
+            rich_help_panel=SIMULATOR,
+            help="Command that starts a CARLA server, also after a crash.",
+            show_default="none",
         ),
     ],
     "carla_timeout": Annotated[
         float | None,
-        typer.Option(help="Time limit of an answer of CARLA [s].", show_default="20"),
+        typer.Option(
+            rich_help_panel=SIMULATOR,
+            help="Time limit of an answer of CARLA [s].",
+            show_default="20",
+        ),
     ],
     "record": Annotated[
         Path | None,
         typer.Option(
+            rich_help_panel=SIMULATOR,
             help="A new folder for camera images, LiDAR points, boxes and incidents, with "
-            "--simulator carla."
+            "--simulator carla.",
         ),
     ],
     "detector": Annotated[
         str | None,
         typer.Option(
-            help="A detector of your own that looks at CARLA's images: module:Class, file.py:Class."
+            rich_help_panel=SIMULATOR,
+            help="A detector of your own that looks at CARLA's images: module:Class, "
+            "file.py:Class.",
         ),
     ],
 }

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bridgegen.cli.completion import completing
 from bridgegen.cli.expansion import expand
 from bridgegen.options import Option, PipelineOptions, SearchOptions, options_of
 
@@ -45,7 +46,13 @@ def _declaration(one: Option) -> Any:
     if one.form.kind is bool:
         spelling = f"{spelling}/--no-{spelling.removeprefix('--')}"
     text = f"{one.help} {one.hint}".rstrip()
-    return typer.Option(spelling, help=text, show_default=one.shown or True)
+    return typer.Option(
+        spelling,
+        help=text,
+        show_default=one.shown or True,
+        rich_help_panel=one.group,
+        autocompletion=completing(one.names),
+    )
 
 
 def _default(one: Option) -> Any:

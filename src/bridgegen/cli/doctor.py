@@ -3,10 +3,11 @@
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import SETUP, app
+from bridgegen.cli.app import app
+from bridgegen.cli.groups import ADVANCED
 
 
-@app.command(rich_help_panel=SETUP)
+@app.command(rich_help_panel=ADVANCED)
 def doctor(as_json: options.Json = False) -> None:
     """Examine this installation: versions, cache, extras.
 

@@ -2,16 +2,16 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import FILES, ONTOLOGY, RESULTS, app, ontology
+from bridgegen.cli.app import app, ontology
+from bridgegen.cli.completion import completing
+from bridgegen.cli.groups import FILES, ONTOLOGY, RESULTS
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_names
-
-SchemaKind = Literal["scenario", "fragment"]
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -21,7 +21,8 @@ def export(
         str,
         typer.Option(
             help="1.2 or 1.3: with parameters; resolved: without; recorded: timed trajectories; "
-            "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego."
+            "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego.",
+            autocompletion=completing("flavour"),
         ),
     ],
     scenario: Annotated[
@@ -131,7 +132,7 @@ def validate(
 
     The exit status is 2 if one breaks any.
     """
-    from bridgegen.campaign.validate import validate_file
+    from bridgegen.campaign.validate import name_note, validate_file
 
     broken: list[str] = []
     for file in files:
@@ -139,6 +140,8 @@ def validate(
         broken += problems
         if not problems:
             print(f"{file}: valid")
+            if note := name_note(file):
+                print(f"bridgegen: note: {note}", file=sys.stderr)
     if broken:
         raise InputError(*broken)
 
@@ -146,22 +149,30 @@ def validate(
 @app.command(rich_help_panel=FILES)
 def schema(
     kind: Annotated[
-        SchemaKind, typer.Argument(help="Of which files: scenario or fragment.")
-    ] = "scenario",
+        str | None,
+        typer.Argument(help="Of which files: scenario, fragment or run.", show_default="scenario"),
+    ] = None,
+    of: Annotated[
+        str | None, typer.Option(help="The same: scenario, fragment or run.", show_default=False)
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="A file for it, new or an earlier schema; else printed.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenario or run files.
 
-    Editors complete and check scenario files with it.
+    Editors complete and check scenario files and run files with it.
     """
-    from bridgegen.odd.json_schema import schema_text, write_schema
+    from bridgegen.cli.runs import run_file_schema
+    from bridgegen.odd.json_schema import as_text, schema_of, write_schema
 
+    if None not in (kind, of) and kind != of:
+        raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
+    made = run_file_schema() if (name := kind or of or "scenario") == "run" else schema_of(name)
     if out is None:
-        print(schema_text(kind), end="")
+        print(as_text(made), end="")
         return
-    write_schema(out, kind)
+    write_schema(out, made)
     print(out)
 
 
@@ -169,7 +180,10 @@ def schema(
 def show(
     what: Annotated[
         str,
-        typer.Argument(help="A scenario's ontology (.owl), a catalogue name, or a YAML file."),
+        typer.Argument(
+            help="A scenario's ontology (.owl), a catalogue name, or a YAML file.",
+            autocompletion=completing("scenario"),
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(help="The page (.html); beside the file by default.")

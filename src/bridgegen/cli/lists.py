@@ -7,6 +7,7 @@ import typer
 
 from bridgegen.cli import options
 from bridgegen.cli.app import listing
+from bridgegen.cli.completion import completing
 
 
 @listing.command("scenarios")
@@ -92,7 +93,13 @@ def list_sight(as_json: options.Json = False) -> None:
 
 @listing.command("parameters")
 def list_parameters(
-    scenario: Annotated[str, typer.Argument(help="A catalogue name, or the path of a YAML file.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A catalogue name, or the path of a YAML file.",
+            autocompletion=completing("scenario"),
+        ),
+    ],
     as_json: options.Json = False,
 ) -> None:
     """Parameters of a scenario: ranges and constraints."""

@@ -5,30 +5,50 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import Connection
 from bridgegen.cli.declared import declaration
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_settings, read_value
+from bridgegen.options.option import DRIVER, OUTPUT, SEARCH, SIMULATOR
 from bridgegen.simulation.choice import SimulatorChoice, Value
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print JSON for machines.", rich_help_panel=OUTPUT)
+]
 
-OwnEgo = Annotated[str | None, typer.Option("--ego", help="The run's driver, if it is your own.")]
+OwnEgo = Annotated[
+    str | None,
+    typer.Option("--ego", help="The run's driver, if it is your own.", rich_help_panel=DRIVER),
+]
 Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
 TimeLimit = Annotated[float | None, declaration("time_limit")]
 OnlyMetrics = Annotated[
     str | None,
-    typer.Option("--metrics", help="Only these, e.g. pet,drac.", show_default="all"),
+    typer.Option(
+        "--metrics",
+        help="Only these, e.g. pet,drac.",
+        show_default="all",
+        rich_help_panel=OUTPUT,
+        autocompletion=completing("metric"),
+    ),
 ]
 Others = Annotated[str | None, declaration("others", shown="the file's")]
 Simulator = Annotated[
     str | None,
-    typer.Option(help="Simulator, see 'bridgegen list simulators'.", show_default="embedded"),
+    typer.Option(
+        help="Simulator, see 'bridgegen list simulators'.",
+        show_default="embedded",
+        rich_help_panel=SIMULATOR,
+        autocompletion=completing("simulator"),
+    ),
 ]
 SimulatorSettings = Annotated[
     list[str] | None,
     typer.Option(
-        "--simulator-set", help="A setting of the simulator, NAME=VALUE; may be repeated."
+        "--simulator-set",
+        help="A setting of the simulator, NAME=VALUE; may be repeated.",
+        rich_help_panel=SIMULATOR,
     ),
 ]
 RoadMap = Annotated[Path | None, declaration("road_map")]
@@ -39,6 +59,7 @@ Workers = Annotated[
         help="Number of worker processes, or 'ray' / 'ray://HOST:PORT' for a Ray cluster (extra "
         "ray). No result depends on it.",
         show_default="threads of one process, one for each core",
+        rich_help_panel=SEARCH,
     ),
 ]
 RunWorkers = Annotated[
@@ -48,6 +69,7 @@ RunWorkers = Annotated[
         help="Number of runs at a time, each in a process; or 'ray' / 'ray://HOST:PORT': a Ray "
         "cluster (extra ray) simulates their scenarios. No result depends on it.",
         show_default="one on each core",
+        rich_help_panel=SEARCH,
     ),
 ]
 FailIf = Annotated[
@@ -55,6 +77,7 @@ FailIf = Annotated[
     typer.Option(
         help="End with exit status 3 if this holds, e.g. 'r_critic > 0.1'; may be repeated.",
         show_default=False,
+        rich_help_panel=OUTPUT,
     ),
 ]
 FileFailIf = Annotated[
@@ -64,6 +87,7 @@ FileFailIf = Annotated[
         help="End with exit status 3 if this holds of its metrics, e.g. 'd_min < 2 and v_d >= 1'; "
         "may be repeated.",
         show_default=False,
+        rich_help_panel=OUTPUT,
     ),
 ]
 ConfirmFailIf = Annotated[
@@ -72,10 +96,14 @@ ConfirmFailIf = Annotated[
         "--fail-if",
         help="End with exit status 3 if this holds, e.g. 'confirmed < 0.95'; may be repeated.",
         show_default=False,
+        rich_help_panel=OUTPUT,
     ),
 ]
 Junit = Annotated[
-    Path | None, typer.Option(help="Write the verdict as JUnit XML, for Jenkins, GitLab …")
+    Path | None,
+    typer.Option(
+        help="Write the verdict as JUnit XML, for Jenkins, GitLab …", rich_help_panel=OUTPUT
+    ),
 ]
 
 

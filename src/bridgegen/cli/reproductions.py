@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import SEARCH, app
+from bridgegen.cli.app import app
+from bridgegen.cli.groups import SEARCH
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_names
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, FILES, RESULTS, SEARCH, app
+from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import (
     NO_CONNECTION,
     Connection,
@@ -18,9 +19,13 @@ from bridgegen.cli.connection import (
     with_connection_options,
 )
 from bridgegen.cli.declared import with_declared_options
+from bridgegen.cli.groups import FILES, RESULTS, SEARCH
+from bridgegen.cli.run_files import keys_of, schema, with_run_files
+from bridgegen.cli.several_runs import search_all
 from bridgegen.ego import split
 from bridgegen.options import SearchOptions
 from bridgegen.options.forms import read_names
+from bridgegen.options.option import DRIVER, OUTPUT
 from bridgegen.simulation.choice import EMBEDDED
 
 if TYPE_CHECKING:
@@ -28,12 +33,16 @@ if TYPE_CHECKING:
 
 
 @app.command(rich_help_panel=SEARCH)
+@with_run_files(search_all)
 @with_connection_options
 @with_declared_options
 def search(
     scenario: Annotated[
         str,
-        typer.Argument(help="A catalogue name, or the path of a YAML or an OpenSCENARIO file."),
+        typer.Argument(
+            help="A catalogue name, or the path of a YAML or an OpenSCENARIO file; or a run file.",
+            autocompletion=completing("scenario"),
+        ),
     ],
     options: SearchOptions,
     simulator: common.Simulator = None,
@@ -42,16 +51,31 @@ def search(
     workers: common.Workers = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the run, new.", show_default="runs/SCENARIO-ALGORITHM-SEED"),
+        typer.Option(
+            help="Folder of the run, new.",
+            show_default="runs/SCENARIO-ALGORITHM-SEED",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
+    save: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write a new run file (.yaml) that repeats this call.", rich_help_panel=OUTPUT
+        ),
+    ] = None,
 ) -> None:
-    """Search a scenario for critical concrete scenarios."""
+    """Search a scenario for critical concrete scenarios.
+
+    In place of a scenario, a run file (docs/run-files.md) may give the scenario and all options;
+    those of the command line override the file's.
+    """
     from bridgegen import campaign
     from bridgegen.screen.search import SearchScreen, print_summary
     from bridgegen.verdict.of_run import PassFailCriteria
 
+    assert save is None  # written by the run file's reader, which knows what was given
     criteria = PassFailCriteria.read(fail_if or (), junit, causes=options.causes)
     chosen = common.read_simulator(simulator, simulator_set, connection)
     options = replace(options, simulator=chosen or EMBEDDED)
@@ -63,6 +87,11 @@ def search(
     _end(criteria.judge(run))
 
 
+def run_file_schema() -> dict[str, object]:
+    """Return the JSON Schema of run files."""
+    return schema(keys_of(search))
+
+
 @app.command(rich_help_panel=FILES)
 def new(
     name: Annotated[
@@ -70,7 +99,11 @@ def new(
         typer.Argument(help="Name of the new scenario; writes NAME.yaml and its JSON schema."),
     ],
     like: Annotated[
-        str | None, typer.Option(help="Start from a copy of this catalogue scenario.")
+        str | None,
+        typer.Option(
+            help="Start from a copy of this catalogue scenario.",
+            autocompletion=completing("scenario"),
+        ),
     ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
@@ -214,7 +247,12 @@ def regions(
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
     ego: Annotated[
-        str | None, typer.Option(help="Driver of the ego; the file's by default.")
+        str | None,
+        typer.Option(
+            help="Driver of the ego; the file's by default.",
+            rich_help_panel=DRIVER,
+            autocompletion=completing("driver"),
+        ),
     ] = None,
     ideal: common.Ideal = None,
     others: common.Others = None,
@@ -225,7 +263,9 @@ def simulate(
     ] = None,
     trace: Annotated[
         Path | None,
-        typer.Option(help="A new .csv of every entity's time, x, y, h and speed."),
+        typer.Option(
+            help="A new .csv of every entity's time, x, y, h and speed.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     metrics: common.OnlyMetrics = None,
     simulator: common.Simulator = None,
@@ -294,7 +334,11 @@ def check_driver(
     ],
     scenario: Annotated[
         list[str] | None,
-        typer.Option(help="Try it in this one; may be repeated.", show_default="four that ship"),
+        typer.Option(
+            help="Try it in this one; may be repeated.",
+            show_default="four that ship",
+            autocompletion=completing("scenario"),
+        ),
     ] = None,
     time_limit: common.TimeLimit = None,
     as_json: common.Json = False,

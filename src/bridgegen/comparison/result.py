@@ -1,5 +1,6 @@
 """The results of a comparison, for tables, pages and notebooks."""
 
+import html
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,12 @@ class Comparison:
         for one in found:
             return one
         raise KeyError(wanted)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the table of all measures, and where the page is."""
+        table = self.summary().to_html(index=False, max_rows=60, border=0)
+        page = html.escape(str(self.page))
+        return f"{table}<p>Whole comparison: <code>{page}</code></p>"
 
     def frame(self) -> "pd.DataFrame":
         """Return every measure of every run, one a row: ``runs.csv``."""

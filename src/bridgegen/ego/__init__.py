@@ -7,11 +7,11 @@ from bridgegen.ego.drivers import (
     STAGES,
     STORYBOARD,
     Driver,
-    get,
     is_spec,
     join,
     split,
 )
+from bridgegen.ego.own_file import get
 
 __all__ = [
     "DRIVERS",

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Set
+from contextlib import suppress
 from itertools import combinations
 
 import numpy as np
@@ -16,6 +17,7 @@ from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import cap, speeds_of
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import probes
+from bridgegen.odd.units import has_unit, in_unit
 from bridgegen.participants import PARTICIPANTS
 from bridgegen.weather import PARAMETERS
 
@@ -82,7 +84,7 @@ def use_problems(
 def time_problems(document: Document) -> list[str]:
     """Return what is wrong with a file's duration and time step."""
     data = document.data if isinstance(document.data, dict) else {}
-    duration, step = data.get("duration"), data.get("time_step")
+    duration, step = (_in_seconds(data.get(key)) for key in ("duration", "time_step"))
     if not isinstance(duration, int | float) or not isinstance(step, int | float):
         return []  # reported with the shape already
     for key, value in (("duration", duration), ("time_step", step)):
@@ -96,6 +98,14 @@ def time_problems(document: Document) -> list[str]:
         f"duration must be a whole number of time steps, 1 to {MAX_STEPS}, got {duration} s / "
         f"{step} s = {steps:.6g} ({document.at(('duration',))})"
     ]
+
+
+def _in_seconds(value: object) -> object:
+    """Return a time that is written with a unit in seconds; others as they are."""
+    if isinstance(value, str) and has_unit(value):
+        with suppress(ValueError):
+            return in_unit(value, "s")
+    return value
 
 
 def try_out(scenario: LogicalScenario) -> None:

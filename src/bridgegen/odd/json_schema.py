@@ -9,10 +9,10 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import NoneType
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from bridgegen.disk import write_whole
-from bridgegen.errors import StorageError
+from bridgegen.errors import StorageError, UnknownNameError
 from bridgegen.odd.kinds import FLOAT, KINDS
 from bridgegen.odd.parameters import UNITS
 from bridgegen.odd.reader import names
@@ -48,7 +48,24 @@ def schema(kind: Kind = "scenario") -> dict[str, Any]:
 
 def schema_text(kind: Kind = "scenario") -> str:
     """Return the JSON Schema as a file holds it."""
-    return json.dumps(schema(kind), indent=2, ensure_ascii=False) + "\n"
+    return as_text(schema(kind))
+
+
+def as_text(made: Mapping[str, Any]) -> str:
+    """Return a JSON Schema as a file holds it."""
+    return json.dumps(made, indent=2, ensure_ascii=False) + "\n"
+
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """Return the JSON Schema of a kind of files.
+
+    Raises:
+        UnknownNameError: no such kind.
+    """
+    for one in get_args(Kind):
+        if kind == one:
+            return schema(one)
+    raise UnknownNameError("kind of files", kind, (*get_args(Kind), "run"))
 
 
 def refuse_other_schema(path: Path) -> None:
@@ -68,14 +85,14 @@ def refuse_other_schema(path: Path) -> None:
         raise StorageError(f"{path}: exists already, is no schema of ours, and is not overwritten")
 
 
-def write_schema(path: Path, kind: Kind = "scenario") -> None:
-    """Write the JSON Schema; an earlier one is replaced.
+def write_schema(path: Path, made: Kind | Mapping[str, Any] = "scenario") -> None:
+    """Write a JSON Schema, made already or of a kind of files; an earlier one is replaced.
 
     Raises:
         StorageError: something else is there, or it cannot be written.
     """
     refuse_other_schema(path)
-    write_whole(path, [schema_text(kind).encode()])
+    write_whole(path, [(schema_text(made) if isinstance(made, str) else as_text(made)).encode()])
 
 
 def _plain(one: Any) -> Any:

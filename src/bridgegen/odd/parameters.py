@@ -12,6 +12,7 @@ from bridgegen.arrays import Float
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.expression import RESERVED, Expression
 from bridgegen.odd.kinds import FLOAT, Kind
+from bridgegen.odd.units import has_unit, in_unit
 
 UNITS = {
     "m": "length",
@@ -142,9 +143,17 @@ class Parameter:
     def read(self, given: float | str) -> float:
         """Return the inner value of what a user gives (`bridgegen.odd.kinds`).
 
+        A text may be a number with a unit, ``90 km/h``.
+
         Raises:
-            ScenarioError: it is not of this kind; it may be outside the range.
+            ScenarioError: it is not of this kind, or its unit is of another dimension; it may be
+                outside the range.
         """
+        if isinstance(given, str) and not self.kind.names and has_unit(given):
+            try:
+                given = in_unit(given, self.unit)
+            except ValueError as error:
+                raise ScenarioError(f"{self.name} {error}, got '{given}'") from None
         value = self.kind.read(given, self.low, self.high)
         if value is None:
             raise ScenarioError(f"{self.name} must be {self.kind.expected()}, got {given!r}")

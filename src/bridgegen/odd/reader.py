@@ -220,17 +220,13 @@ class _Declarations:
                     self.problems.append(f"{name} is derived: it has no default{at(place)}")
             elif isinstance(value, int | float | str) and not isinstance(value, bool):
                 one = self.parameters[at_[name]]
-                default = one.kind.read(value, one.low, one.high)
-                if default is None:
-                    expected = one.kind.expected()
-                    self.problems.append(
-                        f"defaults.{name} must be {expected}, got {value!r}{at(place)}"
-                    )
-                    continue
                 try:
-                    self.parameters[at_[name]] = replace(one, default=default, place=place)
+                    default = one.read(value)
                 except InputError as error:
-                    self.problems += error.problems
+                    self.problems += [f"defaults.{text}{at(place)}" for text in error.problems]
+                    continue
+                with self._noting():
+                    self.parameters[at_[name]] = replace(one, default=default, place=place)
 
     def _parameter(self, name: str, given: ParameterSection, place: str) -> None:
         if problems := _key_problems(name, given):

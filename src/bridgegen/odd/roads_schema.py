@@ -4,13 +4,24 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from bridgegen.odd.shape import Number, QuantityField, ShapedSection
+from bridgegen.odd.shape import (
+    Curvature,
+    Degrees,
+    Duration,
+    Length,
+    Metres,
+    Number,
+    Percent,
+    QuantityField,
+    ShapedSection,
+    Speed,
+)
 
 
 class LegSection(ShapedSection):
     """One leg of a junction or roundabout."""
 
-    heading: Number | None = None
+    heading: Degrees | None = None
     """Outwards [deg], counter-clockwise from east; legs are 45° apart at least."""
     lanes_in: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
     """Number of lanes towards the junction."""
@@ -27,11 +38,11 @@ class LegSection(ShapedSection):
 class SegmentSection(ShapedSection):
     """One stretch of a road."""
 
-    length: QuantityField
+    length: Length
     """[m]"""
-    curvature: QuantityField = 0.0
+    curvature: Curvature = 0.0
     """At its start [1/m], left positive."""
-    end_curvature: QuantityField | None = None
+    end_curvature: Curvature | None = None
     """At its end [1/m]; the same by default."""
 
 
@@ -42,7 +53,7 @@ class RoadsSection(ShapedSection):
     """Of a junction or roundabout, by letter, A to E."""
     segments: list[SegmentSection] = []
     """Of a road, one after the other; straight by default."""
-    crosswalk_at: Number | None = None
+    crosswalk_at: Metres | None = None
     """Of a road: where its crosswalk's centre lies [m]."""
     crosswalks: Annotated[bool, Field(strict=True)] = False
     """Whether there are crosswalks on all legs."""
@@ -50,25 +61,25 @@ class RoadsSection(ShapedSection):
     """Traffic lights at a junction: none, or a phase for each pair of opposite legs."""
     road_type: Literal["town", "rural", "motorway"] | None = None
     """What kind of road it is."""
-    lane_width: QuantityField | None = None
-    speed_limit: QuantityField | None = None
-    sidewalk_width: QuantityField | None = None
-    shoulder_width: QuantityField | None = None
-    crosswalk_width: QuantityField | None = None
-    closing_fog_density: QuantityField | None = None
-    closing_precipitation: QuantityField | None = None
+    lane_width: Length | None = None
+    speed_limit: Speed | None = None
+    sidewalk_width: Length | None = None
+    shoulder_width: Length | None = None
+    crosswalk_width: Length | None = None
+    closing_fog_density: Percent | None = None
+    closing_precipitation: Percent | None = None
     lanes_per_direction: QuantityField | None = None
-    arm_length: QuantityField | None = None
-    intersection_size: QuantityField | None = None
-    green_time: QuantityField | None = None
-    yellow_time: QuantityField | None = None
-    all_red_time: QuantityField | None = None
-    signal_offset: QuantityField | None = None
-    radius: QuantityField | None = None
-    ring_lane_width: QuantityField | None = None
+    arm_length: Length | None = None
+    intersection_size: Length | None = None
+    green_time: Duration | None = None
+    yellow_time: Duration | None = None
+    all_red_time: Duration | None = None
+    signal_offset: Duration | None = None
+    radius: Length | None = None
+    ring_lane_width: Length | None = None
     lanes: QuantityField | None = None
     lanes_against: QuantityField | None = None
-    length: QuantityField | None = None
-    merge_length: QuantityField | None = None
-    taper_length: QuantityField | None = None
-    after_length: QuantityField | None = None
+    length: Length | None = None
+    merge_length: Length | None = None
+    taper_length: Length | None = None
+    after_length: Length | None = None

@@ -6,19 +6,24 @@ Rules about values are kept by the types that the file becomes (``parameters``, 
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.shape import (
     AxisName,
     Formula,
     KindName,
+    Measured,
+    Metres,
+    MetresPerSecond,
     Number,
     NumberOrName,
     OrWord,
+    Seconds,
     ShapedSection,
     Text,
     Word,
+    convert,
 )
 from bridgegen.odd.story_schema import (
     EventSection,
@@ -37,9 +42,9 @@ class ParameterSection(ShapedSection):
     """What it takes: any number, whole ones, one of some names, or angles."""
     unit: Text | None = None
     """SI; see the list of units. A category has none."""
-    low: Number | None = None
+    low: Measured | None = None
     """The smallest value."""
-    high: Number | None = None
+    high: Measured | None = None
     """The largest value; of an angle, that may be less than the smallest."""
     values: Annotated[list[Text], Field(min_length=2)] | None = None
     """The names of a category's values."""
@@ -49,6 +54,11 @@ class ParameterSection(ShapedSection):
     """What it is."""
     source: Text
     """Where its range comes from."""
+
+    @field_validator("low", "high", "default", mode="before")
+    @classmethod
+    def _in_its_unit(cls, value: object, info: ValidationInfo) -> object:
+        return convert(value, info.data.get("unit"))
 
 
 class BoundSection(ShapedSection):
@@ -119,9 +129,9 @@ class CriticalSection(ShapedSection):
 
     n_collision_above: Number = 0.0
     """More collisions than this are critical."""
-    d_min_below: Number = 2.0
+    d_min_below: Metres = 2.0
     """Nearer than this [m] is critical, if v_d is large enough."""
-    v_d_at_least: Number = 1.0
+    v_d_at_least: MetresPerSecond = 1.0
     """How fast the ego must be at d_min for that [m/s]."""
 
 
@@ -159,9 +169,9 @@ class ScenarioFile(ShapedSection):
     """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
     others: Literal["attentive", "scripted"] = "scripted"
     """Default driver of the other participants (see --others, and their ``driver``)."""
-    duration: Number
+    duration: Seconds
     """Of the simulation [s]."""
-    time_step: Number
+    time_step: Seconds
     """Of the simulation [s]."""
     road_end: Literal["leave", "stand"] = "leave"
     """What participants other than the ego do where their road ends: leave, or stand."""

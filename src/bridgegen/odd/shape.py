@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     GetCoreSchemaHandler,
@@ -20,19 +21,48 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_sc
 from bridgegen.odd.parameters import nearest
 from bridgegen.odd.plain_yaml import Document, Path
 from bridgegen.odd.story import STRIPS
+from bridgegen.odd.units import PATTERN, has_unit, in_unit
 
 _PARAMETER = "[A-Za-z][A-Za-z0-9_]{0,63}"
 
 
-def _number_or(what: str, pattern: str) -> PlainValidator:
+def _with_unit(text: str, unit: str) -> float:
+    try:
+        return in_unit(text, unit)
+    except ValueError as error:
+        raise PydanticCustomError("unit", str(error)) from None
+
+
+def convert(value: object, unit: object) -> object:
+    """Return a value of a file, a number with a unit as one in that unit; others as they are.
+
+    Raises:
+        PydanticCustomError: it is in a unit of another dimension.
+    """
+    if isinstance(value, str) and isinstance(unit, str) and has_unit(value):
+        return _with_unit(value, unit)
+    return value
+
+
+def _number_or(what: str, pattern: str, unit: str = "") -> PlainValidator:
     def read(value: object) -> float | str:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return float(value)
+        if unit and isinstance(value, str) and has_unit(value):
+            return _with_unit(value, unit)
         if isinstance(value, str) and re.fullmatch(pattern, value, re.DOTALL):
             return value
         raise PydanticCustomError("number_or", f"must be a number or {what}")
 
     return PlainValidator(read)
+
+
+def _number_in(unit: str) -> BeforeValidator:
+    return BeforeValidator(lambda value: convert(value, unit))
+
+
+def _quantity_in(unit: str) -> PlainValidator:
+    return _number_or("the name of a parameter", _PARAMETER, unit)
 
 
 def _lane() -> PlainValidator:
@@ -57,13 +87,34 @@ Text = Annotated[
     WithJsonSchema({"type": "string", "pattern": r"\S"}),
 ]
 Word = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
-QuantityField = Annotated[
-    float | str,
-    _number_or("the name of a parameter", _PARAMETER),
-    WithJsonSchema(
-        {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_PARAMETER}$"}]}
-    ),
-]
+_SCHEMA_WITH_UNIT = {"type": "string", "pattern": PATTERN}
+_MEASURED = WithJsonSchema({"anyOf": [{"type": "number"}, _SCHEMA_WITH_UNIT]})
+_QUANTITY = WithJsonSchema(
+    {
+        "anyOf": [
+            {"type": "number"},
+            {"type": "string", "pattern": f"^{_PARAMETER}$"},
+            _SCHEMA_WITH_UNIT,
+        ]
+    }
+)
+
+# Numbers, which may be written with a unit of that dimension.
+Metres = Annotated[Number, _number_in("m"), _MEASURED]
+Seconds = Annotated[Number, _number_in("s"), _MEASURED]
+MetresPerSecond = Annotated[Number, _number_in("m/s"), _MEASURED]
+Degrees = Annotated[Number, _number_in("deg"), _MEASURED]
+Measured = Annotated[Number, _MEASURED]
+"""In the unit that another key says, which a validator converts it to."""
+
+# The same, or the name of a parameter in that unit.
+QuantityField = Annotated[float | str, _quantity_in(""), _QUANTITY]
+Length = Annotated[float | str, _quantity_in("m"), _QUANTITY]
+Duration = Annotated[float | str, _quantity_in("s"), _QUANTITY]
+Speed = Annotated[float | str, _quantity_in("m/s"), _QUANTITY]
+Acceleration = Annotated[float | str, _quantity_in("m/s²"), _QUANTITY]
+Curvature = Annotated[float | str, _quantity_in("1/m"), _QUANTITY]
+Percent = Annotated[float | str, _quantity_in("%"), _QUANTITY]
 LaneField = Annotated[
     int | str,
     _lane(),
@@ -78,10 +129,8 @@ Formula = Annotated[
 ]
 NumberOrName = Annotated[
     float | str,
-    _number_or("the name of a category's value", _PARAMETER),
-    WithJsonSchema(
-        {"anyOf": [{"type": "string", "pattern": f"^{_PARAMETER}$"}, {"type": "number"}]}
-    ),
+    _number_or("the name of a category's value", rf"{_PARAMETER}|{PATTERN[1:-1]}"),
+    _QUANTITY,
 ]
 KindName = Literal["float", "integer", "category", "angle"]
 AxisName = Literal["static", "temporary", "participants", "weather", "extension"]

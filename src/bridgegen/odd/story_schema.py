@@ -2,9 +2,22 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from bridgegen.odd.shape import LaneField, Number, QuantityField, ShapedSection, Word
+from bridgegen.odd.shape import (
+    Acceleration,
+    Duration,
+    LaneField,
+    Length,
+    Metres,
+    Number,
+    QuantityField,
+    ShapedSection,
+    Speed,
+    Word,
+    convert,
+)
+from bridgegen.odd.story import CONDITIONS
 from bridgegen.participants import QUEUES, TYPE_NAMES, canonical
 
 if TYPE_CHECKING:
@@ -23,11 +36,11 @@ class WaypointSection(ShapedSection):
     """A to E of a junction; main, ramp or after of a merge; a road needs none."""
     way: Literal["in", "out"] | None = None
     """Towards the junction, or away from it; of a road ``out`` is its direction."""
-    distance: QuantityField
+    distance: Length
     """[m] along the leg from the junction's edge; of a road from its start."""
     lane: LaneField = 1
     """1 is the innermost lane of its direction; or sidewalk, or shoulder."""
-    offset: QuantityField = 0.0
+    offset: Length = 0.0
     """To the left of the lane's centre [m], kept while driving."""
 
 
@@ -42,7 +55,7 @@ class ParticipantSection(ShapedSection):
     """Where its route ends; the ego's must."""
     path: list[WaypointSection] = []
     """Instead of start and end: straight lines through places; not of a vehicle or an obstacle."""
-    speed: QuantityField = 0.0
+    speed: Speed = 0.0
     """At time 0 [m/s]; of the ego also its target."""
     driver: Word | None = None
     """attentive or scripted, instead of ``others``; not of the ego."""
@@ -67,15 +80,21 @@ class ConditionSection(ShapedSection):
     all: "list[ConditionSection]" = []
     """Conditions that must hold together."""
 
+    @field_validator("value", mode="before")
+    @classmethod
+    def _in_its_unit(cls, value: object, info: ValidationInfo) -> object:
+        kind = info.data.get("kind")
+        return convert(value, CONDITIONS[kind].unit if kind else None)
+
 
 class LaneChangeSection(ShapedSection):
     """A lane change of an event."""
 
     lanes: Annotated[Number, Field(ge=-5, le=5, multiple_of=1)]
     """How many, to the left of its direction of travel positive."""
-    time: QuantityField | None = None
+    time: Duration | None = None
     """It takes so long [s]."""
-    distance: QuantityField | None = None
+    distance: Length | None = None
     """It takes so far [m]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
     """Of the way aside over time, or distance."""
@@ -90,13 +109,13 @@ class EventSection(ShapedSection):
 
     participant: Word | None = None
     """The participant that acts; none where the weather changes."""
-    speed: QuantityField | None = None
+    speed: Speed | None = None
     """It takes up this speed [m/s]."""
-    rate: QuantityField | None = None
+    rate: Acceleration | None = None
     """At this rate [m/s²]."""
-    time: QuantityField | None = None
+    time: Duration | None = None
     """Within so long [s]."""
-    distance: QuantityField | None = None
+    distance: Length | None = None
     """Within so far [m]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
     """Of the speed over time, or distance."""
@@ -115,7 +134,7 @@ class JamSection(ShapedSection):
     """Where the last of them stands."""
     vehicles: Annotated[list[QueueName], Field(min_length=1)]
     """Their types, the last first."""
-    gap: QuantityField = 3.0
+    gap: Length = 3.0
     """Between two of them [m]."""
 
 
@@ -124,11 +143,11 @@ class WorksSection(ShapedSection):
 
     start: WaypointSection
     """On the lane that is closed."""
-    length: Number
+    length: Metres
     """[m]"""
-    taper: Number
+    taper: Metres
     """Over which the cones cross the lane [m]."""
-    spacing: Number = 5.0
+    spacing: Metres = 5.0
     """Of the cones [m]."""
-    sign_before: Number = 40.0
+    sign_before: Metres = 40.0
     """How far before them the sign stands [m]."""

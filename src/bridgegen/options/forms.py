@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from bridgegen.errors import InputError
+from bridgegen.options import file_forms
+from bridgegen.options.file_forms import FileForm
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
 
 Words = Callable[[str, Any], list[str]]
@@ -28,12 +30,14 @@ class Form:
         read: the value of what the parser returns, given with the option's spelling for messages.
         words: the words of a command line that give an option a value.
         keep: the value as an option's field keeps it, of any that Python code may give.
+        in_file: how it is written in a run file.
     """
 
     kind: Any
     read: Callable[[Any, str], Any] = lambda parsed, spelling: parsed
     words: Words = lambda spelling, value: [spelling, str(value)]
     keep: Callable[[Any], Any] = lambda value: value
+    in_file: FileForm = file_forms.TEXT
 
 
 def read_names(text: str | None) -> list[str]:
@@ -141,11 +145,13 @@ def _simulator_words(_: str, choice: SimulatorChoice) -> list[str]:
 
 
 TEXT = Form(str)
-WHOLE = Form(int)
-NUMBER = Form(float, words=lambda spelling, value: [spelling, repr(value)])
+WHOLE = Form(int, in_file=file_forms.WHOLE)
+NUMBER = Form(
+    float, words=lambda spelling, value: [spelling, repr(value)], in_file=file_forms.NUMBER
+)
 PATH = Form(Path)
 
-FLAG = Form(bool, words=_flag_words)
+FLAG = Form(bool, words=_flag_words, in_file=file_forms.FLAG)
 """On or off: ``--name``, ``--no-name``."""
 
 NAMES = Form(
@@ -153,19 +159,34 @@ NAMES = Form(
     lambda text, _: tuple(read_names(text)),
     _repeated(lambda names: [",".join(names)] if names else []),
     lambda names: None if names is None else tuple(names),
+    file_forms.NAMES,
 )
 """``name,name``."""
 
-FIXED = Form(list[str], read_fixed, _repeated(_fixed_texts), lambda values: dict(values or {}))
+FIXED = Form(
+    list[str],
+    read_fixed,
+    _repeated(_fixed_texts),
+    lambda values: dict(values or {}),
+    file_forms.FIXED,
+)
 """``name=number`` or ``name=name``, repeated."""
 
 SETTINGS = Form(
-    list[str], read_settings, _repeated(_setting_texts), lambda values: dict(values or {})
+    list[str],
+    read_settings,
+    _repeated(_setting_texts),
+    lambda values: dict(values or {}),
+    file_forms.SETTINGS,
 )
 """``name=value``, repeated."""
 
 TERMS = Form(
-    str, read_terms, _repeated(_term_texts), lambda terms: None if terms is None else dict(terms)
+    str,
+    read_terms,
+    _repeated(_term_texts),
+    lambda terms: None if terms is None else dict(terms),
+    file_forms.TERMS,
 )
 """``metric=weight,metric``."""
 

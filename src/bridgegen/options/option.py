@@ -5,6 +5,16 @@ from typing import Any, Final
 
 from bridgegen.options.forms import Form
 
+WHAT, SEARCH, OBJECTIVE, DRIVER, SIMULATOR, OUTPUT = GROUPS = (
+    "What to search",
+    "Search",
+    "Objective",
+    "Driver",
+    "Simulator",
+    "Output",
+)
+"""The groups in which the help of a command lists its options."""
+
 ALWAYS: Final = object()
 """The ``before`` of an option that every run records."""
 
@@ -21,6 +31,9 @@ class Option:
         limits: the least and the greatest value, both allowed; None where there are none.
         before: the value of a run that does not record the option, since the run is older than
             the option; ALWAYS where there is no such run.
+        group: one of GROUPS.
+        names: what a shell completes its value with: "algorithm", "driver", "metric" … as
+            `bridgegen.cli.completion` knows them; empty where it completes nothing.
         help: what it means, in Python and on the command line; a whole sentence.
         name: of the field.
         default: of the field.
@@ -32,6 +45,8 @@ class Option:
     shown: str | None = None
     limits: tuple[int, int] | None = None
     before: Any = ALWAYS
+    group: str = WHAT
+    names: str = ""
     help: str = ""
     name: str = ""
     default: Any = None
@@ -52,9 +67,12 @@ def option(
     shown: str | None = None,
     limits: tuple[int, int] | None = None,
     before: Any = ALWAYS,
+    group: str = WHAT,
+    names: str = "",
 ) -> dict[str, Any]:
     """Return the metadata of a field that is an option; see `Option` for the arguments."""
-    return {"help": help, "option": Option(form, spelling, hint, shown, limits, before)}
+    declared = Option(form, spelling, hint, shown, limits, before, group, names)
+    return {"help": help, "option": declared}
 
 
 def options_of(kind: type[Any]) -> tuple[Option, ...]:
@@ -91,5 +109,8 @@ def range_problems(options: object) -> list[str]:
         value = getattr(options, one.name)
         if one.limits and value is not None and not one.limits[0] <= value <= one.limits[1]:
             low, high = one.limits
-            problems.append(f"{low} <= {one.name} <= {high} must hold, got {value}")
+            problems.append(
+                f"{low} <= {one.name} <= {high} must hold, got {value} "
+                f"({one.spelling}: {one.help[0].lower()}{one.help[1:].rstrip('.')})"
+            )
     return problems

@@ -20,7 +20,9 @@ from bridgegen.options.forms import (
     TEXT,
     WHOLE,
 )
-from bridgegen.options.option import option, options_of
+from bridgegen.options.option import DRIVER as OF_DRIVER
+from bridgegen.options.option import OBJECTIVE, OUTPUT, SEARCH, option, options_of
+from bridgegen.options.option import SIMULATOR as OF_SIMULATOR
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
 
 MAX_BUDGET = 10**7
@@ -31,6 +33,7 @@ _CAUSES = option(
     FLAG,
     "Find the cause of each critical scenario: it is simulated again with one stage ideal.",
     before=False,
+    group=OBJECTIVE,
 )
 
 
@@ -45,6 +48,8 @@ class PipelineOptions:
             "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
             "file.py:Class (or a compiled driver's function), file.fmu.",
             shown="the scenario's choice",
+            group=OF_DRIVER,
+            names="driver",
         ),
     )
     ideal: Sequence[str] = field(
@@ -55,6 +60,8 @@ class PipelineOptions:
             hint="Separated by commas.",
             shown="none",
             before=(),
+            group=OF_DRIVER,
+            names="stage",
         ),
     )
     time_limit: float | None = field(
@@ -63,6 +70,7 @@ class PipelineOptions:
             NUMBER,
             "Seconds that one call of a driver of your own may take; a compiled one, one scenario.",
             shown="10",
+            group=OF_DRIVER,
         ),
     )
     metrics: Sequence[str] = field(
@@ -73,6 +81,8 @@ class PipelineOptions:
             "metrics'.",
             hint="Separated by commas.",
             before=(),
+            group=OUTPUT,
+            names="metric",
         ),
     )
     causes: bool = field(default=False, metadata=_CAUSES)
@@ -84,6 +94,8 @@ class PipelineOptions:
             "unavoidable.",
             shown="any",
             before=None,
+            group=OBJECTIVE,
+            names="cause",
         ),
     )
 
@@ -122,6 +134,7 @@ class CommonOptions(PipelineOptions):
             "Axes to search, e.g. static,participants,weather.",
             hint="Separated by commas.",
             shown="the scenario's",
+            names="axis",
         ),
     )
     fixed: Mapping[str, float | str] = field(
@@ -131,6 +144,7 @@ class CommonOptions(PipelineOptions):
             "Parameters to hold at a value, by name.",
             spelling="--fix",
             hint="NAME=VALUE, e.g. --fix fog_density=80; a category by name; may be repeated.",
+            names="parameter",
         ),
     )
     road_map: Path | str | None = field(
@@ -145,7 +159,8 @@ class CommonOptions(PipelineOptions):
     junction: str | None = field(
         default=None,
         metadata=option(
-            TEXT, "Id of the map's junction, where several have as many legs as the scenario's."
+            TEXT,
+            "Id of the map's junction, where several have as many legs as the scenario's.",
         ),
     )
     objective: Mapping[str, float | None] | None = field(
@@ -156,6 +171,8 @@ class CommonOptions(PipelineOptions):
             "weights).",
             hint="E.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy.",
             shown="the scenario's",
+            group=OBJECTIVE,
+            names="objective",
         ),
     )
     weights: str | None = field(
@@ -165,6 +182,8 @@ class CommonOptions(PipelineOptions):
             "Weights of the metrics: fixed, or entropy (of a random sample).",
             shown="the scenario's",
             before=None,
+            group=OBJECTIVE,
+            names="weights",
         ),
     )
     scale: str | None = field(
@@ -174,6 +193,8 @@ class CommonOptions(PipelineOptions):
             "Scale of the metrics: raw, or standardised (by a random sample).",
             shown="the scenario's",
             before=None,
+            group=OBJECTIVE,
+            names="scale",
         ),
     )
     objectives: str | None = field(
@@ -183,6 +204,8 @@ class CommonOptions(PipelineOptions):
             "Number of objectives: one, the metrics' weighted sum; or many, one for each metric.",
             shown="what the algorithm is made for",
             before=None,
+            group=OBJECTIVE,
+            names="objectives",
         ),
     )
     count: str | None = field(
@@ -193,6 +216,8 @@ class CommonOptions(PipelineOptions):
             "have prevented; or any.",
             shown="ego",
             before=None,
+            group=OBJECTIVE,
+            names="count",
         ),
     )
     adversary: str | None = field(
@@ -202,6 +227,7 @@ class CommonOptions(PipelineOptions):
             "Participant that an adversary drives instead of the scenario's events.",
             shown="none; with ppo-adversary the first vehicle",
             before=None,
+            group=OF_DRIVER,
         ),
     )
     others: str | None = field(
@@ -211,6 +237,8 @@ class CommonOptions(PipelineOptions):
             "Driver of all other participants: attentive, or scripted (they heed nobody).",
             shown="what the scenario says",
             before="scripted",
+            group=OF_DRIVER,
+            names="others",
         ),
     )
 
@@ -220,7 +248,13 @@ class SearchOptions(CommonOptions):
     """All options of a run that its result depends on: those that it records."""
 
     algorithm: str = field(
-        default="pso", metadata=option(TEXT, "Search algorithm, see 'bridgegen list algorithms'.")
+        default="pso",
+        metadata=option(
+            TEXT,
+            "Search algorithm, see 'bridgegen list algorithms'.",
+            group=SEARCH,
+            names="algorithm",
+        ),
     )
     settings: Mapping[str, Value] = field(
         default_factory=dict,
@@ -229,6 +263,8 @@ class SearchOptions(CommonOptions):
             "Settings of the algorithm, where they are not to be its defaults.",
             spelling="--set",
             hint="NAME=VALUE; may be repeated.",
+            group=SEARCH,
+            names="setting",
         ),
     )
     budget: int | None = field(
@@ -238,6 +274,7 @@ class SearchOptions(CommonOptions):
             "Number of evaluations, exactly.",
             shown="1000, or a distribution's test runs",
             limits=(1, MAX_BUDGET),
+            group=SEARCH,
         ),
     )
     seed: int | None = field(
@@ -247,14 +284,26 @@ class SearchOptions(CommonOptions):
             "Seed of all random numbers: the same seed gives the same result.",
             shown="0, or a distribution's",
             limits=(0, MAX_SEED),
+            group=SEARCH,
         ),
     )
     keep: int = field(
         default=10,
-        metadata=option(WHOLE, "Number of critical scenarios to export.", limits=(0, MAX_KEEP)),
+        metadata=option(
+            WHOLE,
+            "Number of critical scenarios to export.",
+            limits=(0, MAX_KEEP),
+            group=OUTPUT,
+        ),
     )
     simulator: SimulatorChoice = field(
         default=EMBEDDED,
-        metadata=option(SIMULATOR, "Simulator that runs the scenarios.", before=EMBEDDED),
+        metadata=option(
+            SIMULATOR,
+            "Simulator that runs the scenarios.",
+            before=EMBEDDED,
+            group=OF_SIMULATOR,
+            names="simulator",
+        ),
     )
     causes: bool = field(default=True, metadata=_CAUSES)

@@ -33,6 +33,7 @@ class Live:
             TimeRemainingColumn(compact=True),
             console=self.console,
             transient=True,
+            disable=not self.console.is_terminal,  # else it would print an empty line
         )
         self._task: TaskID = self._progress.add_task("starting", total=total, facts="")
         self._items, self._count = total, threading.Event()

@@ -42,7 +42,14 @@ class SearchScreen(Live):
         """The callbacks for a campaign."""
         from bridgegen.campaign import SearchCallbacks
 
-        return SearchCallbacks(stage=self._stage, workers=self._set_workers, batch=self._batch)
+        return SearchCallbacks(
+            stage=self._stage,
+            workers=self._set_workers,
+            batch=self._batch,
+            warning=lambda text: self.console.print(
+                f"bridgegen: warning: {text}", soft_wrap=True, markup=False, highlight=False
+            ),
+        )
 
     def _set_workers(self, workers: "Workers") -> None:
         self._workers = workers
@@ -77,15 +84,8 @@ class SearchScreen(Live):
 
 
 def print_summary(run: "Run", seconds: float) -> None:
-    """Print a run's findings and figures, the total time [s], and its files' paths.
-
-    The findings come first; with the paper's rule for critical scenarios, after the figures.
-    """
+    """Print a run's figures, the total time [s], its failure modes; last, what matters most."""
     s, settings, found = run.summary, run.settings, run.triage
-    leads = settings.optimised.get("rule") == "harm"
-    if found is not None and leads:
-        _print_found(found)
-        print()
     quick = "quick causes" if found is not None else "causes"
     rows = [
         ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
@@ -99,7 +99,6 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
         ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}{_minimal(run)}"),
-        ("report", str(run.report)),
     ]
     rows += [
         ("not exported", f"{one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}")
@@ -107,18 +106,44 @@ def print_summary(run: "Run", seconds: float) -> None:
     ]
     reasons = run.failures.most_common(MOST_REASONS)
     rows += [("failed", f"{count} × {reason}") for reason, count in reasons]
+    _print_rows(rows)
+    if found is not None and found.modes:
+        print()
+        _print_modes(found)
+    print()
+    _print_rows(conclusion(run))
+
+
+def conclusion(run: "Run") -> list[tuple[str, str]]:
+    """Return what matters of a run: the verdict, the worst failure, where it is; and its page."""
+    from bridgegen.triage.words import headline, shortly
+
+    s, found = run.summary, run.triage
+    critical = f"{s.critical} of {s.evaluations} evaluations are critical"
+    succeeded = s.evaluations - s.failed
+    if s.evaluations and not succeeded:
+        rows = [("verdict", "no verdict: all evaluations failed")]
+    else:
+        failed = f"; {s.failed} of {s.evaluations} evaluations failed" if s.failed else ""
+        rows = [("verdict", (headline(found) if found is not None else critical) + failed)]
+    if found is not None and found.modes:
+        worst = max(found.modes, key=lambda one: (one.severity, one.harm))
+        rows.append(("worst", shortly(worst)))
+        where = worst.minimal.sentence if worst.minimal is not None else worst.place
+        if where:
+            rows.append(("where", where))
+    return [*rows, ("page", str(run.report))]
+
+
+def _print_rows(rows: list[tuple[str, str]]) -> None:
     for name, value in rows:
         print(f"{name:<22}{value}")
-    if found is not None and not leads:
-        print()
-        _print_found(found)
 
 
-def _print_found(found: "Triage") -> None:
-    """Print the failure modes, one line each, and the bound of the harmful share."""
-    from bridgegen.triage.words import headline, mode_in_words
+def _print_modes(found: "Triage") -> None:
+    """Print the failure modes, with their simplest scenarios."""
+    from bridgegen.triage.words import mode_in_words
 
-    print(headline(found))
     for one in found.modes[:MOST_MODES]:
         print(mode_in_words(one, found))
         if one.minimal is not None:

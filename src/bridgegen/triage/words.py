@@ -27,6 +27,13 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
     return "; ".join(part for part in parts if part)
 
 
+def shortly(mode: Mode) -> str:
+    """Return a failure mode in few words: what happens, how often, how severe, its cause."""
+    often = f"{mode.count} evaluation" + "s" * (mode.count != 1)
+    severe = f"MAIS3+ {percent(mode.severity)}" if mode.conflict == "contact" else ""
+    return f"{mode.title}: {', '.join(one for one in (often, severe, mode.cause) if one)}"
+
+
 def cause_in_words(mode: Mode, found: Triage) -> str:
     """Return a mode's cause, with the fix that shows it and by how much it lowers harm.
 

@@ -1,0 +1,136 @@
+"""What a shell completes the values of arguments and options with.
+
+Each list is made when it is asked for: the command line starts without the modules that know it.
+"""
+
+from collections.abc import Callable, Iterable
+
+import typer
+
+Complete = Callable[[typer.Context, str], list[str]]
+"""Of a command line so far and the beginning of a word: the words that it may become."""
+
+
+def completing(kind: str) -> Complete | None:
+    """Return what completes values of a kind, a key of `NAMES`; None for the empty text.
+
+    Of a value with several names, separated by commas, the last is completed.
+    """
+    if not kind:
+        return None
+    names = NAMES[kind]
+
+    def complete(ctx: typer.Context, incomplete: str) -> list[str]:
+        try:
+            known = list(names(ctx))
+        except Exception:  # a scenario that cannot be read, say: a shell expects no message
+            return []
+        before, comma, last = incomplete.rpartition(",")
+        return [f"{before}{comma}{name}" for name in known if name.startswith(last)]
+
+    return complete
+
+
+def _scenarios(_: typer.Context) -> Iterable[str]:
+    from bridgegen.odd.reader import names
+
+    return names()
+
+
+def _algorithms(_: typer.Context) -> Iterable[str]:
+    from bridgegen.search import names
+
+    return names()
+
+
+def _settings(ctx: typer.Context) -> Iterable[str]:
+    from bridgegen.search import get
+
+    return [f"{name}=" for name in get(ctx.params.get("algorithm") or "pso").settings]
+
+
+def _drivers(_: typer.Context) -> Iterable[str]:
+    from bridgegen.ego import DRIVERS
+
+    return DRIVERS
+
+
+def _others(_: typer.Context) -> Iterable[str]:
+    from bridgegen.ego import OTHERS
+
+    return OTHERS
+
+
+def _stages(_: typer.Context) -> Iterable[str]:
+    from bridgegen.ego import STAGES
+
+    return STAGES
+
+
+def _metrics(_: typer.Context) -> Iterable[str]:
+    from bridgegen.conflict.quantities import QUANTITIES
+
+    return QUANTITIES
+
+
+def _objectives(ctx: typer.Context) -> Iterable[str]:
+    return ["harm", "paper", *_metrics(ctx)]
+
+
+def _parameters(ctx: typer.Context) -> Iterable[str]:
+    """Return the parameters of the scenario that the command line names."""
+    from bridgegen.odd.reader import load
+
+    given = ctx.params.get("scenario") or ctx.params.get("scenarios") or ctx.args
+    first = given if isinstance(given, str) else given[0]  # after an option without its value
+    return [f"{name}=" for name in load(first).parameters]
+
+
+def _axes(_: typer.Context) -> Iterable[str]:
+    from bridgegen.odd.parameters import Axis
+
+    return [str(axis) for axis in Axis]
+
+
+def _simulators(_: typer.Context) -> Iterable[str]:
+    from bridgegen.simulation.choice import SIMULATORS
+
+    return list(SIMULATORS)
+
+
+def _causes(_: typer.Context) -> Iterable[str]:
+    from bridgegen.cause import CAUSES
+
+    return [one.label for one in CAUSES]
+
+
+def _flavours(_: typer.Context) -> Iterable[str]:
+    from bridgegen.campaign.export import FLAVOURS
+
+    return FLAVOURS
+
+
+def _fixed(*words: str) -> Callable[[typer.Context], Iterable[str]]:
+    return lambda _: words
+
+
+NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
+    "scenario": _scenarios,
+    "algorithm": _algorithms,
+    "setting": _settings,
+    "driver": _drivers,
+    "others": _others,
+    "stage": _stages,
+    "metric": _metrics,
+    "objective": _objectives,
+    "parameter": _parameters,
+    "axis": _axes,
+    "simulator": _simulators,
+    "cause": _causes,
+    "weights": _fixed("fixed", "entropy"),
+    "scale": _fixed("raw", "standardised"),
+    "objectives": _fixed("one", "many"),
+    "count": _fixed("ego", "any"),
+    "flavour": _flavours,
+}
+"""The names of each kind."""

@@ -1,0 +1,61 @@
+"""The command that shows what a search does."""
+
+import sys
+import webbrowser
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli.app import app
+from bridgegen.cli.groups import SEARCH
+
+SCENARIO, DRIVER, ALGORITHM, BUDGET = "cyclist-right-turn", "un-r157", "nsga2", 600
+"""UN R157's driver brakes for what is on its lane, and for nothing that crosses it."""
+
+
+@app.command(rich_help_panel=SEARCH)
+def demo(
+    open_page: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page in your browser.")
+    ] = True,
+) -> None:
+    """Search a small example, and open its page.
+
+    The run is a new folder, runs/demo or runs/demo-2 …; it takes about 20 seconds.
+    """
+    from bridgegen import campaign
+    from bridgegen.screen.search import SearchScreen, print_summary
+
+    folder = next(one for one in _folders(Path("runs")) if not one.exists())
+    print(
+        f"A car turns right while a cyclist goes straight on. Which of {BUDGET} such scenarios "
+        f"make the driver '{DRIVER}' fail?\nbridgegen search {SCENARIO} --ego {DRIVER} --algorithm "
+        f"{ALGORITHM} --budget {BUDGET} --out {folder}\n",
+        flush=True,
+    )
+    with SearchScreen(BUDGET) as screen:
+        run = campaign.run_search(
+            SCENARIO,
+            ego=DRIVER,
+            algorithm=ALGORITHM,
+            budget=BUDGET,
+            out=folder,
+            callbacks=screen.callbacks,
+        )
+    print_summary(run, screen.seconds)
+    if open_page and not webbrowser.open(run.report.resolve().as_uri()):
+        print(
+            f"bridgegen: no browser found: open {run.report} yourself, or see 'bridgegen view "
+            f"{folder}'",
+            file=sys.stderr,
+        )
+
+
+def _folders(parent: Path) -> Iterator[Path]:
+    """Yield the names that a demonstration's folder may have, without end."""
+    yield parent / "demo"
+    for number in count(2):
+        yield parent / f"demo-{number}"

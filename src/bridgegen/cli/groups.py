@@ -1,0 +1,100 @@
+"""Help texts in which commands are listed by panel, and options by group."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from bridgegen.errors import InputError
+from bridgegen.options.option import GROUPS
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+PANELS = ("Search", "Look at results", "Files", "Ontology", "Advanced")
+"""The panels in which ``bridgegen --help`` lists the commands."""
+
+SEARCH, RESULTS, FILES, ONTOLOGY, ADVANCED = PANELS
+
+OTHER = "Options"
+"""The group of the options that belong to none of `GROUPS`."""
+
+
+class PanelledGroup(TyperGroup):
+    """Commands whose help lists them by panel, which typer does with rich's markup only."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the panels, each command with its summary."""
+        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
+        width = max(len(name) for name in commands)
+        for panel in PANELS:
+            rows = [
+                (name.ljust(width), one.get_short_help_str(formatter.width - width - 4))
+                for name, one in commands.items()
+                if getattr(one, "rich_help_panel", "") == panel
+            ]
+            with formatter.section(panel):
+                formatter.write_dl(rows)
+
+
+class GroupedCommand(TyperCommand):
+    """A command whose help lists its options by their groups, in the order of `GROUPS`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words of a command line; an option that takes one value may be given once.
+
+        Raises:
+            InputError: one is given again.
+        """
+        single = {
+            spelling: one
+            for one in self.params
+            if one.param_type_name == "option"
+            and not one.multiple
+            and not getattr(one, "is_flag", False)
+            for spelling in one.opts
+        }
+        values: dict[str, list[str]] = {}
+        words = iter(args)
+        for word in words:
+            if word == "--":
+                break
+            spelling, equals, value = word.partition("=")
+            if spelling in single:
+                name = single[spelling].opts[0]
+                values.setdefault(name, []).append(value if equals else next(words, ""))
+        if twice := [
+            f"{name} takes one value, and is given {len(found)}: {', '.join(found)}"
+            for name, found in values.items()
+            if len(found) > 1
+        ]:
+            raise InputError(*twice)
+        return list(super().parse_args(ctx, args))
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the arguments, then the groups that the command has options of."""
+        arguments: list[tuple[str, str]] = []
+        groups: dict[str, list[tuple[str, str]]] = {group: [] for group in (*GROUPS, OTHER)}
+        for one in self.get_params(ctx):
+            record = one.get_help_record(ctx)
+            if record is None:
+                continue
+            if one.param_type_name == "argument":
+                arguments.append(record)
+            else:
+                groups[getattr(one, "rich_help_panel", None) or OTHER].append(record)
+        for title, rows in {"Arguments": arguments, **groups}.items():
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
+class Application(typer.Typer):
+    """A typer application whose commands list their options by group."""
+
+    def command(self, name: str | None = None, **settings: Any) -> Callable[[Function], Function]:
+        """Return what registers a command; see `typer.Typer.command`."""
+        register: Callable[[Function], Function] = super().command(
+            name, **{"cls": GroupedCommand, **settings}
+        )
+        return register

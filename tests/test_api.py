@@ -1,0 +1,56 @@
+"""The names of ``import bridgegen as bg``, as a notebook completes them."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign.exported import exported_scenarios, read_facts
+from bridgegen.errors import StorageError
+
+
+def test_tab_completes_all_names_before_first_use():
+    code = "import bridgegen as bg; print(*dir(bg))"
+    words = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert {*bg.__all__} <= {*words}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "s4"
+    return bg.run_search("crossroads-s4", budget=120, keep=1, out=str(folder))
+
+
+def test_paths_may_be_texts(run):
+    path = run.scenarios[0]
+    assert bg.simulate_file(str(path)).metrics == bg.simulate_file(path).metrics
+
+
+def test_an_exported_scenario_counts_evaluations_as_the_report_does(run):
+    path = run.scenarios[0].with_suffix(".json")
+    facts = json.loads(path.read_text("utf-8"))
+    X = run.rows().X[facts["evaluation"] - 1]
+    at = run.frame().columns.get_loc("bv_speed")
+    assert facts["parameters"]["bv_speed"]["value"] == run.frame().iloc[facts["row"], at]
+    assert run.frame().iloc[facts["row"], at] in X
+    assert run.exported()[0].evaluation == facts["row"]
+
+
+def test_an_exported_scenario_of_an_earlier_version_counts_from_0(run):
+    path = run.scenarios[0].with_suffix(".json")
+    text = path.read_text("utf-8")
+    facts = json.loads(text)
+    row = facts.pop("row")
+    try:
+        path.write_text(json.dumps(facts | {"evaluation": row}), "utf-8")
+        assert (read_facts(path).row, read_facts(path).evaluation) == (row, row + 1)
+        assert exported_scenarios(run.folder)[0].evaluation == row
+        path.write_text(json.dumps(facts | {"row": row, "evaluation": row}), "utf-8")
+        with pytest.raises(StorageError, match="evaluation must be row \\+ 1"):
+            read_facts(path)
+    finally:
+        path.write_text(text, "utf-8")

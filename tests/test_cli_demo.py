@@ -1,0 +1,23 @@
+"""The demonstration: a search that finds failures, and its page."""
+
+import webbrowser
+
+import bridgegen as bg
+from bridgegen.cli import demo
+
+
+def test_it_finds_failures_and_opens_the_page(cli, tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(demo, "BUDGET", 120)
+    monkeypatch.setattr(webbrowser, "open", lambda url: bool(opened.append(url)))
+    code, out, err = cli("demo")
+    assert code == 0
+    run = bg.Run(tmp_path / "runs/demo")
+    assert run.modes
+    assert opened == [run.report.as_uri()]
+    assert "no browser found: open runs/demo/report.html" in err
+    assert out.splitlines()[-1].split() == ["page", "runs/demo/report.html"]
+    code, out, err = cli("demo", "--no-open")
+    assert (code, err, len(opened)) == (0, "", 1)
+    assert (tmp_path / "runs/demo-2/report.html").is_file()

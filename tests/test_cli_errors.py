@@ -1,0 +1,102 @@
+"""Mistakes on the command line: one clear sentence each, and what is computed is kept."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+CALL = [sys.executable, "-c", "from bridgegen.cli import main; main()"]
+
+
+def refused(cli, *words):
+    code, _, err = cli(*words)
+    assert code == 2
+    return err
+
+
+def test_a_number_out_of_its_range_says_which_option(cli):
+    err = refused(cli, "search", "cut-in", "--budget", 0)
+    assert "1 <= budget <= 10000000 must hold, got 0 (--budget: number of evaluations" in err
+
+
+def test_a_driver_s_file_without_its_class_lists_the_classes(cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "f.py").write_text("class Mine:\n    pass\nclass _No: pass\ndef drive(): pass\n")
+    err = refused(cli, "search", "cut-in", "--ego", "f.py")
+    assert "FILE.py:CLASS" in err
+    assert err.rstrip().endswith("it defines f.py:Mine, f.py:drive")
+    (tmp_path / "f.py").write_text("class")
+    assert "the file is no Python" in refused(cli, "search", "cut-in", "--ego", "f.py")
+    (tmp_path / "f.py").unlink()
+    assert "No such file" in refused(cli, "search", "cut-in", "--ego", "f.py")
+
+
+def test_simulate_a_scenario_file_says_what_to_do(cli, tmp_path):
+    (tmp_path / "my.yaml").write_text("scenario: my\n", "utf-8")
+    err = refused(cli, "simulate", tmp_path / "my.yaml")
+    assert f"bridgegen search {tmp_path / 'my.yaml'}" in err
+    assert "XML" not in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("search", "cut-in", "--ego", "reference", "--ego", "careful"),
+        ("compare", "cut-in", "--ego=reference", "--ego", "careful"),
+    ],
+)
+def test_an_option_of_one_value_is_given_once(cli, words):
+    err = refused(cli, *words)
+    assert "--ego takes one value, and is given 2: reference, careful" in err
+
+
+def test_options_that_may_be_repeated_may(cli):
+    err = refused(cli, "search", "cut-in", "--fix", "a=1", "--fix", "b=1", "--budget", "0")
+    assert "takes one value" not in err
+
+
+def test_a_population_beyond_the_budget_is_a_warning(cli, tmp_path):
+    words = ("search", "crossroads-s4", "--budget", 20, "--keep", 0, "--out", tmp_path / "r")
+    code, _, err = cli(*words, "--set", "population=100")
+    assert code == 0
+    assert "warning: population 100 is greater than the budget, 20 evaluations" in err
+
+
+def test_validate_notes_a_name_that_is_not_the_file_s(cli, tmp_path):
+    from bridgegen.odd.starter import start_scenario
+
+    path = start_scenario("mine", like="crossroads-s4", folder=tmp_path)
+    code, out, err = cli("validate", path)
+    assert (code, err) == (0, "")
+    path = path.rename(tmp_path / "other.yaml")
+    code, out, err = cli("validate", path)
+    assert (code, out) == (0, f"{path}: valid\n")
+    assert "its key 'scenario' is 'mine'" in err
+
+
+def test_an_error_is_the_first_line(tmp_path):
+    done = subprocess.run(
+        [*CALL, "search", "no-such-scenario"], capture_output=True, text=True, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("bridgegen: error: unknown scenario")
+
+
+def test_sigterm_ends_a_search_like_ctrl_c(tmp_path):
+    words = ["search", "crossroads-s4", "--budget", "200000", "--out", "r"]
+    running = subprocess.Popen(
+        [*CALL, *words], stderr=subprocess.PIPE, text=True, cwd=tmp_path, env={**os.environ}
+    )
+    for _ in range(1200):
+        if (tmp_path / "r/run.sqlite").exists() or running.poll() is not None:
+            break
+        time.sleep(0.1)
+    time.sleep(1.0)
+    running.send_signal(signal.SIGTERM)
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 143
+    assert "resume with 'bridgegen resume r'" in err
+    assert "Traceback" not in err
