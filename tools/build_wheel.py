@@ -11,6 +11,7 @@ platform. See ``bridgegen.compilation.shipped`` for when an installation uses it
 import argparse
 import json
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -54,6 +55,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("dist"), help="folder of the wheel")
     out = parser.parse_args().out
+    if (sys.platform, platform.machine()) != ("linux", "x86_64"):
+        parser.error(
+            f"wheels are for Linux on x86_64, this is {sys.platform}, {platform.machine()}"
+        )
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)

@@ -49,7 +49,7 @@ named = [one.data["dispatcher"].__name__ for _, one in recorder.buffer if one.is
 print(*sorted(named))
 """
 
-Run = Callable[[str], list[str]]
+Run = Callable[..., list[str]]
 
 
 @pytest.fixture
@@ -65,12 +65,16 @@ def package(tmp_path) -> Path:
 
 @pytest.fixture
 def compiled_by(package) -> Run:
-    """Runs code in a process, and returns the kernels that it compiled, in alphabetical order."""
+    """Runs code in a process, and returns the kernels that it compiled, in alphabetical order.
 
-    def run(code: str) -> list[str]:
+    Further arguments are variables of its environment.
+    """
+
+    def run(code: str, **more: str) -> list[str]:
         environment = {
             "PATH": os.environ["PATH"], "PYTHONPATH": str(package.parent),
             "XDG_CACHE_HOME": str(package.parent / "cache"), "PYTHONDONTWRITEBYTECODE": "1",
+            **more,
         }  # fmt: skip
         done = subprocess.run(
             [sys.executable, "-W", "error", "-c", COUNTED.format(code)],
