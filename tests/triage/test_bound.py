@@ -34,7 +34,7 @@ def test_where_an_algorithm_chose_the_rows_no_share_is_stated():
     assert (space.share, space.low, space.high) == (None, 0.0, 1.0)
     said = text(space=space, harmful=3, modes=2)
     assert said == (
-        "reference comes to harm in 2 ways: 3 of 1000 evaluations; the harmful share of the space "
+        "reference fails in 2 ways: 3 of 1000 evaluations; the harmful share of the space "
         "is not estimated, for the search chose its rows."
     )
 

@@ -143,7 +143,7 @@ def test_the_summary_ends_with_what_matters(run, capsys):
     out = capsys.readouterr().out
     *_, verdict, worst, where, page = out.splitlines()
     assert verdict.startswith(
-        f"{'verdict':<22}route-follower comes to harm in {len(run.modes)} ways: "
+        f"{'verdict':<22}route-follower fails in {len(run.modes)} ways: "
     )
     severest = max(run.modes, key=lambda one: (one.severity, one.harm))
     assert worst.startswith(f"{'worst':<22}{severest.title}: {severest.count} evaluation")

@@ -69,7 +69,7 @@ def test_shares_of_random_rows_are_the_run_s(made):
     assert sum(one.space.harmful for one in found.record.modes) == space.harmful
     # By hand: 1.0 of 4 m/s is fast, and a tenth of 2.1 m/s is on the comb's teeth.
     assert space.low < 0.25 + 0.0525 < space.high
-    assert headline(found.record).startswith("driver comes to harm in 2 ways: ")
+    assert headline(found.record).startswith("driver fails in 2 ways: ")
 
 
 def test_an_optimiser_s_rows_tell_no_share_fresh_ones_do(made):

@@ -187,7 +187,7 @@ def _modes(data: ReportData) -> str:
     n = len(data.triage.modes) + data.triage.unrecorded_modes
     titles = [f"{one.title} ({one.count:,})" for one in data.triage.modes[:MOST_TITLES]]
     more = ", …" if n > MOST_TITLES else ""
-    return f"{_ways(n)} in which {data.summary.ego} comes to harm: {'; '.join(titles)}{more}."
+    return f"{_ways(n)} in which {data.summary.ego} fails: {'; '.join(titles)}{more}."
 
 
 def _ways(n: int) -> str:

@@ -97,7 +97,7 @@ def bound(
         text = f"No evaluation has a result, so nothing is known of {ego}."
     elif harmful:
         text = (
-            f"{ego} comes to harm in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
+            f"{ego} fails in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
             f"evaluations; {_of_the_space(space)}."
         )
     else:

@@ -199,7 +199,7 @@ class Minimal(_Model):
 
 
 class Mode(_Model):
-    """A way in which the driver comes to harm.
+    """A way in which the driver fails.
 
     Attributes:
         number: 1, 2, … in the order of the record: robust ones first, then by worst harm.

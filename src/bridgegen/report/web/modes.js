@@ -1,4 +1,4 @@
-// The failure modes: the ways in which the driver comes to harm, or what is known where there is none.
+// The failure modes: the ways in which the driver fails, or what is known where there is none.
 
 import { $, NARROW, element } from "./common.js";
 import { data } from "./data.js";
@@ -27,7 +27,7 @@ class Modes {
   fill() {
     const found = data.triage;
     const n = found.modes.length + found.more;
-    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} comes to harm` : "No failure found";
+    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails` : "No failure found";
     $("modes-lead").textContent = found.bound.sentence;
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));
