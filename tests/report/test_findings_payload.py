@@ -159,10 +159,7 @@ def test_by_thresholds_collisions_come_first_then_the_most_severe_then_the_paper
 
 def test_the_text_names_modes_collisions_and_severity(harmful):
     said = " ".join(sentences.sentences(harmful))
-    assert (
-        "One way in which route-follower fails: collides with a car at a crossing (7)"
-        in said
-    )
+    assert "One way in which route-follower fails: collides with a car at a crossing (7)" in said
     assert "20 collisions, the most severe with a probability of 25.0\u202f% of a MAIS3+" in said
     table = dict(sentences.summary_table(harmful))
     assert table["Critical: collisions"] == "20"
@@ -239,9 +236,7 @@ def page(browser, harmful, tmp_path):
 def test_the_page_leads_with_the_failure_modes(page):
     first = page.locator("main > section:visible").first
     assert first.get_attribute("id") == "modes"
-    assert (
-        page.locator("#modes-title").inner_text() == "2 ways in which route-follower fails"
-    )
+    assert page.locator("#modes-title").inner_text() == "2 ways in which route-follower fails"
     card = page.locator(".mode").first.inner_text()
     for words in ("7 scenarios", "25\u202f% worst severity", "24 of 32 neighbours harmful",
                   "5.0\u202f% of the space", "If un-r157 drives, the harmful share",

@@ -142,9 +142,7 @@ def test_the_summary_ends_with_what_matters(run, capsys):
     print_summary(run, 1.0)
     out = capsys.readouterr().out
     *_, verdict, worst, where, page = out.splitlines()
-    assert verdict.startswith(
-        f"{'verdict':<22}route-follower fails in {len(run.modes)} ways: "
-    )
+    assert verdict.startswith(f"{'verdict':<22}route-follower fails in {len(run.modes)} ways: ")
     severest = max(run.modes, key=lambda one: (one.severity, one.harm))
     assert worst.startswith(f"{'worst':<22}{severest.title}: {severest.count} evaluation")
     assert where.startswith(f"{'where':<22}")

@@ -3,7 +3,7 @@
 import os
 import queue
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numba
 
@@ -25,13 +25,15 @@ def compiled_ahead(recipe: Recipe) -> Iterator[None]:
         yield
         return
     said: Said = queue.SimpleQueue()
-    with open(os.devnull, "wb") as nowhere:
+    helper = None
+    with suppress(OSError), open(os.devnull, "wb") as nowhere:  # no process more: alone, then
         helper = Process(said, errors=nowhere)
-    helper.call(_follow, recipe)
+        helper.call(_follow, recipe)
     try:
         yield
     finally:
-        helper.end()
+        if helper is not None:
+            helper.end()
 
 
 def _follow(recipe: Recipe) -> None:
