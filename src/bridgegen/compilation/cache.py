@@ -22,7 +22,7 @@ MAIN = PACKAGE / "simulation" / "embedded" / "_rollout_kernels.py"
 """What every search calls."""
 
 OF_A_SEARCH = 230
-"""About how many kernels are compiled for the first search."""
+"""About how many kernels the first search compiles: files ``code/*.bc`` after crossroads-s4."""
 
 
 def is_compiled() -> bool:
