@@ -6,10 +6,11 @@ Bodies drive straight on, up to 85 m around the ego, on a clear day, for 20 s at
 """
 
 import time
+from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.compiled import borrowed, kernel
+from bridgegen.compiled import bundled, kernel
 from bridgegen.ego._perception_kernels import MEMORY, perceive
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego.detections import DETECTION
@@ -20,20 +21,33 @@ STEPS, DT = 401, 0.05
 CARS = (4.5, 1.8, 1.4, 50.0, 3.0, 9.0, 0.2, 1.5)
 
 
+class Arrays(NamedTuple):
+    """What `perceive` takes and writes, see there."""
+
+    present: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    h: np.ndarray
+    v: np.ndarray
+    bodies: np.ndarray
+    kinds: np.ndarray
+    weather: np.ndarray
+    memory: np.ndarray
+    tracks: np.ndarray
+    detections: np.ndarray
+
+
 @kernel
-def drive(n_rows, present, x, y, h, v, bodies, kinds, weather, memory, tracks, detections):
+def drive(n_rows, arrays):
     """Perceive N rows, each with noise of its own."""
-    present = borrowed(present)
-    x, y, h, v = borrowed(x), borrowed(y), borrowed(h), borrowed(v)
-    bodies, kinds, weather = borrowed(bodies), borrowed(kinds), borrowed(weather)
-    memory, tracks, detections = borrowed(memory), borrowed(tracks), borrowed(detections)
+    a = bundled(arrays)
     for row in range(n_rows):
-        memory[:] = 0.0
-        tracks[:] = 0.0
-        for k in range(x.shape[1]):
+        a.memory[:] = 0.0
+        a.tracks[:] = 0.0
+        for k in range(a.x.shape[1]):
             perceive(
-                k, DT, np.uint64(row), False, present, x, y, h, v, bodies, kinds, weather, memory,
-                tracks, detections,
+                k, DT, np.uint64(row), False, a.present, a.x, a.y, a.h, a.v, a.bodies, a.kinds,
+                a.weather, a.memory, a.tracks, a.detections,
             )  # fmt: skip
 
 
@@ -48,16 +62,16 @@ def perception(n_bodies: int, n_rows: int) -> float:
     h, v = (np.repeat(one[:, None], STEPS, axis=1) for one in (heading, speed))
     x = start[0][:, None] + v * np.cos(h) * t
     y = start[1][:, None] + v * np.sin(h) * t
-    arrays = (
+    arrays = Arrays(
         np.ones(e, dtype=np.bool_), x, y, h, v, np.tile(CARS, (e, 1)), np.full(e, CAR),
         Sky().numbers(),
         np.zeros((e, MEMORY)), np.zeros((e, TRACK)), np.zeros((e, STEPS, DETECTION)),
     )  # fmt: skip
-    drive(1, *arrays)
+    drive(1, arrays)
     times = []
     for _ in range(10):
         began = time.thread_time()
-        drive(n_rows, *arrays)
+        drive(n_rows, arrays)
         times.append((time.thread_time() - began) / n_rows)
     return min(times)
 

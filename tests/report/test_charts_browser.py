@@ -372,7 +372,7 @@ def test_without_critical_scenarios_a_click_gives_the_command(report, show):
     e = report.evaluations
     none = replace(e, critical=np.zeros_like(e.critical))
     page = show(replace(report, kept=(), evaluations=none))
-    assert page.is_hidden("#kept")
+    assert page.is_hidden("#player")
     page.focus("#scatter .chart-stage canvas")
     page.keyboard.press("End")
     page.keyboard.press("Enter")

@@ -232,11 +232,42 @@ def page(browser, harmful, tmp_path):
     assert errors == []
 
 
+def _unfold(page):
+    """Show the details of the first failure mode."""
+    button = page.locator(".mode").first.get_by_role("button", name="Details of mode 1")
+    button.click()
+    assert button.get_attribute("aria-expanded") == "true"
+
+
+@pytest.mark.browser
+def test_verdict_modes_and_playback_are_the_first_screen(page):
+    """At 1280×720: the verdict, the first failure mode, and the worst scenario, which plays."""
+    page.set_viewport_size({"width": 1280, "height": 720})
+    page.reload()
+    for name in ("#modes-title", "#modes-lead", ".mode >> nth=0", "#scene", "#play"):
+        box = page.locator(name).bounding_box()
+        assert box["y"] >= 0.0
+        assert box["y"] + box["height"] <= 720.0, name
+    assert page.evaluate("bridgegen.state().playing")
+
+
+@pytest.mark.browser
+def test_the_contents_lead_to_each_section(page):
+    names = page.locator("#contents button").all_inner_texts()
+    assert names[:2] == ["Failures", "Result"]
+    page.locator("#contents button", has_text="Coverage").click()
+    page.wait_for_function("document.getElementById('coverage').getBoundingClientRect().top < 300")
+    page.wait_for_function(
+        "document.querySelector('#contents [aria-current]').textContent === 'Coverage'"
+    )
+
+
 @pytest.mark.browser
 def test_the_page_leads_with_the_failure_modes(page):
-    first = page.locator("main > section:visible").first
-    assert first.get_attribute("id") == "modes"
+    first = page.locator("main h2:visible").first
+    assert first.get_attribute("id") == "modes-title"
     assert page.locator("#modes-title").inner_text() == "2 ways in which route-follower fails"
+    _unfold(page)
     card = page.locator(".mode").first.inner_text()
     for words in ("7 scenarios", "25\u202f% worst severity", "24 of 32 neighbours harmful",
                   "5.0\u202f% of the space", "If un-r157 drives, the harmful share",
@@ -249,6 +280,7 @@ def test_the_page_leads_with_the_failure_modes(page):
 def test_a_mode_plays_its_worst_scenario_and_its_simplest_form(page):
     page.locator(".mode").first.get_by_role("button", name="Play 0002, mode 1").click()
     page.wait_for_function("document.getElementById('scene-name').textContent === '0002'")
+    _unfold(page)
     page.locator(".mode").first.get_by_role("button", name="Play the simplest form").click()
     page.wait_for_function("document.getElementById('scene-name').textContent === 'minimal-01'")
     assert "simplest form" in page.locator("#measures h3").first.inner_text()
@@ -258,6 +290,7 @@ def test_a_mode_plays_its_worst_scenario_and_its_simplest_form(page):
 def test_its_scenarios_narrows_the_table_and_lifts_again(page):
     note = page.locator("#list-note")
     assert note.inner_text() == "40 critical scenarios"
+    _unfold(page)
     button = page.locator(".mode").first.get_by_role("button", name="Its scenarios")
     button.click()
     assert note.inner_text() == "20 of 40 critical scenarios"

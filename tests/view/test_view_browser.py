@@ -60,6 +60,7 @@ def test_it_grows_with_its_run_and_says_so(opened, growing):
     assert "100 concrete scenarios" in page.inner_text("#sentences")
     assert page.evaluate("bridgegen.state().position") == before
     page.locator("#trend-plots").scroll_into_view_if_needed()
+    page.wait_for_function("bridgegen.trends[0]?.x")
     last = "(({ x, points }) => x.valueAt(points.at(-1).x))(bridgegen.trends[0])"
     assert page.evaluate(last) == pytest.approx(page.evaluate("bridgegen.data.batches.last.at(-1)"))
 
@@ -154,6 +155,6 @@ def test_what_is_confirmed_meanwhile_is_offered(opened, growing):
     page.wait_for_selector("#live-reload")
     assert page.inner_text("#live-reload") == "Show what other simulators confirmed"
     page.click("#live-reload")
-    page.wait_for_function("bridgegen.data.confirmations.length === 1")
+    page.wait_for_function("window.bridgegen?.data.confirmations.length === 1")
     assert "None of 1 scenarios ran in esmini 3.6." in page.inner_text("#elsewhere")
     assert page.complaints == []

@@ -28,12 +28,12 @@ class Modes {
     const found = data.triage;
     const n = found.modes.length + found.more;
     $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails` : "No failure found";
-    $("modes-lead").textContent = found.bound.sentence;
+    $("modes-lead").textContent = capital(n ? found.bound.sentence.replace(/^[^:]*: /, "") : found.bound.sentence); // the title says the rest
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));
     $("modes-list").hidden = !n;
     const notes = [];
-    if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that come to harm too.`);
+    if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");
     const nearest = nearestToHarm();
@@ -56,14 +56,29 @@ class Modes {
     const only = element("button", { type: "button", class: "quiet", "aria-pressed": "false", title: "Show only scenarios of this conflict, responsibility and rule below" }, "Its scenarios");
     only.addEventListener("click", () => filters.inMode(filters.mode === mode.number ? null : mode.number));
     this.buttons.push([mode.number, only]);
-    return element(
-      "li", { class: `card mode${mode.knife_edge ? " edge" : ""}` },
-      element("div", { class: "mode-head" }, element("span", { class: "mode-number", "aria-hidden": "true" }, `${mode.number}`), element("h3", {}, capital(mode.title))),
-      element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...severity, robust, ...share),
+    const more = element(
+      "div", { class: "mode-more", hidden: "" },
+      element("ul", { class: "mode-facts" }, robust, ...share),
       ...(mode.knife_edge ? [element("p", { class: "mode-edge" }, "Knife-edge: fewer than half of its neighbours are harmful.")] : []),
       this.cause(mode),
-      element("p", { class: "mode-buttons" }, play, only),
+      element("p", { class: "mode-buttons" }, only),
       ...this.minimal(mode),
+    );
+    const fold = element("button", { type: "button", class: "quiet", "aria-expanded": "false", "aria-label": `Details of mode ${mode.number}` }, "Details");
+    fold.addEventListener("click", () => {
+      more.hidden = !more.hidden;
+      fold.setAttribute("aria-expanded", `${!more.hidden}`);
+    });
+    return element(
+      "li", { class: `card mode${mode.knife_edge ? " edge" : ""}` },
+      element(
+        "div", { class: "mode-head" },
+        element("span", { class: "mode-number", "aria-hidden": "true" }, `${mode.number}`),
+        element("h3", {}, capital(mode.title)),
+        element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...severity),
+        element("p", { class: "mode-buttons" }, play, fold),
+      ),
+      more,
     );
   }
 

@@ -101,8 +101,10 @@ export class Opener {
   async begin() {
     addEventListener("hashchange", () => this.go());
     if (await this.go()) return;
-    if (data.kept.length) this.kept(0);
-    else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
+    if (data.kept.length) {
+      this.kept(0);
+      this.player.begin();
+    } else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
     else if (nearestToHarm() !== null) await this.row(rows.evaluation.indexOf(nearestToHarm()));
   }
 

@@ -2,6 +2,7 @@
 
 import { darkScheme } from "./colours.js";
 import { $, copy } from "./common.js";
+import "./contents.js";
 import { data, rows } from "./data.js";
 import { filters } from "./filters.js";
 import { nearestToHarm } from "./findings.js";
@@ -25,17 +26,21 @@ function listScenarios() {
 
 function playNearest() {
   const nearest = nearestToHarm();
-  $("kept").hidden = $("made-of").hidden = nearest === null;
+  hideScenario(nearest === null);
   $("no-scenarios").hidden = false;
   $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.${nearest === null ? "" : " Below is the scenario that came nearest to harm."}`;
   $("kept").classList.add("alone");
   $("list").hidden = true;
   if (nearest !== null) return void begin(new Opener(hook));
   hook.show = (...asked) => { // a point of the scatter plot was chosen
-    $("kept").hidden = $("made-of").hidden = false;
+    hideScenario(false);
     begin(new Opener(hook));
     hook.show(...asked);
   };
+}
+
+function hideScenario(hidden) {
+  for (const id of ["player", "measures", "details", "made-of"]) $(id).hidden = hidden;
 }
 
 function begin(opener) {

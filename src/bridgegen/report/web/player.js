@@ -12,6 +12,7 @@ import { Scene } from "./scene.js";
 import { detectionAt, lightAt, unpack, weatherAt } from "./unpack.js";
 import { stateWords } from "./words.js";
 
+const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 const PLAY_ICON = "M4 2v12l10-6z";
 const PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
 
@@ -49,15 +50,18 @@ export class Player {
     fillConflict(this.kept);
     this.seek(this.kept.conflict?.instant ?? this.kept.closest ?? 0, false);
     if (!andPlay) return;
-    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     if ($("player").getBoundingClientRect().bottom > innerHeight) {
-      $("player").scrollIntoView({ block: "nearest", behavior: calm ? "auto" : "smooth" });
+      $("player").scrollIntoView({ block: "nearest", behavior: CALM.matches ? "auto" : "smooth" });
     }
     this.link();
-    if (!calm) {
-      this.position = 0;
-      this.play();
-    }
+    this.begin();
+  }
+
+  // Plays from the start, unless the reader wants no motion.
+  begin() {
+    if (CALM.matches) return;
+    this.position = 0;
+    this.play();
   }
 
   seek(step, link = true) {
