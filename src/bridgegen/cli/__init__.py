@@ -1,7 +1,16 @@
 """The command line: parse, call, print; no logic. Commands are in the order of these imports."""
 
 # ruff: noqa: I001
-from bridgegen.cli import runs, confirmations, comparisons, reproductions, files, lists, doctor
+from bridgegen.cli import (
+    runs,
+    videos,
+    confirmations,
+    comparisons,
+    reproductions,
+    files,
+    lists,
+    doctor,
+)
 from bridgegen.cli.app import app, main
 
 __all__ = [
@@ -14,4 +23,5 @@ __all__ = [
     "main",
     "reproductions",
     "runs",
+    "videos",
 ]
