@@ -68,6 +68,15 @@ def test_no_label_covers_the_contact(playback):
     assert [one for one in drawn if _overlap(one, cross)] == []
 
 
+def test_the_contact_is_red_in_a_gif_that_ends_elsewhere(playback, tmp_path):
+    hit = replace(playback, distance=np.where(np.arange(401) < 60, 5.0, 0.0))
+    out = tmp_path / "a.gif"
+    write_video(hit, out, size=(320, 180), fps=10, start=2.0, end=8.0)
+    with Image.open(out) as film:
+        film.seek(11)
+        assert (192, 0, 32) in {colour for _, colour in film.convert("RGB").getcolors(1 << 16)}
+
+
 @pytest.mark.parametrize(
     ("given", "rule"),
     [

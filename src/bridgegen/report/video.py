@@ -8,7 +8,7 @@ from PIL import Image
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError, StorageError
-from bridgegen.report.frames import Film
+from bridgegen.report.frames import HIT, Film
 from bridgegen.report.playback import Playback
 
 HEADS = {".gif": (b"GIF8",), ".webp": (b"RIFF",), ".png": (b"\x89PNG",)}
@@ -122,7 +122,7 @@ def _write(out: Path, frames: Sequence[Image.Image], fps: int) -> None:
                        loop=0, quality=80, method=2)  # fmt: skip
     else:
         width, height = frames[0].size
-        both = Image.new("RGB", (width, 2 * height))
+        both = Image.new("RGB", (width, 3 * height), HIT)  # red, too, where neither shows it
         both.paste(frames[0])
         both.paste(frames[-1], (0, height))
         palette = both.quantize(_COLOURS, dither=Image.Dither.NONE)
