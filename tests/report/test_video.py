@@ -43,6 +43,7 @@ def test_the_ego_moves_as_it_does(playback):
     """Without labels or trails: bodies alone, the camera at rest."""
     film = Film(playback, (960, 540), 0, 60)
     film._draw_labels = film._draw_trail = lambda *_: None
+    film._follows, film._middle = False, film.centres[0, 40]
     ahead = playback.entities[0].center_ahead
     pixels, metres = [], []
     for k in (20, 60):
