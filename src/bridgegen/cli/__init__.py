@@ -4,6 +4,7 @@
 from bridgegen.cli import (
     demo,
     runs,
+    videos,
     confirmations,
     comparisons,
     reproductions,
@@ -24,4 +25,5 @@ __all__ = [
     "main",
     "reproductions",
     "runs",
+    "videos",
 ]

@@ -1,0 +1,132 @@
+"""A playback as a GIF or WebP film, or as one picture (PNG)."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from PIL import Image
+
+from bridgegen.disk import write_whole
+from bridgegen.errors import InputError, StorageError
+from bridgegen.report.frames import HIT, Film
+from bridgegen.report.playback import Playback
+
+HEADS = {".gif": (b"GIF8",), ".webp": (b"RIFF",), ".png": (b"\x89PNG",)}
+"""The formats by the ends of their names, with the first bytes of such a file."""
+
+SIZES, MAX_FPS = (160, 3840), 50
+BEFORE, AFTER = 8.0, 2.0
+"""What a film shows by default: so long before and after the decisive instant [s]."""
+
+_COLOURS = 128
+
+
+def refuse_path(out: Path) -> None:
+    """Reject a path of another format, or at which another kind of file exists.
+
+    Raises:
+        InputError: no such format.
+        StorageError: another file exists there, or the file cannot be read.
+    """
+    heads = HEADS.get(out.suffix.lower())
+    if heads is None:
+        raise InputError(f"{out}: the name of a video must end in {', '.join(HEADS)}")
+    try:
+        with out.open("rb") as file:
+            ours = file.read(4) in heads
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise StorageError(f"{out}: cannot be written: {error.strerror}") from None
+    if not ours:
+        raise StorageError(f"{out}: exists already, is no {out.suffix}, and is not overwritten")
+
+
+def check_look(size: tuple[int, int], fps: int) -> None:
+    """Reject a size [pixels] or a frame rate [1/s] out of bounds.
+
+    Raises:
+        InputError: one is out of bounds.
+    """
+    low, high = SIZES
+    if not all(low <= one <= high for one in size):
+        raise InputError(
+            f"{low} <= width, height <= {high} must hold for --size [pixels], got "
+            f"{size[0]}x{size[1]}"
+        )
+    if not 1 <= fps <= MAX_FPS:
+        raise InputError(f"1 <= fps <= {MAX_FPS} must hold for --fps [1/s], got {fps}")
+
+
+def write_video(
+    playback: Playback,
+    out: Path,
+    *,
+    size: tuple[int, int] = (960, 540),
+    fps: int = 20,
+    start: float | None = None,
+    end: float | None = None,
+) -> None:
+    """Write a scenario as a film or, with the end ``.png``, as one picture.
+
+    Args:
+        playback: the scenario.
+        out: ``.gif``, ``.webp`` or ``.png``.
+        size: of the picture, width and height [pixels].
+        fps: frames per second; 100 / fps is rounded to whole hundredths of a second.
+        start: of the film, or the instant of the picture [s]; by default ``BEFORE`` the decisive
+            instant, and that instant.
+        end: of the film [s]; by default ``AFTER`` the decisive instant.
+
+    Raises:
+        InputError: size, rate or times are out of bounds, or no such format.
+        StorageError: something else exists there, or it cannot be written.
+    """
+    refuse_path(out)
+    check_look(size, fps)
+    step, last = playback.time_step, playback.n_steps - 1
+    length = last * step
+    whole = Film(playback, size, 0, last)
+    decisive = playback.conflict.instant if playback.conflict else whole.closest
+    still = out.suffix.lower() == ".png"
+    if start is None:
+        before = 0.0 if still else BEFORE
+        start = max(0.0, min(decisive * step, length if end is None else end) - before)
+    if not 0.0 <= start <= length:
+        raise InputError(f"0 <= --from <= {length:g} must hold [s], got {start:g}")
+    if still:
+        k = round(start / step)
+        around = round(2.0 / step)
+        film = Film(playback, size, max(0, k - around), min(last, k + around))
+        _write(out, [film.frame(k)], fps)
+        return
+    if end is None:
+        end = min(length, max(start, decisive * step) + AFTER)
+    if not start < end <= length:
+        raise InputError(
+            f"--from < --to <= {length:g} must hold [s], got --from {start:g}, --to {end:g}"
+        )
+    count = int((end - start) * fps + 1e-9) + 1
+    steps = [min(last, round((start + i / fps) / step)) for i in range(count)]
+    film = Film(playback, size, steps[0], steps[-1])
+    _write(out, [film.frame(k) for k in steps], fps)
+
+
+def _write(out: Path, frames: Sequence[Image.Image], fps: int) -> None:
+    kind, file = out.suffix.lower(), io.BytesIO()
+    delay = 10 * round(100 / fps)  # ms; a GIF counts hundredths of a second
+    if kind == ".png":
+        frames[0].save(file, "PNG", optimize=True)
+    elif kind == ".webp":
+        frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=delay,
+                       loop=0, quality=80, method=2)  # fmt: skip
+    else:
+        width, height = frames[0].size
+        both = Image.new("RGB", (width, 3 * height), HIT)  # red, too, where neither shows it
+        both.paste(frames[0])
+        both.paste(frames[-1], (0, height))
+        palette = both.quantize(_COLOURS, dither=Image.Dither.NONE)
+        few = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
+        few[0].save(file, "GIF", save_all=True, append_images=few[1:], duration=delay, loop=0,
+                    optimize=False)  # fmt: skip
+    write_whole(out, [file.getvalue()])
