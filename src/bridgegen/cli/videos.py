@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import RESULTS, app
+from bridgegen.cli.app import app
+from bridgegen.cli.groups import RESULTS
 from bridgegen.errors import InputError
 
 
