@@ -21,4 +21,4 @@ function markPresent() {
 
 fillContents();
 addEventListener("scroll", markPresent, { passive: true });
-document.addEventListener("grown", fillContents);
+for (const change of ["grown", "shown"]) document.addEventListener(change, fillContents); // either may hide or show sections
