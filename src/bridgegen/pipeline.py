@@ -7,7 +7,7 @@ everything else here prepares it.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Self, TypeVar, TypeVarTuple
+from typing import TYPE_CHECKING, Any, Self, TypeVar, TypeVarTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,9 @@ from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
 from bridgegen.workers.compile_ahead import compiled_ahead
+
+if TYPE_CHECKING:
+    from bridgegen.simulation.embedded.batch import Batch
 
 FAR_ROWS = 8
 """Rows per chunk if only the workers' machines have the simulator."""
@@ -215,22 +218,35 @@ class Pipeline:
         In this thread if rows are simulated on this machine: Ctrl-C ends a compilation at once.
         """
         nominal = self.space.row({})[np.newaxis]
-        if self._workers.are_here:
-            with compiled_ahead(self._recipe_of(_compile_ahead)):
-                self.measure_rows(nominal)
-        else:
+        if not self._workers.are_here:
             self._map(type(self).measure_rows, nominal)
+            return
+        with compiled_ahead(self._recipe_of(_compile_ahead)) as is_shared:
+            if is_shared and self.tries:
+                self._compile_first()
+            self.measure_rows(nominal)
+
+    def _compile_first(self) -> None:
+        batch = self._nominal_batch()
+        batch.compile_start()
+        standing = batch.standing()
+        names = [one for one in self.metrics if one not in quantities.MEASURED]
+        quantities.evaluate(standing, names)
+        plausibility(standing)
+        for fix in self.fixes:
+            self._nominal_batch(driver=fix.driver, dry=fix.dry).take_addresses()
 
     def compile_ahead(self) -> None:
-        """Compile what ``warm_up`` and ``evaluate`` do, beginning with what they need last."""
+        """Compile what ``_compile_first`` leaves: instants and the conflict analysis."""
+        batch = self._nominal_batch()
+        batch.compile_instants()
+        analyse(batch.standing())
+
+    def _nominal_batch(self, driver: egos.Driver | None = None, dry: bool = False) -> "Batch":
         nominal = self.space.row({})[np.newaxis]
         columns = {name: nominal[:, i] for i, name in enumerate(self.space.names)}
         roads, rows = self._roads_of(nominal)
-        embedded = self.simulator.embedded
-        still = embedded.batch(roads, rows, columns).compile_ahead()
-        quantities.evaluate(still, self.metrics)
-        for fix in self.fixes:
-            embedded.batch(roads, rows, columns, driver=fix.driver, dry=fix.dry)
+        return self.simulator.embedded.batch(roads, rows, columns, driver=driver, dry=dry)
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.

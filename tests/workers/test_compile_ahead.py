@@ -38,7 +38,8 @@ def beside(monkeypatch):
 
 
 def test_it_follows_the_recipe_and_ends_with_the_block(beside, tmp_path):
-    with compiled_ahead(Recipe.of(touch, str(tmp_path / "a"))):
+    with compiled_ahead(Recipe.of(touch, str(tmp_path / "a"))) as is_shared:
+        assert is_shared
         assert (tmp_path / "a").read_text() == "done"
         assert Beside.ended == 0
     assert (Beside.begun, Beside.ended) == (1, 1)
@@ -52,8 +53,8 @@ def test_there_is_none_where_it_would_not_help(beside, tmp_path, why):
         beside.setattr(compile_ahead.os, "cpu_count", lambda: 1)
     else:
         beside.setattr(compile_ahead.numba.config, "DISABLE_JIT", 1)
-    with compiled_ahead(Recipe.of(touch, str(tmp_path / "a"))):
-        pass
+    with compiled_ahead(Recipe.of(touch, str(tmp_path / "a"))) as is_shared:
+        assert not is_shared
     assert Beside.begun == 0
 
 
@@ -62,11 +63,11 @@ def test_where_no_process_can_begin_this_one_goes_on_alone(beside, tmp_path):
         raise OSError("no more processes")
 
     beside.setattr(compile_ahead, "Process", refuse)
-    with compiled_ahead(Recipe.of(touch, str(tmp_path / "a"))):
-        pass
+    with compiled_ahead(Recipe.of(touch, str(tmp_path / "a"))) as is_shared:
+        assert not is_shared
 
 
-def test_a_pipeline_s_recipe_compiles_in_another_process_what_is_needed_last(tmp_path):
+def test_a_pipeline_s_recipe_compiles_in_another_process_what_is_needed_later(tmp_path):
     """The real thing, with kernels that are compiled: it ends without an error."""
     from bridgegen.odd.reader import load
     from bridgegen.options import PipelineOptions

@@ -125,6 +125,11 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         # The module's passes do all that Numba's passes over each function do.
         ll_module.data_layout = self._codegen._data_layout
 
+    def _optimize_final_module(self) -> None:
+        # Numba runs a cheap pass before, and at level 3: longer, and no faster code.
+        manager, builder = self._codegen._module_pass_manager(opt=2)
+        manager.run(self._final_module, builder)
+
     def finalize(self) -> None:
         """Link what is small; see the base class."""
         callees: dict[str, None] = {}

@@ -81,8 +81,8 @@ def acceleration_change(a: Float, n_steps: Int, window: int, out: Float) -> None
     low = np.empty(n_instants)
     for i in range(n_rows):
         n = n_steps[i]
-        high[:n] = a[i, 0, :n]
-        low[:n] = a[i, 0, :n]
+        for k in range(n):
+            high[k] = low[k] = a[i, 0, k]
         length = 1
         while 2 * length <= window + 1:
             widen(high, low, length, n)

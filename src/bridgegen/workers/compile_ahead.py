@@ -13,16 +13,19 @@ from bridgegen.workers.recipe import Recipe
 
 
 @contextmanager
-def compiled_ahead(recipe: Recipe) -> Iterator[None]:
+def compiled_ahead(recipe: Recipe) -> Iterator[bool]:
     """Have another process follow a recipe meanwhile, if nothing is compiled and a core is free.
 
     Both put what they compile into the cache, and neither compiles what the other one does.
 
     Args:
-        recipe: of a call that compiles what will be needed, the last first.
+        recipe: of a call that compiles what this process will need later.
+
+    Yields:
+        whether another process does; this one then had better begin with the rest.
     """
     if is_compiled() or numba.config.DISABLE_JIT or (os.cpu_count() or 1) == 1:
-        yield
+        yield False
         return
     said: Said = queue.SimpleQueue()
     helper = None
@@ -30,7 +33,7 @@ def compiled_ahead(recipe: Recipe) -> Iterator[None]:
         helper = Process(said, errors=nowhere)
         helper.call(_follow, recipe)
     try:
-        yield
+        yield helper is not None
     finally:
         if helper is not None:
             helper.end()

@@ -36,6 +36,7 @@ from bridgegen.simulation.embedded.drivers import (
 )
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.embedded.storyboard import start
 from bridgegen.simulation.rollout import Rollout
 
 
@@ -90,7 +91,7 @@ class Batch:
         running: Bool = self.state.ending[:, memory.N_STEPS] == 0
         return running
 
-    def _take_addresses(self) -> None:
+    def take_addresses(self) -> None:
         """Compile what this plan needs and others do not, once."""
         if self._has_addresses:
             return
@@ -124,7 +125,7 @@ class Batch:
 
     def demand(self, k: int) -> tuple[Float, Float]:
         """Return what the compiled driver demands: ``(N,)`` [m/s²] and ``(N,)`` [1/m]."""
-        self._take_addresses()
+        self.take_addresses()
         demanded, curvature = np.zeros((2, len(self._rows)))
         tables = self._roads.tables
         kernels.demand_rows(
@@ -142,25 +143,32 @@ class Batch:
         """
         self._do(kernels.after_drivers, k, demanded, curvature)
 
-    def compile_ahead(self) -> Rollout:
-        """Compile parts of ``run``, the last first; return a rollout for metrics to be tried on.
+    def compile_start(self) -> None:
+        """Compile the parts of ``run`` that its first instant and this plan alone need."""
+        compile_for_kernels(start, self._kinds())
+        self.take_addresses()
 
-        For a process beside one that runs: together they compile sooner. All entities stand still.
-        """
-        rows = (self._roads.tables, self.state, self.record)
-        kinds = (row_type(self._plan, 0), *map(row_type, rows))
+    def compile_instants(self) -> None:
+        """Compile the parts of ``run`` that each instant needs, the last first."""
+        kinds = self._kinds()
         for function, first in kernels.PARTS:
             compile_for_kernels(function, (*first, *kinds))
-        self._take_addresses()
+
+    def standing(self) -> Rollout:
+        """Return a rollout in which all entities stand far apart, to try metrics on."""
         for array in self.record:
             array[...] = 0
         self.record.x[:, :, :] = FAR_APART * np.arange(self.record.x.shape[1])[:, np.newaxis]
         self.state.ending[:, memory.N_STEPS] = self.record.x.shape[2]
         return self.rollout()
 
+    def _kinds(self) -> tuple[Any, ...]:
+        rows = (self._roads.tables, self.state, self.record)
+        return (row_type(self._plan, 0), *map(row_type, rows))
+
     def _do(self, kernel: Callable[..., Any], *arguments: int | Float) -> None:
         """Call a kernel; rows for which a way is not planned yet do the same again when it is."""
-        self._take_addresses()
+        self.take_addresses()
         before = self._block.copy(), self.record.began.copy()
         messages = kernel(
             *arguments, self._plan, self._roads.tables, self._rows, self.state, self.record
