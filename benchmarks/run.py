@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from rates import Rate, processor_time, rate_of
 from traffic import ALL, traffic_rate
 
 from bridgegen.campaign.scenario_files import write_scenario
+from bridgegen.extras import is_installed
 from bridgegen.odd.reader import load
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check
@@ -37,7 +37,6 @@ from bridgegen.openx.source import on_map
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.search import Problem, Results, get, names
-from bridgegen.search.algorithm import EXTRAS
 from bridgegen.store import Rows
 from bridgegen.triage.triage import triage as triage_of
 from workers import workers
@@ -269,7 +268,7 @@ def algorithms() -> list[Row]:
         if getattr(get(name), "is_adversary", False):
             continue  # it drives within scenarios, of which there are none here
         extra = getattr(get(name), "extra", None)
-        if extra and not all(find_spec(module) for module in EXTRAS[extra]):
+        if extra and not is_installed(extra):
             skipped.setdefault(extra, []).append(name)
             continue
         target = "≤ 50" if name in LEARNERS else "≤ 5"

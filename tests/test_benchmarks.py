@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.search.algorithm import EXTRAS
+from bridgegen.extras import EXTRAS, Extra
 
 RUN = Path(__file__).parents[1] / "benchmarks" / "run.py"
 
@@ -27,7 +27,7 @@ def test_without_the_extra_rl_its_algorithms_are_skipped_with_one_line(benchmark
         return 1e-3
 
     monkeypatch.setattr(benchmarks, "seconds_a_row", taken)
-    monkeypatch.setitem(EXTRAS, "rl", ("a_module_that_is_not_there",))
+    monkeypatch.setitem(EXTRAS, "rl", Extra(("a_module_that_is_not_there",), ""))
     rows = benchmarks.algorithms()
     (line,) = [name for name, *_ in rows if "skipped" in name]
     assert line == "dqn, ddpg, ppo: skipped, need the extra rl"

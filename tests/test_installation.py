@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +13,9 @@ import pytest
 from bridgegen import installation
 from bridgegen.compilation import cache, folder
 from bridgegen.compilation.sources import digest
-from bridgegen.installation import EXTRAS, Finding, examine
+from bridgegen.errors import InputError
+from bridgegen.extras import EXTRAS, Extra, is_installed, require
+from bridgegen.installation import Finding, examine
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
@@ -38,10 +42,40 @@ def test_its_extras_are_those_of_the_project_that_users_install():
     project = tomllib.loads(PROJECT.read_text("utf-8"))["project"]
     declared = project["optional-dependencies"]
     assert set(EXTRAS) == set(declared) - {"test", "docs", "browser"}
-    modules = {"jpype1": "jpype"}  # its module has another name
-    for extra, (module, _) in EXTRAS.items():
+    modules = {"jpype1": "jpype", "stable-baselines3": "stable_baselines3"}  # other names
+    for extra, (needed, _) in EXTRAS.items():
         named = {re.match(r"[\w-]+", one)[0] for one in declared[extra]}
-        assert module in {modules.get(one, one) for one in named}
+        assert set(needed) == {modules.get(one, one) for one in named}
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_where_an_extra_is_missing_one_sentence_names_it(extra, monkeypatch):
+    monkeypatch.setitem(EXTRAS, extra, Extra(("json", "no_such_module"), "a test"))
+    assert not is_installed(extra)
+    with pytest.raises(InputError) as error:
+        require(extra, "this")
+    assert str(error.value) == f"this needs the extra '{extra}': pip install 'bridgegen[{extra}]'"
+
+
+def test_only_data_frames_need_pandas(tmp_path):
+    """A search, its figure and what a notebook shows of it do without pandas."""
+    code = f"""
+import sys
+sys.modules["pandas"] = None
+import bridgegen as bg
+from bridgegen.errors import InputError
+run = bg.run_search("crossroads-s4", algorithm="random", budget=20, out={str(tmp_path / "run")!r})
+run.plot()
+assert "crossroads-s4" in run._repr_html_()
+assert len(run.rows().X) == 20
+try:
+    run.frame()
+except InputError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].startswith("a data frame needs the extra 'pandas'")
 
 
 def test_what_is_missing_is_a_problem_with_its_remedy(monkeypatch, tmp_path, cli):

@@ -9,18 +9,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
-from importlib.util import find_spec
 from pathlib import Path
 
-EXTRAS = {
-    "rl": ("torch", "deep reinforcement learning: dqn, ddpg, ppo, ppo-adversary"),
-    "ray": ("ray", "workers on more than one machine: --workers ray"),
-    "parquet": ("pyarrow", "evaluations as Parquet files: bridgegen table"),
-    "fmi": ("fmpy", "drivers in co-simulation units (.fmu)"),
-    "reasoner": ("jpype", "Java and HermiT: bridgegen validate --reason"),
-    "carla": ("carla", "CARLA's client: --simulator carla"),
-}
-"""The extras that users install: a module of each, and its use."""
+from bridgegen.extras import EXTRAS, is_installed
 
 LIBRARIES = ("numpy", "numba", "llvmlite", "pyoxigraph", "pyshacl")
 """Packages whose versions decide on results, or on compiled code."""
@@ -53,8 +44,8 @@ def examine() -> Iterator[Finding]:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     yield Finding("cores", str(cores))
     yield _cache()
-    for extra, (module, use) in EXTRAS.items():
-        if find_spec(module) is not None:
+    for extra, (_, use) in EXTRAS.items():
+        if is_installed(extra):
             yield Finding(f"extra {extra}", f"installed ({use})")
         else:
             advice = f"pip install 'bridgegen[{extra}]'"

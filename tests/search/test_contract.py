@@ -2,7 +2,6 @@
 
 import warnings
 from dataclasses import replace
-from importlib.util import find_spec
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,8 +13,9 @@ from hypothesis import strategies as st
 from bridgegen.arrays import Float
 from bridgegen.campaign.loop import Reason, run_loop
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.extras import is_installed
 from bridgegen.search import ALGORITHMS, Algorithm, Problem, Results
-from bridgegen.search.algorithm import EXTRAS, resolve
+from bridgegen.search.algorithm import resolve
 from bridgegen.store import Store
 
 Kind = type[Algorithm]
@@ -41,8 +41,8 @@ def small(algorithm: Kind) -> Any:
         for key, value in SMALL[algorithm.name].items()
     }
     kind = type(algorithm.__name__, (algorithm,), {"settings": {**algorithm.settings, **changed}})
-    missing = [one for one in EXTRAS[algorithm.extra] if not find_spec(one)]
-    skip = pytest.mark.skipif(bool(missing), reason=f"the extra {algorithm.extra} is not installed")
+    missing = not is_installed(algorithm.extra)
+    skip = pytest.mark.skipif(missing, reason=f"the extra {algorithm.extra} is not installed")
     return pytest.param(kind, id=algorithm.name, marks=skip)
 
 

@@ -16,8 +16,8 @@ from hypothesis.extra.numpy import arrays
 
 from bridgegen.campaign.loop import Reason, run_loop
 from bridgegen.errors import InputError
+from bridgegen.extras import EXTRAS, Extra
 from bridgegen.search import Problem, Results, get
-from bridgegen.search import algorithm as algorithms
 from bridgegen.search.observation import Observer, Reward, step_from
 from bridgegen.search.rl.walkers import Walkers
 from bridgegen.store import Store
@@ -154,10 +154,10 @@ def learners():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_without_the_extra_one_sentence(name, monkeypatch):
-    monkeypatch.setitem(algorithms.EXTRAS, "rl", ("json", "no_such_module"))
+    monkeypatch.setitem(EXTRAS, "rl", Extra(("json", "no_such_module"), ""))
     with pytest.raises(InputError) as error:
         get(name)(PROBLEM, 0)
-    said = f"algorithm '{name}' needs the extra: pip install 'bridgegen[rl]'"
+    said = f"algorithm '{name}' needs the extra 'rl': pip install 'bridgegen[rl]'"
     assert str(error.value) == said
 
 

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 
+from bridgegen import extras
 from bridgegen.errors import InputError
 from bridgegen.workers import open_workers
 from bridgegen.workers.pipeline_cache import CAPACITY, NotPrepared, PipelineCache
@@ -63,9 +64,9 @@ def test_the_latest_used_are_kept():
 
 
 def test_without_ray_the_extra_is_named(monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
     with (
-        pytest.raises(InputError, match=r"need the extra 'ray': pip install 'bridgegen\[ray\]'"),
+        pytest.raises(InputError, match=r"needs the extra 'ray': pip install 'bridgegen\[ray\]'"),
         open_workers("ray"),
     ):
         pass

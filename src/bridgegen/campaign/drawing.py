@@ -63,16 +63,16 @@ def worst_rollout(run: "Run") -> Rollout | None:
 def _draw_space(run: "Run", axes: "Axes") -> None:
     """Draw the evaluations over the two parameters that matter most for their failures."""
     rows = run.rows()
-    names = [name for name in run.frame().columns if name in run.parameters]
-    X = rows.X[:, [run.parameters.index(name) for name in names]]
-    first, second = _telling(X, rows.critical, [names.index(name) for name in _needed(run)])
+    names = run.parameters
+    first, second = _telling(rows.X, rows.critical, [names.index(name) for name in _needed(run)])
     for chosen, colour, label in (
         (~rows.critical, GREY, "not critical"),
         (rows.critical, RED, "critical"),
     ):
         at = np.flatnonzero(chosen)
         at = at[:: max(1, -(-len(at) // MOST_POINTS))]
-        axes.plot(X[at, first], X[at, second], ".", color=colour, markersize=4, label=label)
+        x, y = rows.X[at, first], rows.X[at, second]
+        axes.plot(x, y, ".", color=colour, markersize=4, label=label)
     axes.set(xlabel=names[first], ylabel=names[second])
     n = int(rows.critical.sum())
     axes.set_title(f"{n} critical of {len(rows)} evaluations", fontsize="medium")

@@ -91,7 +91,11 @@ class Run:
             return store.read()
 
     def frame(self) -> "pd.DataFrame":
-        """Return every evaluation as a row: parameters, metrics, objectives, status, critical."""
+        """Return every evaluation as a row: parameters, metrics, objectives, status, critical.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
         with Store.open(self.folder) as store:
             return store.frame()
 

@@ -19,6 +19,7 @@ from bridgegen.cause import Cause
 from bridgegen.conflict.findings import COLUMNS
 from bridgegen.disk import writing_whole
 from bridgegen.errors import InputError, StorageError
+from bridgegen.extras import require
 from bridgegen.store import Rows, Store
 
 if TYPE_CHECKING:
@@ -56,12 +57,7 @@ def write_tables(
     """
     if not 0.0 < sample <= 1.0:
         raise InputError(f"0 < sample <= 1 must hold, got {sample:g}")
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        raise InputError(
-            "tables in Parquet need the package pyarrow: pip install 'bridgegen[parquet]'"
-        ) from None
+    require("parquet", "a table in Parquet")
     folders = {Path(run).resolve().name: Path(run) for run in runs}
     if len(folders) < len(runs):
         names = [Path(run).resolve().name for run in runs]

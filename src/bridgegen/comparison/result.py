@@ -1,8 +1,10 @@
 """The results of a comparison, for tables, pages and notebooks."""
 
+import csv
 import html
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,11 +12,14 @@ from bridgegen.comparison.measures import Measure, Measured
 from bridgegen.comparison.plan import Cell, Plan
 from bridgegen.comparison.record import Record
 from bridgegen.comparison.table import RUNS_FILE, SUMMARY_FILE, TIMES_FILE, Line
+from bridgegen.extras import require
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PAGE = "compare.html"
+MOST_SHOWN = 60
+"""Maximum number of lines of a table in a notebook."""
 
 
 @dataclass(frozen=True)
@@ -61,24 +66,31 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the table of all measures, and where the page is."""
-        table = self.summary().to_html(index=False, max_rows=60, border=0)
+        with (self.folder / SUMMARY_FILE).open(encoding="utf-8", newline="") as file:
+            head, *rows = csv.reader(islice(file, MOST_SHOWN + 1))
+        table = _tr("th", head) + "".join(_tr("td", row) for row in rows)
         page = html.escape(str(self.page))
-        return f"{table}<p>Whole comparison: <code>{page}</code></p>"
+        return f"<table>{table}</table><p>Whole comparison: <code>{page}</code></p>"
 
     def frame(self) -> "pd.DataFrame":
-        """Return every measure of every run, one a row: ``runs.csv``."""
-        import pandas as pd
-
-        return pd.read_csv(self.folder / RUNS_FILE)
+        """Return every measure of every run, one a row: ``runs.csv``. Needs pandas."""
+        return self._frame(RUNS_FILE)
 
     def summary(self) -> "pd.DataFrame":
-        """Return every measure over the runs of an algorithm, one a row: ``summary.csv``."""
-        import pandas as pd
-
-        return pd.read_csv(self.folder / SUMMARY_FILE)
+        """Return every measure over an algorithm's runs: ``summary.csv``. Needs pandas."""
+        return self._frame(SUMMARY_FILE)
 
     def times(self) -> "pd.DataFrame":
-        """Return the duration of every run, which is not repeatable: ``times.csv``."""
+        """Return each run's duration, which is not repeatable: ``times.csv``. Needs pandas."""
+        return self._frame(TIMES_FILE)
+
+    def _frame(self, name: str) -> "pd.DataFrame":
+        require("pandas", "a data frame")
         import pandas as pd
 
-        return pd.read_csv(self.folder / TIMES_FILE)
+        return pd.read_csv(self.folder / name)
+
+
+def _tr(kind: str, cells: Iterable[str]) -> str:
+    inner = "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in cells)
+    return f"<tr>{inner}</tr>"

@@ -24,6 +24,7 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.ego.interface import ROUTE_POINTS, Control, Observation, Scene
 from bridgegen.errors import FileFormatError, InputError
+from bridgegen.extras import require
 
 TRACK = (
     "state", "x", "y", "h", "vx", "vy", "length", "width", "class", "confidence", "unseen", "age",
@@ -47,12 +48,9 @@ class FmuDriver:
     """
 
     def __init__(self, path: Path | str) -> None:
-        try:
-            import fmpy
-        except ImportError:
-            raise InputError(
-                "a driver in a .fmu needs the extra 'fmi': pip install 'bridgegen[fmi]'"
-            ) from None
+        require("fmi", "a driver in a .fmu")
+        import fmpy
+
         try:
             self._description = fmpy.read_model_description(str(path), validate=False)
             self._folder = fmpy.extract(str(path))

@@ -151,7 +151,7 @@ class _Search:
         """Verify the boxes of the run's tree, then boxes inside those that are not confirmed."""
         leaves = fit_leaves(
             self._X, self._critical, low=self._outer.low, high=self._outer.high,
-            min_rows=MIN_ROWS, seed=self._seed, max_depth=MOST_CONDITIONS,
+            min_rows=MIN_ROWS, max_depth=MOST_CONDITIONS,
         )  # fmt: skip
         inner: list[Box] = []
         for box in (boxes := self._readable(leaves, self._outer)):
@@ -227,7 +227,7 @@ class _Search:
         columns = np.arange(len(named)) if free > 0 else np.flatnonzero(named)
         leaves = fit_leaves(
             X[:, columns], critical, low=box.low[columns], high=box.high[columns],
-            min_rows=max(MIN_ROWS, len(fresh) // 12), seed=self._seed,
+            min_rows=max(MIN_ROWS, len(fresh) // 12),
             max_depth=min(2, free) if free > 0 else 2,
         )  # fmt: skip
         inner = []

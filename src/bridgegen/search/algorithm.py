@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
@@ -11,11 +10,9 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.extras import require
 
 Value = bool | int | float | str
-
-EXTRAS = {"rl": ("torch", "stable_baselines3", "gymnasium")}
-"""The modules of each extra."""
 
 JSON = None | bool | int | float | str | Sequence["JSON"] | Mapping[str, "JSON"]
 """Values that a run can record; no NaN and no inf."""
@@ -149,7 +146,7 @@ class Algorithm(Protocol):
     in its order. An algorithm draws random numbers only from its own generator, so that one seed
     gives one sequence of rows, bit for bit; resuming a run replays it and relies on that.
 
-    It may name an ``extra`` that must be installed, see `EXTRAS`, and it may have other methods:
+    It may name an ``extra`` that must be installed, see `bridgegen.extras`. It may also have
     ``notes``, see `TakesNotes`; ``state`` and ``restore``, see `Restorable`.
 
     Attributes:
@@ -244,7 +241,8 @@ def resolve(
         UnknownNameError: no such setting.
     """
     name = algorithm.name
-    _require(name, getattr(algorithm, "extra", None))
+    if extra := getattr(algorithm, "extra", None):
+        require(extra, f"algorithm '{name}'")
     for key in given:
         if key not in algorithm.settings:
             raise UnknownNameError(f"setting of {name}", key, algorithm.settings)
@@ -266,12 +264,6 @@ def resolve(
     if problems:
         raise InputError(*problems)
     return values
-
-
-def _require(name: str, extra: str | None) -> None:
-    """Raise InputError if an algorithm's extra is not installed; imports nothing."""
-    if extra and not all(find_spec(module) for module in EXTRAS[extra]):
-        raise InputError(f"algorithm '{name}' needs the extra: pip install 'bridgegen[{extra}]'")
 
 
 def _wanted(setting: Setting, value: Value) -> str | None:

@@ -14,6 +14,7 @@ import numpy as np
 from bridgegen.arrays import Float, Int
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError, StorageError
+from bridgegen.extras import require
 from bridgegen.store.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from bridgegen.store.rows import Evaluated, Rows, quoted
 from bridgegen.store.run_file import (
@@ -445,7 +446,12 @@ class Store:
             yield self.read(at, min(at + chunk, stop))
 
     def frame(self) -> "pd.DataFrame":
-        """Return every evaluation as a table, without u; the index is id."""
+        """Return every evaluation as a table, without u; the index is id.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        require("pandas", "a data frame")
         import pandas as pd
 
         n, columns = len(self), self.columns

@@ -1,6 +1,5 @@
 """Actors of a Ray cluster, on all of its machines."""
 
-import importlib.util
 import itertools
 import queue
 import re
@@ -11,6 +10,7 @@ from typing import IO, Any
 
 from bridgegen.arrays import Float
 from bridgegen.errors import InputError, WorkersError
+from bridgegen.extras import require
 from bridgegen.workers.pool import WorkerPool
 from bridgegen.workers.process import Process, Said
 from bridgegen.workers.ray_bridge import RayBridge
@@ -33,10 +33,7 @@ class Cluster(WorkerPool[int]):
 
     def __init__(self, address: str | None) -> None:
         super().__init__()
-        if importlib.util.find_spec("ray") is None:
-            raise InputError(
-                "workers in a cluster need the extra 'ray': pip install 'bridgegen[ray]'"
-            )
+        require("ray", "a cluster of workers")
         self._address = address
         self._bridge: Process | None = None
         self._said: Said = queue.SimpleQueue()
