@@ -4,8 +4,9 @@ Besides, a scenario with something in every layer.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build as build_individuals
 from bridgegen.report.data import Column, Evaluations, ReportData, RunSummary
+from bridgegen.report.page import write_report
 from bridgegen.report.playback import Entity, Outline, Playback
 
 ARM, HALF, LANE, LANES = 60.0, 13.0, 3.5, 2
@@ -217,3 +219,48 @@ def values(layered) -> dict[str, float]:
 @pytest.fixture(scope="session")
 def individuals(layered, values) -> Individuals:
     return build_individuals(layered, values, driver="route-follower")
+
+
+@dataclass
+class Opened:
+    """A page, and whatever it complained about or asked for."""
+
+    page: Any
+    complaints: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def state(self) -> dict[str, Any]:
+        return self.page.evaluate("bridgegen.state()")
+
+    def scroll_through(self) -> None:
+        """Bring every chart into sight, and wait until all are drawn."""
+        self.page.evaluate(
+            """async () => {
+                 for (const chart of document.querySelectorAll(".plot, #parallel")) {
+                   chart.scrollIntoView();
+                   await new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(r)));
+                 }
+               }"""
+        )
+        self.page.wait_for_function("bridgegen.chartsDrawn >= bridgegen.charts")
+
+
+@pytest.fixture(scope="module")
+def show(browser, tmp_path_factory):
+    """Write a report and open it from disk."""
+
+    def open_(data: ReportData, fragment: str = "", **context: Any) -> Opened:
+        path: Path = tmp_path_factory.mktemp("report") / "report.html"
+        write_report(path, data)
+        context.setdefault("viewport", {"width": 1280, "height": 720})
+        opened = Opened(browser.new_page(**context))
+        opened.page.on(
+            "console",
+            lambda m: opened.complaints.append(m.text) if m.type == "error" else None,
+        )
+        opened.page.on("pageerror", lambda error: opened.complaints.append(str(error)))
+        opened.page.on("request", lambda request: opened.requests.append(request.url))
+        opened.page.goto(path.as_uri() + fragment)
+        return opened
+
+    return open_

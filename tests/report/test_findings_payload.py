@@ -333,7 +333,7 @@ def test_the_table_has_the_conflict_s_columns(page):
 
 
 @pytest.mark.browser
-def test_where_nothing_was_found_the_nearest_scenario_can_be_played(browser, report, tmp_path):
+def test_where_nothing_was_found_the_nearest_scenario_plays(browser, report, tmp_path):
     from bridgegen.report.page import write_report
 
     near = replace(report.kept[0], name="evaluation 4", evaluation=3, files=(), critical=False)
@@ -343,11 +343,14 @@ def test_where_nothing_was_found_the_nearest_scenario_can_be_played(browser, rep
         summary=replace(report.summary, n_critical=0),
     )  # fmt: skip
     write_report(tmp_path / "quiet.html", quiet)
-    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.goto((tmp_path / "quiet.html").as_uri())
     assert page.locator("#modes-title").inner_text() == "No failure found"
     assert "At most 2 % of the space" in page.locator("#modes-lead").inner_text()
-    page.locator("#modes-nearest").click()
+    assert "Evaluation 4, which came nearest" in page.locator("#modes-note").inner_text()
     page.wait_for_function("document.getElementById('scene-name').textContent === 'evaluation 4'")
+    page.wait_for_function("bridgegen.state().playing && bridgegen.state().position > 0")
+    button = page.locator("#play").bounding_box()
+    assert button["y"] + button["height"] < 720  # on the first screen
     assert page.locator("#list").is_hidden()
     page.close()

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.triage.triage import FRESH, SAMPLED, triage
+from bridgegen.triage.triage import FRESH, SAMPLED, harmful_rows, triage
 from bridgegen.triage.words import headline, mode_in_words
 
 
@@ -40,15 +40,18 @@ def test_robust_modes_come_before_those_on_a_knife_s_edge(made):
     assert "planning: −100 if un-r157 drives" in mode_in_words(robust, found.record)
 
 
-def test_each_mode_is_exported_robust_rows_first(made):
-    _, rows, found = made
+def test_each_mode_is_exported_robust_rows_first_then_the_most_harmful(made):
+    pipeline, rows, found = made
     modes = {i: one.number for one in found.record.modes for i in one.examples}
     robust, edge = found.record.modes
     assert len(found.exports) == len(set(found.exports)) == 6
     assert found.exports[0] == robust.shown
     assert robust.exports[0] == "0001"
-    edges = [found.record.neighbourhood(i).knife_edge for i in found.exports]
-    assert edges == sorted(edges)
+    _, harm = harmful_rows(
+        rows.metrics, pipeline.metrics, pipeline.objective.harm, rows.status, rows.findings
+    )
+    keys = [(found.record.neighbourhood(i).knife_edge, -harm[i]) for i in found.exports]
+    assert keys == sorted(keys)
     assert edge.shown in found.exports
     assert {modes.get(i, 1) for i in found.exports} == {1, 2}
     assert rows.critical[list(found.exports)].all()

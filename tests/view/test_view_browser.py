@@ -57,7 +57,7 @@ def test_it_grows_with_its_run_and_says_so(opened, growing):
     assert page.inner_text("#live-text") == "Live: 100 of 120 evaluations"
     n = critical[:100].sum()
     assert page.inner_text("#list-note") == f"{n} of {n} critical scenarios"
-    assert "100 concrete scenarios" in page.inner_text("#sentences")
+    assert page.inner_text("#figures").startswith("Simulated\n100 in ")
     assert page.evaluate("bridgegen.state().position") == before
     page.locator("#trend-plots").scroll_into_view_if_needed()
     page.wait_for_function("bridgegen.trends[0]?.x")
@@ -126,7 +126,7 @@ def test_a_run_without_a_row_is_shown_once_there_are_some(browser, growing):
     server.start()
     page = browser.new_page()
     page.goto(server.url)
-    assert "has been simulated yet" in page.inner_text("#sentences")
+    assert page.inner_text("#figures").startswith("Simulated\n0 in ")
     assert "yet" in page.inner_text("#no-scenarios")
     growing.grow(60)
     page.wait_for_selector("#list-body button")

@@ -59,22 +59,19 @@ def summary_table(data: ReportData) -> list[tuple[str, str]]:
     """
     s = data.summary
     return [
-        (
-            "Critical share, R_critic",
-            f"{share(s.r_critic)} ({s.n_critical:,} of {s.n_evaluations:,})",
-        ),
-        ("R_critic, 95 % interval *", _interval(s)),
+        ("Simulated", _simulated(s)),
+        ("Critical", f"{s.n_critical:,} ({share(s.r_critic)})"),
+        *([("95 % interval of the critical share", _interval(s))] if s.independent else []),
         ("First critical", _at(s.first_critical)),
         ("50th critical", _at(s.fiftieth_critical)),
         *(_of_harm(data) if s.harm and data.evaluations.findings else _of_paper(s)),
-        ("Wall time", duration(s.wall_seconds)),
     ]
 
 
 def _of_paper(s: RunSummary) -> list[tuple[str, str]]:
     return [
-        ("Distance d_min, smallest", metres(s.d_min_best)),
-        ("Distance d_min, median", metres(s.d_min_median)),
+        ("Minimum distance d_min, least", metres(s.d_min_best)),
+        ("Minimum distance d_min, median", metres(s.d_min_median)),
         ("Speed v_d at d_min, highest", speed(s.v_d_best)),
         ("Speed v_d at d_min, median", speed(s.v_d_median)),
     ]
@@ -99,24 +96,6 @@ def _of_harm(data: ReportData) -> list[tuple[str, str]]:
     return rows
 
 
-def interval_note(s: RunSummary) -> str:
-    """Return the meaning of the interval of R_critic, and its limits."""
-    if not s.n_evaluations:
-        return ""
-    if s.independent:
-        return (
-            "* Wilson's interval. The rows are independent random draws, so it holds for the share "
-            "of critical scenarios in this domain, drawn as random search draws them."
-        )
-    return (
-        "* Wilson's interval for as many independent draws. These rows are not independent: "
-        f"{s.algorithm} chose them by plan or by the results of earlier ones. It shows the "
-        "precision for this search, not how likely harm is in this domain: random search and the "
-        "fresh scenarios of 'bridgegen regions' estimate that; 'bridgegen compare' shows how "
-        "R_critic varies from seed to seed."
-    )
-
-
 def provenance(s: RunSummary) -> list[tuple[str, str]]:
     """Return the data to repeat the run, name and text."""
     rows = [
@@ -127,7 +106,6 @@ def provenance(s: RunSummary) -> list[tuple[str, str]]:
         ("Seed", str(s.seed)),
         ("Budget", _count(s.budget, "evaluation")),
         ("Done", _count(s.n_evaluations, "evaluation") + ("" if s.finished else ", interrupted")),
-        ("Critical means", s.critical_rule),
         ("Started", s.started),
         ("BridgeGen", s.version),
     ]
@@ -244,7 +222,13 @@ def _worst(data: ReportData) -> str:
     return ""
 
 
+def _simulated(s: RunSummary) -> str:
+    text = f"{s.n_evaluations:,} in {duration(s.wall_seconds)}"
+    return text if s.finished else f"{text}, of a budget of {s.budget:,}"
+
+
 def _interval(s: RunSummary) -> str:
+    """Return Wilson's interval, which holds for independent draws only."""
     if not s.n_evaluations:
         return "–"
     low, high = wilson(s.n_critical, s.n_evaluations)

@@ -180,7 +180,7 @@ class _Triage:
         return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
 
     def _choose(self, shown: Sequence[int], U: Float, harm: Float) -> list[int]:
-        """Return the rows to export: one of each mode, then others; robust ones first."""
+        """Return the rows to export, one of each mode and others: robust ones first, then harm."""
         critical = self._rows.critical[self._at]
         first = sorted((i for i in shown if critical[i]), key=lambda i: self._rank(i, harm))
         first = first[: self._keep]
@@ -194,8 +194,7 @@ class _Triage:
             self._simulate(
                 [i for i in more if self._pipeline.tries and i not in self._found], fixes=False
             )
-        both = [*first, *more]
-        return sorted(both, key=lambda i: (self._is_knife_edge(i), both.index(i)))
+        return sorted([*first, *more], key=lambda i: self._rank(i, harm))
 
     def _sample(self, tested: Sequence[int]) -> list[int]:
         """Return some of the harmful rows that are not tested yet, drawn at random."""

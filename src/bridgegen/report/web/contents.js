@@ -1,13 +1,17 @@
 // A table of contents: a button for each section that the page shows, the present one marked.
 
 import { $, element } from "./common.js";
+import { unfold } from "./fold.js";
 
 const shownSections = () => [...document.querySelectorAll("main > section:not([hidden])")];
 
 function fillContents() {
   $("contents").replaceChildren(...shownSections().map((section) => {
     const button = element("button", { type: "button" }, section.dataset.short ?? section.querySelector("h2").textContent);
-    button.addEventListener("click", () => section.scrollIntoView());
+    button.addEventListener("click", () => {
+      unfold(section);
+      section.scrollIntoView();
+    });
     return button;
   }));
   markPresent();

@@ -6,6 +6,8 @@ import { boxCorners, colourOf, isPlaced } from "./geometry.js";
 import { SIGNALS, lightAt } from "./unpack.js";
 import { FONT } from "./view.js";
 
+const CAR = 8; // m²: the words of people and cycles are as long as a small car's
+
 /** @type {(a: number[], b: number[]) => number} */
 function overlap([ax0, ay0, ax1, ay1], [bx0, by0, bx1, by1]) {
   return Math.max(0, Math.min(ax1, bx1) - Math.max(ax0, bx0)) * Math.max(0, Math.min(ay1, by1) - Math.max(ay0, by0));
@@ -37,8 +39,10 @@ export class Labels {
     this.places = [];
   }
 
-  // `texts` by entity, null for none; `others` are boxes of other words.
-  draw(c, state, view, size, texts, others) {
+  // `texts` by entity: null for none, else the whole and the short one, for a body that is smaller on the
+  // screen than the whole; `others` are boxes of other words, `free` those that no word should hide.
+  draw(c, state, view, size, texts, others, free) {
+    this.boxes = [];
     const { width, height } = size;
     const bodies = state.entities.map((s, e) => {
       if (!isPlaced(s)) return null;
@@ -46,22 +50,24 @@ export class Labels {
       const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]);
       return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
     });
-    const taken = [...bodies.filter(Boolean), [0, 0, width, 44], [0, height - 36, width, height], ...others]; // clock, zoom; scale bar, weather
+    const taken = [...bodies.filter(Boolean), [0, 0, width, 52], [0, height - 36, width, height], ...others]; // clock, zoom; scale bar, weather
     const middles = bodies.map((box) => box && [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2]);
     const seen = middles.filter(Boolean);
     const hub = [0, 1].map((i) => seen.reduce((sum, p) => sum + p[i], 0) / seen.length);
     c.font = FONT;
-    texts.forEach((text, e) => {
-      const [mx, my] = middles[e] ?? [], out = 30;
-      if (text === null || !bodies[e] || mx < -out || my < -out || mx > width + out || my > height + out) return;
-      const w = c.measureText(text).width + 14, h = 20, [x0, y0, x1, y1] = bodies[e];
+    texts.forEach((both, e) => {
+      const [mx, my] = middles[e] ?? [];
+      if (both === null || !bodies[e] || !overlap(bodies[e], [0, 0, width, height])) return;
+      const { length, width: across } = this.kept.entities[e], h = 20, wide = (text) => c.measureText(text).width + 14;
+      const body = Math.max(length * across, CAR) * view.scale ** 2, [x0, y0, x1, y1] = bodies[e];
+      const text = wide(both[0]) * h <= body ? both[0] : both[1], w = wide(text);
       const away = seen.length > 1 ? Math.atan2(my - hub[1], mx - hub[0]) : -Math.PI / 2;
       let best = { cost: Infinity };
       for (let place = 0; place < 8; place++) {
         const angle = (place * Math.PI) / 4;
         const x = mx + Math.cos(angle) * ((x1 - x0) / 2 + w / 2 + 5), y = my + Math.sin(angle) * ((y1 - y0) / 2 + h / 2 + 6);
         const box = [x - w / 2, y - h / 2, x + w / 2, y + h / 2];
-        const hidden = taken.reduce((sum, other) => sum + overlap(box, other), 0);
+        const hidden = taken.reduce((sum, other) => sum + overlap(box, other), 0) + free.reduce((sum, other) => sum + 4 * overlap(box, other), 0);
         const outside = w * h - overlap(box, [0, 0, width, height]);
         const turned = 0.15 * w * h * (1 - Math.cos(angle - away)), kept = this.places[e] === place ? 0.35 * w * h : 0;
         const cost = hidden + outside + turned - kept;
@@ -69,9 +75,22 @@ export class Labels {
       }
       this.places[e] = best.place;
       taken.push(best.box);
+      this.boxes.push(best.box);
       pill(c, size, text, best.x, best.y, colourOf(this.kept, e));
     });
   }
+}
+
+// Where somebody out of sight is: a word at the picture's edge, with the distance [m] between the bodies' middles.
+export function pointTo(c, { width, height }, view, name, from, to, colour) {
+  const [x, y] = view.toScreen(to), inset = 26;
+  if (x > 0 && y > 0 && x < width && y < height) return null;
+  const [mx, my] = [width / 2, height / 2], angle = Math.atan2(y - my, x - mx);
+  const reach = Math.min((mx - inset) / Math.abs(Math.cos(angle) || 1e-9), (my - inset - 34) / Math.abs(Math.sin(angle) || 1e-9));
+  const arrow = "→↘↓↙←↖↑↗"[(Math.round((4 * angle) / Math.PI) + 8) % 8];
+  const at = [mx + Math.cos(angle) * reach, my + Math.sin(angle) * reach];
+  pill(c, { width, height }, `${arrow} ${name}  ${Math.round(Math.hypot(to[0] - from[0], to[1] - from[1]))} m`, ...at, colour);
+  return [at[0] - 45, at[1] - 10, at[0] + 45, at[1] + 10];
 }
 
 // What a light shows, as a word beside it, on the side that traffic does not come from. Returns the words' boxes.

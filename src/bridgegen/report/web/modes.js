@@ -28,17 +28,15 @@ class Modes {
     const found = data.triage;
     const n = found.modes.length + found.more;
     $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails` : "No failure found";
-    $("modes-lead").textContent = capital(n ? found.bound.sentence.replace(/^[^:]*: /, "") : found.bound.sentence); // the title says the rest
+    $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^[^:]*: / : /^No failure found in /, "")); // the title says the rest
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));
     $("modes-list").hidden = !n;
-    const notes = [];
+    const notes = [], nearest = nearestToHarm();
+    if (nearest !== null) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");
-    const nearest = nearestToHarm();
-    $("modes-nearest").hidden = n > 0 || nearest === null;
-    $("modes-nearest").onclick = () => this.play(nearest);
   }
 
   play(evaluation) {

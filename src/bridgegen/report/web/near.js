@@ -29,6 +29,7 @@ class NearScreen {
   }
 
   draw(plot) {
+    if (!plot.clientWidth) return void this.stale.add(plot); // in a section that is folded
     this.stale.delete(plot);
     this.charts.get(plot)();
     hook.chartsDrawn += 1;

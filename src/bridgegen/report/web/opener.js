@@ -105,7 +105,10 @@ export class Opener {
       this.kept(0);
       this.player.begin();
     } else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
-    else if (nearestToHarm() !== null) await this.row(rows.evaluation.indexOf(nearestToHarm()));
+    else if (nearestToHarm() !== null) {
+      await this.row(rows.evaluation.indexOf(nearestToHarm()));
+      this.made?.begin();
+    }
   }
 
   // Shows what the page's address names, at that time; says whether it names one.

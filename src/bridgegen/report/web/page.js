@@ -6,6 +6,7 @@ import "./contents.js";
 import { data, rows } from "./data.js";
 import { filters } from "./filters.js";
 import { nearestToHarm } from "./findings.js";
+import { foldSections } from "./fold.js";
 import { hook } from "./hook.js";
 import { Opener } from "./opener.js";
 import { drawSections } from "./sections.js";
@@ -15,6 +16,7 @@ import { TableTools } from "./table_tools.js";
 
 hook.filter = (name, low, high) => filters.set(name, low, high);
 drawSections();
+foldSections();
 if (rows.critical.includes(1) || data.kept.length) listScenarios();
 else playNearest();
 
@@ -27,8 +29,8 @@ function listScenarios() {
 function playNearest() {
   const nearest = nearestToHarm();
   hideScenario(nearest === null);
-  $("no-scenarios").hidden = false;
-  $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.${nearest === null ? "" : " Below is the scenario that came nearest to harm."}`;
+  $("no-scenarios").hidden = nearest !== null; // the verdict says it
+  $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.`;
   $("kept").classList.add("alone");
   $("list").hidden = true;
   if (nearest !== null) return void begin(new Opener(hook));

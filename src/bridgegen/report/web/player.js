@@ -1,12 +1,12 @@
 // The clock of the playback and its controls; the scene and the curves draw what it says.
 
 import { addressOf } from "./address.js";
-import { $, copy } from "./common.js";
+import { $, copy, element } from "./common.js";
 import { ZONED, fillConflict } from "./conflict.js";
 import { intentionAt } from "./course.js";
 import { Curves } from "./curves.js";
 import { data } from "./data.js";
-import { boxCentre, isPlaced, stateAt } from "./geometry.js";
+import { boxCentre, colourOf, isPlaced, playersOf, stateAt } from "./geometry.js";
 import { ghostsAt, ghostsOf } from "./ghosts.js";
 import { Scene } from "./scene.js";
 import { detectionAt, lightAt, unpack, weatherAt } from "./unpack.js";
@@ -15,6 +15,8 @@ import { stateWords } from "./words.js";
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 const PLAY_ICON = "M4 2v12l10-6z";
 const PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
+/** @type {["zoom-fit" | "zoom-all" | "follow", "conflict" | "all" | "ego"][]} */
+const FRAMINGS = [["zoom-fit", "conflict"], ["zoom-all", "all"], ["follow", "ego"]];
 
 export class Player {
   constructor(hook) {
@@ -35,7 +37,7 @@ export class Player {
     return this.kept.n_steps - 1;
   }
 
-  // Shows a scenario at its smallest gap, the moment that tells most; a click plays it from the start.
+  // Shows a scenario at its decisive instant, the moment that tells most; a click plays it from the start.
   show(kept, andPlay = false) {
     this.pause();
     this.kept = unpack(kept);
@@ -96,7 +98,8 @@ export class Player {
   }
 
   showLegend() {
-    const has = { motion: true, conflict: ZONED.includes(this.kept.conflict?.conflict), sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
+    $("legend-players").replaceChildren(...this.players());
+    const has = { players: true, motion: true, conflict: ZONED.includes(this.kept.conflict?.conflict), sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
     for (const item of $("legend").children) {
       const shown = this.scene.layers[item.dataset.layer], button = item.querySelector("button");
       item.hidden = !has[item.dataset.layer] || (!button && !shown);
@@ -109,6 +112,15 @@ export class Player {
     }
     if (has.elsewhere) $("elsewhere-means").textContent = `where ${[...new Set(ghostsOf(this.kept).map(({ label }) => label))].join(", ")} has them`;
     if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
+  }
+
+  // Who is which colour, for the legend.
+  players() {
+    return playersOf(this.kept).map((e) => {
+      const dot = element("i", { "aria-hidden": "true" });
+      dot.style.background = colourOf(this.kept, e);
+      return element("span", { class: "swatch" }, dot, this.kept.entities[e].name);
+    });
   }
 
   play() {
@@ -154,8 +166,8 @@ export class Player {
     const state = stateAt(this.kept, this.position);
     this.scene.draw(state);
     this.curves.draw(state);
-    $("clock").textContent = `${state.time.toFixed(2)} s  ·  gap ${state.distance === null ? "–" : `${state.distance.toFixed(2)} m`}`;
-    $("follow").setAttribute("aria-pressed", this.scene.view.follow);
+    $("clock").textContent = `${state.time.toFixed(2)} s  ·  distance ${state.distance === null ? "–" : `${state.distance.toFixed(2)} m`}`;
+    for (const [id, framing] of FRAMINGS) $(id).setAttribute("aria-pressed", this.scene.view.framing === framing);
     this.drawFlag(state);
     $("scrub").value = Math.round(this.position);
     const weather = weatherAt(this.kept, state.index);
@@ -163,7 +175,7 @@ export class Player {
     this.drawn = {
       scenario: this.kept.name, chosen: this.chosen, position: this.position, ...state,
       screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
-      scale: this.scene.view.scale,
+      scale: this.scene.view.scale, labels: this.scene.labels.boxes, crosses: this.scene.crosses,
       lights: this.kept.lamps.map((lamp) => lightAt(lamp, state.index)),
       detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
       intention: intentionAt(this.kept, state), weather, elsewhere: this.scene.layers.elsewhere ? ghostsAt(this.kept, state) : [],
@@ -185,7 +197,7 @@ export class Player {
     const flag = $("flag");
     const contact = this.kept.contacts.some((k) => state.index >= k && state.index < k + 1 / this.kept.time_step);
     const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
-    const label = contact ? "collision" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "smallest gap" : "";
+    const label = contact ? "collision" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "minimum distance" : "";
     flag.hidden = !label;
     flag.className = contact ? "" : "near";
     flag.textContent = label;
@@ -198,8 +210,7 @@ export class Player {
     $("scrub").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
     $("zoom-in").addEventListener("click", () => this.scene.view.zoom(1.4));
     $("zoom-out").addEventListener("click", () => this.scene.view.zoom(1 / 1.4));
-    $("zoom-fit").addEventListener("click", () => this.fit());
-    $("follow").addEventListener("click", () => this.follow());
+    for (const [id, framing] of FRAMINGS) $(id).addEventListener("click", () => this.frame(framing));
     $("copy-link").addEventListener("click", () => this.copyLink());
     for (const item of $("legend").children) item.querySelector("button")?.addEventListener("click", () => this.toggleLayer(item.dataset.layer));
     $("to-closest").addEventListener("click", () => this.jump(this.kept.closest));
@@ -207,7 +218,7 @@ export class Player {
     $("to-contact").addEventListener("click", () => this.jump(this.kept.contacts[0]));
     document.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => {
-      if (this.scene.view.fitted) this.scene.fit();
+      this.scene.camera.again();
       this.redraw();
     }).observe($("player"));
   }
@@ -222,15 +233,8 @@ export class Player {
     this.seek(k);
   }
 
-  fit() {
-    this.scene.fit();
-    this.redraw();
-  }
-
-  follow() {
-    const view = this.scene.view;
-    if (view.follow) return this.fit();
-    this.scene.follow();
+  frame(framing) {
+    this.scene.camera.frame(framing);
     this.redraw();
   }
 
@@ -246,7 +250,7 @@ export class Player {
       " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
       ",": () => this.step(-1), ".": () => this.step(1), s: () => this.toggleLayer("sensed"), p: () => this.toggleLayer("course"), w: () => this.toggleLayer("weather"),
       g: () => this.toggleLayer("elsewhere"),
-      l: () => this.copyLink(), e: () => this.follow(), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.fit(),
+      l: () => this.copyLink(), e: () => this.frame("ego"), a: () => this.frame("all"), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.frame("conflict"),
       d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.kept.contacts.length) this.jump(this.kept.contacts[0]); },
       t: () => { if (!$("to-decided").hidden) this.jump(this.kept.conflict.decided); },
       "+": () => this.scene.view.zoom(1.4), "=": () => this.scene.view.zoom(1.4), "-": () => this.scene.view.zoom(1 / 1.4),

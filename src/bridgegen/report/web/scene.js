@@ -2,13 +2,14 @@
 
 import { Atmosphere } from "./atmosphere.js";
 import { drawBody, drawLamps, drawStreetLights } from "./bodies.js";
+import { Camera } from "./camera.js";
 import { palette } from "./colours.js";
 import { drawDecided, drawZones } from "./conflict.js";
 import { drawCourse } from "./course.js";
 import { data } from "./data.js";
 import { boxCentre, boxCorners, colourOf, isPlaced, nearestTo, playersOf, stateAt } from "./geometry.js";
 import { drawElsewhere } from "./ghosts.js";
-import { Labels, drawScaleBar, labelLamps, pill } from "./labels.js";
+import { Labels, drawScaleBar, labelLamps, pill, pointTo } from "./labels.js";
 import { measured } from "./numbers.js";
 import { detectedBoxes, drawDetections } from "./senses.js";
 import { detectionAt, unpackLine, weatherAt } from "./unpack.js";
@@ -23,15 +24,12 @@ const LINES = { // colour, width [m], dashes [m]
   sign: ["hit", 0.3, []],
 };
 
-const TOO_SMALL = 2; // pixels per metre: below that a car is a few pixels
-const AROUND = 100; // m across, that are shown where the ego is kept in the middle
-
 export class Scene {
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.view = new View(canvas, changed);
     this.atmosphere = new Atmosphere();
-    this.layers = { motion: true, conflict: true, sensed: true, course: true, weather: true, elsewhere: true }; // the first cannot be hidden
+    this.layers = { players: true, motion: true, conflict: true, sensed: true, course: true, weather: true, elsewhere: true }; // the first cannot be hidden
   }
 
   show(kept) {
@@ -48,29 +46,14 @@ export class Scene {
       const state = { x, y: kept.y[e][k], h: kept.h[e][k] };
       return isPlaced(state) ? boxCentre(entity, state.x, state.y, state.h) : null;
     }));
-    this.fit();
-    if (this.view.scale < TOO_SMALL) this.follow();
-  }
-
-  fit() {
-    this.view.fit(playersOf(this.kept).flatMap((e) => this.centres[e]).filter(Boolean));
-  }
-
-  // Keeps the ego in the middle, near enough to see it well; off again when the view is dragged.
-  follow() {
-    this.view.follow = true;
-    this.view.fitted = false;
-    this.view.scale = Math.max(this.view.scale, Math.min(8, this.canvas.clientWidth / AROUND));
+    this.camera = new Camera(this.view, kept, this.centres);
   }
 
   draw(state) {
     const { context: c, width, height, ratio } = fitCanvas(this.canvas);
     this.size = { width, height };
     if (!width || !height) return; // not laid out yet
-    if (this.view.follow && isPlaced(state.entities[0])) {
-      const { x, y, h } = state.entities[0];
-      [this.view.x, this.view.y] = boxCentre(this.kept.entities[0], x, y, h);
-    }
+    this.camera.aim(state);
     const { x, y, scale } = this.view;
     c.fillStyle = palette.ground;
     c.fillRect(0, 0, width, height);
@@ -100,8 +83,8 @@ export class Scene {
     this.drawContacts(c, state);
     this.drawGap(c, state);
     const words = labelLamps(c, this.kept, state.index, this.view, this.size);
-    const boxes = this.layers.sensed ? detectedBoxes(this.kept, state, this.view) : [];
-    this.labels.draw(c, state, this.view, this.size, this.texts(state), [...words, ...boxes]);
+    const boxes = this.layers.sensed ? detectedBoxes(this.kept, state, this.view) : [], pointer = this.drawPointer(c, state);
+    this.labels.draw(c, state, this.view, this.size, this.texts(state), pointer ? [...words, ...boxes, pointer] : [...words, ...boxes], this.crosses);
     drawScaleBar(c, this.size, scale);
   }
 
@@ -111,8 +94,16 @@ export class Scene {
     return state.entities.map((s, e) => {
       if (!players.includes(e)) return null;
       const seen = this.layers.sensed && e > 0 ? detectionWords(detectionAt(this.kept, e, state.index)) : "";
-      return `${s.name}  ${measured(s.v, "m/s", 2)} m/s${seen && seen !== "seen" ? `  ${seen}` : ""}`;
+      const marked = seen && seen !== "seen" ? `  ${seen}` : "";
+      return [`${s.name}  ${measured(s.v, "m/s", 2)} m/s${marked}`, `${s.name}${marked}`];
     });
+  }
+
+  // Where the conflict's other participant is while it is out of sight.
+  drawPointer(c, state) {
+    const e = this.camera.partner, at = (k) => this.centres[k][state.index];
+    if (!e || !at(0) || !at(e)) return null;
+    return pointTo(c, this.size, this.view, this.kept.entities[e].name, at(0), at(e), colourOf(this.kept, e));
   }
 
   drawRoad(c, scale) {
@@ -197,10 +188,12 @@ export class Scene {
 
   // A cross where a contact began, from that instant on.
   drawContacts(c, state) {
+    this.crosses = [];
     for (const [k, gap] of this.hits) {
       if (k > state.index) continue;
       const [x, y] = this.view.toScreen([(gap.from[0] + gap.to[0]) / 2, (gap.from[1] + gap.to[1]) / 2]);
       const r = 8;
+      this.crosses.push([x - r, y - r, x + r, y + r]);
       c.lineCap = "round";
       for (const [colour, pixels] of [[palette.card, 5.5], [palette.hit, 3]]) {
         c.strokeStyle = colour;

@@ -4,7 +4,7 @@ import { palette } from "./colours.js";
 import { colourOf, playersOf } from "./geometry.js";
 import { detectionAt } from "./unpack.js";
 
-const ROW = 15;
+const ROW = 27; // a name above its bar
 const HEAD = 24;
 const MOST_ROWS = 4;
 
@@ -41,11 +41,11 @@ export class Strip {
     const x = (k) => left + ((right - left) * Math.min(k, last)) / last;
     this.drawKey(c);
     this.rows.forEach(({ e, name, spells }, i) => {
-      const y = top + ROW * i + ROW / 2;
-      c.textAlign = "right";
+      const y = top + ROW * i + 20;
+      c.textAlign = "left";
       c.textBaseline = "middle";
       c.fillStyle = palette.ink;
-      c.fillText(fitting(c, name, left - 8), left - 6, y);
+      c.fillText(name, left, y - 12, right - left);
       c.strokeStyle = palette.grid;
       c.lineWidth = 1;
       c.beginPath();
@@ -89,11 +89,4 @@ export class Strip {
       at += 27 + c.measureText(status).width + 16;
     }
   }
-}
-
-function fitting(c, text, width) {
-  if (c.measureText(text).width <= width) return text;
-  let end = text.length;
-  while (end > 1 && c.measureText(`${text.slice(0, end)}…`).width > width) end--;
-  return `${text.slice(0, end)}…`;
 }

@@ -22,11 +22,10 @@ function fillSummary() {
   $("title").textContent = s.title;
   $("facts").replaceChildren(...s.facts.map((fact) => element("li", {}, fact)));
   if (!s.finished && !data.live) $("facts").append(element("li", { class: "warn" }, "not finished"));
-  $("sentences").replaceChildren(...s.sentences.map((sentence) => element("p", {}, sentence)));
   $("description").textContent = s.description;
+  $("critical-means").textContent = `Critical means ${s.critical_rule}.`;
   $("description").hidden = !s.description;
-  fillTable($("figures"), s.table);
-  $("figures-note").textContent = s.note;
+  $("figures").replaceChildren(...s.table.map(([name, value]) => element("div", {}, element("span", { class: "name" }, name), element("b", {}, value))));
   fillImplausible();
   const failed = data.rows.n_failed;
   fillTable($("settings"), failed ? [...s.provenance, ["Failed evaluations", `${failed}, counted but not drawn`]] : s.provenance);

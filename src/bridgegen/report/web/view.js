@@ -24,8 +24,9 @@ export class View {
     this.changed = changed;
     this.x = this.y = 0;
     this.scale = 6;
-    this.fitted = true;
-    this.follow = false;
+    this.factor = 1; // the reader's own zoom, where the camera chooses the scale
+    /** @type {"conflict" | "all" | "ego" | null} what the camera shows; null once the reader has moved the view */
+    this.framing = "all";
     this.listen();
   }
 
@@ -34,19 +35,28 @@ export class View {
     return [width / 2 + (x - this.x) * this.scale, height / 2 - (y - this.y) * this.scale];
   }
 
-  // Shows all of the points, with half a car and some air around them.
-  fit(points) {
-    this.fitted = true;
-    this.follow = false;
-    const { clientWidth: width, clientHeight: height } = this.canvas, margin = 5;
+  // Shows all of the points with some air [m] around them, or their middle at the least scale.
+  fit(points, margin, [least, most] = [0.5, 24]) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!points.length || !width) return;
     const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
     const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const scale = Math.min(width / (x1 - x0 + 2 * margin), (height - ABOVE - BELOW) / (y1 - y0 + 2 * margin));
-    this.x = (x0 + x1) / 2;
-    this.y = (y0 + y1) / 2;
-    this.scale = Math.min(24, Math.max(0.5, scale));
-    this.y += (ABOVE - BELOW) / 2 / this.scale;
+    this.scale = this.factor * Math.min(most, Math.max(least, scale));
+    this.centre([(x0 + x1) / 2, (y0 + y1) / 2]);
+  }
+
+  // Shows a point in the middle of what the clock and the scale bar leave.
+  centre([x, y]) {
+    [this.x, this.y] = [x, y + (ABOVE - BELOW) / 2 / this.scale];
+  }
+
+  // Keeps a point within a share of the width and height about the middle.
+  keep([x, y], share) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const within = (at, middle, reach) => Math.min(at + reach, Math.max(at - reach, middle));
+    this.x = within(x, this.x, (share * width) / this.scale);
+    this.y = within(y, this.y, (share * height) / this.scale);
   }
 
   // Keeps the world's point at the pixel `at` in its place.
@@ -57,15 +67,16 @@ export class View {
     const shift = 1 / this.scale - 1 / scale;
     this.x += (px - width / 2) * shift;
     this.y += (height / 2 - py) * shift;
+    if (this.framing === "all") this.framing = null;
+    this.factor *= scale / this.scale;
     this.scale = scale;
-    this.fitted = false;
     this.changed();
   }
 
   move(dx, dy) {
     this.x -= dx / this.scale;
     this.y += dy / this.scale;
-    this.fitted = this.follow = false;
+    this.framing = null;
     this.changed();
   }
 

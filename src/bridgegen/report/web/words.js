@@ -30,7 +30,7 @@ export function stateWords(kept, state) {
   parts.push(`${ego.name} ${value(ego.v, "m/s", 1)}, acceleration ${value(state.a?.[0], "m/s²", 1)}`);
   const plans = intentionWords(kept, state);
   if (plans) parts.push(plans);
-  parts.push(`gap ${value(state.distance, "m", 2)}, time to collision ${value(state.ttc, "s", 1)}`);
+  parts.push(`distance ${value(state.distance, "m", 2)}, time to collision ${value(state.ttc, "s", 1)}`);
   for (const e of playersOf(kept)) {
     const s = state.entities[e];
     if (e === 0 || !isPlaced(s)) continue;

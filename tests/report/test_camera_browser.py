@@ -1,0 +1,124 @@
+"""What the playback frames: the conflict, the whole motion, or the ego; and where its words are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridgegen.report.playback import Entity
+
+pytestmark = pytest.mark.browser
+
+INSTANTS = range(0, 400, 8)
+
+
+def states(page, kept):
+    """Return what is drawn of a scenario at some instants."""
+    return page.evaluate(
+        "([kept, instants]) => { bridgegen.select(kept);"
+        " return instants.map((k) => { bridgegen.seek(k); return bridgegen.state(); }); }",
+        [kept, list(INSTANTS)],
+    )
+
+
+def size(page):
+    box = page.locator("#scene").bounding_box()
+    return box["width"], box["height"]
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_conflict_is_framed_and_a_car_is_well_seen(show, report, width):
+    opened = show(report, viewport={"width": width, "height": 720})
+    for kept in range(len(report.kept)):
+        for state in states(opened.page, kept):
+            assert 8.0 <= state["scale"] <= 20.0
+            (ax, ay), other = state["screen"][0], state["screen"][1]
+            wide, high = size(opened.page)
+            assert 0 < ax < wide
+            assert 0 < ay < high
+            apart = np.hypot(ax - other[0], ay - other[1]) / state["scale"]
+            if apart < 15.0:
+                assert 0 < other[0] < wide
+                assert 0 < other[1] < high
+    opened.page.close()
+
+
+def test_all_shows_the_whole_motion_at_one_scale(show, report):
+    opened = show(report)
+    opened.page.evaluate("bridgegen.select(0)")
+    opened.page.click("#zoom-all")
+    assert opened.page.get_attribute("#zoom-all", "aria-pressed") == "true"
+    wide, high = size(opened.page)
+    scales = set()
+    for k in INSTANTS:
+        opened.page.evaluate(f"bridgegen.seek({k})")
+        state = opened.state()
+        scales.add(state["scale"])
+        for x, y in filter(None, state["screen"]):
+            assert 0 < x < wide
+            assert 0 < y < high
+    assert len(scales) == 1
+    opened.page.close()
+
+
+def test_the_reader_s_zoom_stays_while_the_camera_moves(show, report):
+    opened = show(report)
+    opened.page.evaluate("bridgegen.select(0); bridgegen.seek(0)")
+    before = opened.state()["scale"]
+    opened.page.click("#zoom-in")
+    assert opened.state()["scale"] == pytest.approx(1.4 * before)
+    assert opened.page.get_attribute("#zoom-fit", "aria-pressed") == "true"
+    opened.page.click("#zoom-fit")
+    assert opened.state()["scale"] == pytest.approx(before)
+    opened.page.close()
+
+
+def test_labels_are_smaller_than_cars_and_leave_the_collision_free(show, report):
+    opened = show(report)
+    seen = 0
+    for kept, p in enumerate(report.kept):
+        for state in states(opened.page, kept):
+            body = p.entities[0].length * p.entities[0].width * state["scale"] ** 2
+            for x0, y0, x1, y1 in state["labels"]:
+                assert (x1 - x0) * (y1 - y0) <= max(body, 45 * 20)  # "ego" always fits
+                for a0, b0, a1, b1 in state["crosses"]:
+                    seen += 1
+                    wide, high = min(x1, a1) - max(x0, a0), min(y1, b1) - max(y0, b0)
+                    assert min(wide, high) <= 0
+    assert seen
+    opened.page.close()
+
+
+def test_the_legend_names_the_ego_and_all_that_move(show, report):
+    p = report.kept[0]
+    more = tuple(Entity(f"car_{n}", 4.8, 2.0, 1.4, "car") for n in range(4))
+    rows = {
+        name: np.vstack([getattr(p, name), np.tile(getattr(p, name)[1:2] + off, (4, 1))])
+        for name, off in (("x", 30.0), ("y", 5.0), ("h", 0.0), ("v", 1.0))
+    }
+    opened = show(replace(report, kept=(replace(p, entities=(*p.entities, *more), **rows),)))
+    names = opened.page.inner_text("#legend-players").split("\n")
+    assert names == [one.name for one in (*p.entities, *more)]
+    assert names[0] == "ego"
+    opened.page.close()
+
+
+def test_sections_fold_and_a_link_to_one_unfolds_it(show, report):
+    opened = show(report)
+    page = opened.page
+    page.click("#space > .fold")
+    assert page.is_hidden("#scatter")
+    assert page.get_attribute("#space > .fold", "aria-expanded") == "false"
+    drawn = page.evaluate("bridgegen.chartsDrawn")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.is_visible("#scatter")  # paper shows all
+    assert page.evaluate("bridgegen.chartsDrawn") > drawn
+    assert page.evaluate("bridgegen.scatter.box.right > 500")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.is_hidden("#scatter")
+    page.click("#contents button:has-text('Parameter space')")
+    assert page.is_visible("#scatter")
+    page.click("#space h2")
+    assert page.is_hidden("#scatter")
+    assert opened.complaints == []
+    page.close()
