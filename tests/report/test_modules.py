@@ -12,7 +12,7 @@ import pytest
 from bridgegen.report import page
 from bridgegen.report.modules import Module, ModuleError, bundle, in_order
 
-ENTRIES = (*page.SERVED, "show.js")
+ENTRIES = (*page.SERVED, "show.js", "runs.js")
 OURS = {
     file.name: Module(file.name, file.read_text("utf-8"))
     for file in page.WEB.iterdir()
@@ -124,6 +124,7 @@ KEYWORDS = {*re.findall(r"\w+", """
 CONTEXTUAL = {"as", "async", "from", "get", "of", "static"}
 """Those that may be names as well."""
 GLOBALS = {*re.findall(r"\w+", """
+  Date
     Array Blob Boolean CSS CustomEvent DecompressionStream Error Float64Array Infinity Int32Array
     IntersectionObserver JSON Map Math Number Object Path2D ResizeObserver Response Set
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout
@@ -296,11 +297,11 @@ def test_a_statement_declares_one_name(module):
 
 def test_every_module_of_ours_is_used():
     needed = {module.name for module in in_order(page.SERVED, page._text)}
-    needed |= {module.name for module in in_order(["show.js"], page._text)}
+    needed |= {module.name for module in in_order(["show.js", "runs.js"], page._text)}
     assert needed == {*OURS}
 
 
-@pytest.mark.parametrize("entries", [page.REPORT, page.SERVED, ("show.js",)], ids=str)
+@pytest.mark.parametrize("entries", [page.REPORT, page.SERVED, ("show.js",), ("runs.js",)], ids=str)
 def test_node_reads_what_is_joined(tmp_path, entries):
     node = shutil.which("node")
     if node is None:

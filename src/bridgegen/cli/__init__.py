@@ -4,7 +4,7 @@
 from bridgegen.cli import (
     demo,
     runs,
-    videos,
+    views,
     confirmations,
     comparisons,
     reproductions,
@@ -25,5 +25,5 @@ __all__ = [
     "main",
     "reproductions",
     "runs",
-    "videos",
+    "views",
 ]

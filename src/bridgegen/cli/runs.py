@@ -145,37 +145,6 @@ def resume(
 
 
 @app.command(rich_help_panel=RESULTS)
-@with_connection_options
-def view(
-    run: Annotated[Path, typer.Argument(help="The folder of a run, which may still grow.")],
-    port: Annotated[
-        int, typer.Option(help="TCP port of the local server.", show_default="any free one")
-    ] = 0,
-    browser: Annotated[bool, typer.Option(help="Open the page in your browser.")] = True,
-    evaluation: Annotated[
-        int | None, typer.Option(help="Show this evaluation's scenario, counted from 1.")
-    ] = None,
-    ego: common.OwnEgo = None,
-    connection: Connection = NO_CONNECTION,
-) -> None:
-    """Serve a run's report in the browser.
-
-    It updates while the search runs, and plays any scenario of the run.
-    """
-    from bridgegen.screen.view import serve
-    from bridgegen.view.run_view import RunView
-    from bridgegen.view.server import Server
-
-    site = RunView(
-        run,
-        ego=ego,
-        simulator=read_access(connection),
-    )
-    fragment = "" if evaluation is None else site.fragment(evaluation)
-    serve(Server(site, port), browser=browser, fragment=fragment)
-
-
-@app.command(rich_help_panel=RESULTS)
 def coverage(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     bins: Annotated[

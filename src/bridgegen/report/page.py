@@ -60,9 +60,14 @@ def write_page(path: Path, entry: str, title: str, data: str) -> None:
     Raises:
         StorageError: the file cannot be written.
     """
+    write_whole(path, page_of(entry, title, data))
+
+
+def page_of(entry: str, title: str, data: str) -> list[bytes]:
+    """Return a page in parts; see `write_page`."""
     script, style = _bundled((entry,))
     template = entry.replace(".js", ".html")
-    write_whole(path, filled(template, title, style, script=script, data=data.encode("ascii")))
+    return filled(template, title, style, script=script, data=data.encode("ascii"))
 
 
 def write_still_page(path: Path, template: str, title: str, body: bytes) -> None:
@@ -77,8 +82,13 @@ def write_still_page(path: Path, template: str, title: str, body: bytes) -> None
     Raises:
         StorageError: the file cannot be written.
     """
+    write_whole(path, still_page(template, title, body))
+
+
+def still_page(template: str, title: str, body: bytes) -> list[bytes]:
+    """Return a page without scripts, in parts; see `write_still_page`."""
     style = _own("common.css") + b"\n" + _own(template.replace(".html", ".css"))
-    write_whole(path, filled(template, title, style, body=body))
+    return filled(template, title, style, body=body)
 
 
 def filled(template: str, title: str, css: bytes, **more: bytes) -> list[bytes]:

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from bridgegen.errors import BridgeGenError, InputError
@@ -29,14 +29,14 @@ LOOPBACK = "127.0.0.1"
 MAX_PORT = 65_535
 
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
-    "img-src data: blob:; font-src data:; connect-src 'self'; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'"
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; font-src data:; connect-src 'self'; frame-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
 HEADERS = {
     "Content-Security-Policy": POLICY,
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
+    "X-Frame-Options": "SAMEORIGIN",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -67,6 +67,20 @@ class Site(Protocol):
         """Return an exported file by its path in the run's folder; None if there is none."""
 
 
+@runtime_checkable
+class Sites(Protocol):
+    """Several sites, and a page that leads to them."""
+
+    def page(self) -> bytes:
+        """Return the page that leads to all, as HTML."""
+
+    def run(self, number: int) -> Site | None:
+        """Return a site; None if there is none of that number."""
+
+    def pair(self, first: int, second: int) -> bytes | None:
+        """Return a page of two of them, as HTML; None if one does not exist."""
+
+
 @dataclass(frozen=True)
 class Answer:
     """What a request is answered with."""
@@ -76,7 +90,7 @@ class Answer:
     body: bytes
 
 
-def answer(site: Site, target: str) -> Answer:
+def answer(site: Site | Sites, target: str) -> Answer:
     """Return the answer to a GET request for a path with its query.
 
     An error is the answer, in the words of the command line.
@@ -87,13 +101,37 @@ def answer(site: Site, target: str) -> Answer:
         return _json({"error": list(error.problems)}, HTTPStatus.INTERNAL_SERVER_ERROR)
 
 
-def _answer(site: Site, target: str) -> Answer:
+def _answer(site: Site | Sites, target: str) -> Answer:
     try:
         split = urlsplit(target)
         path = unquote(split.path, errors="strict")
         query = parse_qs(split.query, max_num_fields=4)
     except ValueError:
         return _nothing()
+    if isinstance(site, Sites):
+        return _of_sites(site, path, query)
+    return _of_site(site, path, query)
+
+
+def _of_sites(sites: Sites, path: str, query: Mapping[str, list[str]]) -> Answer:
+    if path == "/":
+        return Answer(HTTPStatus.OK, TYPES["html"], sites.page())
+    if path == "/pair":
+        first, second = (_number(query.get(name, [""])[0]) for name in ("first", "second"))
+        page = None if first is None or second is None else sites.pair(first, second)
+        return _nothing() if page is None else Answer(HTTPStatus.OK, TYPES["html"], page)
+    kind, _, rest = path.removeprefix("/").partition("/")
+    name, slash, rest = rest.partition("/")
+    number = _number(name) if kind == "run" and slash else None
+    try:
+        site = None if number is None else sites.run(number)
+    except BridgeGenError as error:  # a person reads it
+        text = "\n".join(error.problems).encode()
+        return Answer(HTTPStatus.INTERNAL_SERVER_ERROR, "text/plain; charset=utf-8", text)
+    return _nothing() if site is None else _of_site(site, f"/{rest}", query)
+
+
+def _of_site(site: Site, path: str, query: Mapping[str, list[str]]) -> Answer:
     if path == "/":
         return Answer(HTTPStatus.OK, TYPES["html"], site.page())
     if path == "/news":
@@ -196,7 +234,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
 
-    def __init__(self, site: Site, port: int = 0) -> None:
+    def __init__(self, site: Site | Sites, port: int = 0) -> None:
         self.site, self.token, self.turn = site, secrets.token_urlsafe(24), threading.Lock()
         if not 0 <= port <= MAX_PORT:
             raise InputError(f"0 <= port <= {MAX_PORT} must hold, got {port}")

@@ -1,0 +1,111 @@
+// The list of the runs in a folder: sorted and filtered; two are chosen for a look side by side.
+
+import { $, NARROW, element } from "./common.js";
+
+const page = JSON.parse($("data").textContent);
+const runs = page.runs;
+const UNITS = ["B", "kB", "MB", "GB"];
+
+const plain = (n) => (n === null ? "–" : n.toLocaleString("en-GB"));
+const perCent = (share) => `${(100 * share).toPrecision(2)}${NARROW}%`;
+
+function sizeText(bytes) {
+  const power = Math.min(UNITS.length - 1, bytes > 0 ? Math.floor(Math.log10(bytes) / 3) : 0);
+  const value = bytes / 1000 ** power;
+  return `${power && value < 10 ? value.toFixed(1) : Math.round(value)}${NARROW}${UNITS[power]}`;
+}
+
+function nameCell(run) {
+  const small = run.problem ? element("small", { class: "problem" }, run.problem) : run.finished ? "" : element("small", {}, `not finished: ${plain(run.evaluations)} of ${plain(run.budget)}`);
+  return [run.problem ? run.path : element("a", { href: `run/${run.number}/` }, run.path), small];
+}
+
+const shareCell = ({ share, low, high }) => (share === null ? ["–"] : [perCent(share), element("small", {}, `${perCent(low)} to ${perCent(high)}`)]);
+const modesCell = ({ modes, worst, finished, problem }) => [worst || (finished && !problem ? "no failure found" : ""), modes > 1 ? element("small", {}, `the worst of ${plain(modes)} ways`) : ""];
+
+/** @type {[string, (run: any) => any, (run: any) => any[], string][]} title, what it is sorted by, its cell, its class */
+const COLUMNS = [
+  ["run", ({ path }) => path, nameCell, "words"],
+  ["scenario", ({ scenario }) => scenario, ({ scenario }) => [scenario], ""],
+  ["driver", ({ ego }) => ego, ({ ego }) => [ego], ""],
+  ["algorithm", ({ algorithm }) => algorithm, ({ algorithm, seed, problem }) => [algorithm, problem ? "" : element("small", {}, `seed ${seed}`)], ""],
+  ["evaluations", ({ evaluations }) => evaluations, ({ evaluations, problem }) => [problem ? "" : plain(evaluations)], "number"],
+  ["failures", ({ failures }) => failures ?? -1, ({ failures, problem }) => [problem ? "" : plain(failures)], "number"],
+  ["of the space", ({ share }) => share ?? -1, shareCell, "number"],
+  ["worst failure", ({ modes }) => modes, modesCell, "words"],
+  ["changed", ({ changed }) => changed, ({ changed }) => [new Date(1000 * changed).toLocaleString("sv-SE").slice(0, 16)], "number"],
+  ["size", ({ size }) => size, ({ size }) => [sizeText(size)], "number"],
+];
+
+class Runs {
+  constructor() {
+    this.column = 8;
+    this.down = true;
+    this.chosen = [];
+    $("folder").textContent = page.folder;
+    for (const name of ["scenario", "ego"]) {
+      const values = [...new Set(runs.map((run) => run[name]).filter(Boolean))].sort();
+      $(name).append(...values.map((value) => element("option", { value }, value)));
+    }
+    for (const id of ["text", "scenario", "ego", "failing"]) $(id).addEventListener("input", () => this.fill());
+    this.head();
+    this.fill();
+  }
+
+  head() {
+    const cells = COLUMNS.map(([title, , , kind], i) => {
+      const button = element("button", { type: "button" }, title);
+      button.addEventListener("click", () => {
+        this.down = this.column === i ? !this.down : i > 3;
+        this.column = i;
+        this.fill();
+      });
+      return element("th", { scope: "col", class: kind }, button);
+    });
+    this.heads = cells;
+    $("runs").tHead.replaceChildren(element("tr", {}, element("th", {}, element("span", { class: "hidden" }, "choose")), ...cells));
+  }
+
+  get shown() {
+    const text = $("text").value.toLowerCase(), [, key] = COLUMNS[this.column];
+    const chosen = runs.filter((run) => (!$("scenario").value || run.scenario === $("scenario").value)
+      && (!$("ego").value || run.ego === $("ego").value) && (!$("failing").checked || run.modes > 0)
+      && [run.path, run.scenario, run.ego, run.algorithm, run.worst].some((one) => one.toLowerCase().includes(text)));
+    const order = (a, b) => (key(a) < key(b) ? -1 : key(a) > key(b) ? 1 : a.number - b.number);
+    return chosen.sort((a, b) => (this.down ? -order(a, b) : order(a, b)));
+  }
+
+  fill() {
+    const { shown } = this;
+    this.heads.forEach((head, i) => {
+      if (i === this.column) head.setAttribute("aria-sort", this.down ? "descending" : "ascending");
+      else head.removeAttribute("aria-sort");
+    });
+    $("shown").textContent = `${plain(shown.length)} of ${plain(runs.length)} runs`;
+    $("runs").tBodies[0].replaceChildren(...shown.map((run) => this.row(run)));
+  }
+
+  row(run) {
+    const box = element("input", { type: "checkbox", "aria-label": `Choose ${run.path}` });
+    box.checked = this.chosen.includes(run.number);
+    const row = element("tr", {}, element("td", {}, box), ...COLUMNS.map(([, , cell, kind]) => element("td", { class: kind }, ...cell(run))));
+    row.classList.toggle("chosen", box.checked);
+    box.addEventListener("change", () => {
+      this.chosen = box.checked ? [...this.chosen, run.number].slice(-2) : this.chosen.filter((one) => one !== run.number);
+      this.offer();
+      this.fill();
+    });
+    return row;
+  }
+
+  offer() {
+    const link = $("compare"), [a, b] = this.chosen;
+    const ready = b !== undefined;
+    link.setAttribute("aria-disabled", `${!ready}`);
+    if (ready) link.setAttribute("href", `pair?first=${a}&second=${b}`);
+    else link.removeAttribute("href");
+    link.textContent = ready ? "Show the two side by side" : "Choose two runs to see them side by side";
+  }
+}
+
+new Runs();

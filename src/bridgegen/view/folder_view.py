@@ -1,0 +1,153 @@
+"""A folder of runs as a site: a page that lists them, each run's report, two runs side by side."""
+
+import html
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from bridgegen.errors import StorageError
+from bridgegen.report.page import page_of, still_page
+from bridgegen.report.payload import script_json
+from bridgegen.report.sentences import NARROW, share
+from bridgegen.triage.record import Mode
+from bridgegen.view.overview import RunLine, find_runs, read_line
+from bridgegen.view.run_view import RunView
+
+
+class FolderView:
+    """The runs below a folder, read only; other processes may be extending them.
+
+    Args:
+        folder: of the runs, at any depth.
+
+    Raises:
+        StorageError: it contains no run.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder).resolve()
+        self._runs: list[Path] = []  # by number
+        self._views: dict[int, RunView] = {}
+        self._find()
+        if not self._runs:
+            raise StorageError(f"{folder}: contains no run, nor does any folder below it")
+
+    def _find(self) -> None:
+        known = set(self._runs)  # a run keeps its number
+        self._runs += [one for one in find_runs(self.folder) if one not in known]
+
+    def page(self) -> bytes:
+        """Return the list of all runs, as HTML."""
+        self._find()
+        lines = [_facts(k, read_line(self.folder, one)) for k, one in enumerate(self._runs)]
+        data = script_json({"folder": str(self.folder), "runs": lines})
+        return b"".join(page_of("runs.js", f"{self.folder.name}: runs – BridgeGen", data))
+
+    def run(self, number: int) -> RunView | None:
+        """Return the site of a run by its number; None if there is none.
+
+        Raises:
+            BridgeGenError: it cannot be shown.
+        """
+        if number >= len(self._runs):
+            return None
+        if number not in self._views:
+            self._views[number] = RunView(self._runs[number])
+        return self._views[number]
+
+    def pair(self, first: int, second: int) -> bytes | None:
+        """Return two runs side by side, as HTML; None if one does not exist."""
+        if max(first, second) >= len(self._runs):
+            return None
+        a, b = (read_line(self.folder, self._runs[k]) for k in (first, second))
+        body = "\n".join(_pair((first, a), (second, b))).encode("utf-8", "replace")
+        return b"".join(still_page("pair.html", f"{a.path} and {b.path} – BridgeGen", body))
+
+
+def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
+    bound = line.triage.bound if line.triage else None
+    worst = max(line.modes, key=lambda one: (not one.knife_edge, one.harm), default=None)
+    return {
+        "number": number, "path": line.path, "problem": line.problem, "changed": line.changed,
+        "size": line.size, "scenario": line.scenario, "ego": line.ego,
+        "algorithm": line.algorithm, "seed": line.seed, "evaluations": line.evaluations,
+        "budget": line.budget, "finished": line.finished,
+        "modes": len(line.modes) + (line.triage.unrecorded_modes if line.triage else 0),
+        "worst": worst.title if worst else "",
+        "failures": bound.harmful if bound else None,
+        "share": bound.space.share if bound else None,
+        "low": bound.space.low if bound else None,
+        "high": bound.space.high if bound else None,
+    }  # fmt: skip
+
+
+def _pair(*runs: tuple[int, RunLine]) -> Iterator[str]:
+    (first, a), (second, b) = runs
+    yield '<p><a href="./">All runs</a></p>'
+    yield "<h1>Two runs side by side</h1>"
+    yield '<div class="card wide"><table class="pair"><thead><tr><th></th>'
+    yield "".join(f'<th scope="col">{_text(line.path)}</th>' for _, line in runs)
+    yield "</tr></thead><tbody>"
+    for name, of in _FIGURES.items():
+        cells = [of(line) for _, line in runs]
+        mark = ' class="differs"' if cells[0] != cells[1] else ""
+        yield f'<tr{mark}><th scope="row">{name}</th>'
+        yield "".join(f"<td>{_text(cell)}</td>" for cell in cells) + "</tr>"
+    yield "</tbody></table></div>"
+    for title, modes in _matched(a, b):
+        if modes:
+            items = "".join(f"<li>{_text(one)}</li>" for one in modes)
+            yield f'<section class="card"><h2>{title}</h2><ul>{items}</ul></section>'
+    yield '<div class="frames">'
+    for number, line in ((first, a), (second, b)):
+        if line.problem:
+            yield f'<p class="card">{_text(line.problem)}</p>'
+        else:
+            yield f'<iframe src="run/{number}/" title="{_text(line.path)}"></iframe>'
+    yield "</div>"
+
+
+def _share(line: RunLine) -> str:
+    space = line.triage.bound.space if line.triage else None
+    if space is None or space.share is None:
+        return "–"
+    return f"{share(space.share)} (95{NARROW}%: {share(space.low)} to {share(space.high)})"
+
+
+_FIGURES: dict[str, Callable[[RunLine], str]] = {
+    "scenario": lambda one: one.scenario,
+    "driver": lambda one: one.ego,
+    "algorithm": lambda one: f"{one.algorithm}, seed {one.seed}",
+    "evaluations": lambda one: f"{one.evaluations:,}" + ("" if one.finished else ", not finished"),
+    "failures": lambda one: f"{one.triage.bound.harmful:,}" if one.triage else "–",
+    "failure modes": lambda one: f"{len(one.modes):,}" if one.triage else "–",
+    "harmful share of the space": _share,
+    "worst severity (MAIS3+)": lambda one: (
+        share(max((mode.severity for mode in one.modes), default=0.0)) if one.triage else "–"
+    ),
+}
+
+
+def _matched(a: RunLine, b: RunLine) -> Iterator[tuple[str, list[str]]]:
+    """Yield the failure modes of both runs, and of each alone, in words."""
+    ours, theirs = ({_key(one): one for one in line.modes} for line in (a, b))
+    both = [key for key in ours if key in theirs]
+    yield (
+        "Failure modes of both",
+        [
+            f"{ours[k].title}: {ours[k].count:,} and {theirs[k].count:,} evaluations"
+            for k in both
+        ],
+    )  # fmt: skip
+    for line, own, other in ((a, ours, theirs), (b, theirs, ours)):
+        alone = [one for key, one in own.items() if key not in other]
+        words = [f"{one.title}: {one.count:,} evaluations" for one in alone]
+        yield f"Only in {_text(line.path)}", words
+
+
+def _key(mode: Mode) -> tuple[str, ...]:
+    return mode.conflict, mode.conflict_type, mode.responsible, mode.rule, mode.partner
+
+
+def _text(text: str) -> str:
+    return html.escape(text)
