@@ -100,7 +100,8 @@ def browser() -> Iterator[Any]:
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(sync_api.Page, "wait_for_function", wait_for)
+            for kind in (sync_api.Page, sync_api.Frame):
+                patched.setattr(kind, "wait_for_function", wait_for)
             yield browser
         browser.close()
 

@@ -188,6 +188,8 @@ def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, run
     for k in (0, 1):
         page.locator("#runs tbody input").nth(k).check()
     page.click("#compare")
+    page.wait_for_function("document.querySelectorAll('iframe').length === 2")
+    page.wait_for_load_state()
     for frame in page.frames[1:]:
         frame.wait_for_function("window.bridgegen?.state()?.playing")
     assert len(page.frames) == 3
