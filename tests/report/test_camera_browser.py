@@ -1,9 +1,15 @@
 """What the playback frames: the conflict, the whole motion, or the ego; and where its words are."""
 
+import io
+import json
+import shutil
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bridgegen.report.playback import Entity
 
@@ -122,3 +128,49 @@ def test_sections_fold_and_a_link_to_one_unfolds_it(show, report):
     assert page.is_hidden("#scatter")
     assert opened.complaints == []
     page.close()
+
+
+def saved(page, kind):
+    with page.expect_download(timeout=60_000) as download:
+        page.select_option("#save", kind)
+    found = download.value
+    return found.suggested_filename, Path(found.path()).read_bytes()
+
+
+def test_a_moment_is_saved_as_a_picture(show, report):
+    opened = show(report)
+    opened.page.evaluate("bridgegen.select(0); bridgegen.seek(100)")
+    name, data = saved(opened.page, "picture")
+    assert name == "0001-5.00s.png"
+    with Image.open(io.BytesIO(data)) as picture:
+        assert picture.size == tuple(int(v) for v in size(opened.page))
+        seen = picture.convert("RGB").getpixel(tuple(round(v) for v in opened.state()["screen"][0]))
+    assert seen == (0x00, 0x63, 0xB0)  # the ego's colour
+    assert opened.complaints == []
+    opened.page.close()
+
+
+@pytest.mark.skipif(shutil.which("ffprobe") is None, reason="ffprobe is not installed")
+def test_the_whole_is_saved_as_a_film(show, report, tmp_path):
+    opened = show(report)
+    opened.page.evaluate("bridgegen.select(0)")
+    opened.page.select_option("#speed", "4")
+    name, data = saved(opened.page, "film")
+    assert name == "0001.webm"
+    (tmp_path / name).write_bytes(data)
+    asked = [
+        "ffprobe",
+        "-v",
+        "error",
+        "-count_frames",
+        "-show_entries",
+        "stream=width,nb_read_frames",
+    ]
+    told = subprocess.run(
+        [*asked, "-of", "json", tmp_path / name], capture_output=True, check=True
+    )  # fmt: skip
+    (stream,) = json.loads(told.stdout)["streams"]
+    assert stream["width"] == size(opened.page)[0]
+    assert int(stream["nb_read_frames"]) > 20
+    assert not opened.state()["playing"]
+    opened.page.close()

@@ -1,12 +1,17 @@
 """Films of a playback: what Pillow reads of them, and where the ego's colour is in them."""
 
+import shutil
+import subprocess
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from lxml import etree
 from PIL import Image, ImageColor
 
 from bridgegen.errors import InputError, StorageError
+from bridgegen.report import ffmpeg
 from bridgegen.report.frames import FINE, PLAYERS, Film, _overlap
 from bridgegen.report.video import write_video
 
@@ -106,3 +111,80 @@ def test_another_file_is_not_overwritten(playback, tmp_path):
 def test_another_format_is_refused(playback, tmp_path):
     with pytest.raises(InputError, match=r"must end in \.gif"):
         write_video(playback, tmp_path / "a.avi")
+
+
+def tags(picture):
+    return Counter(one.tag.rpartition("}")[2] for one in etree.fromstring(picture).iter())
+
+
+def test_one_moment_as_svg_has_the_bodies_where_they_are(playback, tmp_path):
+    out = tmp_path / "moment.svg"
+    write_video(playback, out, size=(640, 360), start=3.0)
+    root = etree.fromstring(out.read_bytes())
+    assert (root.get("width"), root.get("height")) == ("640", "360")
+    (ego,) = [one for one in root if one.get("fill") == PLAYERS[0] and one.tag.endswith("polygon")]
+    corners = np.array([[float(v) for v in pair.split(",")] for pair in ego.get("points").split()])
+    long, wide = np.hypot(*(corners[1:3] - corners[:2]).T)
+    body = playback.entities[0]
+    assert long / wide == pytest.approx(body.length / body.width, rel=0.02)
+    words = [one.text for one in root if one.tag.endswith("text")]
+    assert any(word.startswith("ego  ") for word in words)
+    assert "3.0 s" in words
+    assert out.stat().st_size < 100_000
+
+
+def test_svg_and_png_show_the_same(playback):
+    """Every kind of element that pixels have; the text of a hostile name is text."""
+    named = replace(playback.entities[1], name="<b>&amp;</b>")
+    film = Film(replace(playback, entities=(playback.entities[0], named)), (640, 360), 0, 60)
+    found = tags(film.drawing(60).encode())
+    assert found["polygon"] > 5
+    assert found["polyline"] > 3
+    assert found["circle"] > 1
+    assert found["b"] == 0
+
+
+@pytest.mark.parametrize("kind", [".mp4", ".webm"])
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_a_film_that_ffmpeg_reads_again(playback, tmp_path, kind):
+    out = tmp_path / f"a{kind}"
+    write_video(playback, out, size=(321, 180), fps=10, start=2.0, end=4.0)
+    again = subprocess.run(
+        ["ffmpeg", "-v", "error", "-i", out, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+        capture_output=True, check=True,
+    )  # fmt: skip
+    frames = np.frombuffer(again.stdout, np.uint8).reshape(-1, 180, 322, 3)
+    assert len(frames) == 21
+    film = Film(playback, (321, 180), 40, 80)
+    first = np.asarray(film.frame(40), dtype=int)
+    assert np.abs(frames[0][:, :321] - first).mean() < 6.0
+    write_video(playback, out, size=(320, 180), fps=10, start=2.0, end=3.0)  # ours: replaced
+
+
+def test_without_ffmpeg_one_error_names_it(playback, tmp_path, monkeypatch):
+    monkeypatch.setattr(ffmpeg.shutil, "which", lambda name: None)
+    monkeypatch.setattr(ffmpeg, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match="need the program ffmpeg: install it"):
+        write_video(playback, tmp_path / "a.mp4")
+
+
+def test_an_ffmpeg_that_fails_is_one_error_and_leaves_nothing(playback, tmp_path, monkeypatch):
+    failing = tmp_path / "bin" / "ffmpeg"
+    failing.parent.mkdir()
+    failing.write_text("#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n")
+    failing.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{failing.parent}:/usr/bin:/bin")
+    with pytest.raises(StorageError, match="could not write the mp4 film: Unknown encoder"):
+        write_video(playback, tmp_path / "a.mp4", size=(320, 180), start=1.0, end=2.0)
+    assert not (tmp_path / "a.mp4").exists()
+
+
+def test_an_ffmpeg_that_hangs_is_ended(playback, tmp_path, monkeypatch):
+    hanging = tmp_path / "bin" / "ffmpeg"
+    hanging.parent.mkdir()
+    hanging.write_text("#!/bin/sh\nexec sleep 100\n")
+    hanging.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{hanging.parent}:/usr/bin:/bin")
+    monkeypatch.setattr(ffmpeg, "TIMEOUT", 0.5)
+    with pytest.raises(StorageError, match="could not write the webm film"):
+        write_video(playback, tmp_path / "a.webm", size=(320, 180), start=1.0, end=2.0)

@@ -1,4 +1,4 @@
-"""A scenario of a run as a film."""
+"""A scenario of a run, or of a file, as a film."""
 
 from pathlib import Path
 
@@ -6,15 +6,19 @@ import numpy as np
 
 from bridgegen.campaign.restored import pipeline_of
 from bridgegen.campaign.run import Run
+from bridgegen.campaign.scenarios import STORYBOARD, load
 from bridgegen.errors import InputError
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
-from bridgegen.report.playbacks import playbacks
+from bridgegen.report.playback import Playback
+from bridgegen.report.playbacks import nominal_playback, playbacks
 from bridgegen.report.video import check_look, refuse_path, write_video
 from bridgegen.store import Recorded, Store
 
 
 def film(
-    folder: Path,
+    source: Path,
     out: Path | None = None,
     *,
     evaluation: int | None = None,
@@ -24,25 +28,48 @@ def film(
     end: float | None = None,
     ego: str | None = None,
 ) -> Path:
-    """Write a scenario of a run as a film; return the file.
+    """Write a scenario as a film; return the file.
 
     Args:
-        folder: of the run.
+        source: folder of a run, or an OpenSCENARIO file.
         out: the file; by default a GIF with the run's and the scenario's name, here.
-        evaluation: which, from 1; the worst exported scenario by default.
+        evaluation: which of a run, from 1; the worst exported scenario by default.
         size: of the picture, width and height [pixels].
         fps: frames per second.
         start: of the film [s]; see `write_video`.
         end: likewise.
-        ego: where a driver of the user's drives, that same driver.
+        ego: of a run where a driver of the user's drives, that same driver; of a file any one.
 
     Raises:
         InputError: no such evaluation, it failed, none was exported, or a value out of bounds.
         StorageError: not a run, or the file cannot be written.
+        FileFormatError: not a scenario file, or one that cannot be simulated.
     """
     check_look(size, fps)
     if out is not None:
         refuse_path(out)
+    if source.suffix.lower() == STORYBOARD:
+        if evaluation is not None:
+            raise InputError(f"{source}: is one scenario: --evaluation is for a run")
+        out = out or Path(f"{source.stem}.gif")
+        refuse_path(out)
+        one = _of_file(source, ego)
+    else:
+        one, out = _of_run(source, out, evaluation, ego)
+    write_video(one, out, size=size, fps=fps, start=start, end=end)
+    return out
+
+
+def _of_file(path: Path, ego: str | None) -> Playback:
+    scenario = load(path)
+    options = PipelineOptions(ego=ego, causes=False)
+    return nominal_playback(Pipeline(scenario, scenario.space(), options), path.stem)
+
+
+def _of_run(
+    folder: Path, out: Path | None, evaluation: int | None, ego: str | None
+) -> tuple[Playback, Path]:
+    """Return a scenario of a run, and the file to write."""
     run = Run(folder)
     with Store.open(run.folder) as store:
         rows = Recorded(store, whole=WHOLE)
@@ -62,8 +89,7 @@ def film(
         refuse_path(out)
         pipeline = pipeline_of(run, "video", ego=ego)
         (one,) = playbacks(pipeline, rows, [(name, evaluation - 1, ())], brief=True)
-    write_video(one, out, size=size, fps=fps, start=start, end=end)
-    return out
+    return one, out
 
 
 def _nothing(folder: Path, names: tuple[str, ...], rows: Recorded) -> str:

@@ -62,11 +62,11 @@ def view(
 
 @app.command(rich_help_panel=RESULTS)
 def video(
-    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    run: Annotated[Path, typer.Argument(help="The folder of a run, or an OpenSCENARIO file.")],
     out: Annotated[
         Path | None,
         typer.Option(
-            help="The file: .gif, .webp, or .png for one picture.",
+            help="The file: .gif, .webp, .mp4, .webm; or .png or .svg for one picture.",
             show_default="RUN-SCENARIO.gif in this folder",
         ),
     ] = None,
@@ -85,7 +85,7 @@ def video(
     ] = None,
     ego: options.OwnEgo = None,
 ) -> None:
-    """Film a scenario of a run as GIF or WebP.
+    """Film a scenario as GIF, WebP, MP4 or WebM.
 
     The view is the report's. It frames the ego and the participant that it meets.
     """

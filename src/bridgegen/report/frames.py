@@ -14,6 +14,7 @@ from bridgegen.arrays import Float
 from bridgegen.metrics.d_min import first_closest
 from bridgegen.participants import drawing_of
 from bridgegen.report.playback import AREA_KINDS, Playback
+from bridgegen.report.svg import SvgDraw
 from bridgegen.weather import in_words
 
 FINE = 2
@@ -37,6 +38,9 @@ _MOVES = 0.05  # m/s
 _SCALE = (18.0, 30.0)  # pixels per metre of a picture 960 pixels wide; below, the camera follows
 _MARGIN = 7.0  # m around the paths
 _FLAG = 1.0  # s, for which a contact is announced
+
+Draw = ImageDraw.ImageDraw | SvgDraw
+"""What a picture is drawn with: pixels, or SVG elements."""
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -154,9 +158,21 @@ class Film:
         """Return the picture of an instant."""
         camera = self._camera(k)
         if self._ground is None or self._ground[0] != camera:
-            self._ground = camera, self._road(camera)
+            ground = Image.new("RGB", self._big, GROUND)
+            self._draw_road(ImageDraw.Draw(ground), camera)
+            self._ground = camera, ground
         image = self._ground[1].copy()
-        draw = ImageDraw.Draw(image)
+        self._draw_instant(ImageDraw.Draw(image), camera, k)
+        return image.reduce(FINE)
+
+    def drawing(self, k: int) -> str:
+        """Return the picture of an instant as SVG."""
+        camera, draw = self._camera(k), SvgDraw(self._big, GROUND)
+        self._draw_road(draw, camera)
+        self._draw_instant(draw, camera, k)
+        return draw.svg(self.size)
+
+    def _draw_instant(self, draw: Draw, camera: _Camera, k: int) -> None:
         self._draw_lamps(draw, camera, k)
         for e in self._players:
             self._draw_trail(draw, camera, e, k)
@@ -164,11 +180,8 @@ class Film:
             self._draw_body(draw, camera, e, k)
         taken = self._draw_contact(draw, camera, k) + self._draw_clock(draw, k)
         self._draw_labels(draw, camera, k, taken)
-        return image.reduce(FINE)
 
-    def _road(self, camera: _Camera) -> Image.Image:
-        image = Image.new("RGB", self._big, GROUND)
-        draw = ImageDraw.Draw(image)
+    def _draw_road(self, draw: Draw, camera: _Camera) -> None:
         for one in self.playback.lanes:
             if one.kind in AREA_KINDS:
                 draw.polygon(camera.of(one.points), fill=_AREAS[one.kind])
@@ -177,9 +190,8 @@ class Film:
             width = max(round(metres * camera.scale), FINE)
             for part in _dashes(one.points, dash):
                 draw.line(camera.of(part), fill=colour, width=width, joint="curve")
-        return image
 
-    def _draw_lamps(self, draw: ImageDraw.ImageDraw, camera: _Camera, k: int) -> None:
+    def _draw_lamps(self, draw: Draw, camera: _Camera, k: int) -> None:
         for lamp in self.playback.lamps:
             r = max(0.45, 3.2 * self._unit / camera.scale)
             along = np.array([math.cos(lamp.h), math.sin(lamp.h)])
@@ -194,7 +206,7 @@ class Film:
                 draw.circle((u, v), 0.85 * r * camera.scale,
                             fill=colour if place in lit else "#3a434e")  # fmt: skip
 
-    def _draw_trail(self, draw: ImageDraw.ImageDraw, camera: _Camera, e: int, k: int) -> None:
+    def _draw_trail(self, draw: Draw, camera: _Camera, e: int, k: int) -> None:
         points = self.centres[e, : k + 1]
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) > 1:
@@ -216,7 +228,7 @@ class Film:
         a, b = (self.centres[e, k] + end * along for end in ends)
         return np.array([a - aside, b - aside, b + aside, a + aside])
 
-    def _draw_body(self, draw: ImageDraw.ImageDraw, camera: _Camera, e: int, k: int) -> None:
+    def _draw_body(self, draw: Draw, camera: _Camera, e: int, k: int) -> None:
         if not np.isfinite(self.centres[e, k]).all():
             return
         body = self.playback.entities[e]
@@ -234,7 +246,7 @@ class Film:
             for ends in ((0.24, 0.54), (-0.72, -0.56)):
                 draw.polygon(camera.of(self._corners(e, k, ends, 0.72)), fill=INK)
 
-    def _draw_contact(self, draw: ImageDraw.ImageDraw, camera: _Camera, k: int) -> list[Box]:
+    def _draw_contact(self, draw: Draw, camera: _Camera, k: int) -> list[Box]:
         where = self._contact
         if where is None or where[0] > k:
             return []
@@ -245,12 +257,12 @@ class Film:
                 draw.line(ends, fill=colour, width=round(width * self._unit))
         return [(u - 2 * r, v - 2 * r, u + 2 * r, v + 2 * r)]
 
-    def _draw_clock(self, draw: ImageDraw.ImageDraw, k: int) -> list[Box]:
+    def _draw_clock(self, draw: Draw, k: int) -> list[Box]:
         p, u = self.playback, self._unit
         words = [f"{k * p.time_step:.1f} s"]
         hit = self._contact
         if hit is not None and 0 <= (k - hit[0]) * p.time_step <= _FLAG:
-            words.append("contact")
+            words.append("collision")
         boxes = [self._pill(draw, "   ".join(words), (10 * u, 10 * u),
                             HIT if len(words) > 1 else INK)]  # fmt: skip
         now = [one for one in p.weather if one.step <= k]
@@ -265,7 +277,7 @@ class Film:
         draw.text((x - long / 2, y - 4 * u), f"{metres} m", INK, self._font, anchor="mb")
         return [*boxes, (x - long, y - 20 * u, x, y)]
 
-    def _pill(self, draw: ImageDraw.ImageDraw, text: str, at: Point, edge: str) -> Box:
+    def _pill(self, draw: Draw, text: str, at: Point, edge: str) -> Box:
         w, h, u = self._wide(text), 22 * self._unit, self._unit
         box = (at[0], at[1], at[0] + w, at[1] + h)
         draw.rounded_rectangle(box, 10 * u, PAPER, edge, round(1.5 * u))
@@ -275,7 +287,7 @@ class Film:
     def _wide(self, text: str) -> float:
         return float(self._font.getlength(text)) + 12 * self._unit
 
-    def _draw_labels(self, draw: ImageDraw.ImageDraw, camera: _Camera, k: int,
+    def _draw_labels(self, draw: Draw, camera: _Camera, k: int,
                      taken: list[Box]) -> None:  # fmt: skip
         """Draw names and speeds, each where it hides least of the others and of the contact."""
         p, bodies = self.playback, {}

@@ -13,6 +13,7 @@ from bridgegen.conflict.harm import Count
 from bridgegen.conflict.outcomes import with_outcomes
 from bridgegen.conflict.summary import summarise
 from bridgegen.ego import _weather_columns as column
+from bridgegen.errors import FileFormatError
 from bridgegen.evaluation import Replay
 from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.ontology.check import constraints_in_words
@@ -21,6 +22,7 @@ from bridgegen.report.painter import paint
 from bridgegen.report.playback import Conflict, Course, Playback, Weather
 from bridgegen.report.scenery import Scenery, bodies, lamps
 from bridgegen.report.sensing import sensed
+from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows
 from bridgegen.triage.record import Minimal
 from bridgegen.weather import COLUMNS
@@ -105,6 +107,25 @@ def minimal_playbacks(
         for k, (name, evaluation, files, _) in enumerate(wanted)
     ]
     return _played(pipeline, shown, replay, brief=True)
+
+
+def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
+    """Return the playback of a scenario with all parameters at their defaults.
+
+    No objective is asked whether it is critical.
+
+    Raises:
+        FileFormatError: it has no result.
+    """
+    X = pipeline.space.row({})[np.newaxis]
+    replay = pipeline.replay(X, plans=False)
+    rollout = replay.rollout
+    if rollout.status[0] != 0:
+        words = [STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]
+        raise FileFormatError(f"{pipeline.scenario.place}: {': '.join(words)}")
+    metrics = quantities.evaluate(rollout, pipeline.metrics)
+    shown = Shown(name, 0, (), X[0], metrics[0], critical=False, cause="")
+    return _played(pipeline, [shown], replay, brief=True)[0]
 
 
 def _played(

@@ -1,4 +1,4 @@
-"""A playback as a GIF or WebP film, or as one picture (PNG)."""
+"""A playback as a film (GIF, WebP, MP4, WebM), or as one picture (PNG, SVG)."""
 
 import io
 from collections.abc import Sequence
@@ -8,11 +8,17 @@ from PIL import Image
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError, StorageError
+from bridgegen.report.ffmpeg import CODECS, encode, program
 from bridgegen.report.frames import HIT, Film
 from bridgegen.report.playback import Playback
 
-HEADS = {".gif": (b"GIF8",), ".webp": (b"RIFF",), ".png": (b"\x89PNG",)}
-"""The formats by the ends of their names, with the first bytes of such a file."""
+HEADS = {
+    ".gif": (0, b"GIF8"), ".webp": (0, b"RIFF"), ".mp4": (4, b"ftyp"),
+    ".webm": (0, b"\x1a\x45\xdf\xa3"), ".png": (0, b"\x89PNG"), ".svg": (0, b"<svg"),
+}  # fmt: skip
+"""The formats by the ends of their names, with bytes of such a file and where they are."""
+
+STILL = (".png", ".svg")
 
 SIZES, MAX_FPS = (160, 3840), 50
 BEFORE, AFTER = 8.0, 2.0
@@ -25,15 +31,18 @@ def refuse_path(out: Path) -> None:
     """Reject a path of another format, or at which another kind of file exists.
 
     Raises:
-        InputError: no such format.
+        InputError: no such format, or ffmpeg is needed and missing.
         StorageError: another file exists there, or the file cannot be read.
     """
-    heads = HEADS.get(out.suffix.lower())
-    if heads is None:
+    kind = out.suffix.lower()
+    if kind not in HEADS:
         raise InputError(f"{out}: the name of a video must end in {', '.join(HEADS)}")
+    if kind in CODECS:
+        program()
+    at, head = HEADS[kind]
     try:
         with out.open("rb") as file:
-            ours = file.read(4) in heads
+            ours = file.read(16)[at:].startswith(head)
     except FileNotFoundError:
         return
     except OSError as error:
@@ -67,13 +76,14 @@ def write_video(
     start: float | None = None,
     end: float | None = None,
 ) -> None:
-    """Write a scenario as a film or, with the end ``.png``, as one picture.
+    """Write a scenario as a film or, with an end of ``STILL``, as one picture.
 
     Args:
         playback: the scenario.
-        out: ``.gif``, ``.webp`` or ``.png``.
+        out: its end is one of ``HEADS``.
         size: of the picture, width and height [pixels].
-        fps: frames per second; 100 / fps is rounded to whole hundredths of a second.
+        fps: frames per second; of a GIF or WebP, 100 / fps is rounded to whole hundredths of a
+            second.
         start: of the film, or the instant of the picture [s]; by default ``BEFORE`` the decisive
             instant, and that instant.
         end: of the film [s]; by default ``AFTER`` the decisive instant.
@@ -88,7 +98,8 @@ def write_video(
     length = last * step
     whole = Film(playback, size, 0, last)
     decisive = playback.conflict.instant if playback.conflict else whole.closest
-    still = out.suffix.lower() == ".png"
+    kind = out.suffix.lower()
+    still = kind in STILL
     if start is None:
         before = 0.0 if still else BEFORE
         start = max(0.0, min(decisive * step, length if end is None else end) - before)
@@ -98,7 +109,7 @@ def write_video(
         k = round(start / step)
         around = round(2.0 / step)
         film = Film(playback, size, max(0, k - around), min(last, k + around))
-        _write(out, [film.frame(k)], fps)
+        write_whole(out, [film.drawing(k).encode() if kind == ".svg" else _png(film.frame(k))])
         return
     if end is None:
         end = min(length, max(start, decisive * step) + AFTER)
@@ -109,15 +120,24 @@ def write_video(
     count = int((end - start) * fps + 1e-9) + 1
     steps = [min(last, round((start + i / fps) / step)) for i in range(count)]
     film = Film(playback, size, steps[0], steps[-1])
-    _write(out, [film.frame(k) for k in steps], fps)
+    frames = (film.frame(k) for k in steps)
+    if kind in CODECS:
+        write_whole(out, [encode(frames, size, fps, kind)])
+    else:
+        write_whole(out, [_animated(list(frames), fps, kind)])
 
 
-def _write(out: Path, frames: Sequence[Image.Image], fps: int) -> None:
-    kind, file = out.suffix.lower(), io.BytesIO()
+def _png(picture: Image.Image) -> bytes:
+    file = io.BytesIO()
+    picture.save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def _animated(frames: Sequence[Image.Image], fps: int, kind: str) -> bytes:
+    """Return a GIF or WebP."""
+    file = io.BytesIO()
     delay = 10 * round(100 / fps)  # ms; a GIF counts hundredths of a second
-    if kind == ".png":
-        frames[0].save(file, "PNG", optimize=True)
-    elif kind == ".webp":
+    if kind == ".webp":
         frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=delay,
                        loop=0, quality=80, method=2)  # fmt: skip
     else:
@@ -129,4 +149,4 @@ def _write(out: Path, frames: Sequence[Image.Image], fps: int) -> None:
         few = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
         few[0].save(file, "GIF", save_all=True, append_images=few[1:], duration=delay, loop=0,
                     optimize=False)  # fmt: skip
-    write_whole(out, [file.getvalue()])
+    return file.getvalue()

@@ -8,6 +8,7 @@ import { Curves } from "./curves.js";
 import { data } from "./data.js";
 import { boxCentre, colourOf, isPlaced, playersOf, stateAt } from "./geometry.js";
 import { ghostsAt, ghostsOf } from "./ghosts.js";
+import { Save } from "./save.js";
 import { Scene } from "./scene.js";
 import { detectionAt, lightAt, unpack, weatherAt } from "./unpack.js";
 import { stateWords } from "./words.js";
@@ -26,6 +27,7 @@ export class Player {
     this.position = 0; // in steps; whole on a recorded instant
     this.scene = new Scene($("scene"), () => this.redraw());
     this.curves = new Curves($("curves"), (k) => this.seek(k));
+    new Save(this);
     this.connect();
     Object.assign(hook, {
       seek: (k) => this.seek(k), play: () => this.play(), pause: () => this.pause(),
@@ -241,7 +243,7 @@ export class Player {
   // Keys act while the focus is in the player, or nowhere and the player is in sight.
   key(event) {
     const focus = document.activeElement, inside = $("player").contains(focus);
-    if (event.ctrlKey || event.metaKey || event.altKey || focus?.id === "speed") return;
+    if (event.ctrlKey || event.metaKey || event.altKey || focus?.tagName === "SELECT") return;
     if (!inside && !(focus === document.body && this.inSight())) return;
     if (event.key === " " && inside && focus.tagName === "BUTTON") return; // the button's own
     const speed = $("speed");
