@@ -34,7 +34,7 @@ SCRIPTED, ATTENTIVE = 0, 1
 """Codes of the drivers of participants other than the ego."""
 
 OTHERS = {
-    "attentive": "Does what its script says unless somebody is in its way: keeps its distance, "
+    "attentive": "Follows its script unless another participant is in its way: keeps its distance, "
     f"gives way, brakes after {CAREFUL_REACTION:g} s by up to {CAREFUL_BRAKING_G:g} g, waits for a "
     "gap to change lane.",
     "scripted": "Does what its script says, whatever happens.",

@@ -234,7 +234,7 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TEXT,
-            "Driver of all other participants: attentive, or scripted (they heed nobody).",
+            "Driver of all other participants: attentive, or scripted (they react to no other participant).",
             shown="what the scenario says",
             before="scripted",
             group=OF_DRIVER,

@@ -228,7 +228,7 @@ class Server(ThreadingHTTPServer):
         turn: held while a request is answered.
 
     Raises:
-        InputError: no such port, or it cannot be had.
+        InputError: no such port, or it is not available.
     """
 
     daemon_threads = True
@@ -242,7 +242,7 @@ class Server(ThreadingHTTPServer):
             super().__init__((LOOPBACK, port), _Handler)
         except OSError as error:
             raise InputError(
-                f"port {port} of {LOOPBACK} cannot be had: {error.strerror}; "
+                f"port {port} of {LOOPBACK} is not available: {error.strerror}; "
                 "choose another with --port, or leave it out"
             ) from None
         port = self.server_address[1]

@@ -3,7 +3,7 @@
 import { taken } from "./inflate.js";
 import { playbacks } from "./playbacks.js";
 
-// The motion of an evaluation from the server; null if it cannot be had after all.
+// The motion of an evaluation from the server; null if it is not available after all.
 async function askMotion(evaluation) {
   try {
     const answer = await (await fetch(`motion/${evaluation}`)).json();

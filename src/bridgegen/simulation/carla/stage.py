@@ -269,7 +269,7 @@ class Stage:
         """
         for name, body in zip(self._program.names, self.bodies, strict=True):
             if not snapshot.has_actor(body.id):
-                raise ServerError(ERROR, f"the actor of '{name}' ({body.type}) is gone")
+                raise ServerError(ERROR, f"the actor of '{name}' ({body.type}) no longer exists")
 
 
 def dressed(blueprint: "carla.ActorBlueprint", role: str) -> None:
