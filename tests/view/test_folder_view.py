@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -13,7 +14,8 @@ from hypothesis import strategies as st
 
 from bridgegen.errors import StorageError
 from bridgegen.store import Store
-from bridgegen.view.folder_view import FolderView
+from bridgegen.view import folder_view
+from bridgegen.view.folder_view import FolderView, _by_key, _count
 from bridgegen.view.overview import DEEPEST, find_runs, read_line
 from bridgegen.view.server import Server, answer
 
@@ -110,6 +112,30 @@ def test_two_runs_side_by_side_match_their_failure_modes(runs):
     alone = answer(site, f"/pair?first={a}&second={found['new']['number']}").body.decode()
     assert "Failure modes of both" not in alone
     assert "Only in s4" in alone
+
+
+def test_two_modes_of_one_kind_in_a_run_are_counted_together():
+    """Of other places on the route: another run may have them elsewhere."""
+    mode = SimpleNamespace(
+        conflict="contact", conflict_type="turning", responsible="ego", rule="r", partner="car"
+    )
+    modes = [
+        SimpleNamespace(**vars(mode), title=t, count=n) for t, n in (("here", 3), ("there", 4))
+    ]
+    ((_, grouped),) = _by_key(SimpleNamespace(modes=modes)).items()
+    assert [one.title for one in grouped] == ["here", "there"]
+    assert _count(grouped) == "7"
+
+
+def test_few_runs_are_open_at_a_time(runs, monkeypatch):
+    monkeypatch.setattr(folder_view, "MOST_OPEN", 1)
+    site = FolderView(runs)
+    found = listed(site.page())
+    first, second = (found[name]["number"] for name in ("s4", "week 2/again"))
+    kept = site.run(first)
+    assert site.run(first) is kept
+    site.run(second)
+    assert site.run(first) is not kept
 
 
 class Tags(HTMLParser):

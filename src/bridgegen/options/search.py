@@ -234,7 +234,7 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TEXT,
-            "Driver of all other participants: attentive, or scripted (they react to no other participant).",
+            "Driver of all other participants: attentive, or scripted (they react to nothing).",
             shown="what the scenario says",
             before="scripted",
             group=OF_DRIVER,

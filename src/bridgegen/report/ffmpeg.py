@@ -69,7 +69,13 @@ def encode(frames: Iterable[Image.Image], size: tuple[int, int], fps: int, kind:
             process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
             )
-            limit = threading.Timer(TIMEOUT, process.kill)
+            late = threading.Event()
+
+            def end() -> None:
+                late.set()
+                process.kill()
+
+            limit = threading.Timer(TIMEOUT, end)
             limit.start()
             try:
                 assert process.stdin is not None
@@ -85,5 +91,7 @@ def encode(frames: Iterable[Image.Image], size: tuple[int, int], fps: int, kind:
                 said.seek(0)
                 words = said.read(2000).decode("utf-8", "replace").strip().splitlines()
                 why = words[-1] if words else f"exit status {process.returncode}"
+                if late.is_set():
+                    why = f"it took longer than {TIMEOUT:g} s"
                 raise StorageError(f"ffmpeg could not write the {kind[1:]} film: {why}")
         return out.read_bytes()

@@ -13,6 +13,9 @@ from bridgegen.triage.record import Mode
 from bridgegen.view.overview import RunLine, find_runs, read_line
 from bridgegen.view.run_view import RunView
 
+MOST_OPEN = 4
+"""Maximum number of runs whose rows are in memory."""
+
 
 class FolderView:
     """The runs below a folder, read only; other processes may be extending them.
@@ -51,9 +54,11 @@ class FolderView:
         """
         if number >= len(self._runs):
             return None
-        if number not in self._views:
-            self._views[number] = RunView(self._runs[number])
-        return self._views[number]
+        view = self._views.pop(number, None) or RunView(self._runs[number])
+        self._views[number] = view  # the latest is the last
+        while len(self._views) > MOST_OPEN:
+            del self._views[next(iter(self._views))]
+        return view
 
     def pair(self, first: int, second: int) -> bytes | None:
         """Return two runs side by side, as HTML; None if one does not exist."""
@@ -130,23 +135,32 @@ _FIGURES: dict[str, Callable[[RunLine], str]] = {
 
 def _matched(a: RunLine, b: RunLine) -> Iterator[tuple[str, list[str]]]:
     """Yield the failure modes of both runs, and of each alone, in words."""
-    ours, theirs = ({_key(one): one for one in line.modes} for line in (a, b))
+    ours, theirs = _by_key(a), _by_key(b)
     both = [key for key in ours if key in theirs]
     yield (
         "Failure modes of both",
         [
-            f"{ours[k].title}: {ours[k].count:,} and {theirs[k].count:,} evaluations"
+            f"{ours[k][0].title}: {_count(ours[k])} and {_count(theirs[k])} evaluations"
             for k in both
         ],
     )  # fmt: skip
     for line, own, other in ((a, ours, theirs), (b, theirs, ours)):
         alone = [one for key, one in own.items() if key not in other]
-        words = [f"{one.title}: {one.count:,} evaluations" for one in alone]
+        words = [f"{one[0].title}: {_count(one)} evaluations" for one in alone]
         yield f"Only in {_text(line.path)}", words
 
 
-def _key(mode: Mode) -> tuple[str, ...]:
-    return mode.conflict, mode.conflict_type, mode.responsible, mode.rule, mode.partner
+def _by_key(line: RunLine) -> dict[tuple[str, ...], list[Mode]]:
+    """Return the modes of a run by what makes two of different runs the same, in their order."""
+    found: dict[tuple[str, ...], list[Mode]] = {}
+    for one in line.modes:
+        key = (one.conflict, one.conflict_type, one.responsible, one.rule, one.partner)
+        found.setdefault(key, []).append(one)
+    return found
+
+
+def _count(modes: list[Mode]) -> str:
+    return f"{sum(one.count for one in modes):,}"
 
 
 def _text(text: str) -> str:

@@ -59,7 +59,8 @@ class RunLine:
 
 def is_run(folder: Path) -> bool:
     """Whether a folder is that of a run."""
-    return (folder / FILE).is_file()
+    file = folder / FILE
+    return file.is_file() and not file.is_symlink()
 
 
 def find_runs(folder: Path) -> list[Path]:

@@ -191,6 +191,37 @@ def test_start_that_is_an_expression_of_a_parameter(crossroads: Callable[..., Op
         assert np.interp(a + b * s, path.s, path.y) == pytest.approx(at.y)
 
 
+SPIRAL = b"""<OpenDRIVE><header revMajor="1" revMinor="7"/>
+<road id="1" length="400" junction="-1"><planView>
+<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>
+<geometry s="100" x="100" y="0" hdg="0" length="300">
+<spiral curvStart="0" curvEnd="-0.02"/></geometry>
+</planView><lanes><laneSection s="0"><left>
+<lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></left>
+<center><lane id="0" type="none"/></center><right>
+<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+<lane id="-2" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+</right></laneSection></lanes></road></OpenDRIVE>"""
+
+
+@pytest.mark.parametrize(("lane", "t"), [(-1, -1.75), (-2, -5.25), (1, 1.75)])
+def test_stations_along_a_spiral_are_those_of_the_lane(lane: int, t: float) -> None:
+    """A lane at t advances by 1 - curvature t: s - t k' (s - 100)^2 / 2 with k' = -0.02 / 300."""
+    ends = (("1", lane, 0.0), ("1", lane, 400.0))
+    route = plan_route(read(SPIRAL), ends[lane > 0], [], ends[lane < 0])
+    s = np.array([0.0, 60.0, 100.0, 165.0, 250.0, 333.3, 400.0])
+    bent = np.maximum(s - 100.0, 0.0)
+    wanted = s - t * (-0.02 / 300.0) * bent**2 / 2.0
+    found = route.stations("1", s)
+    if lane > 0:
+        found = route.length - found
+    assert found == pytest.approx(wanted, abs=1e-9)
+    for place in s.tolist():  # exact where it is asked for
+        a, b = route.station("1", place)
+        assert a + b * place == pytest.approx(route.stations("1", np.array([place]))[0], abs=1e-9)
+    assert not route.is_even("1")
+
+
 # -- over Town05 -----------------------------------------------------------------------------------
 
 

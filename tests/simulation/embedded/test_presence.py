@@ -199,7 +199,7 @@ def test_what_an_event_asks_of_whom_it_adds_counts_whatever_stands_first():
     ):
         rollout = scene(("come", actions, after(2.0)), privates=LATER, actor="bv")
         y = rollout.y[0, 1]
-        assert y[40] - y[60] == pytest.approx(5.0 - 0.5 * 5.0 * 0.05), actions
+        assert y[40] - y[60] == pytest.approx(5.0), actions
 
 
 def test_an_addition_at_the_start_is_a_teleport():

@@ -101,6 +101,16 @@ class Piece(NamedTuple):
         """Metres along the road per metre travelled; negative against the reference line."""
         return (self.s_end - self.s) / self.length
 
+    def stations(self, s: Float) -> Float:
+        """Return the stations of places along the road, ``(P,)`` float64 [m].
+
+        Places before the piece or after it continue it straight on.
+        """
+        if self.taper is None:
+            b = self.length / (self.s_end - self.s)
+            return (self.station - b * self.s) + b * s
+        return self.station + self.taper.reached((s - self.s) * (1 if self.rate > 0.0 else -1))
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Taper:
@@ -143,6 +153,16 @@ class Taper:
     def least_stretch(self) -> float:
         """Return the least that the centre advances per metre of road; it must stay positive."""
         return float(np.min(self._frame(self.nodes)[0]))
+
+    def reached(self, distance: Float) -> Float:
+        """Return how far the centre leads up to distances in the direction of travel along s."""
+        within = np.clip(distance, 0.0, self.nodes[-1])
+        cell = np.clip(
+            np.searchsorted(self.nodes, within, side="right") - 1, 0, len(self.nodes) - 2
+        )
+        travelled = self.travelled[cell] + integrate(self.speed, self.nodes[cell], within)
+        beyond: Float = travelled + (distance - within)
+        return beyond
 
     def at(self, travelled: Float) -> tuple[Float, Float, Float, Float, Float]:
         """Return x, y, h, curvature, and the distance along the road from ``start``."""

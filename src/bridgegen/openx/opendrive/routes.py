@@ -9,10 +9,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
+
+from bridgegen.arrays import Float
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_at, section_end, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import LanePath, Piece, joined, pieces_of, sample
+
+NEAR = 1e-3  # m, over which the slope of a curve is taken
 
 
 class Place(NamedTuple):
@@ -75,19 +80,49 @@ class Route:
     def station(self, road_id: str, s: float) -> tuple[float, float]:
         """Return a, b with: distance travelled on the route = a + b · s around a place.
 
-        Exact as long as s stays on the same line or arc of the reference line; a place on one of
-        the route's roads before its start or after its end continues the nearest piece.
+        Exact at the place, and as long as s stays on the same line or arc of the reference line;
+        a place on one of the route's roads before its start or after its end continues the nearest
+        piece.
 
         Raises:
             InputError: the route does not use the road.
         """
-        on_road = [piece for piece in self.pieces if piece.road_id == road_id]
-        if not on_road:
-            roads = ", ".join(dict.fromkeys(step.road_id for step in self.steps))
-            raise InputError(f"the route runs over roads {roads}, got road {road_id}")
-        nearest = min(on_road, key=lambda piece: _away(piece, s))
+        nearest = min(self._on_road(road_id), key=lambda piece: _away(piece, s))
+        if nearest.taper is not None:
+            here, further = nearest.stations(np.array([s, s + NEAR]))
+            b = float(further - here) / NEAR
+            return float(here) - b * s, b
         b = nearest.length / (nearest.s_end - nearest.s)
         return nearest.station - b * nearest.s, b
+
+    def stations(self, road_id: str, s: Float) -> Float:
+        """Return the distances travelled up to places on a road, ``(P,)`` float64 [m].
+
+        Args:
+            road_id: OpenDRIVE's id.
+            s: ``(P,)`` along that road [m].
+
+        Raises:
+            InputError: the route does not use the road.
+        """
+        on_road = self._on_road(road_id)
+        away = np.array([[_away(piece, one) for piece in on_road] for one in s.tolist()])
+        nearest, found = away.argmin(axis=1), np.empty(len(s))
+        for i, piece in enumerate(on_road):
+            found[nearest == i] = piece.stations(s[nearest == i])
+        return found
+
+    def is_even(self, road_id: str) -> bool:
+        """Whether ``station`` is exact for all places on a road: it is one line or arc."""
+        pieces = self._on_road(road_id)
+        return len(pieces) == 1 and pieces[0].taper is None
+
+    def _on_road(self, road_id: str) -> list[Piece]:
+        found = [piece for piece in self.pieces if piece.road_id == road_id]
+        if not found:
+            roads = ", ".join(dict.fromkeys(step.road_id for step in self.steps))
+            raise InputError(f"the route runs over roads {roads}, got road {road_id}")
+        return found
 
 
 def plan_route(

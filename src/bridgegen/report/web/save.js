@@ -51,15 +51,19 @@ export class Save {
     this.canvas.toBlob((blob) => download(blob, `${this.name}-${at}s.png`));
   }
 
-  // Plays it once from the start, and records that; moving the view or the speed is recorded, too.
+  // Plays it once from the start and records that, view and speed as the reader sets them; a pause ends it.
   film() {
     const { player } = this, type = filmType(), parts = [];
+    $("save").disabled = true;
     player.pause();
     player.seek(0);
     paint(this.canvas);
     const recorder = new window.MediaRecorder(this.canvas.captureStream(30), { mimeType: type, videoBitsPerSecond: 6e6 });
     recorder.addEventListener("dataavailable", ({ data }) => parts.push(data));
-    recorder.addEventListener("stop", () => download(new Blob(parts, { type }), `${this.name}.${type.slice(6, 10).replace(";", "")}`));
+    recorder.addEventListener("stop", () => {
+      $("save").disabled = false;
+      download(new Blob(parts, { type }), `${this.name}.${type.slice(6, 10).replace(";", "")}`);
+    });
     recorder.start();
     player.play();
     const record = () => {

@@ -182,6 +182,8 @@ class State(NamedTuple):
         origin: ``(E,)`` [m/s], the one that it comes from,
         target: ``(E,)`` [m/s], the one that it is on its way to,
         rate: ``(E,)`` [m/s²], how fast at most,
+        mean: ``(E,)`` [m/s], its mean speed up to the next instant, where a SpeedAction gives it;
+            NaN: that of a constant acceleration,
         course: ``(E, 6)`` what a course by another entity keeps; see ``_codes``,
         profile: ``(E, R, 4)`` the course of a speed profile; see ``_course_kernels``,
         profile_rows: ``(E,)`` int64, how many rows of it count.
@@ -256,6 +258,7 @@ class State(NamedTuple):
     origin: Annotated[Float, "entities"]
     target: Annotated[Float, "entities"]
     rate: Annotated[Float, "entities"]
+    mean: Annotated[Float, "entities"]
     course: Annotated[Float, "entities", "course"]
     profile: Annotated[Float, "entities", "profile", 4]
     profile_rows: Annotated[Int, "entities"]

@@ -49,6 +49,18 @@ def ramped(value, target, most):
 
 
 @kernel
+def ramp_mean(value, target, rate, dt):
+    """Return the mean over a step of a value that moves to its target at a rate, and stays there.
+
+    Exact: an infinite rate reaches the target at once.
+    """
+    lasts = abs(target - value) / rate if rate > 0.0 else 0.0
+    if lasts >= dt:
+        return 0.5 * (value + ramped(value, target, rate * dt))
+    return target - 0.5 * (target - value) * (lasts / dt)
+
+
+@kernel
 def standing(stood, before, after, dt):
     """Return for how long a body has stood [s] at the end of a step, by its speeds [m/s]."""
     return stood + dt if before <= STANDS and after <= STANDS else 0.0

@@ -372,8 +372,7 @@ def _state(
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
-    a, b = roads.station[rows, :, 0], roads.station[rows, :, 1]
-    at = slots[:, np.maximum(program.start_slots, 0)]  # b is 0 where there is no slot
+    start = slots[:, np.maximum(program.start_slots, 0)]  # of no effect where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
     hypotheses = roads.scene.hypotheses.shape[1]
     has_own = own_memory is not None
@@ -408,7 +407,7 @@ def _state(
     }
     given = {
         "slots": slots,
-        "station": np.ascontiguousarray(a + b * at),
+        "station": roads.stations(rows, start),
         "aside": np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
         "key": key[:, None],
         "feet": np.full((n, hypotheses), LOST),

@@ -7,6 +7,8 @@ storyboard does the rest, as for any other entity.
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
+import math
+
 from bridgegen.compiled import inlined_kernel, kernel
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
@@ -62,6 +64,7 @@ def move_paced(k, demanded, plan, roads, state, record):
     a = min(max(demanded, -min(body[5], grip)), min(body[4], grip))
     asked, target = state.command[0], state.target[0]
     state.command[0] = min(max(v + a * plan.dt, 0.0), body[3])
+    state.mean[0] = math.nan
     move_along_path(0, k, plan, roads, state, record)
     state.command[0], state.target[0] = asked, target
 

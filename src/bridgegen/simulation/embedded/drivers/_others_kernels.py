@@ -85,6 +85,8 @@ def move_heeding(e, before, k, plan, roads, state, record):
     if most < math.inf:
         most = max(most, -min(body[5], state.weather[FRICTION]))
         state.command[e] = min(asked, max(v + most * plan.dt, 0.0))
+        if state.command[e] < asked:
+            state.mean[e] = math.nan
     given = state.command[e]
     move_along_path(e, k, plan, roads, state, record)
     if state.command[e] == given:  # its road continues

@@ -15,7 +15,14 @@ from bridgegen.simulation.embedded._codes import (
     TARGET,
     WHOM,
 )
-from bridgegen.simulation.embedded._motion_kernels import LINEAR, RATE, SAME_SPEED, STEP, ramped
+from bridgegen.simulation.embedded._motion_kernels import (
+    LINEAR,
+    RATE,
+    SAME_SPEED,
+    STEP,
+    ramp_mean,
+    ramped,
+)
 from bridgegen.simulation.embedded.motion._course_kernels import change_time, changed
 
 
@@ -58,17 +65,22 @@ def stop_longitudinal(j, plan, state):
 @inlined_kernel
 def command_speed(e, k, plan, roads, state, record):
     """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
-    j = state.speed_action[e]
+    j, before = state.speed_action[e], state.command[e]
+    state.mean[e] = math.nan
     if j >= 0 and plan.actions[j, DOES] >= RELATIVE_SPEED:
         run_kernel_at(plan.follows_courses, (j, k, plan, roads, state, record))
         return
     if j >= 0 and plan.actions[j, SHAPE] > LINEAR:
-        passed = k * plan.dt + plan.dt - state.speed_began[e]
-        state.command[e] = changed(
-            plan.actions[j, SHAPE], state.origin[e], state.target[e], passed / state.speed_lasts[e]
-        )
+        shape, origin, target = plan.actions[j, SHAPE], state.origin[e], state.target[e]
+        passed, lasts = k * plan.dt + plan.dt - state.speed_began[e], state.speed_lasts[e]
+        state.command[e] = changed(shape, origin, target, passed / lasts)
+        half = changed(shape, origin, target, (passed - 0.5 * plan.dt) / lasts)
+        mean = (before + 4.0 * half + state.command[e]) / 6.0  # Simpson's rule
     else:
-        state.command[e] = ramped(state.command[e], state.target[e], state.rate[e] * plan.dt)
+        state.command[e] = ramped(before, state.target[e], state.rate[e] * plan.dt)
+        mean = ramp_mean(before, state.target[e], state.rate[e], plan.dt)
+    if record.v[e, k] == before:
+        state.mean[e] = mean
     if j >= 0 and abs(state.command[e] - state.target[e]) <= SAME_SPEED:
         state.action_ended[j] = True
         state.speed_action[e] = -1

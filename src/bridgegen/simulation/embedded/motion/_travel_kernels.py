@@ -30,7 +30,8 @@ road network are to be searched; a trajectory ends, on any lane that is there.""
 def move_along_path(e, k, plan, roads, state, record):
     """Move an entity on from instant k at the commanded speed, along its path and across it."""
     dt, before = plan.dt, record.v[e, k]
-    step = 0.0 if state.placed[e] else 0.5 * (before + state.command[e]) * dt
+    mean = state.mean[e] if state.mean[e] >= 0.0 else 0.5 * (before + state.command[e])
+    step = 0.0 if state.placed[e] else mean * dt
     state.placed[e] = False
     ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
     j = state.lateral_action[e]

@@ -60,7 +60,7 @@ class Network:
             for i, point in enumerate(program.points):
                 self._points[p, i] = position(program, model, point)
         e = len(program.names)
-        self.station: Float = np.array([each.station[:e] for each in self._ways])
+        self._station: Float = np.array([each.station[:e] for each in self._ways])
         self.sides: Float = np.array([each.sides[:e] for each in self._ways], dtype=np.float64)
         self._zones: list[list[Float]] = [[] for _ in models]
         pairs = zip(models, self._ways, strict=True)
@@ -79,6 +79,22 @@ class Network:
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         vars(self).update(state, _lock=Lock())
+
+    def stations(self, rows: Int, s: Float) -> Float:
+        """Return where entities start along their first paths, ``(N, E)`` float64 [m].
+
+        Args:
+            rows: ``(N,)`` number of each row's road network.
+            s: ``(N, E)`` along the roads on which they start [m].
+        """
+        found = self._station[rows, :, 0] + self._station[rows, :, 1] * s
+        for p, ways in enumerate(self._ways):
+            for e, road in ways.uneven.items():
+                at = np.flatnonzero(rows == p)
+                route = ways.routes[e]
+                assert route is not None
+                found[at, e] = route.stations(road, s[at, e])
+        return np.ascontiguousarray(found)
 
     @property
     def n_networks(self) -> int:

@@ -47,6 +47,8 @@ class Ways:
         paths: first those that the entities start on, then those that were asked for.
         routes: per entity the lanes that its first path leads along; None off the lanes.
         station: per entity a, b: who starts at s on the first road starts a + b·s along its path.
+        uneven: entities of whom this holds only where the file places them, and whose place may be
+            varied; with the road.
         sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
             trajectory.
         timetables: per trajectory ``trajectories.timetable``, without rows if it has no times.
@@ -65,6 +67,7 @@ class Ways:
         self.routes: list[Route | None] = []
         self.paths: list[Path] = []
         self.station: list[tuple[float, float]] = []
+        self.uneven: dict[int, str] = {}
         self.sides: list[int] = []
         self.timetables: list[Float] = []
         self.lanes: Lanes | None = None
@@ -159,6 +162,9 @@ class Ways:
         goes_on = next(next_stretches(self._model, last), None) is not None
         self.paths.append(Path(table, step, _NO_SPANS, ASKS if goes_on else ENDS))
         self.station.append(route.station(*_known(self._program, spec.start)))
+        varies = isinstance(spec.start.s, ParameterRef | Expr)
+        if varies and number < len(self._program.names) and not route.is_even(spec.start.road):
+            self.uneven[number] = spec.start.road
         self.sides.append(side)
 
     def _along(self, spec: AlongLanes) -> Route:
