@@ -153,6 +153,12 @@ def test_roads_are_written_once_and_go_with_their_owner():
         ("[] [info] no [warn]\n[0.1] [warn] a model is not there\n", None),
         ("[] [info] x\n[1.050] [error] Failed\n[2] [error] later\n", "Failed"),
         ("[] [error] " + "x" * 999, "x" * 300),
+        (
+            '[] [error] INFO: signal element "signalReference" not supported yet\n'
+            "[] [error] lane 9 does not exist\n",
+            "lane 9 does not exist",
+        ),
+        ('[] [error] INFO: signal element "signalReference" not supported yet\n', None),
     ],
 )
 def test_the_first_error_of_a_log(tmp_path, text, said):

@@ -3,13 +3,15 @@
 from pathlib import Path
 
 _MARK = "[error] "
+_REMARK = "INFO: "  # esmini marks elements of a map that it skips as errors, with this word
 _LONGEST = 300
 
 
 def error_in(log: Path) -> str | None:
     """Return the first error in a log; None if there is none, or no log.
 
-    Warnings are ignored: esmini warns of missing 3D models, for example.
+    Warnings are ignored, and remarks on elements of the map that esmini does not draw: it warns of
+    missing 3D models, for example.
     """
     try:
         text = log.read_text(encoding="utf-8", errors="replace")
@@ -17,6 +19,6 @@ def error_in(log: Path) -> str | None:
         return None
     for line in text.splitlines():
         _, mark, said = line.partition(_MARK)
-        if mark:
+        if mark and not said.startswith(_REMARK):
             return said.strip()[:_LONGEST]
     return None
