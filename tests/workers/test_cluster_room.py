@@ -3,7 +3,6 @@
 Without Ray: what its side of the bridge says is scripted here. With Ray: test_cluster.
 """
 
-import importlib.util
 import queue
 from contextlib import closing
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bridgegen import extras
 from bridgegen.workers import cluster
 from bridgegen.workers.cluster import Cluster
 
@@ -71,7 +71,7 @@ def doubles(doubles_can_be_imported):
 
 @pytest.fixture
 def shrunken(monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _: True)
+    monkeypatch.setattr(extras, "find_spec", lambda _: True)
     monkeypatch.setattr(cluster, "Process", Shrunken)
     workers = Cluster(None)
     workers._said = Impatient()
