@@ -86,15 +86,16 @@ def import_file(
         StorageError: the file exists, or cannot be written.
     """
     out = out or file.with_suffix(".owl")
+    notes: list[str] = []
     if file.suffix.lower() == ".xosc":
         individuals, notes = _import_storyboard(file, out, partial, ego)
     elif partial or ego is not None:
         raise InputError(f"{file}: only a scenario (.xosc) can be imported in part, or has an ego")
     else:
         data = read_bytes(file)
-        model = opendrive_read.read(data, str(file))
+        model = opendrive_read.read(data, str(file), notes)
         individuals = individuals_from_opendrive(model, _seen_from(out, file), digest_of(data))
-        notes = list(losses(model))
+        notes += losses(model)
     if out.exists():
         raise StorageError(f"{out}: exists already, and is not overwritten")
     save(individuals, out)
