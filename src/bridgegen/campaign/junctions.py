@@ -5,6 +5,7 @@ from pathlib import Path
 
 from bridgegen.errors import BridgeGenError, UnsupportedError
 from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.road_map import RoadMap, map_of
@@ -53,6 +54,7 @@ def junctions_of(
         FileFormatError: no map that can be read.
         UnsupportedError: the scenario is not one of an intersection.
     """
+    path = map_path(path)
     if path.suffix.lower() == ".owl":
         path, _ = map_of(path)
     if scenario is not None:

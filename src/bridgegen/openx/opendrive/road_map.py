@@ -8,6 +8,7 @@ from bridgegen.errors import FileFormatError
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.files import load
 from bridgegen.ontology.site import Site
+from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.site import find_site
@@ -40,8 +41,9 @@ def load_map(
     """Read a map and find the intersection on it that a scenario takes place at.
 
     Args:
-        path: an OpenDRIVE file, or the ``.owl`` that ``bridgegen import`` made of one: the file
-            that it names is read then, which must be what it was.
+        path: an OpenDRIVE file (or a map of CARLA's by its name), or the ``.owl`` that
+            ``bridgegen import`` made of one: the file that it names is read then, which must be
+            what it was.
         junction: the id of the junction; where the map has several, it must be named, or "best":
             the one that fits the scenario and is most like its own.
         scenario: what takes place there; a usual crossroads' legs are looked for by default.
@@ -52,6 +54,7 @@ def load_map(
         UnsupportedError: the junction has not the legs, or the lanes, of the scenario.
         InputError: the choice of the junction is open.
     """
+    path = map_path(path)
     owl = path if path.suffix.lower() == ".owl" else None
     digest = ""
     if owl is not None:
