@@ -267,7 +267,7 @@ def test_structure(individuals, subject, predicate, value, message, caplog):
 
 def test_required_properties(individuals):
     for cls, predicate in (
-        ("Car", "has_wheelbase"), ("Road", "has_lane"), ("Trigger", "has_condition"),
+        ("Car", "has_wheelbase"), ("Road", "has_length"), ("Trigger", "has_condition"),
         ("StoryboardEvent", "has_who"), ("Scenario", "has_road_network"),
         ("Controller", "has_driver"),
     ):  # fmt: skip

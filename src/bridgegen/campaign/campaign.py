@@ -19,6 +19,8 @@ from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_stands
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.openx.opendrive.site_fit import shortened
 from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
@@ -103,7 +105,11 @@ def run_search(given: SearchArguments) -> Run:
     columns = columns_of(method, given.objectives)
     spec = chosen_objective(catalogue.objective, given, columns)
     logical = as_judged(replace(catalogue, objective=spec), spec.rule)
+    judged = logical
     logical, roads = placed(logical, given.road_map, given.junction)
+    if roads is not None and isinstance(judged, LogicalScenario):
+        for note in (*roads.warnings, *shortened(judged, roads.site)[1]):
+            callbacks.warning(note)
     driven: str | None = None
     if given.adversary is not None or getattr(method, "is_adversary", False):
         logical = adversarial(logical, given.adversary)

@@ -19,7 +19,7 @@ from bridgegen.errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from bridgegen.openx.logic_file import logic_file, roads_of
+from bridgegen.openx.logic_file import logic_path, roads_of
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
 from bridgegen.openx.openscenario.parameters import numbers
@@ -150,7 +150,7 @@ def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> lis
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     made, maps = flavour(scenario, path), []
     if scenario.road_network.logic_file is not None and town is None:
-        maps = [path.parent / logic_file(scenario, path)]
+        maps = [logic_path(scenario, path)]
     made = _moved(made, path, [one.name for one in maps], folder)
     if town is not None:
         made = replace(made, road_network=osc.RoadNetwork(osc.File(town)))

@@ -20,7 +20,9 @@ from bridgegen.openx.openscenario.distributions import is_distribution, read_dis
 from bridgegen.pipeline import Pipeline
 
 
-def validate_file(path: Path, *, reason: bool = False) -> list[str]:
+def validate_file(
+    path: Path, *, reason: bool = False, warnings: list[str] | None = None
+) -> list[str]:
     """Return the problems of an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
 
     An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints. An
@@ -31,6 +33,8 @@ def validate_file(path: Path, *, reason: bool = False) -> list[str]:
     Args:
         path: the file.
         reason: run the reasoner on an ``.owl``, too, for consistency.
+        warnings: takes what is odd about an ``.xodr`` that can be imported and searched all the
+            same; by default, that is a problem, too.
 
     Raises:
         InputError: a file of another kind, or the reasoner is not installed.
@@ -39,7 +43,7 @@ def validate_file(path: Path, *, reason: bool = False) -> list[str]:
         reasoner.require()
     kinds = {
         ".owl": _ontology,
-        ".xodr": _roads,
+        ".xodr": lambda file: _roads(file, warnings),
         ".xosc": _storyboard,
         ".yaml": _logical,
         ".yml": _logical,
@@ -88,8 +92,14 @@ def _is_map(individuals: Individuals) -> bool:
     )
 
 
-def _roads(path: Path) -> list[str]:
-    return opendrive_validate.problems(opendrive_read.read(path))
+def _roads(path: Path, warnings: list[str] | None) -> list[str]:
+    odd: list[str] = []
+    model = opendrive_read.read(path, warnings=odd)
+    odd += [_placed(path, problem) for problem in opendrive_validate.problems(model)]
+    if warnings is None:
+        return odd
+    warnings += odd
+    return []
 
 
 def _storyboard(path: Path) -> list[str]:

@@ -9,6 +9,7 @@ from bridgegen.cli import (
     comparisons,
     reproductions,
     files,
+    maps,
     lists,
     doctor,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "files",
     "lists",
     "main",
+    "maps",
     "reproductions",
     "runs",
     "views",

@@ -127,19 +127,28 @@ def validate(
         bool,
         typer.Option("--reason", help="Ask the reasoner HermiT about .owl files, too (extra)."),
     ] = False,
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Take warnings about maps as errors, too."),
+    ] = False,
 ) -> None:
     """Check files against their rules.
 
-    The exit status is 2 if one breaks any.
+    The exit status is 2 if one breaks any. A map that can be imported and searched although
+    something is odd about it is valid, with warnings.
     """
     from bridgegen.campaign.validate import name_note, validate_file
 
     broken: list[str] = []
     for file in files:
-        problems = validate_file(file, reason=reason)
+        warnings: list[str] = []
+        problems = validate_file(file, reason=reason, warnings=None if strict else warnings)
         broken += problems
+        for warning in warnings:
+            print(f"bridgegen: warning: {warning}", file=sys.stderr)
         if not problems:
-            print(f"{file}: valid")
+            count = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
+            print(f"{file}: valid{f', {count}' if warnings else ''}")
             if note := name_note(file):
                 print(f"bridgegen: note: {note}", file=sys.stderr)
     if broken:

@@ -10,9 +10,10 @@ from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.logic_file import logic_file, roads_of
+from bridgegen.openx.logic_file import logic_path, roads_of
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import write as opendrive_write
+from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import digest_of
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
@@ -71,7 +72,8 @@ def import_file(
     """Write a whole OpenDRIVE map, or a scenario file on its map, as an ontology.
 
     Args:
-        file: the map (``.xodr``), or the scenario (``.xosc``), which references its map.
+        file: the map (``.xodr``, or by CARLA's name), or the scenario (``.xosc``), which
+            references its map.
         out: the file to write, new; beside the first by default.
         partial: leave out contents that the ontology cannot express, instead of refusing the file.
         ego: of a scenario, the entity under test, if it is not called so.
@@ -85,16 +87,18 @@ def import_file(
         UnsupportedError: it uses what this version, or the ontology, cannot represent.
         StorageError: the file exists, or cannot be written.
     """
-    out = out or file.with_suffix(".owl")
+    named, file = file, map_path(file)
+    out = out or (file if file == named else Path(named.name)).with_suffix(".owl")
+    notes: list[str] = []
     if file.suffix.lower() == ".xosc":
         individuals, notes = _import_storyboard(file, out, partial, ego)
     elif partial or ego is not None:
         raise InputError(f"{file}: only a scenario (.xosc) can be imported in part, or has an ego")
     else:
         data = read_bytes(file)
-        model = opendrive_read.read(data, str(file))
+        model = opendrive_read.read(data, str(file), notes)
         individuals = individuals_from_opendrive(model, _seen_from(out, file), digest_of(data))
-        notes = list(losses(model))
+        notes += losses(model)
     if out.exists():
         raise StorageError(f"{out}: exists already, and is not overwritten")
     save(individuals, out)
@@ -109,7 +113,7 @@ def _import_storyboard(
     if ego is not None:
         scenario = rename_entity(scenario, ego, EGO)
     roads = roads_of(scenario, file)
-    road_map = file.parent / logic_file(scenario, file)
+    road_map = logic_path(scenario, file)
     individuals, lost = individuals_from_openscenario(
         scenario, roads, _seen_from(out, road_map), str(file), partial=partial
     )

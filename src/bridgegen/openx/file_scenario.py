@@ -17,7 +17,7 @@ from bridgegen.odd.objectives import HARM
 from bridgegen.odd.parameters import Axis, Parameter
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.logic_file import logic_file
+from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario import distributions as dst
@@ -83,7 +83,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         UnsupportedError: what the readers cannot represent, by name and line.
     """
     storyboard = read(path)
-    road = path.parent / logic_file(storyboard, path)
+    road = logic_path(storyboard, path)
     data = read_bytes(road)
     roads = RoadFile(road.name, hashlib.sha256(data).hexdigest(), data, read_roads(data, str(road)))
     if problems := validate.problems(storyboard, roads.model):

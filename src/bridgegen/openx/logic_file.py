@@ -4,6 +4,7 @@ from pathlib import Path
 
 from bridgegen.errors import FileFormatError
 from bridgegen.openx.opendrive import read as opendrive_read
+from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -18,7 +19,16 @@ def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
     """
     if scenario.road_network.logic_file is None:
         return OpenDrive(Header(1, 7))
-    return opendrive_read.read(path.parent / logic_file(scenario, path))
+    return opendrive_read.read(logic_path(scenario, path))
+
+
+def logic_path(scenario: OpenScenario, path: Path) -> Path:
+    """Return the file of the map that a scenario file names, by path or as CARLA's.
+
+    Raises:
+        FileFormatError: it names none, or one of CARLA's that is not found.
+    """
+    return map_path(path.parent / logic_file(scenario, path))
 
 
 def logic_file(scenario: OpenScenario, path: Path) -> str:

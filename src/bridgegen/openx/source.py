@@ -15,6 +15,7 @@ from bridgegen.openx.file_scenario import FileScenario, FileSource
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
+from bridgegen.openx.opendrive.site_fit import shortened
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -116,8 +117,9 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
 
     A start that is searched stays on the road that touches the junction: a position in an
     OpenSCENARIO file is on one road, whatever its parameter's value. The map's lowest speed limit
-    bounds speeds, too.
+    bounds speeds, too. Routes end at the latest where their legs end.
     """
+    scenario, _ = shortened(scenario, road_map.site)
     moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
     static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
     found = road_map.site.measures([start.leg for start in moving])

@@ -160,7 +160,7 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TEXT,
-            "Id of the map's junction, where several have as many legs as the scenario's.",
+            "Id of the map's junction, or best: the one that fits and is most like the scenario's.",
         ),
     )
     objective: Mapping[str, float | None] | None = field(

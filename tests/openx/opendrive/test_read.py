@@ -107,18 +107,12 @@ def test_path_and_bytes(tmp_path: Path) -> None:
         ('lane id="-1"', 'lane id="-1.5"', "line 18: road 1, lane -1.5: id must be a whole number"),
         ('successor id="-1"', "successor", "<successor>: id must be a whole number, got ''"),
         ('level="false"', 'level="no"', "level must be true or false, got 'no'"),
-        ('length="20"><arc curvature="0.01"/>', 'length="0"><line/>', "length [m] must be > 0"),
         ('<arc curvature="0.01"/>', "<clothoid/>", "is required, got clothoid"),
         ('<arc curvature="0.01"/>', "<line/><line/>", "only one <line> or <arc> or <spiral>"),
         ('curvature="0.01"', 'curvature="7"', "length · curvature must be ≤ 100 rad, got 140"),
-        ('curvature="0.01"', 'curvature="70"', "curvature [1/m] must be within ±10, got '70'"),
+        ('curvature="0.01"', 'curvature="7e4"', "curvature [1/m] must be within ±10000, got '7e4'"),
         ('contactPoint="end"', 'contactPoint="middle"', "must be one of start, end, got 'middle'"),
-        ('contactPoint="end"', "", "line 7: road 1: its successor is a road and needs a contactP"),
-        ('elementId="2"', 'elementId="9"', "line 7: road 1: its successor, road '9', is not in"),
-        ('elementType="road"', 'elementType="junction"', "junction '2', is not in the file"),
-        ('junction="-1" name', 'junction="5" name', "line 7: road 1: junction '5' is not in"),
         ('lane id="0"', 'lane id="1"', "line 15: road 1, <laneSection>: the center must be one"),
-        ('lane id="-1"', 'lane id="-2"', "lanes on the right must count from -1, got [-2]"),
         ('lane id="-1"', 'lane id="1"', "lanes on the right must count from -1, got [1]"),
         ('max="30"', 'max="fast"', "max must be a finite number, got 'fast'"),
         ('unit="mph"', 'unit="knots"', "unit must be one of m/s, km/h, mph, got 'knots'"),
@@ -146,12 +140,12 @@ def test_everything_at_once() -> None:
     broken = (
         DOCUMENT.replace('a="3.5"', 'a="wide"')
         .replace('x="10"', "")
-        .replace('revMajor="1"', 'revMajor="one"')
+        .replace('length="30"', 'length="long"')
     )
     with pytest.raises(FileFormatError) as caught:
         read(broken.encode(), "map.xodr")
     assert [problem.split(":")[0] for problem in caught.value.problems] == [
-        "map.xodr, line 3", "map.xodr, line 12", "map.xodr, line 20",
+        "map.xodr, line 7", "map.xodr, line 12", "map.xodr, line 20",
     ]  # fmt: skip
 
 
@@ -168,7 +162,7 @@ def test_a_thousand_things_wrong() -> None:
         (b"", "not well-formed XML"),
         (b"<OpenDRIVE>", "not well-formed XML"),
         (b"<OpenSCENARIO/>", "the root element must be OpenDRIVE, got OpenSCENARIO"),
-        (b"<OpenDRIVE/>", "<header> is required, got nothing"),
+        (b"<OpenDRIVE/>", "<road> is required, got nothing"),
         (b'<!DOCTYPE x [<!ENTITY e "e">]><OpenDRIVE/>', "DOCTYPE is refused"),
         (b"<OpenDRIVE>" + b"<a>" * 100 + b"</a>" * 100 + b"</OpenDRIVE>", "nest 64 deep"),
     ],
@@ -181,11 +175,6 @@ def test_not_a_road_network(text: bytes, said: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (
-            '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>',
-            '<border sOffset="0" a="3.5" b="0" c="0" d="0"/>',
-            "line 20: road 1, lane -1, <border>: a lane's outer border as <border>",
-        ),
         (
             "</OpenDRIVE>",
             '<junction id="5" type="virtual"><connection id="0"/></junction></OpenDRIVE>',
@@ -239,15 +228,15 @@ def test_shapes_that_cannot_be_followed(shape: str, said: str) -> None:
         ('<junction id="100"', '<junction id="99"', "junction '100' is not in the file"),
     ],
 )
-def test_links_to_nothing(
+def test_links_to_nothing_are_left_out_and_said(
     old: str, new: str, said: str, crossroads: Callable[..., OpenDrive]
 ) -> None:
     text = to_xml(crossroads()).decode()
     assert old in text
     broken = text.replace(old, new, 1)
-    with pytest.raises(FileFormatError) as caught:
-        read(broken.encode(), "map.xodr")
-    (problem, *_) = [one for one in caught.value.problems if said in one]
+    warnings: list[str] = []
+    read(broken.encode(), "map.xodr", warnings)
+    (problem, *_) = [one for one in warnings if said in one]
     line = int(problem.split("line ")[1].split(":")[0])
     assert line <= len(broken.splitlines())
     assert any(

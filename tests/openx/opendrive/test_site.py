@@ -19,7 +19,8 @@ from bridgegen.ontology.templates import crossroads, site_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
-from bridgegen.openx.opendrive.site import find_site, site_for
+from bridgegen.openx.opendrive.site import find_site
+from bridgegen.openx.opendrive.site_fit import missing, shortened, site_for
 
 from .kinds import KINDS
 from .kinds import model as kind
@@ -100,7 +101,7 @@ def test_several_and_none_is_named(town05: OpenDrive) -> None:
     with pytest.raises(InputError) as caught:
         find_site(town05, map_name="another.xodr")
     (problem,) = caught.value.problems
-    assert "another has 13 such, one of them must be named: 53 (4 legs)" in problem
+    assert "another has 13 such, one of them must be named, or best: 53 (4 legs)" in problem
     assert "965 (4 legs)" in problem
     assert "1260 (3 legs)" in problem
 
@@ -238,11 +239,68 @@ def test_what_a_junction_lacks_is_one_error(town05: OpenDrive) -> None:
         site_for(load("red-light-runner"), town05, "685", "Town05.xodr")
     (problem,) = caught.value.problems
     assert problem == (
-        "junction 685 of Town05 must have the lanes that red-light-runner uses; it has 4 legs; "
-        "missing: leg B out, lane 2, 50 m away (the leg has 49.1 m); "
-        "leg D in, lane 2 (road 48 has 1)"
+        "junction 685 of Town05 must have the lanes that red-light-runner uses, at one of 4 "
+        "rotations; it has 4 legs; missing: leg D in, lane 2 (road 48 has 1)"
     )
     with pytest.raises(UnsupportedError, match="cut-in takes place on the template road; on a map"):
         site_for(load("cut-in"), town05, "685")
     with pytest.raises(UnsupportedError, match="leg D out, sidewalk"):
         site_for(load("pedestrian-at-night"), town05, "965")
+
+
+def test_the_rotation_at_which_a_scenario_fits(crossroads: Callable[..., OpenDrive]) -> None:
+    """Without the way from A straight on, a scenario that needs it lies a quarter turn further."""
+    model = crossroads()
+    scenario = load("red-light-runner")
+    site = site_for(scenario, model)
+    start, end = (site.leg(name) for name in ("A", "C"))
+    assert start is not None
+    assert end is not None
+    (junction,) = model.junctions
+    beyond = {
+        road.id for road in model.connecting_roads(junction.id)
+        if {link.element_id for link in (road.predecessor, road.successor) if link}
+        == {start.roads[0].road_id, end.roads[0].road_id}
+    }  # fmt: skip
+    blocked = dataclasses.replace(
+        junction,
+        connections=tuple(
+            one for one in junction.connections
+            if not (one.incoming_road == start.roads[0].road_id and one.entered_road in beyond)
+        ),
+    )  # fmt: skip
+    turned = site_for(scenario, dataclasses.replace(model, junctions=(blocked,)))
+    assert turned.legs[0].roads[0].road_id != start.roads[0].road_id
+    assert {leg.roads[0].road_id for leg in turned.legs} == {
+        leg.roads[0].road_id for leg in site.legs
+    }
+    in_order = [math.remainder(leg.heading_deg - turned.legs[0].heading_deg, 360.0) % 360.0
+                for leg in turned.legs]  # fmt: skip
+    assert in_order == pytest.approx([0.0, 270.0, 180.0, 90.0], abs=1e-6)  # clockwise, as A to D
+
+
+def test_the_best_junction_of_a_town(town05: OpenDrive) -> None:
+    best = site_for(load("red-light-runner"), town05, "best", "Town05.xodr")
+    assert missing(load("red-light-runner"), town05, best) == []
+    with pytest.raises(UnsupportedError, match="pedestrian-at-night fits no junction of Town05"):
+        site_for(load("pedestrian-at-night"), town05, "best", "Town05.xodr")
+
+
+def test_a_route_that_ends_beyond_its_leg_is_shortened(town05: OpenDrive) -> None:
+    scenario = load("crossroads-s4")
+    site = site_for(scenario, town05, "965")
+    leg = site.leg("D")
+    assert leg is not None
+    far = scenario.story.participants[0]
+    assert far.end is not None
+    far = dataclasses.replace(far, end=dataclasses.replace(far.end, distance=leg.length + 500.0))
+    story = dataclasses.replace(
+        scenario.story, participants=(far, *scenario.story.participants[1:])
+    )
+    beyond = dataclasses.replace(scenario, story=story)
+    placed, (note,) = shortened(beyond, site_for(beyond, town05, "965"))
+    end = placed.story.participants[0].end
+    assert end is not None
+    assert end.distance == pytest.approx(leg.length - 1.0)
+    assert "the route of ego ends" in note
+    assert shortened(scenario, site) == (scenario, [])

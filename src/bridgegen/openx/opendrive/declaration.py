@@ -10,6 +10,13 @@ from functools import cache
 from types import UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
+DECORATION = "DECORATION"
+"""The class attribute that marks a record without influence on driving.
+
+One that cannot be read is left out, and an impossible value of an attribute that it may lack is
+passed over; warnings say so.
+"""
+
 Role = Literal["attribute", "child", "children", "choice", "ids", "text"]
 _REQUIRED = object()
 
@@ -29,6 +36,9 @@ class Form:
         high: largest absolute value allowed.
         words: the texts allowed; empty allows all.
         least: fewest children allowed.
+        fallback: what a missing or impossible value is read as, with a warning; None: that is an
+            error.
+        decoration: of children: one that cannot be read is left out, with a warning.
     """
 
     role: Role
@@ -39,6 +49,8 @@ class Form:
     high: float | None = None
     words: tuple[str, ...] = ()
     least: int = 0
+    fallback: Any = None
+    decoration: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +83,10 @@ def attribute(
     above: float | None = None,
     high: float | None = None,
     words: tuple[str, ...] = (),
+    fallback: Any = None,
 ) -> Any:
-    """Declare an attribute; without ``default`` a file must have it."""
-    form = Form("attribute", (name,), unit, low, above, high, words)
+    """Declare an attribute; without ``default`` or ``fallback`` a file must have it."""
+    form = Form("attribute", (name,), unit, low, above, high, words, fallback=fallback)
     return _field(form, default)
 
 
@@ -82,14 +95,14 @@ def child(path: str) -> Any:
     return _field(Form("child", tuple(path.split("/"))), None)
 
 
-def only_child(path: str) -> Any:
-    """Declare a child element that a file must have."""
-    return _field(Form("child", tuple(path.split("/"))), _REQUIRED)
+def only_child(path: str, *, fallback: Any = None) -> Any:
+    """Declare a child element that a file must have, if there is no ``fallback``."""
+    return _field(Form("child", tuple(path.split("/")), fallback=fallback), _REQUIRED)
 
 
-def children(path: str, *, least: int = 0) -> Any:
+def children(path: str, *, least: int = 0, decoration: bool = False) -> Any:
     """Declare child elements of one tag, in the file's order, of which it must have ``least``."""
-    return _field(Form("children", tuple(path.split("/")), least=least), ())
+    return _field(Form("children", tuple(path.split("/")), least=least, decoration=decoration), ())
 
 
 def choice() -> Any:

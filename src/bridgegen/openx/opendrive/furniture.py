@@ -3,6 +3,7 @@
 # ruff: noqa: RUF009  (fields are declared through functions that call dataclasses.field)
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from bridgegen.openx.opendrive.declaration import attribute, child, children
 from bridgegen.openx.opendrive.user_data import UserData
@@ -22,8 +23,8 @@ class CornerRoad:
 
     s: float = attribute("s", unit="m", low=0.0)
     t: float = attribute("t", unit="m")
-    dz: float = attribute("dz", unit="m")
-    height: float = attribute("height", unit="m", low=0.0)
+    dz: float = attribute("dz", unit="m", fallback=0.0)
+    height: float = attribute("height", unit="m", low=0.0, fallback=0.0)
     id: int | None = attribute("id", default=None, low=0)
 
 
@@ -33,8 +34,8 @@ class CornerLocal:
 
     u: float = attribute("u", unit="m")
     v: float = attribute("v", unit="m")
-    z: float = attribute("z", unit="m")
-    height: float = attribute("height", unit="m", low=0.0)
+    z: float = attribute("z", unit="m", fallback=0.0)
+    height: float = attribute("height", unit="m", low=0.0, fallback=0.0)
     id: int | None = attribute("id", default=None, low=0)
 
 
@@ -42,6 +43,7 @@ class CornerLocal:
 class Outline:
     """The outline of an object: corners in the road's coordinates or in the object's."""
 
+    DECORATION: ClassVar[bool] = True
     id: int | None = attribute("id", default=None, low=0)
     fill_type: str | None = attribute("fillType", default=None)
     outer: bool | None = attribute("outer", default=None)
@@ -55,6 +57,7 @@ class Outline:
 class Object:
     """Something on or beside a road: a crosswalk, a barrier, a pole."""
 
+    DECORATION: ClassVar[bool] = True
     id: str = attribute("id")
     s: float = attribute("s", unit="m", low=0.0)
     t: float = attribute("t", unit="m")
@@ -82,6 +85,7 @@ class Object:
 class Dependency:
     """Another signal that a signal depends on."""
 
+    DECORATION: ClassVar[bool] = True
     id: str = attribute("id")
     type: str | None = attribute("type", default=None)
 
@@ -93,8 +97,8 @@ class Signal:
     id: str = attribute("id")
     s: float = attribute("s", unit="m", low=0.0)
     t: float = attribute("t", unit="m")
-    dynamic: str = attribute("dynamic", words=("yes", "no"))
-    orientation: str = attribute("orientation", words=("+", "-", "none"))
+    dynamic: str = attribute("dynamic", words=("yes", "no"), fallback="no")
+    orientation: str = attribute("orientation", words=("+", "-", "none"), fallback="none")
     type: str = attribute("type")
     z_offset: float = attribute("zOffset", default=0.0, unit="m")
     subtype: str = attribute("subtype", default="-1")
@@ -121,7 +125,7 @@ class SignalReference:
     id: str = attribute("id")
     s: float = attribute("s", unit="m", low=0.0)
     t: float = attribute("t", unit="m")
-    orientation: str = attribute("orientation", words=("+", "-", "none"))
+    orientation: str = attribute("orientation", words=("+", "-", "none"), fallback="none")
     validity: tuple[Validity, ...] = children("validity")
 
 

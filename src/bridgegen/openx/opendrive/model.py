@@ -15,6 +15,7 @@ position.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.declaration import attribute, child, children, ids, only_child, text
@@ -46,9 +47,20 @@ class Width(Cubic):
 
 
 @dataclass(frozen=True, slots=True)
+class Border(Cubic):
+    """A lane's outer border [m from the reference line]; ``s`` counts from the section's start.
+
+    The reader turns borders into widths (`bridgegen.openx.opendrive.repair`).
+    """
+
+    s: float = attribute("sOffset", unit="m", low=0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class RoadMark:
     """The marking of a lane's outer border; ``s`` counts from the start of the lane section."""
 
+    DECORATION: ClassVar[bool] = True
     s: float = attribute("sOffset", unit="m", low=0.0)
     type: str = attribute("type")
     color: str = attribute("color", default="standard")
@@ -78,6 +90,7 @@ class Lane:
     predecessors: tuple[int, ...] = ids("link/predecessor")
     successors: tuple[int, ...] = ids("link/successor")
     widths: tuple[Width, ...] = children("width")
+    borders: tuple[Border, ...] = children("border")
     road_marks: tuple[RoadMark, ...] = children("roadMark")
     speeds: tuple[LaneSpeed, ...] = children("speed")
     user_data: tuple[UserData, ...] = children("userData")
@@ -163,8 +176,8 @@ class Road:
     successor: RoadLink | None = child("link/successor")
     types: tuple[RoadType, ...] = children("type")
     plan_view: tuple[Geometry, ...] = children("planView/geometry", least=1)
-    elevations: tuple[Cubic, ...] = children("elevationProfile/elevation")
-    superelevations: tuple[Cubic, ...] = children("lateralProfile/superelevation")
+    elevations: tuple[Cubic, ...] = children("elevationProfile/elevation", decoration=True)
+    superelevations: tuple[Cubic, ...] = children("lateralProfile/superelevation", decoration=True)
     lane_offsets: tuple[Cubic, ...] = children("lanes/laneOffset")
     sections: tuple[LaneSection, ...] = children("lanes/laneSection", least=1)
     objects: tuple[Object, ...] = children("objects/object")
@@ -273,6 +286,7 @@ class Junction:
 class Offset:
     """Where the map's origin lies in its geographical projection; coordinates do not include it."""
 
+    DECORATION: ClassVar[bool] = True
     x: float = attribute("x", unit="m")
     y: float = attribute("y", unit="m")
     z: float = attribute("z", unit="m")
@@ -283,8 +297,9 @@ class Offset:
 class Header:
     """Whence the map comes."""
 
-    rev_major: int = attribute("revMajor", low=1)
-    rev_minor: int = attribute("revMinor", low=0)
+    DECORATION: ClassVar[bool] = True
+    rev_major: int = attribute("revMajor", low=1, fallback=1)
+    rev_minor: int = attribute("revMinor", low=0, fallback=4)
     name: str | None = attribute("name", default=None)
     version: str | None = attribute("version", default=None)
     date: str | None = attribute("date", default=None)
@@ -301,8 +316,8 @@ class Header:
 class OpenDrive:
     """A road network."""
 
-    header: Header = only_child("header")
-    roads: tuple[Road, ...] = children("road")
+    header: Header = only_child("header", fallback=Header(1, 4))
+    roads: tuple[Road, ...] = children("road", least=1)
     controllers: tuple[Controller, ...] = children("controller")
     junctions: tuple[Junction, ...] = children("junction")
 

@@ -12,8 +12,10 @@ from bridgegen.openx.opendrive.declaration import attribute, choice
 
 LENGTH_LIMIT = 1e6
 """Longest road [m]."""
-CURVATURE_LIMIT = 10.0
-"""Largest curvature [1/m]: no vehicle turns on 0.1 m."""
+CURVATURE_LIMIT = 1e4
+"""Largest curvature [1/m]."""
+SHARP_CURVATURE = 10.0
+"""Above this curvature [1/m] a reader warns: no vehicle turns on 0.1 m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,7 @@ class Geometry:
     x: float = attribute("x", unit="m")
     y: float = attribute("y", unit="m")
     hdg: float = attribute("hdg", unit="rad", high=1e4)
-    length: float = attribute("length", unit="m", above=0.0, high=LENGTH_LIMIT)
+    length: float = attribute("length", unit="m", low=0.0, high=LENGTH_LIMIT)
     shape: Line | Arc | Spiral | Poly3 | ParamPoly3 = choice()
 
 

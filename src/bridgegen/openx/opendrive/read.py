@@ -1,4 +1,8 @@
-"""OpenDRIVE text → model. Everything that is wrong with a file is reported at once, by line."""
+"""OpenDRIVE text → model. Everything that is wrong with a file is reported at once, by line.
+
+What matters for driving must be right, or the file is refused. Decoration is read with a warning,
+and what can be repaired without a guess at a way to drive is repaired, and said (`repair`).
+"""
 
 import math
 from collections.abc import Iterator
@@ -9,7 +13,7 @@ from typing import Any
 from lxml import etree
 
 from bridgegen.errors import FileFormatError, UnsupportedError
-from bridgegen.openx.opendrive.declaration import ID, Field, plan
+from bridgegen.openx.opendrive.declaration import DECORATION, ID, Field, plan
 from bridgegen.openx.opendrive.geometry import impossible_shape
 from bridgegen.openx.opendrive.model import (
     JUNCTION_TYPES,
@@ -19,8 +23,9 @@ from bridgegen.openx.opendrive.model import (
     OpenDrive,
     Road,
 )
-from bridgegen.openx.opendrive.plan_view import Geometry
+from bridgegen.openx.opendrive.plan_view import SHARP_CURVATURE, Arc, Geometry, Spiral
 from bridgegen.openx.opendrive.references import broken_references, misnumbered
+from bridgegen.openx.opendrive.repair import Lines, Notes, repair, repair_section
 from bridgegen.openx.opendrive.user_data import PREFIX, UserData
 from bridgegen.openx.xml import parse_xml
 
@@ -30,15 +35,12 @@ NUMBER_LIMIT = 1e9
 SHOWN = 20
 """How many problems of a file are spelled out."""
 
-_BEYOND_US = {
-    ("lane", "border"): "a lane's outer border as <border> (give the lane a <width>)",
-    ("signal", "positionInertial"): "a signal's <positionInertial>",
-}
-
 _Tree = dict[str, "Field | _Tree"]
 
 
-def read(source: Path | str | bytes, place: str | None = None) -> OpenDrive:
+def read(
+    source: Path | str | bytes, place: str | None = None, warnings: list[str] | None = None
+) -> OpenDrive:
     """Read a road network.
 
     What the model has no place for is dropped (see `bridgegen.openx.opendrive.model`).
@@ -46,6 +48,8 @@ def read(source: Path | str | bytes, place: str | None = None) -> OpenDrive:
     Args:
         source: a path, or the document itself as bytes.
         place: what to call it in messages; the path by default.
+        warnings: takes a sentence for each kind of thing that was read as something else, was
+            repaired or left out, with the line of the first.
 
     Raises:
         FileFormatError: unreadable or malformed, or with values, ids or links that cannot be:
@@ -61,9 +65,12 @@ def read(source: Path | str | bytes, place: str | None = None) -> OpenDrive:
     model = reader.record(OpenDrive, root)
     _complain(place, reader)
     assert isinstance(model, OpenDrive)
+    model = repair(model, reader.lines, reader.notes)
     for record, problem in broken_references(model):
         reader.problems.append((reader.lines[id(record)], problem))
     _complain(place, reader)
+    if warnings is not None:
+        warnings += reader.notes.sentences(place)
     return model
 
 
@@ -88,23 +95,31 @@ class _Reader:
     Attributes:
         problems: (line, sentence) of everything that cannot be.
         beyond: the same of what is valid but not supported.
-        lines: where roads, junctions and connections stand, by ``id()`` of the record.
+        notes: of what was not read as it stands.
+        lines: where roads, junctions and connections stand.
     """
 
     def __init__(self) -> None:
+        self.notes = Notes()
         self.problems: list[tuple[int, str]] = []
         self.beyond: list[tuple[int, str]] = []
-        self.lines: dict[int, int] = {}
+        self.lines: Lines = {}
 
     def record(self, cls: type, element: etree._Element) -> Any:
-        """Return a record of a class, or None where anything in it is wrong (and was noted)."""
+        """Return a record of a class.
+
+        None where anything in it is wrong (and was noted); `_LEFT_OUT` of decoration.
+        """
+        decoration = getattr(cls, DECORATION, False)
         before = len(self.problems)
         attributes, below, tree = _table(cls)
         values: dict[str, Any] = {}
         for one, key in attributes:
             raw = element.get(key)
             if raw is not None:
-                values[one.name] = self._value(one, str(raw), element)
+                values[one.name] = self._value(one, str(raw), element, decoration)
+            elif one.form.fallback is not None:
+                values[one.name] = self._fallback(element, one, "missing")
             elif one.required:
                 self._note(element, f"attribute {key} is required")
         found: dict[str, list[Any]] = {}
@@ -116,25 +131,59 @@ class _Reader:
                 self._require(element, one, len(items) >= one.form.least)
                 values[one.name] = tuple(items)
             else:
+                if one.form.fallback is not None and not items:
+                    items = [self._fallback(element, one, "missing")]
                 self._require(element, one, bool(items) or not one.required)
                 if len(items) > 1:
                     self._note(element, f"only one <{_name(one)}> is allowed, got {len(items)}")
                 values[one.name] = items[0] if items else None
         if len(self.problems) > before:
-            return None
+            return self._left_out(element, before) if decoration else None
         record = cls(**values)
+        if isinstance(record, LaneSection):
+            record = repair_section(record, _line(element), _where(element), self.notes)
+            for problem in misnumbered(record):
+                self._note(element, problem)
         self._look_at(record, element)
         return record
 
+    def _left_out(self, element: etree._Element, before: int) -> object:
+        """Turn the problems of a piece of decoration into one warning."""
+        line, problem = self.problems[before]
+        del self.problems[before:]
+        self.notes.add(
+            f"{_tag(element)} left out", line, f"{problem}; the {_tag(element)} is left out"
+        )
+        return _LEFT_OUT
+
+    def _fallback(self, element: etree._Element, one: Field, problem: str) -> Any:
+        value = one.form.fallback
+        name = _name(one)
+        what = f"{name} is {problem}"
+        if one.form.role == "attribute":
+            what += f", read as {value}"
+        else:
+            what = f"<{name}> is {problem}"
+        key = f"{_tag(element)} {name} {problem}"
+        self.notes.add(key, _line(element), f"{_where(element)}: {what}")
+        return value
+
     def _look_at(self, record: object, element: etree._Element) -> None:
         if isinstance(record, Geometry):
-            impossible = impossible_shape(record)
+            impossible = impossible_shape(record) if record.length > 0.0 else None
             if impossible:
                 self._note(element, impossible)
-        elif isinstance(record, LaneSection):
-            for problem in misnumbered(record):
-                self._note(element, problem)
+            sharpest = max((abs(one) for one in _curvatures(record)), default=0.0)
+            if sharpest > SHARP_CURVATURE:
+                self.notes.add(
+                    "sharp",
+                    _line(element),
+                    f"{_where(element)}: a curvature of {sharpest:g} /m turns within "
+                    f"{1.0 / sharpest:.2g} m, which no vehicle does",
+                )
         elif isinstance(record, Road | Junction | Connection):
+            if isinstance(record, Road) and not any(one.length > 0.0 for one in record.plan_view):
+                self._note(element, "length [m] of a geometry must be > 0, got 0")
             self.lines[id(record)] = _line(element)
 
     def _collect(self, element: etree._Element, tree: _Tree, found: dict[str, list[Any]]) -> None:
@@ -144,12 +193,14 @@ class _Reader:
             if isinstance(branch, Field):
                 if branch.types[0] is UserData and not _is_ours(item):
                     continue
-                found.setdefault(branch.name, []).append(self._item(branch, item))
+                made = self._item(branch, item)
+                if made is not _LEFT_OUT:
+                    found.setdefault(branch.name, []).append(made)
             elif branch is not None:
                 self._collect(item, branch, found)
-            elif (_tag(element), tag) in _BEYOND_US:
-                what = f"{_where(item)}: {_BEYOND_US[_tag(element), tag]}"
-                self.beyond.append((_line(item), what))
+            elif (_tag(element), tag) == ("signal", "positionInertial"):
+                what = f"{_where(item)} is passed over: the signal stands at its s and t"
+                self.notes.add("positionInertial", _line(item), what)
 
     def _item(self, one: Field, item: etree._Element) -> Any:
         role = one.form.role
@@ -160,15 +211,29 @@ class _Reader:
         if one.types[0] is Junction and item.get("type", "default") not in JUNCTION_TYPES:
             self.beyond.append((_line(item), f"{_where(item)}: type '{item.get('type')}'"))
             return None
-        return self.record(one.tags[_tag(item)] if role == "choice" else one.types[0], item)
+        before = len(self.problems)
+        made = self.record(one.tags[_tag(item)] if role == "choice" else one.types[0], item)
+        if made is None and one.form.decoration:
+            return self._left_out(item, before)
+        return made
 
-    def _value(self, one: Field, raw: str, element: etree._Element) -> Any:
+    def _value(
+        self, one: Field, raw: str, element: etree._Element, decoration: bool = False
+    ) -> Any:
         try:
             return _parse(one, raw)
         except ValueError as error:
             unit = f" [{one.form.unit}]" if one.form.unit else ""
             shown = raw if len(raw) <= 40 else raw[:40] + "…"
-            self._note(element, f"{one.form.path[0]}{unit} must be {error}, got '{shown}'")
+            problem = f"{one.form.path[0]}{unit} must be {error}, got '{shown}'"
+            if one.form.fallback is not None:
+                return self._fallback(element, one, f"'{shown}'")
+            optional_number = one.default is None and str not in one.types
+            if not one.required and (decoration or optional_number):
+                key = f"{_tag(element)} {one.name}"
+                self.notes.add(key, _line(element), f"{_where(element)}: {problem}; passed over")
+                return one.default
+            self._note(element, problem)
 
     def _require(self, element: etree._Element, one: Field, there: bool) -> None:
         if not there:
@@ -177,6 +242,18 @@ class _Reader:
 
     def _note(self, element: etree._Element, problem: str) -> None:
         self.problems.append((_line(element), f"{_where(element)}: {problem}"))
+
+
+_LEFT_OUT = object()
+"""Stands for a piece of decoration that could not be read."""
+
+
+def _curvatures(geometry: Geometry) -> tuple[float, ...]:
+    """Return the curvatures that a geometry states [1/m]."""
+    shape = geometry.shape
+    if isinstance(shape, Arc):
+        return (shape.curvature,)
+    return (shape.curv_start, shape.curv_end) if isinstance(shape, Spiral) else ()
 
 
 @cache

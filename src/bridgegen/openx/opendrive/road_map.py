@@ -8,9 +8,11 @@ from bridgegen.errors import FileFormatError
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.files import load
 from bridgegen.ontology.site import Site
+from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
-from bridgegen.openx.opendrive.site import find_site, site_for
+from bridgegen.openx.opendrive.site import find_site
+from bridgegen.openx.opendrive.site_fit import site_for
 from bridgegen.openx.xml import read_bytes
 
 
@@ -23,12 +25,14 @@ class RoadMap:
         data: its bytes, exported unchanged.
         model: its contents.
         site: the intersection.
+        warnings: what was not read as it stands.
     """
 
     path: Path
     data: bytes
     model: OpenDrive
     site: Site
+    warnings: tuple[str, ...] = ()
 
 
 def load_map(
@@ -37,9 +41,11 @@ def load_map(
     """Read a map and find the intersection on it that a scenario takes place at.
 
     Args:
-        path: an OpenDRIVE file, or the ``.owl`` that ``bridgegen import`` made of one: the file
-            that it names is read then, which must be what it was.
-        junction: the id of the junction; where the map has several, it must be named.
+        path: an OpenDRIVE file (or a map of CARLA's by its name), or the ``.owl`` that
+            ``bridgegen import`` made of one: the file that it names is read then, which must be
+            what it was.
+        junction: the id of the junction; where the map has several, it must be named, or "best":
+            the one that fits the scenario and is most like its own.
         scenario: what takes place there; a usual crossroads' legs are looked for by default.
 
     Raises:
@@ -48,6 +54,7 @@ def load_map(
         UnsupportedError: the junction has not the legs, or the lanes, of the scenario.
         InputError: the choice of the junction is open.
     """
+    path = map_path(path)
     owl = path if path.suffix.lower() == ".owl" else None
     digest = ""
     if owl is not None:
@@ -58,12 +65,13 @@ def load_map(
             f"{owl}: its map {path} must be what it was when it was imported, but has changed; "
             "import it again"
         )
-    model = read(data, str(path))
+    warnings: list[str] = []
+    model = read(data, str(path), warnings)
     if scenario is None:
         site = find_site(model, junction, map_name=path.name)
     else:
         site = site_for(scenario, model, junction, path.name)
-    return RoadMap(path, data, model, site)
+    return RoadMap(path, data, model, site, tuple(warnings))
 
 
 def map_of(owl: Path) -> tuple[Path, str]:

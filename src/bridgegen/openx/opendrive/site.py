@@ -1,12 +1,10 @@
-"""Finding the intersection of a map that a scenario can take place at, and its legs."""
+"""The intersections of a map, with their legs named as a scenario names them."""
 
 import math
 from collections.abc import Iterator, Mapping
 
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.odd.roads import HEADINGS
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.story import Waypoint
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.legs import heading, leads_to
@@ -18,44 +16,10 @@ KNOWN_SITES = {"Town05": "965"}
 Source: Town05 is CARLA's (version of 2019); 965 has two lanes in and out on each of four legs.
 """
 
-TEMPLATES = ("crossroads", "t-junction")
-"""Templates whose scenarios can take place on a map."""
-
 ROAD_TYPES = ("town", "rural", "motorway")
 """Types of road that a scenario distinguishes."""
 
 _KINDS = {3: "TJunction", 4: "Crossroads"}
-
-
-def site_for(
-    scenario: LogicalScenario,
-    model: OpenDrive,
-    junction_id: str | None = None,
-    map_name: str | None = None,
-) -> Site:
-    """Return a junction that has the legs and lanes of a scenario; see `find_site`.
-
-    Raises:
-        InputError: as `find_site`.
-        UnsupportedError: as `find_site`; or the scenario is not one of an intersection, or the
-            junction lacks lanes that participants stand on or drive to, or these are too short
-            (all of them are named).
-    """
-    roads = scenario.roads
-    if roads.template not in TEMPLATES:
-        raise UnsupportedError(
-            f"{scenario.name} takes place on the template {roads.template}; on a map, scenarios of "
-            f"the templates {' and '.join(TEMPLATES)} can"
-        )
-    headings = {name: leg.heading for name, leg in roads.legs.items()}
-    site = find_site(model, junction_id, map_name, headings)
-    missing = sorted({_missing(site, one) for one in _places(scenario)} - {""})
-    if missing:
-        raise UnsupportedError(
-            f"junction {site.junction_id} of {site.name} must have the lanes that {scenario.name} "
-            f"uses; it has {len(site.legs)} legs; missing: {'; '.join(missing)}"
-        )
-    return site
 
 
 def find_site(
@@ -84,10 +48,30 @@ def find_site(
         UnsupportedError: the junction (or every junction) has more or fewer legs with a driving
             lane, or a leg's lanes change on the road that touches the junction.
     """
+    return turned_sites(model, junction_id, map_name, headings)[0]
+
+
+def turned_sites(
+    model: OpenDrive,
+    junction_id: str | None = None,
+    map_name: str | None = None,
+    headings: Mapping[str, float] = HEADINGS["crossroads"],
+) -> list[Site]:
+    """Return a junction once per rotation of its legs' names, that most like a scenario's first.
+
+    Where traffic drives on the left, the scenario's order of legs is mirrored, so that its left
+    turns become right turns.
+
+    Args:
+        model: as for `find_site`, which says what is raised, too.
+        junction_id: as for `find_site`.
+        map_name: as for `find_site`.
+        headings: as for `find_site`.
+    """
     name = (map_name or model.header.name or "map").rpartition("/")[2]
     stem = name.removesuffix(".xodr")
     junction = model.junction(junction_id or _default_junction(model, stem, len(headings)))
-    ends = sorted(_ends(model, junction), key=lambda end: heading(*end))
+    ends = sorted(road_ends(model, junction), key=lambda end: heading(*end))
     if len(ends) != len(headings):
         touching = {road.id for road, _ in ends}
         roads = ", ".join(road.id for road in model.roads if road.id in touching)
@@ -96,73 +80,51 @@ def find_site(
             f"as the scenario has ({', '.join(headings)}), got {len(ends)} "
             f"(roads {roads or 'none'})"
         )
+    if all(road.rule == "LHT" for road, _ in ends):
+        headings = {leg: 180.0 - angle for leg, angle in headings.items()}
     names = sorted(headings, key=lambda leg: headings[leg] % 360.0)
-    turned = [ends[k:] + ends[:k] for k in range(len(ends))]
-    best = min(turned, key=lambda some: _misfit([headings[leg] for leg in names], some))
-    found = dict(zip(names, best, strict=True))
-    legs = tuple(
-        Leg(leg, heading(*found[leg]), tuple(_arm(model, *found[leg]))) for leg in headings
-    )
-    return Site(
-        name=stem,
-        map_file=map_name,
-        junction_id=junction.id,
-        size=None,
-        legs=legs,
-        kind=_KINDS.get(len(legs), "Intersection"),
-    )
+    arms = {id(end): tuple(_arm(model, *end)) for end in ends}
+    sites = []
+    for k in range(len(ends)):
+        found = dict(zip(names, ends[k:] + ends[:k], strict=True))
+        legs = tuple(Leg(leg, heading(*found[leg]), arms[id(found[leg])]) for leg in headings)
+        sites.append(
+            Site(
+                name=stem,
+                map_file=map_name,
+                junction_id=junction.id,
+                size=None,
+                legs=legs,
+                kind=_KINDS.get(len(legs), "Intersection"),
+            )
+        )
+    return sorted(sites, key=lambda site: unlikeness(headings, site))
 
 
-def _misfit(wanted: list[float], ends: list[tuple[Road, str]]) -> float:
+def unlikeness(headings: Mapping[str, float], site: Site) -> float:
     """Return how badly legs are as wanted [deg²]: first their angles, then their directions.
 
     The angles between the legs make the junction's shape (which leg of a T is the side road);
     only among fits of one shape does it count how far the whole is turned.
+
+    Args:
+        headings: by the legs' names, outwards [deg].
+        site: with legs of these names.
     """
-    turned = [heading(*end) - angle for angle, end in zip(wanted, ends, strict=True)]
+    legs = sorted(site.legs, key=lambda leg: headings[leg.name] % 360.0)
+    turned = [leg.heading_deg - headings[leg.name] for leg in legs]
     beside = [math.remainder(one - turned[0], 360.0) for one in turned]
     middle = sum(beside) / len(beside)
     shape = sum((one - middle) ** 2 for one in beside)
-    return _SHAPE * shape + len(ends) * math.remainder(turned[0] + middle, 360.0) ** 2
+    return _SHAPE * shape + len(legs) * math.remainder(turned[0] + middle, 360.0) ** 2
 
 
 _SHAPE = 100.0
 """How much more an angle between legs counts than a direction: 90° of these, 9° of those."""
 
 
-def _places(scenario: LogicalScenario) -> Iterator[Waypoint]:
-    """Yield where a scenario's participants and things stand, and where routes end."""
-    story = scenario.story
-    for one in story.participants:
-        yield one.start
-        yield from one.path
-        if one.end is not None:
-            yield one.end
-    for jam in story.jams:
-        yield jam.tail
-    for works in story.works:
-        yield from (works.start, works.sign, *works.cones)
-
-
-def _missing(site: Site, place: Waypoint) -> str:
-    """Return what is not there of a place, for a message; empty where nothing is missing."""
-    leg = site.leg(place.leg)
-    if leg is None:
-        return f"leg {place.leg}"
-    road = leg.roads[0]
-    if not isinstance(place.lane, int):
-        there = any((one.type, one.direction) == (place.lane, place.way) for one in road.strips)
-        return "" if there else f"{place} (road {road.road_id})"
-    count = len(road.along(place.way))
-    if place.lane > count:
-        return f"{place} (road {road.road_id} has {count})"
-    if not isinstance(place.distance, str) and place.distance > leg.length:
-        return f"{place}, {place.distance:g} m away (the leg has {leg.length:.4g} m)"
-    return ""
-
-
 def _default_junction(model: OpenDrive, stem: str, count: int) -> str:
-    counts = {junction.id: len(list(_ends(model, junction))) for junction in model.junctions}
+    counts = {junction.id: len(list(road_ends(model, junction))) for junction in model.junctions}
     known = KNOWN_SITES.get(stem)
     if known and counts.get(known) == count:
         return known
@@ -175,10 +137,12 @@ def _default_junction(model: OpenDrive, stem: str, count: int) -> str:
     listed = ", ".join(f"{name} ({legs} legs)" for name, legs in counts.items()) or "none"
     if not fitting:
         raise UnsupportedError(f"{rule}; {stem} has none such: {listed}")
-    raise InputError(f"{rule}; {stem} has {len(fitting)} such, one of them must be named: {listed}")
+    raise InputError(
+        f"{rule}; {stem} has {len(fitting)} such, one of them must be named, or best: {listed}"
+    )
 
 
-def _ends(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]]:
+def road_ends(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]]:
     """Yield the road ends with a driving lane that touch a junction."""
     for road in model.roads:
         if not road.is_connecting:

@@ -121,7 +121,7 @@ def _widths(where: str, lane: Lane, length: float) -> Iterator[str]:
         yield f"{where}: the first width must start at sOffset=0 m, got {lane.widths[0].s:.6g}"
     ends = [width.s for width in lane.widths[1:]] + [length]
     for width, end in zip(lane.widths, ends, strict=True):
-        if end < width.s - SLACK:
+        if end < width.s:
             got = f"got sOffset={width.s:.6g} m"
             yield f"{where}: widths must be in order and within the section, {got}"
             continue

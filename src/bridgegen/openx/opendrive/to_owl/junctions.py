@@ -61,6 +61,10 @@ class Junctions:
                 inner.append(road)
             elif touches:
                 legs.append(road)
+        if not legs:  # roads lead from one junction into another
+            legs = [road for road in inner if any(road.ends_at(one) for one in ids)]
+        if not legs:
+            return  # no road leads there
         kind = self.kinds.get(junction.id) or _BY_LEGS.get(len(legs), "Intersection")
         node = self._builder.node(junction_name(junction.id), kind)
         put(self._network, "has_area", node)

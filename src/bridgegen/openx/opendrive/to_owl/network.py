@@ -170,16 +170,17 @@ class _Map(Builder):
     def lane(self, road_node: ox.NamedNode, road: Road, index: int, lane: Lane, end: str) -> None:
         """Add a lane of a section, or a strip beside the lanes."""
         section = road.sections[index]
-        cls = "Lane" if lane.drivable else STRIPS.get(lane.type, "RoadStrip")
+        drivable = lane.drivable and has_width(road, index, lane)
+        cls = "Lane" if drivable else STRIPS.get(lane.type, "RoadStrip")
         node = self.node(lane_name(road.id, index, lane.id), cls)
-        self.put(road_node, "has_lane" if lane.drivable else "has_strip", node)
+        self.put(road_node, "has_lane" if drivable else "has_strip", node)
         self.put(node, "has_lane_id", lane.id)
         self.put(node, "has_lane_type", lane.type)
         self.put(node, "has_section_start", float(section.s))
         self.put(node, "has_start_width", width_of(section, lane, section.s, section.s)[0])
         self.put(node, "has_direction", self.direction(road, lane.id, end))
         width = _middle_width(road, index, lane)
-        if lane.drivable or width > 0.0:
+        if drivable or width > 0.0:
             self.put(node, "has_width", width)
         for turn in values_of(lane.user_data, "allows_turn"):
             if turn in tbox().allowed["allows_turn"]:
@@ -235,6 +236,11 @@ def _middle_width(road: Road, index: int, lane: Lane) -> float:
     section = road.sections[index]
     middle = (section.s + section_end(road, index)) / 2.0
     return width_of(section, lane, middle, middle)[0]
+
+
+def has_width(road: Road, index: int, lane: Lane) -> bool:
+    """Return whether a lane is wider than 0 m halfway along its section."""
+    return _middle_width(road, index, lane) > 0.0
 
 
 def _speed_limit(road: Road) -> float | None:
