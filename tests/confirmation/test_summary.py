@@ -71,14 +71,14 @@ def test_harm_changes_where_it_is_known():
 def test_the_sentences_are_for_people():
     line, *rest = sentences("esmini 3.6", THREE)
     assert line == (
-        "2 of 3 confirmed in esmini 3.6 (95 %: 21–94 %); 1 not: 0002; 1 not run, which says "
-        "nothing of them."
+        "2 of 3 confirmed in esmini 3.6 (95 %: 21–94 %); 1 not: 0002; 1 not run (neither "
+        "confirmed nor refuted)."
     )
     assert rest == [
         "Differences, median (largest): d_min 0.250 (2.000) m, v_d 0.000 (1.000) m/s, first "
-        "contact 0.500 (0.500) s.",
+        "collision 0.500 (0.500) s.",
         "In 2 of 3 an entity deviates by more than 0.5 m, first at 2.00 s (median).",
-        "Contacts: 1 in both, 1 only here, 0 only there.",
+        "Collisions: 1 in both, 1 only here, 0 only there.",
     ]
 
 

@@ -36,7 +36,7 @@ def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
         more = ", …" if len(lost) > NAMED else ""
         line += f"; {len(lost)} not: {', '.join(lost[:NAMED])}{more}"
     if s.not_run:
-        line += f"; {s.not_run} not run, which says nothing of them"
+        line += f"; {s.not_run} not run (neither confirmed nor refuted)"
     return [f"{line}.", *_robust(s), *_differences(s)]
 
 
@@ -62,7 +62,7 @@ def _differences(s: ConfirmationSummary) -> list[str]:
             _spread("harm", s.harm, ""),
             _spread("d_min", s.d_min, "m"),
             _spread("v_d", s.v_d, "m/s"),
-            _spread("first contact", s.contact, "s"),
+            _spread("first collision", s.contact, "s"),
         ],
     )
     lines = [f"Differences, median (largest): {', '.join(parts)}."]
@@ -75,7 +75,7 @@ def _differences(s: ConfirmationSummary) -> list[str]:
         )
     both, here, there = s.contacts
     if here or there:
-        lines.append(f"Contacts: {both} in both, {here} only here, {there} only there.")
+        lines.append(f"Collisions: {both} in both, {here} only here, {there} only there.")
     return lines
 
 

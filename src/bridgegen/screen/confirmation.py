@@ -71,7 +71,7 @@ def _table(found: "RunConfirmation") -> Table:
     table.add_column("there", no_wrap=True)
     by_harm = found.record.rule == "harm"
     figures = ("harm", "d_min [m]") if by_harm else ("d_min [m]", "v_d [m/s]")
-    for name in (*figures, "contact [s]", "parts [s]"):
+    for name in (*figures, "collision [s]", "diverges [s]"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("first", overflow="fold")
     words = {True: "critical", False: "NOT", None: "not run"}
