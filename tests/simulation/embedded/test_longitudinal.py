@@ -214,6 +214,29 @@ def test_a_profile_relative_to_another_s_speed():
     assert at(rollout, "bv", 3.0) == pytest.approx(8.0)
 
 
+def test_one_that_stands_across_and_cannot_follow_has_the_speed_at_which_it_moves():
+    """Its own way leads off the road: it comes no nearer to its place, and is not said to drive."""
+    turned = (
+        '<Position><RelativeObjectPosition entityRef="lead" dx="0" dy="-0.6">'
+        '<Orientation type="relative" h="1.57"/></RelativeObjectPosition></Position>'
+    )
+    keep = longitudinal(
+        '<LongitudinalDistanceAction entityRef="lead" freespace="false" continuous="true" '
+        'distance="1.2" coordinateSystem="road"/>'
+    )
+    names = ("ego", "bv", "lead")
+    privates = [start("ego", lane(3, -1, 5.0), 0.0), start("lead", lane(1, 1, 200.0), 10.0)]
+    privates.append(
+        f'<Private entityRef="bv"><PrivateAction><TeleportAction>{turned}</TeleportAction>'
+        f"</PrivateAction><PrivateAction>{keep}</PrivateAction></Private>"
+    )
+    rollout = run(scenario(names, "".join(privates), events()), roads=ROADS)
+    e, n = rollout.names.index("bv"), int(rollout.n_steps[0])
+    x, y, v = (array[0, e, 1:n] for array in (rollout.x, rollout.y, rollout.v))
+    moved = np.hypot(np.diff(x), np.diff(y))[1:]
+    assert moved == pytest.approx(0.5 * (v[1:-1] + v[2:]) * DT, abs=1e-3)
+
+
 def test_a_distance_without_limits_is_kept_at_once():
     rows = (
         ("keep", "bv", distance("lead", metres=12.0), after(1.0)),

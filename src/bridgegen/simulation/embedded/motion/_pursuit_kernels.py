@@ -245,6 +245,8 @@ def _keep_distance(j, e, k, plan, roads, state, record):
     if row[UNLIMITED] and e > 0:
         before = record.v[e, k]
         state.command[e] = min(record.v[ref, seen], plan.bodies[e, 3])
+        if abs(error) < 0.5 * state.command[e] * plan.dt:  # it cannot follow: it stands across
+            state.command[e] = abs(error) / plan.dt
         state.station[e] += error - 0.5 * (before + state.command[e]) * plan.dt
         return not row[CONTINUOUS]
     limits = _limits(row, e, plan, state)
