@@ -1,23 +1,15 @@
-"""Validation of a file: all of its problems at once."""
+"""Validation of a file: all of its problems at once.
+
+Each kind of file imports what checks it: a map needs neither the simulator nor the ontology.
+"""
 
 from pathlib import Path
 
-from bridgegen.campaign.exportable import CHECKED_BY_VALIDATE, require_exportable
 from bridgegen.errors import BridgeGenError, InputError
-from bridgegen.odd.reader import load as load_scenario
 from bridgegen.ontology import reasoner
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.convert import scenario_of
-from bridgegen.openx.file_scenario import load_file_scenario
-from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
-from bridgegen.openx.openscenario import read as openscenario_read
-from bridgegen.openx.openscenario import validate as openscenario_validate
-from bridgegen.openx.openscenario.distributions import is_distribution, read_distribution
-from bridgegen.pipeline import Pipeline
 
 
 def validate_file(
@@ -63,6 +55,8 @@ def name_note(path: Path) -> str | None:
     """Return what is odd about a valid scenario file's name; None where nothing is."""
     if path.suffix.lower() not in (".yaml", ".yml"):
         return None
+    from bridgegen.odd.reader import load as load_scenario
+
     name = load_scenario(path).name
     if name == path.stem:
         return None
@@ -77,6 +71,10 @@ def _placed(path: Path, problem: str) -> str:
 
 
 def _ontology(path: Path) -> list[str]:
+    from bridgegen.ontology.check import check
+    from bridgegen.ontology.files import load
+    from bridgegen.openx.convert import scenario_of
+
     individuals = load(path)
     if _is_map(individuals):
         return [str(one) for one in check(individuals)]
@@ -103,6 +101,12 @@ def _roads(path: Path, warnings: list[str] | None) -> list[str]:
 
 
 def _storyboard(path: Path) -> list[str]:
+    from bridgegen.openx.file_scenario import load_file_scenario
+    from bridgegen.openx.logic_file import roads_of
+    from bridgegen.openx.openscenario import read as openscenario_read
+    from bridgegen.openx.openscenario import validate as openscenario_validate
+    from bridgegen.openx.openscenario.distributions import is_distribution, read_distribution
+
     if is_distribution(path):
         named = read_distribution(path).scenario_file.filepath
         load_file_scenario(path.parent / str(named), path)
@@ -112,6 +116,10 @@ def _storyboard(path: Path) -> list[str]:
 
 
 def _logical(path: Path) -> list[str]:
+    from bridgegen.campaign.exportable import CHECKED_BY_VALIDATE, require_exportable
+    from bridgegen.odd.reader import load as load_scenario
+    from bridgegen.pipeline import Pipeline
+
     scenario = load_scenario(path)
     pipeline = Pipeline(scenario, scenario.space())  # builds and compiles it at the defaults
     require_exportable(pipeline, CHECKED_BY_VALIDATE)

@@ -85,7 +85,12 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     storyboard = read(path)
     road = logic_path(storyboard, path)
     data = read_bytes(road)
-    roads = RoadFile(road.name, hashlib.sha256(data).hexdigest(), data, read_roads(data, str(road)))
+    roads = RoadFile(
+        road.name,
+        hashlib.sha256(data).hexdigest(),
+        data,
+        read_roads(data, str(road), may_be_empty=True),
+    )
     if problems := validate.problems(storyboard, roads.model):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     definition = None

@@ -19,7 +19,7 @@ def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
     """
     if scenario.road_network.logic_file is None:
         return OpenDrive(Header(1, 7))
-    return opendrive_read.read(logic_path(scenario, path))
+    return opendrive_read.read(logic_path(scenario, path), may_be_empty=True)
 
 
 def logic_path(scenario: OpenScenario, path: Path) -> Path:

@@ -162,7 +162,7 @@ def test_a_thousand_things_wrong() -> None:
         (b"", "not well-formed XML"),
         (b"<OpenDRIVE>", "not well-formed XML"),
         (b"<OpenSCENARIO/>", "the root element must be OpenDRIVE, got OpenSCENARIO"),
-        (b"<OpenDRIVE/>", "<road> is required, got nothing"),
+        (b"<OpenDRIVE/>", "line 1: <OpenDRIVE>: <road> is required"),
         (b'<!DOCTYPE x [<!ENTITY e "e">]><OpenDRIVE/>', "DOCTYPE is refused"),
         (b"<OpenDRIVE>" + b"<a>" * 100 + b"</a>" * 100 + b"</OpenDRIVE>", "nest 64 deep"),
     ],

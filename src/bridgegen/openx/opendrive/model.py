@@ -317,7 +317,7 @@ class OpenDrive:
     """A road network."""
 
     header: Header = only_child("header", fallback=Header(1, 4))
-    roads: tuple[Road, ...] = children("road", least=1)
+    roads: tuple[Road, ...] = children("road")
     controllers: tuple[Controller, ...] = children("controller")
     junctions: tuple[Junction, ...] = children("junction")
 

@@ -39,7 +39,11 @@ _Tree = dict[str, "Field | _Tree"]
 
 
 def read(
-    source: Path | str | bytes, place: str | None = None, warnings: list[str] | None = None
+    source: Path | str | bytes,
+    place: str | None = None,
+    warnings: list[str] | None = None,
+    *,
+    may_be_empty: bool = False,
 ) -> OpenDrive:
     """Read a road network.
 
@@ -50,6 +54,8 @@ def read(
         place: what to call it in messages; the path by default.
         warnings: takes a sentence for each kind of thing that was read as something else, was
             repaired or left out, with the line of the first.
+        may_be_empty: whether a network without a road is fine, as a storyboard's is whose
+            participants go by world positions.
 
     Raises:
         FileFormatError: unreadable or malformed, or with values, ids or links that cannot be:
@@ -65,6 +71,8 @@ def read(
     model = reader.record(OpenDrive, root)
     _complain(place, reader)
     assert isinstance(model, OpenDrive)
+    if not model.roads and not may_be_empty:
+        raise FileFormatError(f"{place}, line {_line(root)}: <OpenDRIVE>: <road> is required")
     model = repair(model, reader.lines, reader.notes)
     for record, problem in broken_references(model):
         reader.problems.append((reader.lines[id(record)], problem))
