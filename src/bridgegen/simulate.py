@@ -39,6 +39,7 @@ class FileResult:
             decisive conflict.
         cause: of its harm, by the search that exported the file, as its header states; None where
             it states none, or another driver than the file's drives.
+        notes: what runs otherwise than a reader of the file may expect, a sentence each.
     """
 
     driver: str
@@ -49,6 +50,7 @@ class FileResult:
     rollout: Rollout
     conflicts: Conflicts
     cause: str | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def incidents(self) -> tuple[Incident, ...]:
@@ -132,6 +134,7 @@ def simulate_file(
         rollout=rollout,
         conflicts=analyse(rollout),
         cause=_stated_cause(scenario) if ego is None and ideal is None and others is None else None,
+        notes=embedded.program.notes,
     )
 
 

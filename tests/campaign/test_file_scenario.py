@@ -269,6 +269,23 @@ def test_a_distribution_keeps_the_declared_constraints(tmp_path):
         search(tmp_path / "d", uniform("Gap", 20, 60), CONSTRAINED, budget=5)
 
 
+def test_a_constraint_on_two_parameters_holds_in_every_evaluation(tmp_path):
+    text = scenario_text().replace(
+        '<ParameterDeclaration name="Gap" parameterType="double" value="30"/>',
+        '<ParameterDeclaration name="Gap" parameterType="double" value="30"><ConstraintGroup>'
+        '<ValueConstraint rule="greaterOrEqual" value="${0.5 * $EgoSpeed + 20}"/>'
+        '<ValueConstraint rule="greaterThan" value="0"/></ConstraintGroup></ParameterDeclaration>',
+    )
+    both = stochastic(
+        ("Gap", f"<UniformDistribution>{limits(20, 60)}</UniformDistribution>"),
+        ("EgoSpeed", f"<UniformDistribution>{limits(10, 30)}</UniformDistribution>"),
+    )
+    search(tmp_path, both, text, budget=50)
+    found = columns(tmp_path / "run")
+    assert (found["Gap"] >= 0.5 * found["EgoSpeed"] + 20.0 - 1e-9).all()
+    assert found["EgoSpeed"].max() > 25.0
+
+
 def test_a_distribution_of_another_scenario_is_refused(tmp_path):
     scenario, ranges = write_pair(tmp_path)
     ranges.write_text(distribution_text(uniform("Gap"), "../other.xosc"), "utf-8")

@@ -135,6 +135,8 @@ def run_search(given: SearchArguments) -> Run:
         pipeline = Pipeline(
             logical, space, given, road_map=roads, simulator=given.simulator, workers=pool
         )
+        for note in pipeline.simulator.embedded.program.notes:
+            callbacks.warning(note)
         callbacks.stage("compile")
         pipeline.warm_up()
         require_exportable(pipeline)

@@ -273,6 +273,8 @@ def simulate(
     )
     for one in skipped or ():
         print(f"bridgegen: warning: left out: {one}", file=sys.stderr)
+    for note in result.notes:
+        print(f"bridgegen: note: {note}", file=sys.stderr)
     if trace is not None:
         write_trace(trace, result.rollout)
     if as_json:

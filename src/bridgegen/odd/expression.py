@@ -196,13 +196,22 @@ def lookup(index: str, values: Sequence[float]) -> Lookup:
     return Lookup(source, frozenset({index}), tree, take, tuple(table.tolist()))
 
 
-def parse(text: str, place: str = "", categories: Categories = MappingProxyType({})) -> Expression:
+def parse(
+    text: str,
+    place: str = "",
+    categories: Categories = MappingProxyType({}),
+    *,
+    longest: int = MAX_LENGTH,
+    deepest: int = MAX_DEPTH,
+) -> Expression:
     """Read a formula.
 
     Args:
         text: such as ``"50 if fog_density > 80 else 100 - 0.5*fog_density"``.
         place: file and line, for the message.
         categories: the names of the values of each parameter that is a category.
+        longest: how many characters it may have.
+        deepest: how deep it may nest.
 
     Raises:
         InputError: not a formula, or one that holds what formulas may not.
@@ -210,15 +219,15 @@ def parse(text: str, place: str = "", categories: Categories = MappingProxyType(
     source = " ".join(text.split())
     where = f" ({place})" if place else ""
     shown = source if len(source) <= 80 else source[:77] + "..."
-    if len(source) > MAX_LENGTH:
+    if len(source) > longest:
         raise InputError(
-            f"a formula may have {MAX_LENGTH} characters, got {len(source)}: '{shown}'{where}"
+            f"a formula may have {longest} characters, got {len(source)}: '{shown}'{where}"
         )
     try:
         unknown = _CHARACTERS.sub("", source)
         if unknown:
             raise _RefusedError(f"{unknown[0]!r} is no part of a formula")
-        tree, _ = _normalise(_numbered(_syntax(source), categories))
+        tree, _ = _normalise(_numbered(_syntax(source, deepest), categories))
     except _RefusedError as error:
         raise InputError(f"cannot read the formula '{shown}': {error}{where}") from None
     names = frozenset(node.id for node in _nodes(tree) if isinstance(node, ast.Name))
@@ -230,7 +239,7 @@ class _RefusedError(Exception):
     """Why a text is not a formula."""
 
 
-def _syntax(source: str) -> ast.expr:
+def _syntax(source: str, deepest: int) -> ast.expr:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # such as "0if a else b": Python only warns
@@ -239,11 +248,11 @@ def _syntax(source: str) -> ast.expr:
         reason = error.msg if isinstance(error, SyntaxError) else str(error)
         raise _RefusedError(reason or "too deep") from None
     level: list[ast.AST] = [tree]
-    for _ in range(MAX_DEPTH):
+    for _ in range(deepest):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
         if not level:
             return tree
-    raise _RefusedError(f"a formula may nest {MAX_DEPTH} deep")
+    raise _RefusedError(f"a formula may nest {deepest} deep")
 
 
 def _numbered(tree: ast.expr, categories: Categories) -> ast.expr:

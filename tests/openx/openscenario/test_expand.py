@@ -196,7 +196,7 @@ def test_expressions_that_double_each_time_are_refused():
     many = [parameter("p0", "double", "1")]
     many += [parameter(f"p{k}", "double", f"${{$p{k - 1} + $p{k - 1}}}") for k in range(1, 31)]
     text = scenario(declared=declared(*many), stories=story(maneuver(speed("$p30"))))
-    assert "may have 1000 characters" in problems(text)
+    assert "may have 20000 characters" in problems(text)
 
 
 def test_what_is_made_of_literals_alone_is_a_literal():

@@ -92,6 +92,34 @@ def test_constraints_groups_are_alternatives(s4, constraints, holds):
 
 
 @pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        ("$w", None),
+        ("${$w - 1}", None),
+        ("${$later / 3}", None),  # declared after it, and made of another
+        ("${$w - 3}", "parameter d must be lessThan ${$w - 3} = 2.0, got 3.0"),
+        ("$nothing", "has a constraint that refers to $nothing, which is not declared"),
+        ("${$word + 1}", "has a constraint that computes with $word, which is no number"),
+        ("${1 / 0}", "has a constraint that must be finite"),
+        ("${1 +}", "has a constraint that"),
+    ],
+)
+def test_a_constraint_may_refer_to_other_parameters(s4, limit, said):
+    declared = (
+        one("d", "double", "3.0", group(("lessThan", limit))),
+        one("w", "double", "5"),
+        one("word", "string", "end"),
+        one("later", "double", "${$w * 4}"),
+    )
+    if said is None:
+        read(declare(s4, *declared))
+        return
+    with pytest.raises(FileFormatError) as caught:
+        read(declare(s4, *declared))
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("kind", "value", "constraint", "text"),
     [
         ("string", "a", ("lessThan", "b"), "which string does not know"),
@@ -109,10 +137,9 @@ def test_constraints_that_do_not_fit(s4, kind, value, constraint, text):
     ("declaration", "text"),
     [
         (one("d", "$other", "1.0"), "as parameterType of ParameterDeclaration is not supported"),
-        (one("d", "double", "1", group(("lessThan", "$bv_speed"))), "as value of ValueConstraint"),
     ],
 )
-def test_declarations_refer_to_parameters_in_their_values_only(s4, declaration, text):
+def test_declarations_refer_to_parameters_in_values_and_limits_only(s4, declaration, text):
     with pytest.raises(UnsupportedError, match=text):
         read(declare(s4, declaration))
 

@@ -4,12 +4,14 @@ On leg C (road 3, straight, south is inward) lane 1 leads south, lane 2 lies 3.5
 The instants are 0.05 s apart.
 """
 
+import re
+
 import numpy as np
 import pytest
 
 from bridgegen.errors import UnsupportedError
 
-from .storyboards import after, events, lane, lateral, run, scenario, speeding, start
+from .storyboards import after, events, lane, lateral, run, scenario, simulator, speeding, start
 
 EGO = start("ego", lane(3, 1, 95.0), 10.0)
 AHEAD = start("bv", lane(3, 1, 45.0), 0.0)
@@ -47,15 +49,24 @@ BOTH_OFF, BOTH_ON = (
 )
 
 
-def test_a_controller_that_is_not_known_is_not_switched_on():
+def test_the_storyboard_moves_an_entity_whose_controller_is_not_known():
     unknown = assign("pilot somebody")
     for first in ((unknown, BOTH_ON), (assign(more=' activateLateral="true"'),), (BOTH_ON,)):
-        with pytest.raises(UnsupportedError, match=r"line \d+: switching on a controller of 'ego'"):
-            told(first=first, ego=None)
-    with pytest.raises(UnsupportedError, match="switching on a controller of 'ego'"):
-        told(("on", BOTH_ON, after(1.0)), ego=None)
+        assert (told(first=first, ego=None).v[0, 0] == 10.0).all()
+    assert (told(("on", BOTH_ON, after(1.0)), ego=None).v[0, 0] == 10.0).all()
     rollout = told(("off", BOTH_OFF, after(1.0)), first=(unknown, BOTH_OFF), ego=None)
-    assert (rollout.v[0, 0] == 10.0).all()  # the storyboard moves it
+    assert (rollout.v[0, 0] == 10.0).all()
+
+
+def test_a_note_says_once_that_the_storyboard_stands_in():
+    story = events(("on", "ego", BOTH_ON, after(1.0)))
+    first = (assign("pilot somebody"), BOTH_ON)
+    actions = "".join(f"<PrivateAction>{one}</PrivateAction>" for one in first)
+    text = scenario(("ego", "bv"), EGO.replace("</Private>", actions + "</Private>") + AHEAD, story)
+    (note,) = simulator(text, None).program.notes
+    said = "the storyboard moves 'ego': its controller is not known here"
+    assert re.fullmatch(rf"test\.xosc, line \d+: {said}; a driver in its place: --ego NAME", note)
+    assert simulator(text, "careful").program.notes == ()
 
 
 def test_a_driver_of_ours_takes_the_place_of_any_controller_of_the_ego():
@@ -131,7 +142,7 @@ def test_pedals_that_are_held_are_refused_by_name():
 
 def test_which_of_several_controllers_is_meant():
     named = switch(objectControllerRef="other", lateral="true", longitudinal="true")
-    with pytest.raises(UnsupportedError, match="switching on a controller of 'ego'"):
+    with pytest.raises(UnsupportedError, match="another controller of 'ego' than its driver"):
         told(first=(assign("driver careful"), named), ego=None)
     off = named.replace("true", "false")
     always = told(first=(assign("driver careful"),), ego=None)

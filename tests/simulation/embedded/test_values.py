@@ -82,6 +82,22 @@ def test_a_variable_is_set_and_looked_at_one_instant_later(change, seen):
     assert at == {"change": 20, "seen": 21}
 
 
+def test_a_variable_is_set_to_what_is_computed_from_parameters():
+    """Each row its own: 2 · 1.5 + 1 = 4, and 2 · 3 + 1 = 7."""
+    p = '<ParameterDeclaration name="p" parameterType="double" value="1.5"/>'
+    change = set_("x", '<SetAction value="${2 * $p + 1}"/>')
+    at, _ = began(
+        ("change", change, after(1.0)), ("four", MOVE, variable("x", 4)),
+        ("seven", MOVE, variable("x", "${$p + 4}")),
+        declared=VARIABLES, parameters=p, p=[1.5, 3.0],
+    )  # fmt: skip
+    assert at == {"change": [20, 20], "four": [21, -1], "seven": [-1, 21]}
+    change = set_("x", '<SetAction value="$p"/>')
+    row = ("seen", MOVE, variable("x", 3.0))
+    at, _ = began(("change", change, after(1.0)), row, declared=VARIABLES, parameters=p, p=[1.5, 3])
+    assert at["seen"] == [-1, 21]
+
+
 def test_a_variable_has_its_first_value_until_it_is_set():
     at, _ = began(("seen", MOVE, variable("n", 3)), declared=VARIABLES)
     assert at == {"seen": 0}

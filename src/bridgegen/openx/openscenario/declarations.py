@@ -113,7 +113,7 @@ class ValueConstraint(Element):
     """A comparison that a parameter's value must satisfy."""
 
     rule: Rule
-    value: LiteralString
+    value: Annotated[LiteralString, RAW]
 
 
 @dataclass(frozen=True)

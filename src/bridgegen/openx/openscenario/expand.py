@@ -122,7 +122,8 @@ class _Expander:
             raise FileFormatError(*shorten([*texts, *dict.fromkeys(self._elsewhere)]))
         if self._unsupported:
             raise UnsupportedError(*shorten(list(dict.fromkeys(self._unsupported))))
-        literal = {one.name: one for one in self._declared if one.name in self._scope.own}
+        own = (one for one in self._declared if one.name in self._scope.own)
+        literal = {one.name: self._scope.constrained(one) for one in own}
         declarations = (*literal.values(), *(one for _, one in self._named.values()))
         return replace(
             made,

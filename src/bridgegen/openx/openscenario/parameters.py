@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping, Set
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
+import numpy as np
+
 from bridgegen.errors import FileFormatError
 from bridgegen.odd.kinds import slack
 from bridgegen.openx.openscenario import expression_types
@@ -25,7 +27,14 @@ from bridgegen.openx.openscenario.element import (
 )
 from bridgegen.openx.openscenario.enumerations import ParameterType, Rule
 from bridgegen.openx.openscenario.storyboard import OpenScenario
-from bridgegen.openx.openscenario.values import Expr, Kind, Literal, ParameterRef, parse_literal
+from bridgegen.openx.openscenario.values import (
+    Expr,
+    Kind,
+    Literal,
+    ParameterRef,
+    parse_literal,
+    parse_value,
+)
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _COMPARE = {
@@ -85,9 +94,12 @@ def problems(scenario: OpenScenario) -> list[str]:
         except FileFormatError as error:
             found.append((one.line, f"the value of parameter {name} {error}"))
             value = one.value
-        else:
-            found += [(one.line, f"parameter {name} {text}") for text in broken(one, value)]
         declared[name] = kind, value
+    known_values = {name: value for name, (_, value) in declared.items()}
+    for name, one in first.items():
+        if not isinstance(declared[name][1], str) or declared[name][0] is Kind.STRING:
+            reasons = broken(one, declared[name][1], known_values)
+            found += [(one.line, f"parameter {name} {text}") for text in reasons]
     known = {
         Meaning.PARAMETER: declared.keys(),
         Meaning.VARIABLE: _names(scenario.variable_declarations, "variables"),
@@ -200,24 +212,42 @@ def _reads_as(want: Kind, have: Kind, value: Literal) -> bool:
     return True
 
 
-def broken(declaration: ParameterDeclaration, value: Literal) -> list[str]:
-    """Return why a value breaks its constraints: none of the groups holds."""
+def broken(
+    declaration: ParameterDeclaration, value: Literal, known: Mapping[str, Literal]
+) -> list[str]:
+    """Return why a value breaks its constraints: none of the groups holds.
+
+    Args:
+        declaration: the parameter's.
+        value: its value.
+        known: the values of the parameters that a constraint may refer to, by name.
+    """
     reasons: list[str] = []
     for group in declaration.constraint_groups:
-        found = [text for one in group.constraints for text in _violates(declaration, one, value)]
+        found = [
+            text for one in group.constraints for text in _violates(declaration, one, value, known)
+        ]
         if not found:
             return []
         reasons += found
     return reasons
 
 
+def refers(constraint: ValueConstraint) -> bool:
+    """Return whether a constraint's limit depends on parameters, or is computed."""
+    return constraint.value.startswith("$")
+
+
 def _violates(
-    declaration: ParameterDeclaration, constraint: ValueConstraint, value: Literal
+    declaration: ParameterDeclaration,
+    constraint: ValueConstraint,
+    value: Literal,
+    known: Mapping[str, Literal],
 ) -> list[str]:
     rule, text = constraint.rule, constraint.value
     kind = kind_of(declaration.parameter_type)
     try:
-        limit = parse_literal(kind, text)
+        limit = _limit(kind, text, known) if refers(constraint) else parse_literal(kind, text)
     except FileFormatError as error:
         return [f"has a constraint that {error}"]
     ordered = kind.is_number or rule in (Rule.EQUAL_TO, Rule.NOT_EQUAL_TO)
@@ -225,7 +255,31 @@ def _violates(
         return [f"has the constraint {rule}, which {kind.value} does not know"]
     if _COMPARE[rule](value, limit) or _nearly(rule, value, limit):
         return []
-    return [f"must be {rule} {text}, got {value}"]
+    shown = f"{text} = {limit}" if refers(constraint) else text
+    return [f"must be {rule} {shown}, got {value}"]
+
+
+def _limit(kind: Kind, text: str, known: Mapping[str, Literal]) -> Literal:
+    """Return what a constraint's limit is by the values of the parameters that it refers to.
+
+    Raises:
+        FileFormatError: it refers to what is not there, or has no value of that type.
+    """
+    value = parse_value(kind, text, expressions=kind.is_number)
+    if not isinstance(value, ParameterRef | Expr):
+        raise FileFormatError(f"must be of type {kind.value}, got '{text}'")
+    if unknown := sorted(value.names - known.keys()):
+        raise FileFormatError(f"refers to ${unknown[0]}, which is not declared")
+    if isinstance(value, ParameterRef):
+        return parse_literal(kind, str(known[value.name]))
+    numbers = {name: one for name in value.names if isinstance(one := known[name], int | float)}
+    if texts := sorted(value.names - numbers.keys()):
+        raise FileFormatError(f"computes with ${texts[0]}, which is no number")
+    with np.errstate(all="ignore"):
+        number = float(value.resolve(numbers))
+    if not np.isfinite(number):
+        raise FileFormatError(f"must be finite, got {value} = {number:g}")
+    return number
 
 
 def _nearly(rule: Rule, value: Literal, limit: Literal) -> bool:

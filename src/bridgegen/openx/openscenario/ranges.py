@@ -4,7 +4,7 @@ What the standard leaves open, and what is chosen here, is in docs/decisions.md.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -13,16 +13,25 @@ from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.distributions import Discrete, Distribution, Uniform, shares_within
 from bridgegen.odd.expression import lookup, parse
 from bridgegen.odd.kinds import FLOAT, INTEGER, Category
-from bridgegen.odd.parameters import Axis, Derived, Parameter, nearest
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, nearest
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, values_of, walk
 from bridgegen.openx.openscenario.from_owl.notes import PARAMETER
-from bridgegen.openx.openscenario.parameters import broken, kind_of, numbers
-from bridgegen.openx.openscenario.values import Expr, Kind, ParameterRef, parse_literal
+from bridgegen.openx.openscenario.parameters import broken, kind_of, numbers, refers, values
+from bridgegen.openx.openscenario.values import (
+    Expr,
+    Kind,
+    ParameterRef,
+    parse_literal,
+    parse_value,
+)
 
 UNIT = "?"
 """The unit of a parameter whose file states none."""
+
+_AT_LEAST = (osc.Rule.GREATER_THAN, osc.Rule.GREATER_OR_EQUAL, osc.Rule.EQUAL_TO)
+_AT_MOST = (osc.Rule.LESS_THAN, osc.Rule.LESS_OR_EQUAL, osc.Rule.EQUAL_TO)
 
 
 @dataclass(frozen=True)
@@ -83,10 +92,12 @@ class Ranges:
             value that the file declares. Texts that vary. Besides, which of its sets a joint
             distribution takes.
         derived: those that value sets give, or a formula.
+        bounds: the limits of parameters by others.
     """
 
     parameters: dict[str, Parameter]
     derived: tuple[Derived, ...] = ()
+    bounds: tuple[Bound, ...] = ()
 
 
 def ranges_of(
@@ -113,6 +124,34 @@ def ranges_of(
     return builder.ranges()
 
 
+def _fixed(group: osc.ValueConstraintGroup) -> osc.ValueConstraintGroup:
+    """Return those constraints of a group that do not depend on other parameters."""
+    fixed = tuple(limit for limit in group.constraints if not refers(limit))
+    return replace(group, constraints=fixed)
+
+
+def _bounds(one: osc.ParameterDeclaration, known: Collection[str]) -> Iterator[Bound]:
+    """Yield the limits of a parameter that depend on others.
+
+    Of several groups one must hold, which is no limit that holds by itself.
+    """
+    if len(one.constraint_groups) != 1 or not kind_of(one.parameter_type).is_number:
+        return
+    for limit in one.constraint_groups[0].constraints:
+        if not refers(limit):
+            continue
+        value = parse_value(Kind.DOUBLE, limit.value, expressions=True)
+        if not isinstance(value, ParameterRef | Expr) or not value.names <= set(known):
+            continue
+        text = value.name if isinstance(value, ParameterRef) else str(value.expression)
+        place = f"line {limit.line}"
+        low = parse(text, place) if limit.rule in _AT_LEAST else None
+        high = parse(text, place) if limit.rule in _AT_MOST else None
+        if low is not None or high is not None:
+            why = "The file constrains it so."
+            yield Bound(one.name, low, high, why, "its ValueConstraint", place)
+
+
 def _is_text(one: osc.ParameterDeclaration | None) -> bool:
     return one is not None and kind_of(one.parameter_type) is Kind.STRING
 
@@ -134,7 +173,7 @@ class _Builder:
     def __init__(self, scenario: osc.OpenScenario) -> None:
         declared = scenario.parameter_declarations
         self._declared = {one.name: one for one in declared.parameters} if declared else {}
-        self._numbers = numbers(scenario)
+        self._numbers, self._values = numbers(scenario), values(scenario)
         header = scenario.file_header.properties
         self._said = {str(one.name): str(one.value) for one in header.properties} if header else {}
         self._single: dict[str, Distribution] = {}
@@ -195,7 +234,7 @@ class _Builder:
         words = [str(one.value) for one in given.elements]
         declaration = self._declared[name]
         for word in words:
-            if reasons := broken(declaration, word):
+            if reasons := broken(declaration, word, self._values):
                 raise InputError(f"parameter {name} {reasons[0]}")
         allowed = [
             one.value
@@ -264,7 +303,14 @@ class _Builder:
         derived = [*joint, *self._formulas({one.name for one in joint})]
         following = {one.name for one in derived}
         own = {name: self._parameter(name) for name in self._numbers if name not in following}
-        return Ranges(own | self._categories | parameters, tuple(derived))
+        made = own | self._categories | parameters
+        bounds = [
+            bound
+            for name, one in self._declared.items()
+            for bound in _bounds(one, self._numbers.keys())
+            if bound.names & made.keys()
+        ]
+        return Ranges(made, tuple(derived), tuple(bounds))
 
     def _formulas(self, joint: set[str]) -> Iterator[Derived]:
         """Yield the parameters that follow from others, as a file of ours says (`from_owl.notes`).
@@ -329,10 +375,12 @@ class _Builder:
         except FileFormatError as error:
             raise InputError(f"parameter {name} {error}") from None
         declaration = self._declared[name]
-        groups = declaration.constraint_groups
+        groups = [_fixed(group) for group in declaration.constraint_groups]
         alone = [replace(declaration, constraint_groups=(group,)) for group in groups]
-        if groups and not any(all(not broken(one, end) for end in ends) for one in alone):
-            reasons = [text for end in ends for text in broken(declaration, end)]
+        known = self._values
+        if groups and not any(all(not broken(one, end, known) for end in ends) for one in alone):
+            whole = replace(declaration, constraint_groups=tuple(groups))
+            reasons = [text for end in ends for text in broken(whole, end, known)]
             reason = reasons[0] if reasons else f"may not have all values from {low:g} to {high:g}"
             raise InputError(f"parameter {name} {reason}")
 

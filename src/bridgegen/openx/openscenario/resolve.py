@@ -76,6 +76,8 @@ def texts_resolved(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, dict[s
         for attribute, value in () if isinstance(element, osc.Property) else values_of(element):
             if isinstance(value, osc.ParameterRef) and not attribute.kind.is_number:
                 name = value.name
+                if attribute.takes_expressions and name in numbers:  # a value of any type
+                    continue
                 changes[attribute.field] = _literal(attribute, values[name], texts[name])
                 if name in numbers:
                     line = f" (line {element.line})" if element.line else ""

@@ -16,8 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bridgegen.errors import FileFormatError
-from bridgegen.odd.expression import MAX_LENGTH
-from bridgegen.openx.openscenario.declarations import ParameterDeclaration
+from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
 from bridgegen.openx.openscenario.element import Attribute, Element
 from bridgegen.openx.openscenario.enumerations import ParameterType
 from bridgegen.openx.openscenario.parameters import (
@@ -26,8 +25,10 @@ from bridgegen.openx.openscenario.parameters import (
     kind_of,
     misfits,
     name_problem,
+    refers,
 )
 from bridgegen.openx.openscenario.values import (
+    MAX_LENGTH,
     Expr,
     Kind,
     Literal,
@@ -91,15 +92,20 @@ class Scope:
         """Return the scope of a scenario's declarations; see `inner`."""
         declarations = list(declarations)
         literal = [one for one in declarations if not is_made(one)]
-        found = cls().inner(literal, problems).names
+        found = cls().inner(literal, problems, checks=False).names
         own = {name: replace(one, value=ParameterRef(f"${name}")) for name, one in found.items()}
-        return cls(own, own).inner([one for one in declarations if is_made(one)], problems)
+        made = [one for one in declarations if is_made(one)]
+        scope = cls(own, own).inner(made, problems, checks=False)
+        scope._check(declarations, problems)
+        return scope
 
     def inner(
         self,
         declarations: Iterable[ParameterDeclaration],
         problems: Problems,
         assigned: Mapping[str, Value] | None = None,
+        *,
+        checks: bool = True,
     ) -> "Scope":
         """Return the scope within an element that declares parameters.
 
@@ -107,6 +113,7 @@ class Scope:
             declarations: a value may refer to what is in scope around, or declared before.
             problems: takes what is wrong with them.
             assigned: values that count instead of the declared ones, by the scenario's own.
+            checks: whether to compare them with their constraints.
         """
         names = dict(self.names)
         made = Scope(names, self.own)
@@ -128,10 +135,19 @@ class Scope:
                 as_text = replace(one, parameter_type=ParameterType.STRING)
                 with suppress(FileFormatError):
                     names[one.name] = scope._bind(as_text, value)
-                continue
-            for text in broken(one, names[one.name].now):
-                problems.wrong(one, f"parameter {one.name} {text}")
+        if checks:
+            made._check(seen.values(), problems)
         return made
+
+    def _check(self, declarations: Iterable[ParameterDeclaration], problems: Problems) -> None:
+        """Compare parameters with their constraints, which may refer to one another."""
+        known = {name: one.now for name, one in self.names.items()}
+        for one in declarations:
+            bound = self.names.get(one.name)
+            if bound is None or bound.kind is not kind_of(one.parameter_type):
+                continue  # it has no value of its type, which has been said
+            for text in broken(one, bound.now, known):
+                problems.wrong(one, f"parameter {one.name} {text}")
 
     def _bind(self, declaration: ParameterDeclaration, value: Value) -> Binding:
         kind = kind_of(declaration.parameter_type)
@@ -198,6 +214,26 @@ class Scope:
         if kind is Kind.BOOLEAN:
             return bool(number)
         return int(number) if kind.is_integer else number
+
+    def constrained(self, one: ParameterDeclaration) -> ParameterDeclaration:
+        """Return one of the scenario's own declarations with constraints on its own parameters."""
+        kind = kind_of(one.parameter_type)
+        takes = Attribute("value", "value", kind, None, True, False, True, None, None)
+
+        def limited(limit: ValueConstraint) -> ValueConstraint:
+            if not refers(limit):
+                return limit
+            made = self.value(takes, parse_value(kind, limit.value, expressions=True))
+            is_made = isinstance(made, ParameterRef | Expr)
+            return replace(limit, value=made.text if is_made else text_of(made))
+
+        with suppress(FileFormatError):  # which has been said
+            groups = (
+                replace(group, constraints=tuple(map(limited, group.constraints)))
+                for group in one.constraint_groups
+            )
+            return replace(one, constraint_groups=tuple(groups))
+        return one
 
     def text(self, attribute: Attribute, value: Any) -> str:
         """Return the text that an attribute is at the scenario's declared values.

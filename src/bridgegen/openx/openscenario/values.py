@@ -31,6 +31,10 @@ _TRUTH = re.compile(r"(?<![$A-Za-z0-9_])(true|false)(?![A-Za-z0-9_])")
 _WORDS = RESERVED | {"not", "and", "or", *_TRUTHS}  # of an expression besides parameters
 
 
+MAX_LENGTH, MAX_DEPTH = 20_000, 100
+"""Characters of an expression, and how deep it nests, with what its parameters stand for."""
+
+
 class Kind(Enum):
     """A data type of the standard's attributes, named as a parameter's type is."""
 
@@ -190,7 +194,8 @@ def _compile(text: str) -> Expression:
     if taken:
         raise FileFormatError(f"'{text}': the parameter ${taken[0]} is a word of expressions")
     try:
-        return parse(_TRUTH.sub(lambda word: _TRUTHS[word[1]], body).replace("$", ""))
+        formula = _TRUTH.sub(lambda word: _TRUTHS[word[1]], body).replace("$", "")
+        return parse(formula, longest=MAX_LENGTH, deepest=MAX_DEPTH)
     except InputError as error:
         raise FileFormatError(f"'{text}' cannot be evaluated: {error}") from None
 

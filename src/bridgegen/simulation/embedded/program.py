@@ -254,6 +254,7 @@ class Program:
         n_steps: recorded instants at most.
         fixed: parameters that rows may not vary, and what they are used for.
         event_names: of the V events, in the order of the file.
+        notes: what runs otherwise than a reader of the file may expect, a sentence each.
         noise_key: of the driver's random numbers, if the file says it.
     """
 
@@ -312,6 +313,7 @@ class Program:
     fixed: Mapping[str, str]
     event_names: tuple[str, ...] = ()
     noise_key: int | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def attends(self) -> Int:

@@ -15,6 +15,7 @@ from bridgegen.ontology.vocabulary import bg, tbox
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import ROAD_END, SEVERITY, TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, PARAMETER, SIGNALS
+from bridgegen.openx.openscenario.parameters import refers
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
 from bridgegen.openx.openscenario.to_owl.entities import as_number
 from bridgegen.weather import PARAMETERS
@@ -176,7 +177,7 @@ def _put_range(
     found: set[str] = set()
     for limit in one.constraint_groups[0].constraints:
         name = _LIMITS.get(limit.rule)
-        if name is not None and name not in found:
+        if name is not None and name not in found and not refers(limit):
             found.add(name)
             builder.put(node, name, builder.now(float(limit.value), limit))
 

@@ -231,6 +231,7 @@ class _Compiler:
             fixed=self.tables.fixed,
             event_names=tuple(one.path[-1] for one in found if one.kind == EVENT),
             noise_key=declared.noise_key(self.controllers, self.place),
+            notes=tuple(self.tables.notes),
         )
 
     def _aside_slot(self, path: PathSpec) -> int:

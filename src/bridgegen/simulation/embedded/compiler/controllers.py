@@ -2,9 +2,9 @@
 
 The ego's driver is the controller that names it (`declarations.DRIVER`); one that the user names
 takes the place of whatever controller the file gives the ego. Other entities' drivers are named in
-the same way, and drive all the time. No other controller is known here:
-it may be given to an entity, but not switched on. An entity without one that is on is moved by the
-storyboard, as by the standard's default controller.
+the same way, and drive all the time. No other controller is known here: where one is switched on,
+the storyboard moves the entity, as the standard's default controller does, and a note says so. An
+entity without one that is on is moved by the storyboard, too.
 """
 
 from collections.abc import Iterator
@@ -40,6 +40,7 @@ class Controllers:
     def __init__(self, tables: Tables, scenario: osc.OpenScenario) -> None:
         self._tables, self._scenario = tables, scenario
         self.has_driver = self.replaces = False
+        self._unknown: set[str] = set()
         self._first = {LATERALLY: UNSAID, LONGITUDINALLY: UNSAID}
         self._later: dict[int, list[int]] = {LATERALLY: [], LONGITUDINALLY: []}
 
@@ -113,7 +114,7 @@ class Controllers:
                         self._tables.unsupported(part, f"switching off the driver of '{name}'")
                         break
                 elif on:
-                    self._refuse(part, entity)
+                    self._stand_in(part, entity)
                     break
         return found
 
@@ -138,10 +139,20 @@ class Controllers:
         mine = {str(one.name) for one in self.of(entity) if _names_driver(one)}
         return self._tables.text(wanted) in mine if wanted is not None else bool(mine)
 
-    def _refuse(self, part: Element, entity: int) -> None:
-        what = f"switching on a controller of '{self._tables.names[entity]}' that is not known here"
-        hint = " (a driver in its place: --ego NAME)" if entity == 0 else ""
-        self._tables.unsupported(part, what + hint)
+    def _stand_in(self, part: Switching, entity: int) -> None:
+        """Note that the storyboard moves an entity whose controller is not known here.
+
+        Refuse it where a known one would have to make way for it.
+        """
+        name = self._tables.names[entity]
+        if any(_names_driver(one) for one in self.of(entity)):
+            what = f"switching on another controller of '{name}' than its driver"
+            self._tables.unsupported(part, what)
+        elif name not in self._unknown:
+            self._unknown.add(name)
+            hint = "; a driver in its place: --ego NAME" if entity == 0 else ""
+            sentence = f"the storyboard moves '{name}': its controller is not known here{hint}"
+            self._tables.note(part, sentence)
 
     def _refuse_override(self, part: osc.OverrideControllerValueAction) -> None:
         """Refuse to hold pedals, wheel and gear, which nobody has here; to let go of them is fine.

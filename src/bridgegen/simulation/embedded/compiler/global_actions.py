@@ -2,6 +2,7 @@
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.environments import Environments
 from bridgegen.simulation.embedded.compiler.signals import Signals
@@ -73,7 +74,7 @@ class GlobalActions:
                 self._tables.unsupported(action, type(action).__name__)
         return []
 
-    def _row(self, which: int, kind: int, value: float = 0.0, flag: int = 0, path: int = 0) -> Row:
+    def _row(self, which: int, kind: int, value: Value = 0.0, flag: int = 0, path: int = 0) -> Row:
         slot = self._tables.slot(value)
         return which, kind, flag, 0, slot, slot, path
 

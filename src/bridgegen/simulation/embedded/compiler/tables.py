@@ -32,6 +32,7 @@ class Tables:
         parameters: the numeric parameters with their declared values.
         problems: what the rollout cannot do, a sentence each.
         culprits: the elements that cause it.
+        notes: what runs otherwise than a reader of the file may expect, a sentence each.
         fixed: parameters that rows may not vary, and what they are used for.
     """
 
@@ -45,6 +46,7 @@ class Tables:
         self._declared = values(scenario)
         self.problems: list[str] = []
         self.culprits: list[Element] = []
+        self.notes: list[str] = []
         self.fixed: dict[str, str] = {}
         self._slots: dict[tuple[type, Value], int] = {}
 
@@ -96,6 +98,11 @@ class Tables:
         line = f", line {element.line}" if element.line else ""
         self.problems.append(f"{self.place}{line}: {what} is not supported")
         self.culprits.append(element)
+
+    def note(self, element: Element, sentence: str) -> None:
+        """Record how something is run, with its line."""
+        line = f", line {element.line}" if element.line else ""
+        self.notes.append(f"{self.place}{line}: {sentence}")
 
     def literal(self, element: Element, name: str, value: Value) -> float:
         """Return a number that rows may not vary: parameters keep their declared values."""

@@ -50,18 +50,27 @@ class Values:
             self.slots.append(self._tables.slot(value if value is not None else math.nan))
         return self._numbers[key]
 
-    def value(self, element: Element, what: str, name: str, text: Value) -> float:
-        """Return what a text is as a value of a parameter or variable."""
+    def value(self, element: Element, what: str, name: str, text: Value) -> Value:
+        """Return what a text is as a value of a parameter or variable: a number, or its source."""
         kind, _ = self._declared.get((what, name), (Kind.STRING, ""))
+        if self._is_number(text) and kind not in (Kind.STRING, Kind.DATE_TIME):
+            return text
         value = self._read(kind, text)
         if value is None:
-            self._tables.unsupported(element, f"value=\"{text}\" for {what} '{name}' ({kind})")
+            what = f"value=\"{text}\" for {what} '{name}' ({kind.value})"
+            self._tables.unsupported(element, what)
             return 0.0
         return value
 
     def is_ordered(self, what: str, name: str) -> bool:
         """Return whether values of a parameter or variable can be greater or less."""
         return self._declared.get((what, name), (Kind.STRING, ""))[0] is not Kind.STRING
+
+    def _is_number(self, value: Value) -> bool:
+        """Return whether a value is computed, or a number of the file's parameters."""
+        if isinstance(value, osc.ParameterRef):
+            return value.name in self._tables.parameters
+        return isinstance(value, osc.Expr)
 
     def _read(self, kind: Kind, value: Value) -> float | None:
         text = self._tables.text(value) if isinstance(value, osc.ParameterRef) else str(value)
