@@ -23,6 +23,7 @@ STATUS_MESSAGES = {
     5: "no lane leads from where an entity is to its route",
     6: "a position that counts from an entity which is not there",
     7: "the ego's driver is on no lane",
+    8: "the times of a trajectory's vertices do not increase",
     30: "the worker's process ended",
     40: "the simulator reported an error",
     41: "the simulator's process ended",

@@ -26,7 +26,7 @@ PASSES = 2  # of a date: whether time passes
 # controller, a value.
 FIRST_MOTION, FIRST_ALONG, FIRST_ACROSS, FIRST_GLOBAL = 20, 40, 50, 100
 ADD_ENTITY, DELETE_ENTITY, CONTROL = 20, 21, 22
-TELEPORT, ASSIGN_ROUTE, FOLLOW, ACQUIRE = range(30, 34)
+TELEPORT, ASSIGN_ROUTE, FOLLOW, ACQUIRE, FOLLOW_LAID = range(30, 35)
 SPEED_CHANGE, RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE = range(40, 45)
 LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE = range(50, 53)
 TIME_CHANGE, PHASE_CHANGE, VALUE_SET, VALUE_ADD, VALUE_MULTIPLY = range(100, 105)
@@ -84,3 +84,10 @@ COURSE_MEMORY = 6
 # absolute, its slot, whether ahead and left are those of the lane's traffic, not of the road.
 PLACE_KIND, WHOSE, LANES_LEFT, ALONG, ACROSS, ABSOLUTE, HEADING, BY_LANE = range(8)
 ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_OBJECT, BY_WORLD = range(7)
+
+# Program.layouts: first and past-the-last anchor and row of shapes, how the vertices follow from
+# them, whether they have times, slots of what these are multiplied by and then moved by [s].
+FIRST_ANCHOR, PAST_ANCHOR, FIRST_SAMPLE, PAST_SAMPLE, LAYOUT_SHAPE, IS_TIMED = range(6)
+LAYOUT_SCALE, LAYOUT_OFFSET = 6, 7
+LAYOUT_WIDTH = 8
+THROUGH, RIGID, WEIGHTED = range(3)  # the anchors; a line from the one anchor; their means

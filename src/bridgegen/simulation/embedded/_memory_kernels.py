@@ -19,7 +19,7 @@ from bridgegen.arrays import Bool, Float, Int
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
 # See rollout.STATUS_MESSAGES.
-OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE, OFF_LANES = range(8)
+OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE, OFF_LANES, BAD_TIMES = range(9)
 RAISED, NO_CONTROL = 20, 23  # of a driver of the user's own
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
@@ -35,6 +35,9 @@ class Plan(NamedTuple):
     follows: Int
     starts: Int
     places: Int
+    layouts: Int
+    anchors: Int
+    shapes: Float
     trajectories: Int
     triggers: Int
     groups: Int
@@ -52,6 +55,7 @@ class Plan(NamedTuple):
     actions: Int
     begins: Int
     follows_courses: int
+    moves_laid: int
     laterals: Int
     values: Int
     first_states: npt.NDArray[np.int8]
@@ -170,6 +174,9 @@ class State(NamedTuple):
         follow: ``(E,)`` int64, the trajectory whose timetable moves it; -1: none,
         follow_action: ``(E,)`` int64, the action that leads it along a trajectory; -1: none,
         follow_began: ``(E,)`` [s], when the times of the timetable begin.
+        laid: ``(E, V, 10)`` the segments of a trajectory that was laid, see ``_laying_kernels``,
+        laid_count: ``(E,)`` int64, how many; 0: it is on none,
+        passed: ``(E,)`` [m], how far along them.
         timed: ``(E,)`` bool, a timetable moves it at this instant.
         placed: ``(E,)`` bool, it was teleported at this instant, and does not move on.
         goal: ``(E, 2)`` [m], the position that it is sent to,
@@ -246,6 +253,9 @@ class State(NamedTuple):
     follow: Annotated[Int, "entities"]
     follow_action: Annotated[Int, "entities"]
     follow_began: Annotated[Float, "entities"]
+    laid: Annotated[Float, "laying", "vertices", 10]
+    laid_count: Annotated[Int, "entities"]
+    passed: Annotated[Float, "entities"]
     timed: Annotated[Bool, "entities"]
     placed: Annotated[Bool, "entities"]
     goal: Annotated[Float, "entities", 2]

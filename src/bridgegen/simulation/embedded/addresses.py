@@ -11,7 +11,7 @@ from bridgegen.simulation.embedded._codes import DOES, FIRST_ACROSS, RELATIVE_SP
 from bridgegen.simulation.embedded._memory_kernels import Plan, Record, Roads, State
 from bridgegen.simulation.embedded.conditions import look_closely
 from bridgegen.simulation.embedded.drivers import begin_waiting, heed
-from bridgegen.simulation.embedded.motion import BEGINS, follow_course
+from bridgegen.simulation.embedded.motion import BEGINS, follow_course, move_laid
 
 
 def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Plan:
@@ -40,6 +40,7 @@ def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Pl
     return plan._replace(
         begins=np.array([begins.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64),
         follows_courses=at(follow_course, types.int64, types.int64) if chases else 0,
+        moves_laid=at(move_laid, types.int64, types.int64) if len(plan.layouts) else 0,
         looks_closely=at(look_closely, types.int64) if plan.looks_closely else 0,
         heeds=at(heed, types.int64) if plan.attends else 0,
         begins_waiting=at(begin_waiting, types.int64) if plan.attends else 0,

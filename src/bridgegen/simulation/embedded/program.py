@@ -200,6 +200,12 @@ class Program:
         follows: ``(E,)`` the trajectory by whose times an entity moves at first, -1 for none.
         starts: ``(·, 2)`` entities that start at a position, and its number.
         places: ``(·, 8)`` positions, see ``_codes``.
+        layouts: ``(·, 8)`` trajectories that are laid when they begin, see ``_codes``.
+        anchors: ``(·, 3)`` of these: a position, the slot of a time or -1, whether it states a
+            heading.
+        shapes: ``(·, W)`` of these: x, y [m], heading [rad], time [s] of vertices in the frame of
+            the anchor; or the weights of the anchors.
+        most_vertices: how many the longest of these has.
         spots: per position what its road network has to resolve.
         routes: ``(E,)`` the route that each starts with, 0 for none; route r has the places of
             ``waypoints[r - 1]``.
@@ -291,6 +297,10 @@ class Program:
     follows: Int
     starts: Int
     places: Int
+    layouts: Int
+    anchors: Int
+    shapes: Float
+    most_vertices: int
     spots: tuple[Spot | None, ...]
     weathers: Int
     values: Int

@@ -11,6 +11,7 @@ from bridgegen.simulation.embedded._codes import (
     ASSIGN_ROUTE,
     DELETE_ENTITY,
     FOLLOW,
+    FOLLOW_LAID,
     LANE_CHANGE,
     LANE_OFFSET,
     LATERALLY,
@@ -19,6 +20,7 @@ from bridgegen.simulation.embedded._codes import (
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
+from bridgegen.simulation.embedded.compiler.layouts import Layouts, is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
@@ -45,6 +47,7 @@ class Actions:
         laterals: as ``Program.laterals`` has them.
         routes: as ``Program.waypoints`` has them.
         lane_checks: lane changes that are known to be asked for.
+        layouts: trajectories that are laid when they begin.
 
     Args:
         tables: the compiler's; takes down what cannot be run.
@@ -65,6 +68,7 @@ class Actions:
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
         self.courses = Courses(tables, positions)
+        self.layouts = Layouts(tables, positions)
         self.rows: list[tuple[int, ...]] = []
         self.initial: list[int] = []
 
@@ -166,6 +170,12 @@ class Actions:
             relative = isinstance(timing, osc.Timing) and (
                 timing.domain_absolute_relative is osc.ReferenceContext.RELATIVE
             )
+            if is_laid(action):
+                start = self._tables.slot(action.initial_distance_offset or 0.0)
+                number = self.layouts.add(action, entity)
+                row = (entity, FOLLOW_LAID, 0, int(relative), start, slot, number)
+                self.rows.append(row)
+                return
             number = sum(isinstance(one, AlongTrajectory) for one in self._paths)
             path = compile_trajectory(self._tables, action)
             self._paths.append(path)

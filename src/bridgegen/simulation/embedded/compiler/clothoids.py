@@ -21,8 +21,10 @@ STEP = 0.2  # m, between two samples at most
 
 def bends(
     tables: Tables, line: osc.Clothoid | osc.ClothoidSpline
-) -> tuple[osc.Position, tuple[Bend, ...], tuple[float | None, ...]]:
+) -> tuple[osc.Position | None, tuple[Bend, ...], tuple[float | None, ...]]:
     """Return where a clothoid, or a chain of them, starts, its bends, and when to be at their ends.
+
+    A chain may state no start: it starts where the entity is.
 
     Unsupported elements are reported to ``tables``. Rows may not vary it.
     """
@@ -54,15 +56,13 @@ def bends(
             )
         )
         times.append(time(segment.time_start))
-    start = line.segments[0].position_start
-    if start is None:
-        tables.unsupported(line, "a ClothoidSpline without a PositionStart")
-        start = osc.Position(osc.WorldPosition(0.0, 0.0))
-    return start, tuple(found), (*times, time(line.time_end))
+    return line.segments[0].position_start, tuple(found), (*times, time(line.time_end))
 
 
-def sampled(x: float, y: float, h: float, line: Sequence[Bend]) -> tuple[Float, float]:
-    """Return a chain of bends from a pose as a path, and its step [m].
+def sampled(
+    x: float, y: float, h: float, line: Sequence[Bend], step: float = STEP
+) -> tuple[Float, float]:
+    """Return a chain of bends from a pose as a path, and its step [m], at most as long as asked.
 
     Returns:
         ``(L, 6)``: x, y [m], heading [rad], its cosine and sine, curvature [1/m].
@@ -73,7 +73,7 @@ def sampled(x: float, y: float, h: float, line: Sequence[Bend]) -> tuple[Float, 
     length = sum(bend.length for bend in line)
     if not (0.0 < length < math.inf):
         raise InputError(f"a clothoid must have a length, got {length:g} m")
-    step = length / math.ceil(length / STEP)
+    step = length / math.ceil(length / step)
     s = np.arange(round(length / step) + 1) * step
     table = np.empty((len(s), 6))
     station = 0.0

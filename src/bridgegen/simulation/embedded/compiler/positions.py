@@ -109,6 +109,13 @@ class Positions:
         self._tables.unsupported(where, type(where).__name__)
         return 0
 
+    def add_own(self, entity: int) -> int:
+        """Return the number of the position where an entity is."""
+        slot = self._tables.slot(0.0)
+        self.rows.append((BY_OBJECT, entity, 0, slot, slot, 0, slot, 0))
+        self.spots.append(None)
+        return len(self.rows) - 1
+
     def spot(self, position: osc.Position) -> Spot | None:
         """Return a position that does not depend on where entities are; others are taken down.
 

@@ -9,6 +9,7 @@ from bridgegen.simulation.embedded._codes import WHOSE
 from bridgegen.simulation.embedded.compiler.actions import CONTROLLING, Actions
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.courses import LONGITUDINAL, first_speed
+from bridgegen.simulation.embedded.compiler.layouts import is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
@@ -96,6 +97,10 @@ class Start:
                         init[name] = self._tables.slot(speed)
                 elif isinstance(action, osc.LateralAction):
                     first.append((wrapped, self._tables.entity(name)))
+                elif isinstance(inner, osc.FollowTrajectoryAction) and is_laid(inner):
+                    first.append((wrapped, self._tables.entity(name)))
+                    if (begins := _first_position(inner)) is not None:
+                        starts.setdefault(name, begins)
                 elif isinstance(inner, osc.FollowTrajectoryAction):
                     tracks[name] = compile_trajectory(self._tables, inner)
                 elif isinstance(inner, Way):
@@ -206,6 +211,19 @@ class Start:
             self._places[e] = self._positions.add(position)
             return Nowhere()
         return AlongLanes(point, via, aside)
+
+
+def _first_position(action: osc.FollowTrajectoryAction) -> osc.Position | None:
+    """Return the position that a trajectory's line begins with, if it states one."""
+    line = action.trajectory_ref.trajectory.shape.shape
+    match line:
+        case osc.Polyline():
+            return line.vertices[0].position
+        case osc.Nurbs():
+            return line.control_points[0].position
+        case osc.Clothoid():
+            return line.position
+    return line.segments[0].position_start
 
 
 def _faces_ahead(turned: osc.Orientation | None) -> bool:

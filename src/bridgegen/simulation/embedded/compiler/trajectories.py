@@ -1,4 +1,7 @@
-"""Trajectories: lines to follow, at the entity's own speed or by a timetable."""
+"""Trajectories that the road network gives: lines to follow, at a speed or by a timetable.
+
+Those that depend on the row, or on entities, are laid when they begin (`layouts`).
+"""
 
 import math
 from collections.abc import Sequence
@@ -38,13 +41,14 @@ def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> Al
         ]
     elif isinstance(line, osc.Clothoid | osc.ClothoidSpline):
         origin, curve, ends = bends(tables, line)
+        assert origin is not None  # else it is laid
         positions, stated = [origin], list(ends)
     else:
         tables.unsupported(line, type(line).__name__)
         return AlongTrajectory((), action.line)
     points = [point for one in positions if (point := _point(tables, one)) is not None]
     elements = line.vertices if isinstance(line, osc.Polyline) else (line,) * len(stated)
-    times = () if isinstance(timing, osc.NoTime) else _times(tables, timing, stated, elements)
+    times = () if isinstance(timing, osc.NoTime) else check_times(tables, timing, stated, elements)
     start = tables.literal(action, "initialDistanceOffset", action.initial_distance_offset or 0.0)
     if times and start:
         tables.unsupported(action, f'initialDistanceOffset="{start:g}" in a trajectory with times')
@@ -60,7 +64,7 @@ def _point(tables: Tables, position: osc.Position) -> Point | None:
     return LanePoint(point.road, point.lane, s, point.line, aside)
 
 
-def _times(
+def check_times(
     tables: Tables, timing: osc.Timing, stated: Sequence[float | None], where: Sequence[Element]
 ) -> tuple[float, ...]:
     """Return when to be at each vertex [s]: a stated time, scaled and then moved."""

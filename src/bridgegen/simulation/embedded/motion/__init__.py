@@ -13,6 +13,7 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     move_by_timetable,
     stop_follow,
 )
+from bridgegen.simulation.embedded.motion._laying_kernels import move_laid
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     is_pointless,
     leave_out_absent,
@@ -36,6 +37,7 @@ __all__ = [
     "leave_out_absent",
     "move_along_path",
     "move_by_timetable",
+    "move_laid",
     "note",
     "pass_end",
     "start_at_speed",

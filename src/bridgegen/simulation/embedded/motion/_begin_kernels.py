@@ -20,6 +20,7 @@ from bridgegen.simulation.embedded._codes import (
     FIRST_ALONG,
     FIRST_GLOBAL,
     FOLLOW,
+    FOLLOW_LAID,
     KEEP_ASIDE,
     KEEP_DISTANCE,
     LANE_CHANGE,
@@ -43,6 +44,7 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     stop_follow,
     stop_route,
 )
+from bridgegen.simulation.embedded.motion._laying_kernels import begin_laid
 from bridgegen.simulation.embedded.motion._presence_kernels import begin_add, begin_delete
 from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course
 from bridgegen.simulation.embedded.motion._speed_kernels import (
@@ -62,6 +64,7 @@ BEGINS: dict[int, Callable[..., Any]] = {
     TELEPORT: begin_teleport,
     **dict.fromkeys((ASSIGN_ROUTE, ACQUIRE), begin_route),
     FOLLOW: begin_follow,
+    FOLLOW_LAID: begin_laid,
 }
 """How each kind of action begins; compiled where a storyboard has one, see `addresses`."""
 
@@ -82,7 +85,7 @@ def stop_motion(j, k, plan, roads, state, record):
         stop_longitudinal(j, plan, state)
     elif FIRST_ACROSS <= kind < FIRST_GLOBAL:
         stop_lateral(j, plan, state)
-    elif kind == FOLLOW:
+    elif kind in (FOLLOW, FOLLOW_LAID):
         stop_follow(j, k, plan, roads, state, record)
     elif kind == ACQUIRE:
         stop_route(j, plan, state)
@@ -92,4 +95,4 @@ def stop_motion(j, k, plan, roads, state, record):
 def steers(j, plan):
     """Return whether action j steers its entity, as a driver does."""
     kind = plan.actions[j, DOES]
-    return FIRST_ACROSS <= kind < FIRST_GLOBAL or kind == FOLLOW
+    return FIRST_ACROSS <= kind < FIRST_GLOBAL or kind in (FOLLOW, FOLLOW_LAID)

@@ -129,6 +129,7 @@ def stop_follow(j, k, plan, roads, state, record):
     e = plan.actions[j, WHOM]
     if state.follow_action[e] == j:
         state.follow_action[e] = state.follow[e] = -1
+        state.laid_count[e] = 0
         put_in_world(e, record.x[e, k], record.y[e, k], record.h[e, k], roads, state)
 
 

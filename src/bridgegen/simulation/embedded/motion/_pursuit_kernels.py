@@ -76,6 +76,7 @@ from bridgegen.simulation.embedded.motion._course_kernels import (
     profile_speed,
     spring,
 )
+from bridgegen.simulation.embedded.motion._laying_kernels import left_on_laid
 from bridgegen.simulation.embedded.places._place_kernels import place_at
 
 NEAR = 0.1  # m, a distance that is missed by less is reached
@@ -272,6 +273,10 @@ def _way_left(e, k, x, y, plan, roads, state, record):
             # Its station may be the next instant's already.
             own, _ = project(path, n, ds, state.station[e], record.x[e, k], record.y[e, k])
             return foot - own
+    elif state.laid_count[e] > 0:
+        left = left_on_laid(e, k, x, y, state, record)
+        if not math.isnan(left):
+            return left
     return math.hypot(x - record.x[e, k], y - record.y[e, k])
 
 

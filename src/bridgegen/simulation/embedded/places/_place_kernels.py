@@ -92,6 +92,7 @@ def end_follow(e, state):
     if state.follow_action[e] >= 0:
         state.action_ended[state.follow_action[e]] = True
     state.follow_action[e] = state.follow[e] = -1
+    state.laid_count[e] = 0
 
 
 @kernel
