@@ -29,7 +29,7 @@ def found(track, meeting):
         start = {
             "kind": NO_CONFLICT, "responsible": Responsible.EGO, "nearness": 0.0, "ttc": np.inf,
             "needed": 0.0, "severity": 0.0, "zone_ego": Zone.FRONT, "preventable": False,
-            "type": ConflictType.CROSSING,
+            "type": ConflictType.CROSSING, "leads_ego": False,
         }  # fmt: skip
         columns = {
             name: np.array([[start[name], *given.get(name, [start[name]] * others)]])
@@ -88,7 +88,7 @@ def test_when_the_ego_has_failed(found, responsible, preventable, zone, kind, ty
     """It is responsible, or its front meets in a contact that it could have prevented."""
     conflicts = found(
         responsible=[responsible], preventable=[preventable], zone_ego=[zone], kind=[kind],
-        type=[type_],
+        type=[type_], leads_ego=[zone in (Zone.FRONT, Zone.FRONT_LEFT)],
     )  # fmt: skip
     assert bool(conflicts.at_fault[0, 1]) is failed
 

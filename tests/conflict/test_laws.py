@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridgegen.conflict import quantities
 from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
 from bridgegen.conflict._conflict_kernels import urgency
 from bridgegen.conflict._limits import HORIZON
@@ -121,6 +122,37 @@ MIRRORED = np.array(
     [Zone.NONE, Zone.FRONT, Zone.FRONT_RIGHT, Zone.RIGHT, Zone.REAR_RIGHT, Zone.REAR,
      Zone.REAR_LEFT, Zone.LEFT, Zone.FRONT_LEFT]
 )  # fmt: skip
+
+
+@given(SEEDS, st.lists(st.booleans(), min_size=4, max_size=4))
+@settings(max_examples=60, deadline=None)
+def test_driving_backwards_is_driving_ahead_with_the_body_turned_round(seed, turned):
+    """Only the zones have other names: what was the front is the rear."""
+    ahead = drive_around(seed)
+    back = np.array(turned)
+    sign = np.where(back, -1.0, 1.0)
+    box = ahead.box.copy()
+    box[:, 2] *= sign
+    backwards = replace(
+        ahead, box=box, h=ahead.h + np.where(back, np.pi, 0.0)[:, None],
+        v=ahead.v * sign[:, None], a=ahead.a * sign[:, None],
+    )  # fmt: skip
+    one, other = analyse(ahead), analyse(backwards)
+    for name in ("kind", "type", "responsible", "rule", "instant", "decided", "at_fault"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    for name in ("severity", "ttc", "v_ego", "v_other"):
+        if not back.any() or name != "severity":
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-6)
+    for zone, there, flips in (
+        (one.zone_ego, other.zone_ego, back[0]),
+        (one.zone_other, other.zone_other, back),
+    ):
+        opposite = np.where(zone == Zone.NONE, zone, (zone - Zone.FRONT + 4) % 8 + Zone.FRONT)
+        assert np.array_equal(np.where(flips, opposite, zone), there)
+    names = ["d_min", "v_d", "ttc", "btn", "drac", "pet", "thw"]
+    np.testing.assert_allclose(
+        quantities.evaluate(ahead, names), quantities.evaluate(backwards, names), rtol=1e-6
+    )
 
 
 @given(SEEDS)
@@ -249,7 +281,7 @@ def pair(**values):
     for name in ("kind", "type", "responsible", "rule", "instant", "decided", "zone_ego",
                  "zone_other"):  # fmt: skip
         whole[name] = np.zeros((1, 2), np.int64)
-    whole["preventable"] = np.zeros((1, 2), np.bool_)
+    whole["preventable"] = whole["leads_ego"] = np.zeros((1, 2), np.bool_)
     whole["responsible"][0, 1] = Responsible.EGO
     whole |= {"names": ("ego", "bv"), "time_step": DT, "ok": np.ones(1, np.bool_)}
     for name, value in values.items():

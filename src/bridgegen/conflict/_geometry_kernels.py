@@ -263,7 +263,7 @@ def presence(distance, k, n):
 def displaced(x, y, v, e, k, dt):
     """Return whether body e is teleported from instant k to the next, not driven."""
     moved = math.hypot(x[e, k + 1] - x[e, k], y[e, k + 1] - y[e, k])
-    return moved > (max(v[e, k], v[e, k + 1]) + JUMPS) * dt
+    return moved > (max(abs(v[e, k]), abs(v[e, k + 1])) + JUMPS) * dt
 
 
 @kernel

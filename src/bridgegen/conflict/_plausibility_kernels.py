@@ -82,12 +82,12 @@ def _motion(i, e, x, y, h, v, c, s, present, limits, last, window, dt, found):
         moves = True
         step = math.sqrt(dx * dx + dy * dy)
         longest = max(longest, step)
-        most = FASTER * max(v[k], v[k + 1]) * dt + LEAP
+        most = FASTER * max(abs(v[k]), abs(v[k + 1])) * dt + LEAP
         if step > most:
             found[0], found[1], found[2], found[3] = JUMP, k + 1, step, most
             return moves, longest
         slide = 0.5 * abs(dy * (c[k] + c[k + 1]) - dx * (s[k] + s[k + 1])) / dt
-        most = SLIDE + limits[SLIPS] * 0.5 * (v[k] + v[k + 1])
+        most = SLIDE + limits[SLIPS] * 0.5 * (abs(v[k]) + abs(v[k + 1]))
         if slide > most:
             found[0], found[1], found[2], found[3] = SIDEWAYS, k + 1, slide, most
             return moves, longest

@@ -97,7 +97,7 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     level = braked(scene, 0, e, since, since, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
-        avoidable = scene.v[e, k] <= STANDS
+        avoidable = abs(scene.v[e, k]) <= STANDS
     whole[DECIDED], whole[PREVENTABLE] = since, avoidable
     if appears:
         whole[RESPONSIBLE], whole[RULE] = NEITHER, UNSAFE_START

@@ -57,6 +57,7 @@ class Conflicts:
         decided: ``(N, E)`` instant at which the risk arose that decides on responsibility.
         zone_ego: ``(N, E)`` of `Zone`, on the ego.
         zone_other: ``(N, E)`` of `Zone`, on the other.
+        leads_ego: ``(N, E)`` bool: the ego's zone is at the end that is ahead as it drives.
         preventable: ``(N, E)`` bool: the careful driver of UN R157, Annex 3 (0.75 s, 0.774 g, or
             what the tyres give on this road), braking on the ego's path since the other was
             visibly in its way (or since the vehicle ahead braked), would have avoided the contact,
@@ -92,6 +93,7 @@ class Conflicts:
     decided: Int
     zone_ego: Int
     zone_other: Int
+    leads_ego: Bool
     preventable: Bool
     ttc: Float
     needed: Float
@@ -113,11 +115,11 @@ class Conflicts:
     def at_fault(self) -> Bool:
         """``(N, E)``: the ego has failed.
 
-        It is responsible, alone or with the other; or its front meets another in a contact that it
-        could have prevented.
+        It is responsible, alone or with the other; or its front, or in reverse its rear, meets
+        another in a contact that it could have prevented.
         """
         blamed = (self.responsible == Responsible.EGO) | (self.responsible == Responsible.SHARED)
-        by_front = np.isin(self.zone_ego, _FRONT) & ~np.isin(self.type, _BY_OTHERS)
+        by_front = self.leads_ego & ~np.isin(self.type, _BY_OTHERS)
         fault: Bool = blamed | ((self.kind == CONTACT) & self.preventable & by_front)
         return fault
 
@@ -147,7 +149,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
     kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
     kernels.analyse_rows(
         moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
-        moving.cosine, moving.sine, moving.v, recorded(rollout, "a"), recorded(rollout, "offset"),
+        moving.cosine, moving.sine, moving.v, moving.a, recorded(rollout, "offset"),
         moving.distance, moving.n_steps, rollout.time_step,
         np.ascontiguousarray(claims, dtype=np.int64), np.ascontiguousarray(crosswalks),
         np.ascontiguousarray(friction),
@@ -156,6 +158,9 @@ def _analyse(rollout: Rollout) -> Conflicts:
         np.ascontiguousarray(lights, dtype=np.int8), _is_routed(rollout), np.empty((e, t)), whole,
         real,
     )  # fmt: skip
+    leads_ego = whole[:, :, codes.ZONE_EGO].copy()
+    if moving.reverses is not None:
+        _turn_round(whole, moving.reverses)
     ok = np.asarray(rollout.status) == 0
     whole[~ok], real[~ok] = 0, 0.0
     real[~ok, :, codes.TTC] = np.inf
@@ -192,9 +197,23 @@ def _analyse(rollout: Rollout) -> Conflicts:
     found |= {name: real[:, :, column] for name, column in numbers.items()}
     return Conflicts(
         names=rollout.names, time_step=rollout.time_step, **found,
+        leads_ego=np.isin(leads_ego, _FRONT),
         preventable=whole[:, :, codes.PREVENTABLE] > 0,
         severity=harm, delta_v_ego=dv_ego, delta_v_other=dv_other, ok=ok,
     )  # fmt: skip
+
+
+def _turn_round(whole: Int, reverses: Bool) -> None:
+    """Name the zones of bodies that reverse: the analysis took their rear for the front."""
+    instant = whole[:, :, codes.INSTANT]
+    rows, entities = np.indices(instant.shape)
+    for column, backwards in (
+        (codes.ZONE_EGO, reverses[rows, 0, instant]),
+        (codes.ZONE_OTHER, reverses[rows, entities, instant]),
+    ):
+        zone = whole[:, :, column]
+        turned = (zone - Zone.FRONT + 4) % 8 + Zone.FRONT
+        whole[:, :, column] = np.where(backwards & (zone != Zone.NONE), turned, zone)
 
 
 def _is_routed(rollout: Rollout) -> bool:

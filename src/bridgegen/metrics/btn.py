@@ -4,7 +4,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.metrics.drac import MOST
-from bridgegen.metrics.metric import Metric, recorded, without_failed
+from bridgegen.metrics.metric import Metric, without_failed
 from bridgegen.metrics.motion import motion
 from bridgegen.physics import GRIP
 from bridgegen.simulation.rollout import Rollout
@@ -43,7 +43,7 @@ def btn(rollout: Rollout, available: float = GRIP) -> Float:
     m = motion(rollout)
     out = np.empty(len(m.n_steps))
     _brake_kernels.largest_required(
-        m.half, m.x, m.y, m.cosine, m.sine, m.v, recorded(rollout, "a"), m.distance, m.n_steps,
+        m.half, m.x, m.y, m.cosine, m.sine, m.v, m.a, m.distance, m.n_steps,
         MOST, out,
     )  # fmt: skip
     return without_failed(rollout, out / available)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int, as_float
+from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.metrics.metric import distance, recorded, shared, steps
 from bridgegen.simulation.rollout import Rollout
 
@@ -16,8 +16,11 @@ class Motion:
     Attributes:
         half: ``(E, 2)`` float64 [m], half lengths and half widths.
         x, y: ``(N, E, T)`` float64 [m], the boxes' centres.
-        cosine, sine: ``(N, E, T)`` float64, of the headings.
-        v: ``(N, E, T)`` float64 [m/s].
+        cosine, sine: ``(N, E, T)`` float64, of the direction in which each body drives: that of
+            its heading, the opposite one where it reverses. Its box is the same either way.
+        v: ``(N, E, T)`` float64 [m/s], ≥ 0, in that direction.
+        a: ``(N, E, T)`` float64 [m/s²], likewise.
+        reverses: ``(N, E, T)`` bool; None where no body ever does.
         distance: ``(N, E, T)`` float64 [m], from the ego's box; +inf where absent.
         n_steps: ``(N,)`` int64.
     """
@@ -28,6 +31,8 @@ class Motion:
     cosine: Float
     sine: Float
     v: Float
+    a: Float
+    reverses: Bool | None
     distance: Float
     n_steps: Int
 
@@ -45,4 +50,11 @@ def _motion(rollout: Rollout) -> Motion:
     n_steps, (cosine, sine) = steps(rollout), rollout.direction
     centre_x, centre_y = np.empty(rollout.shape), np.empty(rollout.shape)
     _motion_kernels.place(box, x, y, cosine, sine, n_steps, centre_x, centre_y)
-    return Motion(0.5 * box[:, :2], centre_x, centre_y, cosine, sine, v, distance(rollout), n_steps)
+    a, reverses = recorded(rollout, "a"), None
+    if v.size and v.min() < 0.0:
+        reverses = v < 0.0
+        cosine, sine, v, a = (np.where(reverses, -one, one) for one in (cosine, sine, v, a))
+    half = 0.5 * box[:, :2]
+    return Motion(
+        half, centre_x, centre_y, cosine, sine, v, a, reverses, distance(rollout), n_steps
+    )

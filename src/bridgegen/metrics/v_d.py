@@ -12,14 +12,14 @@ def v_d(rollout: Rollout) -> Float:
     """Return the ego's speed at the moment of d_min, the first within 1e-9 m of it.
 
     Returns:
-        ``(N,)`` float64 [m/s], ≥ 0: on a collision the speed at first contact; 0 where there is
-        no other entity; NaN where the scenario failed.
+        ``(N,)`` float64 [m/s], ≥ 0, ahead or in reverse: on a collision the speed at first contact;
+        0 where there is no other entity; NaN where the scenario failed.
 
     Source: paper, Table I.
     """
     _, instant = closest(rollout)
     speed = recorded(rollout, "v")[np.arange(len(instant)), 0, instant]
-    return without_failed(rollout, np.where(instant < 0, 0.0, speed))
+    return without_failed(rollout, np.where(instant < 0, 0.0, np.abs(speed)))
 
 
 METRIC = Metric(

@@ -71,7 +71,7 @@ class Rollout:
         x: ``(N, E, T)`` float64 [m].
         y: ``(N, E, T)`` float64 [m].
         h: ``(N, E, T)`` float64 [rad], heading, counter-clockwise from +x, continuous.
-        v: ``(N, E, T)`` float64 [m/s], forward speed, ≥ 0.
+        v: ``(N, E, T)`` float64 [m/s], forward speed; < 0 of a body that reverses.
         a: ``(N, E, T)`` float64 [m/s²], forward acceleration applied from this instant on.
         offset: ``(N, E, T)`` float64 [m], signed lateral distance of the reference point from the
             entity's route (the lane's centre), left positive.

@@ -288,7 +288,6 @@ def test_a_distance_that_is_reached_once_is_over():
 
 
 UNSUPPORTED = {
-    'value="-3" (driving backwards)': speeding(-3.0, "linear rate 1"),
     'continuous="true" over a time': relative(
         "lead", 1.0, continuous=True, dynamics="linear time 2"
     ),

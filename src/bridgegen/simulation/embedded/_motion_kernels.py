@@ -63,7 +63,7 @@ def ramp_mean(value, target, rate, dt):
 @kernel
 def standing(stood, before, after, dt):
     """Return for how long a body has stood [s] at the end of a step, by its speeds [m/s]."""
-    return stood + dt if before <= STANDS and after <= STANDS else 0.0
+    return stood + dt if abs(before) <= STANDS and abs(after) <= STANDS else 0.0
 
 
 @kernel

@@ -141,8 +141,19 @@ class Actions:
         elif isinstance(action, CONTROLLING):
             if (row := self._controllers.row(action, entity)) is not None:
                 self.rows.append(row)
-        else:
-            self._tables.unsupported(action, f"{type(action).__name__} in an Event")
+        elif not self.is_unseen(inner, entity):
+            self._tables.unsupported(action, f"{type(inner).__name__} in an Event")
+
+    def is_unseen(self, action: Element, entity: int) -> bool:
+        """Return whether an action changes only what no driver here sees; note it then."""
+        if isinstance(action, osc.LightStateAction | osc.AnimationAction):
+            what = "lights" if isinstance(action, osc.LightStateAction) else "animations"
+            who = self._tables.names[entity]
+            self._tables.note(action, f"no driver here sees the {what} of '{who}'")
+            return True
+        if isinstance(action, osc.VisibilityAction):
+            return self._tables.truth(action.sensors) and self._tables.truth(action.traffic)
+        return False
 
     def _presence(self, action: osc.EntityAction) -> None:
         """Add an action by which an entity comes or goes."""

@@ -114,7 +114,6 @@ class Courses:
         target = action.speed_action_target.target
         slot = self._tables.slot(target.value)
         if isinstance(target, osc.AbsoluteTargetSpeed):
-            self._forward(target, "value", target.value)
             return entity, codes.SPEED_CHANGE, shape, dimension, slot, value, 0
         continuous = self._flag(target, "continuous", target.continuous)
         if continuous and dimension != 0 and shape != 0:

@@ -1,7 +1,7 @@
 """Positions of a scenario file as a table: what the rollout needs to find one when it is asked for.
 
 Their numbers may vary by row, but for those that only the roads can resolve: t of a RoadPosition,
-and where on a route a RoutePosition is.
+and where on a route or on a trajectory a position is.
 """
 
 from dataclasses import replace
@@ -17,15 +17,20 @@ from bridgegen.simulation.embedded._codes import (
     IN_WORLD,
     ON_LANE,
     ON_ROAD,
+    ON_TRAJECTORY,
 )
+from bridgegen.simulation.embedded.compiler.clothoids import bends
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import (
+    Bend,
     LanePoint,
     LaneSpot,
     Point,
     RoadSpot,
     RouteSpot,
     Spot,
+    TrajectorySpot,
+    VertexSpot,
     WorldSpot,
 )
 
@@ -106,6 +111,8 @@ class Positions:
             return self._append(where, BY_OBJECT, where.dx, where.dy, whose=where.entity_ref)
         if isinstance(where, osc.RelativeWorldPosition):
             return self._append(where, BY_WORLD, where.dx, where.dy, whose=where.entity_ref)
+        if isinstance(where, osc.TrajectoryPosition):
+            return self._append(where, ON_TRAJECTORY, 0.0, 0.0, spot=self._trajectory_spot(where))
         self._tables.unsupported(where, type(where).__name__)
         return 0
 
@@ -164,6 +171,52 @@ class Positions:
         aside = literal(inner, "laneOffset", inner.lane_offset or 0.0)
         return RouteSpot(waypoints, s, int(self._tables.text(inner.lane_id)), aside, where.line)
 
+    def _trajectory_spot(self, where: osc.TrajectoryPosition) -> TrajectorySpot | None:
+        """Return a place along a trajectory that neither rows nor entities change."""
+        literal, line = self._tables.literal, where.trajectory_ref.trajectory.shape.shape
+        curve: tuple[Bend, ...] = ()
+        if isinstance(line, osc.Polyline):
+            positions = [vertex.position for vertex in line.vertices]
+        elif isinstance(line, osc.Clothoid | osc.ClothoidSpline):
+            origin, curve, _ = bends(self._tables, line)
+            positions = [] if origin is None else [origin]
+        else:
+            positions = []
+        found = [self._vertex_spot(one) for one in positions]
+        vertices = tuple(one for one in found if one is not None)
+        if not positions:
+            lacks = "" if isinstance(line, osc.Nurbs) else " without a start"
+            what = f"a TrajectoryPosition on a {type(line).__name__}{lacks}"
+            self._tables.unsupported(where, what)
+        if not positions or len(vertices) < len(positions):
+            return None
+        s, t = literal(where, "s", where.s), literal(where, "t", where.t or 0.0)
+        return TrajectorySpot(vertices, curve, s, t, where.line)
+
+    def _vertex_spot(self, position: osc.Position) -> VertexSpot | None:
+        where, literal = position.position, self._tables.literal
+        spot: Spot | None
+        if isinstance(where, osc.TrajectoryPosition):
+            spot = self._trajectory_spot(where)
+        elif isinstance(where, osc.LanePosition):
+            lane = self._lane_spot(where)
+            spot = lane and replace(lane, s=literal(where, "s", where.s))
+        else:
+            spot = self.spot(position)
+        turned: osc.Orientation | None = getattr(where, "orientation", None)
+        turn = 0.0 if turned is None or turned.h is None else literal(turned, "h", turned.h)
+        aside: Value = getattr(where, "offset", None) or 0.0
+        if spot is None:
+            return None
+        return VertexSpot(spot, literal(where, "offset", aside), turn, self._is_absolute(turned))
+
+    def _is_absolute(self, turned: osc.Orientation | None) -> bool:
+        """Return whether an orientation counts from the world's x axis."""
+        return turned is not None and (
+            turned.type is osc.ReferenceContext.ABSOLUTE
+            or (turned.type is None and self._minor < RELATIVE_SINCE)
+        )
+
     def _append(
         self, where: Element, kind: int, u: Value, w: Value, *, whose: object = None,
         count: int = 0, by_lane: bool = False, heading: Value | None = None,
@@ -172,10 +225,7 @@ class Positions:
         turned = getattr(where, "orientation", None)
         absolute = kind == IN_WORLD
         if turned is not None:
-            heading = turned.h
-            absolute = turned.type is osc.ReferenceContext.ABSOLUTE or (
-                turned.type is None and self._minor < RELATIVE_SINCE
-            )
+            heading, absolute = turned.h, self._is_absolute(turned)
         entity = -1 if whose is None else self._tables.entity(whose)
         slots = (self._tables.slot(u), self._tables.slot(w))
         h = self._tables.slot(heading or 0.0)

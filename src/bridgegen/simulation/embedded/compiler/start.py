@@ -105,7 +105,7 @@ class Start:
                     tracks[name] = compile_trajectory(self._tables, inner)
                 elif isinstance(inner, Way):
                     routes[name] = inner
-                else:
+                elif not self._actions.is_unseen(inner, self._tables.entity(name)):
                     self._tables.unsupported(inner, f"an initial {type(inner).__name__}")
         later = dict(self._added(walk(storyboard)))
         self.absent = [

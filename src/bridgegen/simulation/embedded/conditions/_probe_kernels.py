@@ -54,7 +54,7 @@ def look(p, k, plan, state, record):
         return compare(record.v[e, k], rule, limit)
     if kind == TRAVELED_DISTANCE:
         return state.travelled[e] >= limit - SAME_VALUE
-    return record.v[e, k] <= STANDS and state.stood[e] >= limit - SAME_VALUE  # STAND_STILL
+    return abs(record.v[e, k]) <= STANDS and state.stood[e] >= limit - SAME_VALUE  # STAND_STILL
 
 
 @kernel

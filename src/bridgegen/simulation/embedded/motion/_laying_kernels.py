@@ -187,6 +187,8 @@ def start_on_laid(e, state, record):
         state.passed[e] = passed
     else:
         x, y, h = at_distance(table, n, state.passed[e])
+        if record.v[e, 0] < 0.0:
+            h += math.pi
     stand_at(e, x, y, h, state)
     record.x[e, 0], record.y[e, 0], record.h[e, 0] = x, y, h
 
@@ -209,12 +211,14 @@ def move_laid(e, k, plan, roads, state, record):
     else:
         v = state.command[e]
         mean = state.mean[e] if state.mean[e] >= 0.0 else 0.5 * (before + v)
-        step = 0.0 if state.placed[e] else mean * dt
+        step = 0.0 if state.placed[e] else abs(mean) * dt
         state.placed[e] = False
         passed = state.passed[e] + step
         beyond = max(passed - length, 0.0)
         ends = passed >= length
         x, y, h = at_distance(table, n, passed)
+        if v < 0.0:  # tail first
+            h += math.pi
     state.travelled[e] += step
     state.passed[e] = passed
     state.stood[e] = standing(state.stood[e], before, v, dt)

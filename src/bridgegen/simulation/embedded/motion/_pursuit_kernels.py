@@ -287,7 +287,7 @@ def _synchronise(j, e, k, plan, roads, state, record):
     master = row[REF]
     left = _way_left(e, k, memory[OWN_X], memory[OWN_Y], plan, roads, state, record)
     other = _way_left(master, k, memory[MASTER_X], memory[MASTER_Y], plan, roads, state, record)
-    speed = record.v[master, k]
+    speed = abs(record.v[master, k])
     final = 0.0
     if row[FINAL] != NO_FINAL:
         final = state.slots[row[FINAL_VALUE]]

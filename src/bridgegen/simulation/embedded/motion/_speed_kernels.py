@@ -40,8 +40,9 @@ def begin_speed_change(j, k, plan, roads, state, record):
     """Begin action j, a SpeedAction to a speed of its own."""
     e, shape, dimension = plan.actions[j, WHOM], plan.actions[j, SHAPE], plan.actions[j, DIMENSION]
     value = state.slots[plan.actions[j, LASTS]]
-    before, after = state.command[e], min(state.slots[plan.actions[j, TARGET]], plan.bodies[e, 3])
-    most = plan.bodies[e, 4] if after > before else plan.bodies[e, 5]
+    before, fastest = state.command[e], plan.bodies[e, 3]
+    after = min(max(state.slots[plan.actions[j, TARGET]], -fastest), fastest)
+    most = plan.bodies[e, 4] if abs(after) > abs(before) else plan.bodies[e, 5]
     state.target[e], state.origin[e], state.speed_began[e] = after, before, k * plan.dt
     state.rate[e] = math.inf
     if shape == LINEAR and dimension == RATE:

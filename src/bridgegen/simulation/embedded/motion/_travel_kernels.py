@@ -3,6 +3,8 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
+import math
+
 from bridgegen.compiled import kernel
 from bridgegen.ego._path_kernels import shrinks
 from bridgegen.simulation.embedded._codes import DIMENSION, DOES, KEEP_ASIDE, ROW, SHAPE
@@ -33,6 +35,10 @@ def move_along_path(e, k, plan, roads, state, record):
     mean = state.mean[e] if state.mean[e] >= 0.0 else 0.5 * (before + state.command[e])
     step = 0.0 if state.placed[e] else mean * dt
     state.placed[e] = False
+    if step < 0.0 and state.follow_action[e] >= 0:  # on along its trajectory, tail first
+        step, state.turn[e] = -step, math.pi
+    elif state.follow_action[e] >= 0:
+        state.turn[e] = 0.0
     ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
     j = state.lateral_action[e]
     keeps_aside = j >= 0 and plan.actions[j, DOES] == KEEP_ASIDE
@@ -62,7 +68,10 @@ def move_along_path(e, k, plan, roads, state, record):
         else:
             station, step = length, 0.5 * before * dt
             state.command[e] = state.target[e] = 0.0
-    state.travelled[e] += step
+    if p >= 0 and station < 0.0:  # backwards to where its way begins
+        station, step = 0.0, 0.5 * before * dt
+        state.command[e] = state.target[e] = 0.0
+    state.travelled[e] += abs(step)
     state.stood[e] = standing(state.stood[e], before, state.command[e], dt)
     record.a[e, k] = (state.command[e] - before) / dt
     state.station[e] = station

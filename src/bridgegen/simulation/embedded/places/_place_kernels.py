@@ -24,6 +24,7 @@ from bridgegen.simulation.embedded._codes import (
     IN_WORLD,
     LANES_LEFT,
     ON_LANE,
+    ON_TRAJECTORY,
     PLACE_KIND,
     WHOSE,
 )
@@ -227,12 +228,15 @@ def lane_place_by(c, plan, roads, state):
 
 
 @kernel
-def world_place(c, k, plan, state, record):
-    """Return (x, y, heading) of a World, RelativeObject or RelativeWorld position."""
+def world_place(c, k, plan, roads, state, record):
+    """Return (x, y, heading) of a World, RelativeObject, RelativeWorld or Trajectory position."""
     row = plan.places[c]
     u, w, h = state.slots[row[ALONG]], state.slots[row[ACROSS]], state.slots[row[HEADING]]
     if row[PLACE_KIND] == IN_WORLD:
         return u, w, h
+    if row[PLACE_KIND] == ON_TRAJECTORY:
+        spot = roads.spots[c]
+        return spot[0], spot[1], h if row[ABSOLUTE] else spot[2] + h
     e = row[WHOSE]
     x, y, own = record.x[e, k], record.y[e, k], record.h[e, k]
     if not row[ABSOLUTE]:
@@ -253,7 +257,7 @@ def pose_of(c, k, plan, roads, state, record):
     if other >= 0 and not state.present[other]:
         return math.nan, math.nan, math.nan
     if kind == IN_WORLD or kind >= BY_OBJECT:
-        return world_place(c, k, plan, state, record)
+        return world_place(c, k, plan, roads, state, record)
     if roads.nodes.shape[0] == 0:
         ask(0, LANES, state)
         return math.nan, math.nan, math.nan
@@ -299,7 +303,7 @@ def put(e, c, k, plan, roads, state, record):
         ask(0, LANES, state)
         return
     if kind == IN_WORLD or kind >= BY_OBJECT:
-        x, y, h = world_place(c, k, plan, state, record)
+        x, y, h = world_place(c, k, plan, roads, state, record)
         put_in_world(e, x, y, h, roads, state)
         return
     if kind >= BY_LANES:

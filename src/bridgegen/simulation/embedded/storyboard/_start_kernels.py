@@ -37,7 +37,8 @@ def start(plan, roads, state, record):
         state.present[e] = plan.absent[e] == 0
         if plan.comes_and_goes:
             record.present[e, 0] = state.present[e]
-        record.v[e, 0] = min(state.slots[plan.init[e]], plan.bodies[e, 3])
+        most = plan.bodies[e, 3]
+        record.v[e, 0] = min(max(state.slots[plan.init[e]], -most), most)
         record.offset[e, 0] = 0.0
         m = plan.follows[e]
         if m >= 0:
