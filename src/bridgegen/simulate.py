@@ -104,7 +104,8 @@ def simulate_file(
     driver = egos.get(ego, time_limit=time_limit) if ego else None
     if others is not None and others not in egos.OTHERS:
         raise UnknownNameError("driver of other participants", others, egos.OTHERS)
-    scenario = read_scenario(path, skipped=skipped)
+    warnings: list[str] = []
+    scenario = read_scenario(path, skipped=skipped, warnings=warnings)
     roads = roads_of(scenario, path)
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
@@ -134,7 +135,7 @@ def simulate_file(
         rollout=rollout,
         conflicts=analyse(rollout),
         cause=_stated_cause(scenario) if ego is None and ideal is None and others is None else None,
-        notes=embedded.program.notes,
+        notes=(*warnings, *embedded.program.notes),
     )
 
 

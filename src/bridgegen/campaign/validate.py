@@ -25,8 +25,8 @@ def validate_file(
     Args:
         path: the file.
         reason: run the reasoner on an ``.owl``, too, for consistency.
-        warnings: takes what is odd about an ``.xodr`` that can be imported and searched all the
-            same; by default, that is a problem, too.
+        warnings: takes what is odd about an ``.xodr`` or ``.xosc`` that can be imported, searched
+            or simulated all the same; by default, that is a problem, too.
 
     Raises:
         InputError: a file of another kind, or the reasoner is not installed.
@@ -36,7 +36,7 @@ def validate_file(
     kinds = {
         ".owl": _ontology,
         ".xodr": lambda file: _roads(file, warnings),
-        ".xosc": _storyboard,
+        ".xosc": lambda file: _storyboard(file, warnings),
         ".yaml": _logical,
         ".yml": _logical,
     }
@@ -100,7 +100,7 @@ def _roads(path: Path, warnings: list[str] | None) -> list[str]:
     return []
 
 
-def _storyboard(path: Path) -> list[str]:
+def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
     from bridgegen.openx.file_scenario import load_file_scenario
     from bridgegen.openx.logic_file import roads_of
     from bridgegen.openx.openscenario import read as openscenario_read
@@ -111,8 +111,13 @@ def _storyboard(path: Path) -> list[str]:
         named = read_distribution(path).scenario_file.filepath
         load_file_scenario(path.parent / str(named), path)
         return []
-    scenario = openscenario_read.read(path)
-    return openscenario_validate.problems(scenario, roads_of(scenario, path))
+    odd: list[str] = []
+    scenario = openscenario_read.read(path, warnings=odd)
+    problems = openscenario_validate.problems(scenario, roads_of(scenario, path))
+    if warnings is None:
+        return [*odd, *problems]
+    warnings += odd
+    return problems
 
 
 def _logical(path: Path) -> list[str]:

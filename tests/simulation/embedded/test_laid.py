@@ -188,6 +188,18 @@ def test_a_spline_is_that_of_scipy():
         told((follow(f'<Nurbs order="4">{wrong}</Nurbs>'), after(1.0)))
 
 
+def test_a_spline_with_times_is_where_its_times_say():
+    """Along a straight line: times and places are the same means of the control points'."""
+    points = "".join(
+        f'<ControlPoint time="{t}"><Position>{world(x, 50.0)}</Position></ControlPoint>'
+        for t, x in ((0, 0.0), (1, 10.0), (2, 20.0), (3, 30.0))
+    )
+    knots = "".join(f'<Knot value="{one}"/>' for one in (0, 0, 0, 1, 2, 2, 2))
+    out = told((follow(f'<Nurbs order="3">{points}{knots}</Nurbs>', RELATIVE), after(1.0)))
+    for seconds in (1.5, 2.0, 3.5):
+        assert place(out, seconds) == pytest.approx((10.0 * (seconds - 1.0), 50.0, 0.0), abs=1e-6)
+
+
 @given(st.integers(2, 5), st.integers(0, 4), st.data())
 @settings(max_examples=50, deadline=None)
 def test_weights_of_control_points_add_up_to_one_and_are_scipy_s(order, more, data):

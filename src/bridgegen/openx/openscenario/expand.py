@@ -44,7 +44,11 @@ E = TypeVar("E", bound=Element)
 
 
 def expanded(
-    file: OpenScenario, folder: Path | None, place: str, skipped: list[str] | None = None
+    file: OpenScenario,
+    folder: Path | None,
+    place: str,
+    skipped: list[str] | None = None,
+    warnings: list[str] | None = None,
 ) -> OpenScenario:
     """Return a scenario that stands by itself.
 
@@ -53,6 +57,7 @@ def expanded(
         folder: of the file, from which its catalogues' paths count; None if it has none.
         place: what to call it in messages.
         skipped: as of `bridgegen.openx.openscenario.read.read`.
+        warnings: likewise.
 
     Raises:
         FileFormatError: parameters that are malformed or do not fit; catalogues or entries that
@@ -61,7 +66,7 @@ def expanded(
     """
     if not any(map(_refers, walk(file))):
         return without_selections(file)
-    return without_selections(_Expander(file, folder, place, skipped).result())
+    return without_selections(_Expander(file, folder, place, skipped, warnings).result())
 
 
 def _refers(element: Element) -> bool:
@@ -80,8 +85,14 @@ class _Expander:
     """Goes down a file with the parameters in scope."""
 
     def __init__(
-        self, file: OpenScenario, folder: Path | None, place: str, skipped: list[str] | None
+        self,
+        file: OpenScenario,
+        folder: Path | None,
+        place: str,
+        skipped: list[str] | None,
+        warnings: list[str] | None,
     ) -> None:
+        self._warnings = warnings
         self._file, self._place = file, place
         self._problems: list[tuple[int, str]] = []
         self._elsewhere: list[str] = []
@@ -111,6 +122,12 @@ class _Expander:
             self.wrong(element, text)
         elif (said := f"{self._place}: {text} (line {element.line})") not in self._skipped:
             self._skipped.append(said)
+
+    def odd(self, element: Element, text: str) -> None:
+        """Note what harms nothing unless it is used."""
+        said = f"{self._place}: {text} (line {element.line})"
+        if self._warnings is not None and said not in self._warnings:
+            self._warnings.append(said)
 
     def result(self) -> OpenScenario:
         """Return the scenario, or raise all problems."""
@@ -232,7 +249,7 @@ class _Expander:
         declared = getattr(entry, _DECLARED, None)
         known = {one.name for one in declared.parameters} if declared is not None else set()
         for unknown in sorted(assigned.keys() - known):
-            self.doubtful(
+            self.odd(
                 reference,
                 f"catalogue '{catalog}': the entry '{name}' has no parameter '{unknown}'",
             )

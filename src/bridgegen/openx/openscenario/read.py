@@ -17,7 +17,11 @@ DISTRIBUTION = "ParameterValueDistribution"
 
 
 def read(
-    source: Path | str | bytes, place: str | None = None, *, skipped: list[str] | None = None
+    source: Path | str | bytes,
+    place: str | None = None,
+    *,
+    skipped: list[str] | None = None,
+    warnings: list[str] | None = None,
 ) -> OpenScenario:
     """Read a scenario file of version 1.0 to 1.3.
 
@@ -33,6 +37,9 @@ def read(
         skipped: takes a sentence for each thing that is not supported, which is left out then
             instead of refused: an attribute, or the whole event, action, entity or condition group
             that an element is part of.
+        warnings: takes a sentence for each thing that is wrong and harms nothing: a parameter's
+            value that is not of its type, and is a text then; a parameter that a catalogue's entry
+            is given and does not have.
 
     Raises:
         FileFormatError: missing, unreadable, not well-formed, hostile, malformed; all that is
@@ -52,7 +59,7 @@ def read(
         )
     file = verbatim(root, place, skipped)
     folder = path.parent if isinstance(path, Path) else None
-    scenario = expanded(file, folder, place, skipped)
+    scenario = expanded(file, folder, place, skipped, warnings)
     while skipped is not None and (astray := strays(scenario)):
         skipped += [
             f"{place}: {type(one).__name__} of an entity that is not there (line {one.line})"

@@ -52,7 +52,10 @@ class Problems(Protocol):
         """Note what is wrong."""
 
     def doubtful(self, element: Element, text: str) -> None:
-        """Note what is wrong and can be made sense of: the last value counts, as a text."""
+        """Note what is wrong and can be made sense of: the last value counts."""
+
+    def odd(self, element: Element, text: str) -> None:
+        """Note what is wrong and harms nothing unless it is used."""
 
 
 @dataclass(frozen=True)
@@ -131,10 +134,17 @@ class Scope:
             try:
                 names[one.name] = scope._bind(one, value)
             except FileFormatError as error:
-                problems.doubtful(one, f"the value of parameter {one.name} {error}")
+                said = f"the value of parameter {one.name} {error}"
                 as_text = replace(one, parameter_type=ParameterType.STRING)
-                with suppress(FileFormatError):
+                try:
                     names[one.name] = scope._bind(as_text, value)
+                except FileFormatError:
+                    problems.doubtful(one, said)
+                else:
+                    if "$" in str(value):
+                        problems.doubtful(one, said)
+                    else:
+                        problems.odd(one, f"{said}; taken as a text")
         if checks:
             made._check(seen.values(), problems)
         return made

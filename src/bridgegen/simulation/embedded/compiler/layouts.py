@@ -152,10 +152,14 @@ class Layouts:
     def _weighted(self, line: osc.Nurbs, timing: osc.Timing | None) -> osc.Timing | None:
         """Add a spline: its points are weighted means of its control points."""
         points = line.control_points
-        if timing is not None and any(point.time is not None for point in points):
-            self._tables.unsupported(line, "a Nurbs with times")
+        if timing is not None and all(point.time is None for point in points):
+            self._tables.note(line, "it states no times: followed at the entity's own speed")
+            timing = None
         for point in points:
-            self._anchors.append((self._positions.add(point.position), UNTIMED, 0))
+            if timing is not None and point.time is None:
+                self._tables.unsupported(point, "a ControlPoint without a time among such with")
+            time = UNTIMED if point.time is None else self._tables.slot(point.time)
+            self._anchors.append((self._positions.add(point.position), time, 0))
         literal = self._tables.literal
         order = int(literal(line, "order", line.order))
         weights = [literal(one, "weight", _or(one.weight, 1.0)) for one in points]
@@ -165,7 +169,7 @@ class Layouts:
             return None
         count = max(LEAST_SAMPLES, SAMPLES_PER_POINT * len(points))
         self._shapes.append(basis(order, knots, weights, count))
-        return None
+        return timing
 
 
 def _knot_problem(

@@ -123,6 +123,9 @@ def lay(q, e, k, plan, roads, state, record):
                 weight = plan.shapes[samples + m, i - first]
                 table[m, X_END] += weight * x
                 table[m, Y_END] += weight * y
+                if row[IS_TIMED]:
+                    time = scale * state.slots[plan.anchors[i, TIME]] + offset
+                    table[m, ENDS_AT] += weight * time
     for m in range(n if row[LAYOUT_SHAPE] == WEIGHTED else 0):  # of a curve, its tangent
         i, following = max(m - 1, 0), min(m + 1, n - 1)
         dx = table[following, X_END] - table[i, X_END]
