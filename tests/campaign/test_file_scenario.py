@@ -286,6 +286,33 @@ def test_a_constraint_on_two_parameters_holds_in_every_evaluation(tmp_path):
     assert found["EgoSpeed"].max() > 25.0
 
 
+@pytest.mark.parametrize("many", [False, True])
+def test_a_text_with_one_value_is_part_of_the_scenario(tmp_path, many):
+    """By itself, or in sets of values: it is in what is exported, and no axis of the search."""
+    text = scenario_text().replace(
+        "</ParameterDeclarations>",
+        '<ParameterDeclaration name="Case" parameterType="string" value="none"/>'
+        '<ParameterDeclaration name="Wet" parameterType="boolean" value="false"/>'
+        "</ParameterDeclarations>",
+    )
+    def one_of(*values):
+        return "".join(f'<Element value="{value}"/>' for value in values)
+
+    rows = ("Case", "CCR-7"), ("RoadId", "1"), ("Wet", "true"), ("Gap", 20, 30)
+    body = deterministic(
+        *((name, f"<DistributionSet>{one_of(*values)}</DistributionSet>") for name, *values in rows)
+    )
+    if many:
+        body = value_sets(*({"Gap": gap, "Case": "CCR-7", "Wet": "true"} for gap in (20, 30)))
+    search(tmp_path, body, text, budget=4)
+    found = columns(tmp_path / "run")
+    assert set(found["Gap"]) <= {20.0, 30.0}
+    assert "Case" not in found
+    exported = (tmp_path / "run" / "critical" / "0001.xosc").read_text()
+    assert 'name="Case" parameterType="string" value="CCR-7"' in exported
+    assert 'name="Wet" parameterType="boolean" value="true"' in exported
+
+
 def test_a_distribution_of_another_scenario_is_refused(tmp_path):
     scenario, ranges = write_pair(tmp_path)
     ranges.write_text(distribution_text(uniform("Gap"), "../other.xosc"), "utf-8")

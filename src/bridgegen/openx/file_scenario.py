@@ -25,6 +25,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, validate
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.fixed_texts import fixed_texts
 from bridgegen.openx.openscenario.from_owl.scenario import EGO
 from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.ranges import ranges_of
@@ -83,6 +84,18 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         UnsupportedError: what the readers cannot represent, by name and line.
     """
     storyboard = read(path)
+    definition: dst.Deterministic | dst.Stochastic | None = None
+    if distribution is not None:
+        given = dst.read_distribution(distribution)
+        named = distribution.parent / str(given.scenario_file.filepath)
+        if named.resolve() != path.resolve():
+            raise FileFormatError(
+                f"{distribution}: ScenarioFile must name the scenario that is searched, {path}, "
+                f"got {given.scenario_file.filepath} (line {given.scenario_file.line})"
+            )
+        texts, definition = fixed_texts(storyboard, given.definition)
+        if texts:
+            storyboard = read(path, texts=texts)
     road = logic_path(storyboard, path)
     data = read_bytes(road)
     roads = RoadFile(
@@ -93,16 +106,6 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     )
     if problems := validate.problems(storyboard, roads.model):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    definition = None
-    if distribution is not None:
-        given = dst.read_distribution(distribution)
-        named = distribution.parent / str(given.scenario_file.filepath)
-        if named.resolve() != path.resolve():
-            raise FileFormatError(
-                f"{distribution}: ScenarioFile must name the scenario that is searched, {path}, "
-                f"got {given.scenario_file.filepath} (line {given.scenario_file.line})"
-            )
-        definition = given.definition
     ranges = ranges_of(storyboard, definition, str(distribution))
     varied = {one.axis for one in ranges.parameters.values() if one.low < one.high}
     description = str(storyboard.file_header.description).strip()

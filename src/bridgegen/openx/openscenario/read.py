@@ -1,5 +1,6 @@
 """From an OpenSCENARIO file to the model: a scenario that stands by itself."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
@@ -22,6 +23,7 @@ def read(
     *,
     skipped: list[str] | None = None,
     warnings: list[str] | None = None,
+    texts: dict[str, str] | None = None,
 ) -> OpenScenario:
     """Read a scenario file of version 1.0 to 1.3.
 
@@ -40,6 +42,7 @@ def read(
         warnings: takes a sentence for each thing that is wrong and harms nothing: a parameter's
             value that is not of its type, and is a text then; a parameter that a catalogue's entry
             is given and does not have.
+        texts: values of the scenario's own parameters of type string in place of the declared.
 
     Raises:
         FileFormatError: missing, unreadable, not well-formed, hostile, malformed; all that is
@@ -57,7 +60,7 @@ def read(
             f"{place}: is no scenario but says how the parameters of one vary; to search that: "
             f"bridgegen search {its_own} --distribution {place}"
         )
-    file = verbatim(root, place, skipped)
+    file = _with_texts(verbatim(root, place, skipped), texts or {})
     folder = path.parent if isinstance(path, Path) else None
     scenario = expanded(file, folder, place, skipped, warnings)
     while skipped is not None and (astray := strays(scenario)):
@@ -69,6 +72,17 @@ def read(
     if problems := parameters.problems(scenario):
         raise FileFormatError(*shorten([f"{place}: {problem}" for problem in problems]))
     return scenario
+
+
+def _with_texts(scenario: OpenScenario, texts: dict[str, str]) -> OpenScenario:
+    """Return a file as it stands with other values of parameters that are texts."""
+    declared = scenario.parameter_declarations
+    if declared is None or not texts:
+        return scenario
+    parameters = tuple(
+        replace(one, value=texts.get(one.name, one.value)) for one in declared.parameters
+    )
+    return replace(scenario, parameter_declarations=replace(declared, parameters=parameters))
 
 
 def verbatim(
