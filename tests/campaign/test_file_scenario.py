@@ -295,6 +295,7 @@ def test_a_text_with_one_value_is_part_of_the_scenario(tmp_path, many):
         '<ParameterDeclaration name="Wet" parameterType="boolean" value="false"/>'
         "</ParameterDeclarations>",
     )
+
     def one_of(*values):
         return "".join(f'<Element value="{value}"/>' for value in values)
 

@@ -70,7 +70,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         first = 1
     for e in range(first, record.x.shape[0]):  # entities that depend on no other come first
         state.timed[e] = state.present[e] and state.follow[e] >= 0
-        if state.timed[e] and state.laid_count[e] > 0:
+        if plan.moves_laid and state.timed[e] and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
         elif state.timed[e]:
             move_by_timetable(e, k, plan, roads, state, record)
@@ -84,7 +84,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         before = state.command[e]
         if e > 0:
             command_speed(e, k, plan, roads, state, record)
-        if state.laid_count[e] > 0:
+        if plan.moves_laid and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
         elif plan.attends and plan.others[e] == ATTENTIVE:
             move_heeding(e, before, k, plan, roads, state, record)

@@ -36,9 +36,7 @@ def move_along_path(e, k, plan, roads, state, record):
     step = 0.0 if state.placed[e] else mean * dt
     state.placed[e] = False
     if step < 0.0 and state.follow_action[e] >= 0:  # on along its trajectory, tail first
-        step, state.turn[e] = -step, math.pi
-    elif state.follow_action[e] >= 0:
-        state.turn[e] = 0.0
+        step, state.turn[e] = -step, math.pi if state.command[e] < 0.0 else 0.0
     ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
     j = state.lateral_action[e]
     keeps_aside = j >= 0 and plan.actions[j, DOES] == KEEP_ASIDE
