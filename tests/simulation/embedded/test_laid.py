@@ -200,6 +200,29 @@ def test_a_spline_with_times_is_where_its_times_say():
         assert place(out, seconds) == pytest.approx((10.0 * (seconds - 1.0), 50.0, 0.0), abs=1e-6)
 
 
+KNOT = '<Knot value="0"/>'
+CURVE = f"<ControlPoint><Position>{world(0, 50)}</Position></ControlPoint>"
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        (line(*[vertex(beside(0))] * 5001), "a Polyline of 5001 vertices"),
+        (ARC.format(k=0.0, l=1e9), "a clothoid 1e+09 m long"),
+        (ARC.format(k=1e6, l=1.0), "a clothoid must turn by at most"),
+        (f'<Nurbs order="2">{CURVE * 501}<Knot value="0"/><Knot value="1"/></Nurbs>',
+         "a Nurbs of 501 control points"),
+        (f'<Nurbs order="21">{CURVE * 22}{KNOT * 43}</Nurbs>', "of order 21"),
+        (f'<Nurbs order="2">{CURVE * 2}{KNOT * 4}</Nurbs>', "leave no curve"),
+        (f'<Nurbs order="3">{CURVE * 2}{KNOT * 5}</Nurbs>', "of order 3 with 2"),
+    ],
+)  # fmt: skip
+def test_what_would_take_too_much_or_is_no_curve_is_refused(shape, said):
+    with pytest.raises(UnsupportedError) as caught:
+        told((follow(shape), after(1.0)))
+    assert said in str(caught.value)
+
+
 @given(st.integers(2, 5), st.integers(0, 4), st.data())
 @settings(max_examples=50, deadline=None)
 def test_weights_of_control_points_add_up_to_one_and_are_scipy_s(order, more, data):

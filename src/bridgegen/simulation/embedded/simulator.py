@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 CHUNK = 128
 """Rows that one thread rolls out at a time at most: enough to keep it busy."""
 
-CHUNK_BYTES, INSTANT_BYTES = 16 * 2**20, 112
-"""What they may record between them, and what an entity's instant takes: little to go through."""
+CHUNK_BYTES, INSTANT_BYTES, VERTEX_BYTES = 16 * 2**20, 112, 80
+"""What they may record between them, and what an entity's instant takes, and a vertex of what it
+follows: little to go through."""
 
 LOCK_STEP_ROWS = 1024
 """Rows that a driver in Python drives at a time: a thousand take it little longer than one."""
@@ -97,8 +98,9 @@ class EmbeddedSimulator:
         """See `Simulator`."""
         if self._asks_python:
             return LOCK_STEP_ROWS
-        instants = len(self.program.names) * self.program.n_steps
-        return max(1, min(CHUNK, CHUNK_BYTES // (INSTANT_BYTES * instants)))
+        entities, vertices = len(self.program.names), self.program.most_vertices
+        each = entities * (INSTANT_BYTES * self.program.n_steps + VERTEX_BYTES * vertices)
+        return max(1, min(CHUNK, CHUNK_BYTES // each))
 
     @property
     def runs_at_once(self) -> int:

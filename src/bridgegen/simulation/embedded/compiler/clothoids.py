@@ -17,6 +17,7 @@ from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import Bend
 
 STEP = 0.2  # m, between two samples at most
+LONGEST = 100_000.0  # m, a chain of clothoids
 
 
 def bends(
@@ -71,8 +72,8 @@ def sampled(
         InputError: it has no length, or turns without end.
     """
     length = sum(bend.length for bend in line)
-    if not (0.0 < length < math.inf):
-        raise InputError(f"a clothoid must have a length, got {length:g} m")
+    if not 0.0 < length <= LONGEST:
+        raise InputError(f"a clothoid must be 0 to {LONGEST:g} m long, got {length:g} m")
     step = length / math.ceil(length / step)
     s = np.arange(round(length / step) + 1) * step
     table = np.empty((len(s), 6))

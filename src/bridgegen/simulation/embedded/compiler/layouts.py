@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded._codes import LAYOUT_WIDTH, RIGID, THROUGH, WEIGHTED
@@ -22,6 +23,9 @@ from bridgegen.simulation.embedded.compiler.trajectories import check_times
 UNTIMED = -1
 SAMPLE = 1.0  # m, between the vertices of a clothoid that is laid: 1 mm off in a bend of 125 m
 LEAST_SAMPLES, SAMPLES_PER_POINT = 64, 32  # vertices of a spline that is laid
+MOST_VERTICES, MOST_POINTS, MOST_ORDER = 5_000, 500, 20
+"""How many vertices a trajectory that is laid may have, how many control points a spline, and its
+order: what rows keep, and how long the weights take, is bounded."""
 
 
 def is_laid(action: osc.FollowTrajectoryAction) -> bool:
@@ -113,6 +117,10 @@ class Layouts:
         if timing is not None and all(vertex.time is None for vertex in line.vertices):
             self._tables.note(line, "no vertex states a time: followed at the entity's own speed")
             timing = None
+        if len(line.vertices) > MOST_VERTICES:
+            what = f"a Polyline of {len(line.vertices)} vertices (at most {MOST_VERTICES})"
+            self._tables.unsupported(line, what)
+            return None
         stated = [vertex.time for vertex in line.vertices]
         if timing is not None and all(map(_is_literal, (*stated, timing.scale, timing.offset))):
             known = [None if time is None else self._tables.declared(time) for time in stated]
@@ -131,10 +139,14 @@ class Layouts:
         place = self._positions.add_own(entity) if origin is None else self._positions.add(origin)
         self._anchors.append((place, UNTIMED, 1))
         length = sum(bend.length for bend in curve)
-        if not 0.0 < length < math.inf:
+        if not 0.0 < length <= SAMPLE * (MOST_VERTICES - 1):
             self._tables.unsupported(line, f"a clothoid {length:g} m long")
             return timing
-        samples, step = sampled(0.0, 0.0, 0.0, curve, SAMPLE)
+        try:
+            samples, step = sampled(0.0, 0.0, 0.0, curve, SAMPLE)
+        except InputError as error:
+            self._tables.unsupported(line, str(error))
+            return timing
         knots = np.cumsum([0.0, *(bend.length for bend in curve)])
         times = np.zeros(len(samples))
         if timing is not None and all(time is None for time in ends):
@@ -160,6 +172,10 @@ class Layouts:
                 self._tables.unsupported(point, "a ControlPoint without a time among such with")
             time = UNTIMED if point.time is None else self._tables.slot(point.time)
             self._anchors.append((self._positions.add(point.position), time, 0))
+        if len(points) > MOST_POINTS:
+            what = f"a Nurbs of {len(points)} control points (at most {MOST_POINTS})"
+            self._tables.unsupported(line, what)
+            return None
         literal = self._tables.literal
         order = int(literal(line, "order", line.order))
         weights = [literal(one, "weight", _or(one.weight, 1.0)) for one in points]
@@ -167,7 +183,7 @@ class Layouts:
         if problem := _knot_problem(order, len(points), knots, weights):
             self._tables.unsupported(line, f"a Nurbs {problem}")
             return None
-        count = max(LEAST_SAMPLES, SAMPLES_PER_POINT * len(points))
+        count = min(max(LEAST_SAMPLES, SAMPLES_PER_POINT * len(points)), MOST_VERTICES)
         self._shapes.append(basis(order, knots, weights, count))
         return timing
 
@@ -176,6 +192,8 @@ def _knot_problem(
     order: int, points: int, knots: Sequence[float], weights: Sequence[float]
 ) -> str | None:
     """Return what is wrong with a spline, if anything is."""
+    if order > MOST_ORDER:
+        return f"of order {order} (at most {MOST_ORDER})"
     if order > points:
         return f"of order {order} with {points} control points (order <= points must hold)"
     if len(knots) != points + order:
