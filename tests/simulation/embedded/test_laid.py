@@ -267,11 +267,23 @@ def test_a_place_along_a_trajectory(shape, s, t, turn, found):
     assert math.remainder(h - found[2], math.tau) == pytest.approx(0.0, abs=1e-2)
 
 
+def test_a_place_along_a_trajectory_may_vary_by_row():
+    """So may the line: from (0, p) to (0, p + 10), q along it and 1 m to its left."""
+    shape = line(vertex(world(0, "$p")), vertex(world(0, "${$p + 10}")))
+    beam = f"<TeleportAction>{along(shape, '$q', 1.0)}</TeleportAction>"
+    out = told(
+        (beam, after(1.0)), bv=start("bv", lane(3, 1, 90.0), 0.0),
+        parameters=number("p", 50.0) + number("q", 2.0), p=[50.0, 60.0], q=[2.0, 99.0],
+    )  # fmt: skip
+    assert place(out, 2.0, 0)[:2] == pytest.approx((-1.0, 52.0))
+    assert place(out, 2.0, 1)[:2] == pytest.approx((-1.0, 70.0))
+
+
 def test_no_stated_time_means_the_entity_s_own_speed_and_is_noted():
     untimed = line(vertex(beside(0)), vertex(beside(-40)))
     story = events(("e", "bv", follow(untimed, RELATIVE), after(1.0)))
     (note,) = simulator(scenario(("ego", "bv"), EGO + BV, story), None).program.notes
-    assert "no vertex states a time: followed at the entity's own speed" in note
+    assert "it states no times: followed at the entity's own speed" in note
     out = told((follow(untimed, RELATIVE), after(1.0)))
     assert place(out, 3.0)[1] == pytest.approx(73.0)
 

@@ -83,7 +83,8 @@ COURSE_MEMORY = 6
 # Program.places: kind, entity, lanes to the left, slots of the two numbers, whether the heading is
 # absolute, its slot, whether ahead and left are those of the lane's traffic, not of the road.
 PLACE_KIND, WHOSE, LANES_LEFT, ALONG, ACROSS, ABSOLUTE, HEADING, BY_LANE = range(8)
-ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_OBJECT, BY_WORLD, ON_TRAJECTORY = range(8)
+ON_LANE, ON_ROAD, IN_WORLD, BY_LANES, BY_ROAD, BY_OBJECT, BY_WORLD, BY_TRAJECTORY = range(8)
+LAYOUT = 2  # of a place along a trajectory, in the place of the lanes to the left
 
 # Program.layouts: first and past-the-last anchor and row of shapes, how the vertices follow from
 # them, whether they have times, slots of what these are multiplied by and then moved by [s].

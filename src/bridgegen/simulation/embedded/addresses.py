@@ -7,11 +7,17 @@ import numpy as np
 from numba import types
 
 from bridgegen.compiled import address_of, row_type
-from bridgegen.simulation.embedded._codes import DOES, FIRST_ACROSS, RELATIVE_SPEED
+from bridgegen.simulation.embedded._codes import (
+    BY_TRAJECTORY,
+    DOES,
+    FIRST_ACROSS,
+    PLACE_KIND,
+    RELATIVE_SPEED,
+)
 from bridgegen.simulation.embedded._memory_kernels import Plan, Record, Roads, State
 from bridgegen.simulation.embedded.conditions import look_closely
 from bridgegen.simulation.embedded.drivers import begin_waiting, heed
-from bridgegen.simulation.embedded.motion import BEGINS, follow_course, move_laid
+from bridgegen.simulation.embedded.motion import BEGINS, follow_course, move_laid, pose_along
 
 
 def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Plan:
@@ -36,10 +42,12 @@ def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Pl
         for kind in np.unique(kinds).tolist()
         if kind in BEGINS
     }
+    along = (plan.places[:, PLACE_KIND] == BY_TRAJECTORY).any()
     chases = ((kinds >= RELATIVE_SPEED) & (kinds < FIRST_ACROSS)).any()
     return plan._replace(
         begins=np.array([begins.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64),
         follows_courses=at(follow_course, types.int64, types.int64) if chases else 0,
+        poses_along=at(pose_along, types.int64, types.int64) if along else 0,
         moves_laid=at(move_laid, types.int64, types.int64) if len(plan.layouts) else 0,
         looks_closely=at(look_closely, types.int64) if plan.looks_closely else 0,
         heeds=at(heed, types.int64) if plan.attends else 0,

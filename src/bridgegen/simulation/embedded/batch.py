@@ -305,6 +305,7 @@ def _plan(program: Program) -> memory.Plan:
         "begins": np.zeros(len(program.actions), dtype=np.int64),
         "follows_courses": 0,
         "moves_laid": 0,
+        "poses_along": 0,
         "heeds": 0,
         "begins_waiting": 0,
         "is_driven": int(program.driver != STORYBOARD),

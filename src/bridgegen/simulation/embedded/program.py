@@ -157,43 +157,7 @@ class RouteSpot:
     line: int
 
 
-@dataclass(frozen=True)
-class VertexSpot:
-    """A vertex of a trajectory that places are given along.
-
-    Attributes:
-        spot: its place.
-        aside: how far left of a lane's centre, in the road's direction [m].
-        turn: its heading [rad], from that of its place or absolute.
-        is_absolute: whether the heading is.
-    """
-
-    spot: "Spot"
-    aside: float = 0.0
-    turn: float = 0.0
-    is_absolute: bool = False
-
-
-@dataclass(frozen=True)
-class TrajectorySpot:
-    """A point so far along a trajectory, and left of it [m].
-
-    Attributes:
-        vertices: of its straight lines; the start of its bends.
-        bends: one after the other.
-        s: along it.
-        t: left of it.
-        line: of the position in the file.
-    """
-
-    vertices: tuple[VertexSpot, ...]
-    bends: tuple[Bend, ...]
-    s: float
-    t: float
-    line: int
-
-
-Spot = LaneSpot | RoadSpot | WorldSpot | RouteSpot | TrajectorySpot
+Spot = LaneSpot | RoadSpot | WorldSpot | RouteSpot
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ What the same file and road network always give is a path instead (`trajectories
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -47,6 +48,15 @@ def is_laid(action: osc.FollowTrajectoryAction) -> bool:
     )
 
 
+@dataclass(frozen=True)
+class _Drawn:
+    """How a trajectory follows from places: rows of ``Program.anchors`` and of ``.shapes``."""
+
+    kind: int
+    anchors: list[tuple[int, int, int]]
+    shape: Float | None = None
+
+
 class Layouts:
     """The trajectories that are laid when they begin.
 
@@ -57,6 +67,7 @@ class Layouts:
 
     def __init__(self, tables: Tables, positions: Positions) -> None:
         self._tables, self._positions = tables, positions
+        positions.layouts = self
         self._rows: list[tuple[int, ...]] = []
         self._anchors: list[tuple[int, int, int]] = []
         self._shapes: list[Float] = []
@@ -85,26 +96,39 @@ class Layouts:
             self._tables.unsupported(trajectory, 'a Trajectory with closed="true"')
         line, stated = trajectory.shape.shape, action.time_reference.reference
         timing = stated if isinstance(stated, osc.Timing) else None
-        first, begins = len(self._anchors), sum(len(one) for one in self._shapes)
-        if isinstance(line, osc.Polyline):
-            kind = THROUGH
-            timing = self._through(line, timing)
-        elif isinstance(line, osc.Nurbs):
-            kind = WEIGHTED
-            timing = self._weighted(line, timing)
-        else:
-            kind = RIGID
-            timing = self._rigid(line, timing, entity)
-        past = sum(len(one) for one in self._shapes)
-        scale: Value = 1.0 if timing is None else timing.scale
-        offset: Value = 0.0 if timing is None else timing.offset
+        if timing is not None and not _has_times(line):
+            self._tables.note(line, "it states no times: followed at the entity's own speed")
+            timing = None
         start = action.initial_distance_offset
         if timing is not None and start not in (None, 0.0):
             what = f'initialDistanceOffset="{start}" in a trajectory with times'
             self._tables.unsupported(action, what)
-        slots = (self._tables.slot(scale), self._tables.slot(offset))
-        row = (first, len(self._anchors), begins, past, kind, int(timing is not None), *slots)
-        self._rows.append(row)
+        return self._append(self._drawn(line, timing, entity), timing)
+
+    def add_line(self, where: osc.TrajectoryPosition) -> int:
+        """Return the number of the trajectory along which a position is; it is not followed."""
+        line = where.trajectory_ref.trajectory.shape.shape
+        starts = not isinstance(line, osc.ClothoidSpline) or line.segments[0].position_start
+        if isinstance(line, osc.Nurbs) or not starts:
+            lacks = "" if starts else " without a start"
+            what = f"a TrajectoryPosition on a {type(line).__name__}{lacks}"
+            self._tables.unsupported(where, what)
+            return 0
+        return self._append(self._drawn(line, None, 0), None)
+
+    def _append(self, drawn: "_Drawn", timing: osc.Timing | None) -> int:
+        """Add a row; lines along which its own places are have been added before."""
+        first, begins = len(self._anchors), sum(map(len, self._shapes))
+        self._anchors += drawn.anchors
+        if drawn.shape is not None:
+            self._shapes.append(drawn.shape)
+        past = sum(map(len, self._shapes))
+        slots = (
+            self._tables.slot(1.0 if timing is None else timing.scale),
+            self._tables.slot(0.0 if timing is None else timing.offset),
+        )
+        ends = (first, len(self._anchors), begins, past)
+        self._rows.append((*ends, drawn.kind, int(timing is not None), *slots))
         return len(self._rows) - 1
 
     @property
@@ -112,80 +136,100 @@ class Layouts:
         """How many vertices the longest has."""
         return max((max(row[1] - row[0], row[3] - row[2]) for row in self._rows), default=0)
 
-    def _through(self, line: osc.Polyline, timing: osc.Timing | None) -> osc.Timing | None:
-        """Add the vertices of straight lines; return their timing, None where none has a time."""
-        if timing is not None and all(vertex.time is None for vertex in line.vertices):
-            self._tables.note(line, "no vertex states a time: followed at the entity's own speed")
-            timing = None
+    def _drawn(
+        self,
+        line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs,
+        timing: osc.Timing | None,
+        entity: int,
+    ) -> "_Drawn":
+        if isinstance(line, osc.Polyline):
+            return self._through(line, timing)
+        if isinstance(line, osc.Nurbs):
+            return self._weighted(line, timing)
+        return self._rigid(line, timing, entity)
+
+    def _through(self, line: osc.Polyline, timing: osc.Timing | None) -> "_Drawn":
+        """Return the vertices of straight lines."""
         if len(line.vertices) > MOST_VERTICES:
             what = f"a Polyline of {len(line.vertices)} vertices (at most {MOST_VERTICES})"
             self._tables.unsupported(line, what)
-            return None
+            return _Drawn(THROUGH, [])
         stated = [vertex.time for vertex in line.vertices]
         if timing is not None and all(map(_is_literal, (*stated, timing.scale, timing.offset))):
             known = [None if time is None else self._tables.declared(time) for time in stated]
             check_times(self._tables, timing, known, line.vertices)
-        for vertex in line.vertices:
-            time = UNTIMED if vertex.time is None else self._tables.slot(vertex.time)
-            place = self._positions.add(vertex.position)
-            self._anchors.append((place, time, int(_states_heading(vertex.position))))
-        return timing
+        anchors = [
+            (
+                self._positions.add(vertex.position),
+                UNTIMED if vertex.time is None else self._tables.slot(vertex.time),
+                int(_states_heading(vertex.position)),
+            )
+            for vertex in line.vertices
+        ]
+        return _Drawn(THROUGH, anchors)
 
     def _rigid(
         self, line: osc.Clothoid | osc.ClothoidSpline, timing: osc.Timing | None, entity: int
-    ) -> osc.Timing | None:
-        """Add bends from a start, the entity's own place where they state none."""
+    ) -> "_Drawn":
+        """Return bends from a start, the entity's own place where they state none."""
         origin, curve, ends = bends(self._tables, line)
         place = self._positions.add_own(entity) if origin is None else self._positions.add(origin)
-        self._anchors.append((place, UNTIMED, 1))
+        drawn = _Drawn(RIGID, [(place, UNTIMED, 1)])
         length = sum(bend.length for bend in curve)
         if not 0.0 < length <= SAMPLE * (MOST_VERTICES - 1):
             self._tables.unsupported(line, f"a clothoid {length:g} m long")
-            return timing
+            return drawn
         try:
             samples, step = sampled(0.0, 0.0, 0.0, curve, SAMPLE)
         except InputError as error:
             self._tables.unsupported(line, str(error))
-            return timing
-        knots = np.cumsum([0.0, *(bend.length for bend in curve)])
+            return drawn
         times = np.zeros(len(samples))
-        if timing is not None and all(time is None for time in ends):
-            self._tables.note(line, "it states no times: followed at the entity's own speed")
-            timing = None
         if timing is not None:
-            if any(time is None for time in ends):
-                self._tables.unsupported(line, "a clothoid with some of its times")
-                return timing
             known = [time for time in ends if time is not None]
+            if len(known) < len(ends):
+                self._tables.unsupported(line, "a clothoid with some of its times")
+                return drawn
+            knots = np.cumsum([0.0, *(bend.length for bend in curve)])
             times = np.interp(np.arange(len(samples)) * step, knots, known)
-        self._shapes.append(np.column_stack((samples[:, :3], times)))
-        return timing
+        return replace(drawn, shape=np.column_stack((samples[:, :3], times)))
 
-    def _weighted(self, line: osc.Nurbs, timing: osc.Timing | None) -> osc.Timing | None:
-        """Add a spline: its points are weighted means of its control points."""
+    def _weighted(self, line: osc.Nurbs, timing: osc.Timing | None) -> "_Drawn":
+        """Return a spline: its points are weighted means of its control points."""
         points = line.control_points
-        if timing is not None and all(point.time is None for point in points):
-            self._tables.note(line, "it states no times: followed at the entity's own speed")
-            timing = None
+        if len(points) > MOST_POINTS:
+            what = f"a Nurbs of {len(points)} control points (at most {MOST_POINTS})"
+            self._tables.unsupported(line, what)
+            return _Drawn(WEIGHTED, [])
+        anchors = []
         for point in points:
             if timing is not None and point.time is None:
                 self._tables.unsupported(point, "a ControlPoint without a time among such with")
             time = UNTIMED if point.time is None else self._tables.slot(point.time)
-            self._anchors.append((self._positions.add(point.position), time, 0))
-        if len(points) > MOST_POINTS:
-            what = f"a Nurbs of {len(points)} control points (at most {MOST_POINTS})"
-            self._tables.unsupported(line, what)
-            return None
+            anchors.append((self._positions.add(point.position), time, 0))
         literal = self._tables.literal
         order = int(literal(line, "order", line.order))
         weights = [literal(one, "weight", _or(one.weight, 1.0)) for one in points]
         knots = [literal(one, "value", one.value) for one in line.knots]
         if problem := _knot_problem(order, len(points), knots, weights):
             self._tables.unsupported(line, f"a Nurbs {problem}")
-            return None
+            return _Drawn(WEIGHTED, anchors)
         count = min(max(LEAST_SAMPLES, SAMPLES_PER_POINT * len(points)), MOST_VERTICES)
-        self._shapes.append(basis(order, knots, weights, count))
-        return timing
+        return _Drawn(WEIGHTED, anchors, basis(order, knots, weights, count))
+
+
+def _has_times(line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs) -> bool:
+    """Return whether a line states any time."""
+    times: list[Value | None]
+    if isinstance(line, osc.Polyline):
+        times = [vertex.time for vertex in line.vertices]
+    elif isinstance(line, osc.Nurbs):
+        times = [point.time for point in line.control_points]
+    elif isinstance(line, osc.Clothoid):
+        times = [line.start_time, line.stop_time]
+    else:
+        times = [line.time_end, *(segment.time_start for segment in line.segments)]
+    return any(time is not None for time in times)
 
 
 def _knot_problem(

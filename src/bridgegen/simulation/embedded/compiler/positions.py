@@ -1,10 +1,11 @@
 """Positions of a scenario file as a table: what the rollout needs to find one when it is asked for.
 
 Their numbers may vary by row, but for those that only the roads can resolve: t of a RoadPosition,
-and where on a route or on a trajectory a position is.
+and where on a route a RoutePosition is.
 """
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
@@ -13,26 +14,25 @@ from bridgegen.simulation.embedded._codes import (
     BY_LANES,
     BY_OBJECT,
     BY_ROAD,
+    BY_TRAJECTORY,
     BY_WORLD,
     IN_WORLD,
     ON_LANE,
     ON_ROAD,
-    ON_TRAJECTORY,
 )
-from bridgegen.simulation.embedded.compiler.clothoids import bends
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import (
-    Bend,
     LanePoint,
     LaneSpot,
     Point,
     RoadSpot,
     RouteSpot,
     Spot,
-    TrajectorySpot,
-    VertexSpot,
     WorldSpot,
 )
+
+if TYPE_CHECKING:
+    from bridgegen.simulation.embedded.compiler.layouts import Layouts
 
 RELATIVE_SINCE = 3
 """The minor version from which a missing type of an Orientation means relative."""
@@ -60,6 +60,7 @@ class Positions:
         rows: ``(·, 8)`` as ``_codes`` names the columns.
         spots: per position what its road network has to resolve, None where there is nothing.
         points: the places that are the same whatever rows and entities do.
+        layouts: takes the trajectories along which positions are.
 
     Args:
         tables: the compiler's; takes down what cannot be run.
@@ -71,6 +72,7 @@ class Positions:
         self.rows: list[tuple[int, ...]] = []
         self.spots: list[Spot | None] = []
         self.points: list[Point] = []
+        self.layouts: Layouts | None = None
 
     def place(self, position: osc.Position) -> int:
         """Return the number of a place: of a point, or, from -1 down, of a position."""
@@ -112,7 +114,8 @@ class Positions:
         if isinstance(where, osc.RelativeWorldPosition):
             return self._append(where, BY_WORLD, where.dx, where.dy, whose=where.entity_ref)
         if isinstance(where, osc.TrajectoryPosition):
-            return self._append(where, ON_TRAJECTORY, 0.0, 0.0, spot=self._trajectory_spot(where))
+            number = self.layouts.add_line(where) if self.layouts else 0
+            return self._append(where, BY_TRAJECTORY, where.s, where.t or 0.0, count=number)
         self._tables.unsupported(where, type(where).__name__)
         return 0
 
@@ -170,45 +173,6 @@ class Positions:
             return RouteSpot(waypoints, s, None, literal(inner, "t", inner.t), where.line)
         aside = literal(inner, "laneOffset", inner.lane_offset or 0.0)
         return RouteSpot(waypoints, s, int(self._tables.text(inner.lane_id)), aside, where.line)
-
-    def _trajectory_spot(self, where: osc.TrajectoryPosition) -> TrajectorySpot | None:
-        """Return a place along a trajectory that neither rows nor entities change."""
-        literal, line = self._tables.literal, where.trajectory_ref.trajectory.shape.shape
-        curve: tuple[Bend, ...] = ()
-        if isinstance(line, osc.Polyline):
-            positions = [vertex.position for vertex in line.vertices]
-        elif isinstance(line, osc.Clothoid | osc.ClothoidSpline):
-            origin, curve, _ = bends(self._tables, line)
-            positions = [] if origin is None else [origin]
-        else:
-            positions = []
-        found = [self._vertex_spot(one) for one in positions]
-        vertices = tuple(one for one in found if one is not None)
-        if not positions:
-            lacks = "" if isinstance(line, osc.Nurbs) else " without a start"
-            what = f"a TrajectoryPosition on a {type(line).__name__}{lacks}"
-            self._tables.unsupported(where, what)
-        if not positions or len(vertices) < len(positions):
-            return None
-        s, t = literal(where, "s", where.s), literal(where, "t", where.t or 0.0)
-        return TrajectorySpot(vertices, curve, s, t, where.line)
-
-    def _vertex_spot(self, position: osc.Position) -> VertexSpot | None:
-        where, literal = position.position, self._tables.literal
-        spot: Spot | None
-        if isinstance(where, osc.TrajectoryPosition):
-            spot = self._trajectory_spot(where)
-        elif isinstance(where, osc.LanePosition):
-            lane = self._lane_spot(where)
-            spot = lane and replace(lane, s=literal(where, "s", where.s))
-        else:
-            spot = self.spot(position)
-        turned: osc.Orientation | None = getattr(where, "orientation", None)
-        turn = 0.0 if turned is None or turned.h is None else literal(turned, "h", turned.h)
-        aside: Value = getattr(where, "offset", None) or 0.0
-        if spot is None:
-            return None
-        return VertexSpot(spot, literal(where, "offset", aside), turn, self._is_absolute(turned))
 
     def _is_absolute(self, turned: osc.Orientation | None) -> bool:
         """Return whether an orientation counts from the world's x axis."""

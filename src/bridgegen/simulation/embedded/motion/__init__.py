@@ -13,7 +13,7 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     move_by_timetable,
     stop_follow,
 )
-from bridgegen.simulation.embedded.motion._laying_kernels import move_laid
+from bridgegen.simulation.embedded.motion._laying_kernels import move_laid, pose_along
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     is_pointless,
     leave_out_absent,
@@ -40,6 +40,7 @@ __all__ = [
     "move_laid",
     "note",
     "pass_end",
+    "pose_along",
     "start_at_speed",
     "stay_away",
     "steer",

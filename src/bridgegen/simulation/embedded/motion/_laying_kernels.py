@@ -11,10 +11,12 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
+    ALONG,
     DETAIL,
     FIRST_ANCHOR,
     FIRST_SAMPLE,
     IS_TIMED,
+    LAYOUT,
     LAYOUT_OFFSET,
     LAYOUT_SCALE,
     LAYOUT_SHAPE,
@@ -241,6 +243,36 @@ def move_laid(e, k, plan, roads, state, record):
     record.x[e, k + 1], record.y[e, k + 1], record.v[e, k + 1] = x, y, v
     record.h[e, k + 1] = continued(h, record.h[e, k])
     record.offset[e, k + 1] = 0.0
+
+
+@kernel
+def pose_along(c, k, plan, roads, state, record):
+    """Write the pose so far along a trajectory to ``state.pose``; at its end if it is shorter.
+
+    NaN where one of its vertices is no place.
+    """
+    row, s = plan.layouts[plan.places[c, LAYOUT]], state.slots[plan.places[c, ALONG]]
+    first, past = row[FIRST_ANCHOR], row[PAST_ANCHOR]
+    x, y, h = pose_of(plan.anchors[first, PLACE], k, plan, roads, state, record)
+    rigid = row[LAYOUT_SHAPE] == RIGID
+    count = row[PAST_SAMPLE] - row[FIRST_SAMPLE] if rigid else past - first
+    passed, at_x, at_y, turn = 0.0, x, y, h
+    sine, cosine = math.sin(h), math.cos(h)
+    for i in range(1, count):
+        if rigid:
+            u, w = plan.shapes[row[FIRST_SAMPLE] + i, 0], plan.shapes[row[FIRST_SAMPLE] + i, 1]
+            x_end, y_end = x + cosine * u - sine * w, y + sine * u + cosine * w
+        else:
+            x_end, y_end, _ = pose_of(plan.anchors[first + i, PLACE], k, plan, roads, state, record)
+        length = math.hypot(x_end - at_x, y_end - at_y)
+        if length > SHORTEST:
+            turn = math.atan2(y_end - at_y, x_end - at_x)
+        if passed + length >= s and length > SHORTEST:
+            share = max(s - passed, 0.0) / length
+            at_x, at_y = at_x + share * (x_end - at_x), at_y + share * (y_end - at_y)
+            break
+        passed, at_x, at_y = passed + length, x_end, y_end
+    state.pose[0], state.pose[1], state.pose[2] = at_x, at_y, turn
 
 
 @kernel

@@ -9,7 +9,7 @@ begins, the row ends, and is run again from its start when it is there.
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.ego._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ABSOLUTE,
@@ -19,12 +19,12 @@ from bridgegen.simulation.embedded._codes import (
     BY_LANES,
     BY_OBJECT,
     BY_ROAD,
+    BY_TRAJECTORY,
     BY_WORLD,
     HEADING,
     IN_WORLD,
     LANES_LEFT,
     ON_LANE,
-    ON_TRAJECTORY,
     PLACE_KIND,
     WHOSE,
 )
@@ -229,14 +229,19 @@ def lane_place_by(c, plan, roads, state):
 
 @kernel
 def world_place(c, k, plan, roads, state, record):
-    """Return (x, y, heading) of a World, RelativeObject, RelativeWorld or Trajectory position."""
+    """Return (x, y, heading) of a World, RelativeObject, RelativeWorld or Trajectory position.
+
+    A trajectory may be laid through positions along others: its kernel has an address.
+    """
     row = plan.places[c]
     u, w, h = state.slots[row[ALONG]], state.slots[row[ACROSS]], state.slots[row[HEADING]]
     if row[PLACE_KIND] == IN_WORLD:
         return u, w, h
-    if row[PLACE_KIND] == ON_TRAJECTORY:
-        spot = roads.spots[c]
-        return spot[0], spot[1], h if row[ABSOLUTE] else spot[2] + h
+    if row[PLACE_KIND] == BY_TRAJECTORY:
+        run_kernel_at(plan.poses_along, (c, k, plan, roads, state, record))
+        x, y, along = state.pose[0], state.pose[1], state.pose[2]
+        x, y = shifted(x, y, along, w)
+        return x, y, h if row[ABSOLUTE] else along + h
     e = row[WHOSE]
     x, y, own = record.x[e, k], record.y[e, k], record.h[e, k]
     if not row[ABSOLUTE]:
@@ -304,6 +309,9 @@ def put(e, c, k, plan, roads, state, record):
         return
     if kind == IN_WORLD or kind >= BY_OBJECT:
         x, y, h = world_place(c, k, plan, roads, state, record)
+        if math.isnan(x):
+            fail(NO_PLACE, state)
+            return
         put_in_world(e, x, y, h, roads, state)
         return
     if kind >= BY_LANES:

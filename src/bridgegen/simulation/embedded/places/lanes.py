@@ -12,21 +12,16 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.errors import InputError
-from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
-from bridgegen.openx.opendrive.lanes import borders, lane_at, lane_pose, section_index
+from bridgegen.openx.opendrive.lanes import borders, lane_at, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import Piece
 from bridgegen.openx.opendrive.routes import Place, Route
-from bridgegen.simulation.embedded.compiler import clothoids
-from bridgegen.simulation.embedded.compiler.trajectories import polyline
 from bridgegen.simulation.embedded.program import (
     LaneSpot,
     RoadSpot,
     RouteSpot,
     Spot,
-    TrajectorySpot,
-    VertexSpot,
     WorldSpot,
 )
 
@@ -83,9 +78,7 @@ class Lanes:
         """
         self.ways.append(self._way([self._on_lane(spot) for spot in spots]))
 
-    def locate(
-        self, spot: LaneSpot | RoadSpot | WorldSpot | RouteSpot
-    ) -> tuple[int, int, float, float, int]:
+    def locate(self, spot: Spot) -> tuple[int, int, float, float, int]:
         """Return number of the road, lane id, s, how far left of the lane's centre [m], and a way.
 
         Left is that of the reference line. s is NaN where rows may vary it. The way is the one
@@ -111,51 +104,8 @@ class Lanes:
         return model.roads.index(road), lane, math.nan if s is None else s, aside, way
 
     def _on_lane(self, spot: Spot) -> Place:
-        if isinstance(spot, TrajectorySpot):
-            raise InputError("a place along a trajectory is on no lane")
         road, lane, s, _, _ = self.locate(spot)
         return Place(self.graph.model.roads[road].id, lane, s)
-
-    def along_trajectory(self, spot: TrajectorySpot) -> tuple[float, float, float]:
-        """Return the pose (x, y [m], heading [rad]) of a place along a trajectory.
-
-        Beyond its end it is there.
-
-        Raises:
-            InputError: a vertex is not on the road network.
-        """
-        corners = [self._vertex(one) for one in spot.vertices]
-        if spot.bends:
-            ((x, y, h),) = corners
-            path, step = clothoids.sampled(x, y, h, spot.bends)
-        else:
-            path, step = polyline(corners)
-        stations = np.arange(len(path)) * step
-        x, y, h = (float(np.interp(spot.s, stations, path[:, i])) for i in range(3))
-        return x - spot.t * math.sin(h), y + spot.t * math.cos(h), h
-
-    def _vertex(self, vertex: VertexSpot) -> tuple[float, float, float]:
-        """Return the pose of a trajectory's vertex."""
-        spot, model = vertex.spot, self.graph.model
-        if isinstance(spot, LaneSpot):
-            road = model.road(spot.road)
-            assert spot.s is not None
-            x, y, h, _ = lane_pose(road, spot.lane, spot.s)
-            aside = vertex.aside * road.direction(spot.lane)
-            x, y = x - aside * math.sin(h), y + aside * math.cos(h)
-        elif isinstance(spot, RoadSpot):
-            road = model.road(spot.road)
-            if not 0.0 <= spot.s <= road.length:
-                raise InputError(f"road {road.id} is {road.length:g} m long, got s={spot.s:g} m")
-            x, y, h, _ = reference_pose(road, spot.s)
-            x, y = x - spot.t * math.sin(h), y + spot.t * math.cos(h)
-        elif isinstance(spot, TrajectorySpot):
-            x, y, h = self.along_trajectory(spot)
-        elif isinstance(spot, WorldSpot):
-            return spot.x, spot.y, spot.h
-        else:
-            raise InputError("a vertex of a trajectory may not be a place on a route")
-        return x, y, vertex.turn if vertex.is_absolute else h + vertex.turn
 
     def _along(self, spot: RoadSpot | RouteSpot) -> tuple[Road, float, int]:
         """Return the road of a position, its s, and which way a route leads there."""

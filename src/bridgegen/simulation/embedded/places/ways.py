@@ -29,7 +29,6 @@ from bridgegen.simulation.embedded.program import (
     Nowhere,
     Point,
     Program,
-    TrajectorySpot,
 )
 
 UNKNOWN, NONE = -1, -2  # in Ways.numbers: not asked for yet; there is no such way
@@ -54,8 +53,7 @@ class Ways:
             trajectory.
         timetables: per trajectory ``trajectories.timetable``, without rows if it has no times.
         spots: ``(C, 5)`` per position of the file: number of its road, lane, s, left of its centre,
-            the way from which headings count; see `Lanes.locate`. Of one along a trajectory x, y
-            [m] and heading [rad].
+            the way from which headings count; see `Lanes.locate`.
         lanes: the lanes of the road network, None while nobody has asked for them.
         has_ground: whether somebody has asked where all of them are.
         numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
@@ -235,10 +233,7 @@ class Ways:
         for row, spot in zip(self.spots, self._program.spots, strict=True):
             if spot is not None:
                 try:
-                    if isinstance(spot, TrajectorySpot):
-                        row[:3] = self.lanes.along_trajectory(spot)
-                    else:
-                        row[:] = self.lanes.locate(spot)
+                    row[:] = self.lanes.locate(spot)
                 except InputError as error:
                     place = f"{self._program.place}, line {spot.line}"
                     raise InputError(f"{place}: {error}") from None
