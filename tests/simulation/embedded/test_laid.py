@@ -320,3 +320,17 @@ def test_backwards_along_a_lane_ends_where_its_way_begins():
     assert math.remainder(h - SOUTH, math.tau) == pytest.approx(0.0, abs=1e-9)
     assert place(out, 9.0)[1] == pytest.approx(113.0, abs=1e-6)
     assert out.v[0, 1, 180] == 0.0
+
+
+def test_a_driver_takes_the_trajectory_of_its_ego_for_its_way():
+    """By the declared numbers: these cannot vary then. Without a driver, they can."""
+    shape = ARC.format(k=0.05, l="$l").replace("/>", STARTS, 1)
+    ego = f"""<Private entityRef="ego"><PrivateAction>{follow(shape)}</PrivateAction>
+<PrivateAction>{speeding(5.0, "step time 0")}</PrivateAction></Private>"""
+    far = start("bv", lane(3, 1, 20.0), 0.0)
+    text = scenario(("ego", "bv"), ego + far, parameters=number("l", 31.4159))
+    driven = run(text, "route-follower")
+    k = round(10.0 * math.pi / 5.0 / 0.05)
+    assert float(driven.x[0, 0, k]) == pytest.approx(20.0, abs=0.3)
+    assert float(driven.y[0, 0, k]) == pytest.approx(70.0, abs=0.3)
+    assert "l" in simulator(text, "route-follower").fixed

@@ -57,6 +57,26 @@ class _Drawn:
     shape: Float | None = None
 
 
+def gives_path(action: osc.FollowTrajectoryAction) -> bool:
+    """Return whether a trajectory is a path on the road network once its numbers are known."""
+    line = action.trajectory_ref.trajectory.shape.shape
+    places: list[osc.Position | None]
+    if isinstance(line, osc.Polyline):
+        places = [vertex.position for vertex in line.vertices]
+    elif isinstance(line, osc.Clothoid):
+        places = [line.position]
+    elif isinstance(line, osc.ClothoidSpline):
+        places = [line.segments[0].position_start]
+    else:
+        return False
+    return all(
+        place is not None
+        and isinstance(place.position, osc.WorldPosition | osc.LanePosition)
+        and getattr(place.position, "orientation", None) is None
+        for place in places
+    )
+
+
 class Layouts:
     """The trajectories that are laid when they begin.
 

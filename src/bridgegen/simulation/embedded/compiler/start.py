@@ -9,7 +9,7 @@ from bridgegen.simulation.embedded._codes import WHOSE
 from bridgegen.simulation.embedded.compiler.actions import CONTROLLING, Actions
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.courses import LONGITUDINAL, first_speed
-from bridgegen.simulation.embedded.compiler.layouts import is_laid
+from bridgegen.simulation.embedded.compiler.layouts import gives_path, is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
@@ -97,7 +97,10 @@ class Start:
                         init[name] = self._tables.slot(speed)
                 elif isinstance(action, osc.LateralAction):
                     first.append((wrapped, self._tables.entity(name)))
-                elif isinstance(inner, osc.FollowTrajectoryAction) and is_laid(inner):
+                elif isinstance(inner, osc.FollowTrajectoryAction) and (
+                    is_laid(inner)  # a driver needs a path, by the declared numbers
+                    and not (has_driver and self._tables.entity(name) == 0 and gives_path(inner))
+                ):
                     first.append((wrapped, self._tables.entity(name)))
                     if (begins := _first_position(inner)) is not None:
                         starts.setdefault(name, begins)
