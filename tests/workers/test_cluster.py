@@ -178,7 +178,7 @@ def test_campaigns_share_the_same_actors(nodes, doubles):
     for one in threads:
         one.join()
     assert done == [True] * 10
-    assert len(actors()) == 2
+    assert 1 <= len(actors()) <= 2  # one may have done all before the other has started
 
 
 def test_a_killed_worker_costs_nothing_and_rows_that_kill_are_lost_alone(
@@ -232,7 +232,7 @@ def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
     run = bg.run_search(
         **SEARCH, out=tmp_path / "run", workers=cluster, callbacks=SearchCallbacks(batch=disturb)
     )
-    assert done.wait(10.0)
+    assert done.wait(60.0)
     assert same_rows(run.folder, undisturbed.folder)
     nodes.obey("grow")
 
