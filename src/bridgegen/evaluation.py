@@ -61,6 +61,24 @@ class Evaluation:
             np.concatenate(sought) if sought else None,
         )
 
+    @classmethod
+    def gathered(cls, parts: Sequence[tuple[Int, "Evaluation"]]) -> "Evaluation":
+        """Return the evaluation of N rows from those of parts of them.
+
+        Args:
+            parts: the rows ``(n,)`` of each, every one of 0 … N − 1 once, and its evaluation.
+        """
+        if len(parts) == 1:
+            return parts[0][1]
+        rows = np.concatenate([at for at, _ in parts])
+        order, whole = np.argsort(rows), cls.join([one for _, one in parts])
+        return cls(
+            whole.metrics[order], whole.F[order], whole.critical[order], whole.status[order],
+            whole.findings.take(order),
+            {int(rows[row]): text for row, text in whole.messages.items()},
+            None if whole.cause is None else whole.cause[order],
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Trials:
@@ -175,3 +193,23 @@ class Replay:
             [self.ways[row] for row in rows] if self.ways else [],
             [self.weathers[row] for row in rows],
         )
+
+
+@dataclass(frozen=True)
+class Replays:
+    """Replays of N rows, one for each storyboard that they have.
+
+    Attributes:
+        parts: the numbers of its rows, ascending, and each replay.
+    """
+
+    parts: tuple[tuple[Int, Replay], ...]
+
+    def take(self, at: Int) -> "Replays":
+        """Return some of the rows, in the order of their numbers ``at``."""
+        found = []
+        for rows, one in self.parts:
+            mine = np.flatnonzero(np.isin(at, rows))
+            if mine.size:
+                found.append((mine, one.take(np.searchsorted(rows, at[mine]))))
+        return Replays(tuple(found))

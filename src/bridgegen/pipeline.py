@@ -4,9 +4,10 @@ Read this first. `Pipeline.evaluate_rows` is the whole path of a batch, one line
 everything else here prepares it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Self, TypeVar, TypeVarTuple
 
 import numpy as np
@@ -22,9 +23,8 @@ from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import Count
 from bridgegen.conflict.plausibility import Implausible, plausibility
-from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError
-from bridgegen.evaluation import Evaluation, Replay, Trials
+from bridgegen.evaluation import Evaluation, Replay, Replays, Trials
 from bridgegen.objective import CLASSIFYING, Objective, Objectives, needs_sample
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
@@ -32,8 +32,9 @@ from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.options import PipelineOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
+from bridgegen.simulation.rollout import NO_SCENARIO, WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.simulator import Simulator
+from bridgegen.variants import Variants, nominal_of
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
 from bridgegen.workers.compile_ahead import compiled_ahead
 
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
 
 FAR_ROWS = 8
 """Rows per chunk if only the workers' machines have the simulator."""
+
+KEPT_VARIANTS = 64
+"""Storyboards that stay compiled."""
 
 SAMPLE = 400
 """Random scenarios that set an objective's weights and scales where it needs a sample."""
@@ -115,8 +119,9 @@ class Pipeline:
         nominal = self.concrete(space.row({}), road_map.path.name if road_map else "")
         self._workers = workers or Threads()
         self._is_far = simulator != EMBEDDED and not self._workers.are_here
-        near = EMBEDDED if self._is_far else simulator
-        self.simulator: Simulator[Any] = near.simulator(nominal.storyboard, scenario.name, driver)
+        self._simulates = EMBEDDED if self._is_far else simulator
+        self._given_driver, self._refused = driver, ""
+        self.simulator: Simulator[Any] = self._simulator_of(nominal)
         self.driver = self.simulator.embedded.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # write the file's choice, too
             self.source = _source(scenario, self.driver, road_map, space)
@@ -127,10 +132,56 @@ class Pipeline:
             recorded = metrics_of(scenario, self.driver, options.metrics, detects=sees)
         held = measures.held_by(self.driver, detects=sees)
         self.metrics = quantities.require(recorded, held, f"the driver '{self.driver.name}'")
-        _refuse_fixed(scenario, space, self.simulator.fixed)
-        self._roads: Any = None
-        if not {*self._road_names} & {*space.variables}:
-            self._roads = self.simulator.roads([nominal.roads])
+        self._roads: Any = self._static_roads(nominal)
+        embedded = self.simulator.embedded
+        self._variants = Variants.of(scenario, space, self.source, embedded, driver)
+        self._variant = lru_cache(maxsize=KEPT_VARIANTS)(self._make_variant)
+
+    def _simulator_of(self, nominal: ConcreteScenario) -> Simulator[Any]:
+        place = self.scenario.name
+        return self._simulates.simulator(nominal.storyboard, place, self._given_driver)
+
+    def _static_roads(self, nominal: ConcreteScenario) -> Any:
+        """Return the compiled road network, None if rows have several."""
+        if {*self._road_names} & {*self.space.variables}:
+            return None
+        return self.simulator.roads([nominal.roads])
+
+    def _make_variant(self, key: tuple[float, ...]) -> "Pipeline":
+        """Return the pipeline of the rows that have these values of what storyboards differ in."""
+        one = copy(self)
+        one._variants = replace(self._variants, names=())
+        try:
+            values = dict(zip(self._variants.names, key, strict=True))
+            nominal = nominal_of(self.source, self.space, values)
+            one.simulator = self._simulator_of(nominal)
+            one._roads = one._static_roads(nominal)
+        except InputError as error:  # it is a result of these rows; the others go on
+            one.simulator, one._refused = self.simulator, "; ".join(error.problems)
+        return one
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is run otherwise than one may expect, a sentence each."""
+        return self._variants.notes
+
+    def by_variant(self, X: Float) -> "Iterator[tuple[Int, Pipeline]]":
+        """Yield the rows of each storyboard, and the pipeline that has it.
+
+        Args:
+            X: ``(N, len(space.names))``.
+
+        Yields:
+            Their numbers in X, ascending; and the pipeline, this one where one serves every row.
+        """
+        names = self._variants.names
+        if not (names and len(X)):
+            yield np.arange(len(X)), self
+            return
+        columns = [self.space.index(name) for name in names]
+        keys, which = np.unique(X[:, columns], axis=0, return_inverse=True)
+        for k, key in enumerate(keys.tolist()):
+            yield np.flatnonzero(which.reshape(-1) == k), self._variant(tuple(key))
 
     @cached_property
     def recipe(self) -> Recipe:
@@ -264,6 +315,12 @@ class Pipeline:
 
     def evaluate_rows(self, X: Float, objective: Objective) -> Evaluation:
         """Evaluate N rows at once, in this thread; ``evaluate`` shares them among workers."""
+        return Evaluation.gathered(
+            [(at, one._evaluate(X[at], objective)) for at, one in self.by_variant(X)]
+        )
+
+    def _evaluate(self, X: Float, objective: Objective) -> Evaluation:
+        """Evaluate N rows of one storyboard."""
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
         metrics = quantities.evaluate(rollout, self.metrics)
@@ -293,10 +350,9 @@ class Pipeline:
         return counterfactuals(self.driver)
 
     @property
-    def kinds(self) -> dict[str, str]:
-        """What each participant is, "car" or "pedestrian" say, by its name."""
-        program = self.simulator.embedded.program
-        return dict(zip(program.names, (NAMES[k] for k in program.kinds), strict=True))
+    def kinds(self) -> Mapping[str, str]:
+        """What each participant is, "car", "pedestrian" or "car or truck" say, by its name."""
+        return self._variants.kinds
 
     def try_all(self, X: Float, fix: Int | None = None, noise: Float | None = None) -> Trials:
         """Simulate N rows again, each unchanged or with one stage idealised; see `Trials`.
@@ -331,8 +387,17 @@ class Pipeline:
             harm: the quantity that is measured.
             count: the conflicts that count.
         """
+        parts = [(at, one._try(rows[at], harm, count)) for at, one in self.by_variant(rows)]
+        return Trials.join([one for _, one in parts]).take(
+            np.argsort(np.concatenate([at for at, _ in parts]))
+        )
+
+    def _try(self, rows: Float, harm: str, count: Count) -> Trials:
+        """Simulate N rows of one storyboard; see ``try_rows``."""
         n = len(self.space.names)
         X, keys, numbers = rows[:, :n], rows[:, n : 2 * n], rows[:, -1].astype(np.int64)
+        if self._refused:
+            return Trials.none(len(rows))
         roads, which = self._roads_of(X)
         parts, order = [], []
         for number in np.unique(numbers).tolist():
@@ -352,6 +417,12 @@ class Pipeline:
 
     def rollout_again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
         """Roll out N rows in the embedded simulator with the random numbers of some keys."""
+        return joined([(at, one._again(X[at], noise[at])) for at, one in self.by_variant(X)])
+
+    def _again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
+        """Roll out N rows of one storyboard; see ``rollout_again``."""
+        if self._refused:
+            return self._failed(X)
         roads, rows = self._roads_of(X)
         return self.simulator.embedded.run(roads, rows, self._columns(X), noise=noise)
 
@@ -378,7 +449,9 @@ class Pipeline:
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         if not self._is_far:
-            return self._run(*self._roads_of(X), X)
+            return joined(
+                [(at, one._run(*one._roads_of(X[at]), X[at])) for at, one in self.by_variant(X)]
+            )
         parts, start = [], 0
         for part in self._map(type(self).rollout, X):
             rows, rollout = np.arange(start, start := start + part.rows), part.result
@@ -393,10 +466,21 @@ class Pipeline:
         """Roll out N rows in the workers; return the rollouts of consecutive parts of them."""
         return [one.result for one in self._map(type(self).rollout, X)]
 
+    def replays(
+        self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
+    ) -> Replays:
+        """Roll out N rows, of one storyboard or of several, as ``replay`` does."""
+        return Replays(
+            tuple(
+                (at, one.replay(X[at], plans=plans, noise=None if noise is None else noise[at]))
+                for at, one in self.by_variant(X)
+            )
+        )
+
     def replay(
         self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
     ) -> Replay:
-        """Roll out N rows as ``evaluate`` does, with the egos' plans and the weather.
+        """Roll out N rows of one storyboard as ``evaluate`` does, with the egos' plans and weather.
 
         Args:
             X: ``(N, len(space.names))`` float64.
@@ -419,9 +503,28 @@ class Pipeline:
         weathers = [embedded.weathers(columns, rollout, i) for i in range(len(X))]
         return Replay(rollout, intentions, ways, weathers)
 
+    def bodies(self, x: Float) -> Mapping[str, str]:
+        """Return what the entities of a row are, by name: a car, a pedestrian, a cone."""
+        return self.source.bodies(self.space.values(x))
+
+    def _failed(self, X: Float) -> Rollout:
+        """Return the rollout of N rows whose values make no scenario."""
+        columns = {
+            name: X[:, i]
+            for i, name in enumerate(self.space.names)
+            if name not in self.simulator.fixed
+        }
+        batch = self.simulator.embedded.batch(*self._roads_of(X), columns)
+        batch.start()
+        batch.fail(NO_SCENARIO, self._refused)
+        return batch.rollout()
+
     def _run(
         self, roads: Any, rows: Int, X: Float, replay: Counterfactual | None = None
     ) -> Rollout:
+        """Roll out N rows of one storyboard."""
+        if self._refused:
+            return self._failed(X)
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         if replay is None:
             return self.simulator.run(roads, rows, columns)
@@ -507,18 +610,6 @@ def _source(
     if isinstance(source, OntologySource) and source.constraints.adversary:
         return AdversarySource(source, space.values(space.row({})))
     return source
-
-
-def _refuse_fixed(scenario: SearchedScenario, space: SearchSpace, fixed: Mapping[str, str]) -> None:
-    """Reject a search of parameters that must be the same in every row."""
-    moving = {*space.variables}
-    moving |= {one.name for one in scenario.derived if one.names & moving}
-    if problems := [
-        f"{scenario.place}: parameter '{name}' cannot vary: it is used for {use}"
-        for name, use in fixed.items()
-        if name in moving
-    ]:
-        raise InputError(*problems)
 
 
 def metrics_of(

@@ -206,9 +206,8 @@ def uniform(name: str, low: float = 1.0, high: float = 2.0) -> str:
 
 
 REFUSED = {
-    "parameter 'StopAfter' cannot vary: it is used for value=\"$StopAfter\"": uniform("StopAfter"),
     "declares no parameter 'EgoSped'; did you mean 'EgoSpeed'?": uniform("EgoSped"),
-    "parameter RoadId is a string; only numbers can be searched": uniform("RoadId"),
+    "parameter RoadId is a string; it can take the values of a set, but not of a range": uniform("RoadId"),
     "low <= high must hold for a range, got 3 and 2": uniform("Gap", 3, 2),
     "UserDefinedDistribution in StochasticDistribution is not supported": stochastic(
         ("Gap", '<UserDefinedDistribution type="mine">1</UserDefinedDistribution>')
@@ -344,8 +343,8 @@ def test_without_a_distribution_the_command_says_what_could_vary(tmp_path, monke
     scenario, _ = write_pair(tmp_path)
     said = command(monkeypatch, capsys, "search", scenario)
     assert "these parameters can vary: EgoSpeed, Gap, BrakeTime, Deceleration" in said
-    assert 'parameter StopAfter cannot vary: it is used for value="$StopAfter"' in said
-    assert "parameter RoadId cannot vary: it is no number, but '1'" in said
+    assert "parameter StopAfter can vary, but each value is compiled by itself: it is used" in said
+    assert "parameter RoadId can vary within a set of values, it is no number: '1'" in said
 
 
 @pytest.mark.parametrize("what", ["simulate", "search"])

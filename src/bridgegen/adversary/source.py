@@ -23,6 +23,9 @@ class AdversarySource:
         nominal: a value of every parameter.
     """
 
+    variant_names: tuple[str, ...] = ()
+    variants: tuple[tuple[float, ...], ...] = ()
+
     def __init__(self, inner: OntologySource, nominal: Mapping[str, float]) -> None:
         assert inner.constraints.adversary is not None
         self.adversary: Adversary = inner.constraints.adversary
@@ -53,10 +56,9 @@ class AdversarySource:
         """See `Source`."""
         return self._inner.junction
 
-    @property
-    def bodies(self) -> Mapping[str, str]:
+    def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
-        return self._inner.bodies
+        return self._inner.bodies(values)
 
     def roads(self, values: Mapping[str, float]) -> OpenDrive:
         """See `Source`."""

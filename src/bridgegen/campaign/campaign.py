@@ -135,7 +135,7 @@ def run_search(given: SearchArguments) -> Run:
         pipeline = Pipeline(
             logical, space, given, road_map=roads, simulator=given.simulator, workers=pool
         )
-        for note in pipeline.simulator.embedded.program.notes:
+        for note in (*logical.notes, *pipeline.notes):
             callbacks.warning(note)
         callbacks.stage("compile")
         pipeline.warm_up()
@@ -290,13 +290,12 @@ def _finish(
     callbacks.stage("export")
     chosen = rows.take(best)
     # One simulation, for the files and the playback.
-    replay = pipeline.replay(chosen.X) if len(best) else None
-    rollout = replay.rollout if replay else None
-    exported = export_critical(pipeline, chosen, rollout, store.folder, callbacks.exported, record)
+    replays = pipeline.replays(chosen.X) if len(best) else None
+    exported = export_critical(pipeline, chosen, replays, store.folder, callbacks.exported, record)
     callbacks.stage("report")
     run = Run.of(store, rows)
     there = np.flatnonzero(np.isin(best, [one.evaluation for one in exported]))
-    write_run_report(pipeline, run, rows, exported, replay.take(there) if replay else None)
+    write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
 
 

@@ -18,6 +18,7 @@ from bridgegen.conflict.harm import Count
 from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.conflict.summary import ConflictSummary, summarise
 from bridgegen.errors import OntologyError, StorageError
+from bridgegen.evaluation import Replays
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.rollout import Rollout
@@ -44,7 +45,7 @@ def most_critical(U: Float, F: Float, critical: Bool, keep: int) -> Int:
 def export_critical(
     pipeline: Pipeline,
     rows: Rows,
-    rollout: Rollout | None,
+    replays: Replays | None,
     folder: Path,
     progress: Callable[[int], None] | None = None,
     triage: Triage | None = None,
@@ -58,7 +59,7 @@ def export_critical(
     Args:
         pipeline: evaluated the rows.
         rows: the scenarios, most critical first.
-        rollout: of these rows; None if there are none.
+        replays: of these rows; None if there are none.
         folder: the run's.
         progress: called with the number of rows written, after each.
         triage: the run's, if there is one.
@@ -68,11 +69,11 @@ def export_critical(
     """
     target, fresh = folder / FOLDER, folder / f"{FOLDER}.part"
     exported, refused = [], []
-    conflicts = _conflicts(rollout, pipeline.objective.count)
+    motions = _motions(replays, pipeline.objective.count)
     try:
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir()
-        for i, conflict in enumerate(conflicts):
+        for i, (rollout, row, conflict) in enumerate(motions):
             name, tested = f"{i + 1:04d}", None
             if triage is not None:
                 tested = triage.neighbourhood(int(rows.id[i]))
@@ -82,7 +83,7 @@ def export_critical(
             try:
                 files = write_scenario(
                     pipeline, rows.X[i], fresh, name, _cause(quick, tested),
-                    rollout=rollout, row=i, conflict=conflict,
+                    rollout=rollout, row=row, conflict=conflict,
                 )  # fmt: skip
             except OntologyError as error:
                 refused.append(Refused(name, int(rows.id[i]), error.problems))
@@ -115,12 +116,16 @@ def export_critical(
     return tuple(exported)
 
 
-def _conflicts(rollout: Rollout | None, count: Count) -> list[ConflictSummary | None]:
-    """Return the decisive conflict of each scenario."""
-    if rollout is None:
-        return []
-    found = analyse(rollout)
-    return [summarise(found, row, count) for row in range(rollout.shape[0])]
+def _motions(
+    replays: Replays | None, count: Count
+) -> list[tuple[Rollout, int, ConflictSummary | None]]:
+    """Return of each scenario a rollout, its row there and its decisive conflict."""
+    found = {}
+    for rows, replay in replays.parts if replays else ():
+        conflicts = analyse(replay.rollout)
+        for k, i in enumerate(rows.tolist()):
+            found[i] = (replay.rollout, k, summarise(conflicts, k, count))
+    return [found[i] for i in sorted(found)]
 
 
 def _write_refused(refused: list[Refused], path: Path) -> None:

@@ -60,6 +60,14 @@ def run_elsewhere(
         every: all rows of the run.
         evaluations: some of these, which succeeded.
     """
+    for at, one in here.by_variant(every.X[list(evaluations)]):
+        yield from _run_some(one, there, every, [evaluations[row] for row in at.tolist()])
+
+
+def _run_some(
+    here: Pipeline, there: Pipeline, every: Rows, evaluations: Sequence[int]
+) -> Iterator[Scenario]:
+    """Compare evaluations of one storyboard."""
     most = max(1, min(AT_A_TIME, there.rows_at_once * there.runs_at_once))
     size, done = min(most, there.runs_at_once), 0
     while done < len(evaluations):

@@ -69,7 +69,9 @@ def require_exportable(pipeline: Pipeline, checked: int = CHECKED) -> None:
         raise OntologyError(*problems)
     if pipeline.simulator is not pipeline.simulator.embedded or pipeline.driver.is_own:
         return  # other simulators and drivers take seconds a row
-    status = pipeline.rollout(X).status
+    status = np.empty(len(X), np.int8)
+    for at, one in pipeline.by_variant(X):
+        status[at] = one.rollout(X[at]).status
     if status[0] in FAULTS_OF_THE_SCENARIO:
         raise InputError(f"{pipeline.scenario.place}: {words[0]}: {STATUS_MESSAGES[status[0]]}")
 

@@ -9,7 +9,7 @@ from bridgegen.campaign.run import Run
 from bridgegen.campaign.settings import Settings
 from bridgegen.confirmation.record import read_records
 from bridgegen.disk import read_inside
-from bridgegen.evaluation import Replay
+from bridgegen.evaluation import Replays
 from bridgegen.pipeline import Pipeline
 from bridgegen.regions.record import JSON_FILE, read_record
 from bridgegen.report.build import build_report
@@ -45,7 +45,7 @@ def write_run_report(
     run: Run,
     rows: Rows | Recorded,
     exported: Sequence[Exported],
-    replay: Replay | None = None,
+    replays: Replays | None = None,
 ) -> Path:
     """Write a run's report, its critical regions included if they are known; return its path.
 
@@ -54,7 +54,7 @@ def write_run_report(
         run: as these rows stand.
         rows: all of it, in order.
         exported: its exported scenarios, most critical first.
-        replay: of these scenarios, if they have been simulated.
+        replays: of these scenarios, if they have been simulated.
 
     Raises:
         StorageError: the page cannot be written.
@@ -62,7 +62,7 @@ def write_run_report(
     """
     names = [*(name for one in exported for name in one.files), *minimal_files(run.folder)]
     files = {name: read_inside(run.folder, name) for name in names}
-    data = run_data(pipeline, run, rows, exported, files=files, more=True, replay=replay)
+    data = run_data(pipeline, run, rows, exported, files=files, more=True, replays=replays)
     write_report(run.report, data)
     return run.report
 
@@ -76,7 +76,7 @@ def run_data(
     coverage: bool = True,
     files: Mapping[str, bytes] | None = None,
     more: bool = False,
-    replay: Replay | None = None,
+    replays: Replays | None = None,
 ) -> ReportData:
     """Return the data of a run's report.
 
@@ -88,7 +88,7 @@ def run_data(
         coverage: whether to count the coverage of the search space.
         files: the exported files, by their paths in the run's folder, if the page holds them.
         more: whether the page holds the motion of other scenarios, too.
-        replay: of the exported scenarios, if they have been simulated.
+        replays: of the exported scenarios, if they have been simulated.
 
     Raises:
         FileFormatError: the file of the triage, the regions or a confirmation is damaged, or
@@ -100,7 +100,7 @@ def run_data(
     results = rows.digest() if known else None
     return build_report(
         pipeline, rows, run.summary,
-        kept=[(one.name, one.evaluation, one.files) for one in exported], replay=replay,
+        kept=[(one.name, one.evaluation, one.files) for one in exported], replays=replays,
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
         command=settings.command(folder), finished=run.finished,
         version=run.version, notes=run.notes, view=view_command(folder),

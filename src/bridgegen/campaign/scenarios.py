@@ -73,15 +73,18 @@ def refuse_standstill(scenario: SearchedScenario) -> NoReturn:
     if not isinstance(scenario, FileScenario) or scenario.definition is not None:
         raise InputError(f"{scenario.name}: nothing to search, every parameter is fixed")
     simulator = EmbeddedSimulator(scenario.storyboard, scenario.place)
-    free, others = [], []
+    quick, others = [], []
     for name, value in values(scenario.storyboard).items():
         if name in simulator.fixed:
-            others.append(f"{name} cannot vary: it is used for {simulator.fixed[name]}")
+            others.append(
+                f"{name} can vary, but each value is compiled by itself: it is used for "
+                f"{simulator.fixed[name]}"
+            )
         elif name in simulator.parameters:
-            free.append(name)
+            quick.append(name)
         else:
-            others.append(f"{name} cannot vary: it is no number, but '{value}'")
-    could = f"these parameters can vary: {', '.join(free)}" if free else "no parameter can vary"
+            others.append(f"{name} can vary within a set of values, it is no number: '{value}'")
+    could = f"these parameters can vary: {', '.join(quick)}" if quick else "no number can vary"
     raise InputError(
         f"{scenario.place}: say what may vary with --distribution FILE, an OpenSCENARIO file with "
         f"a ParameterValueDistribution; {could}",

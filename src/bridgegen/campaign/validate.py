@@ -109,7 +109,10 @@ def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
 
     if is_distribution(path):
         named = read_distribution(path).scenario_file.filepath
-        load_file_scenario(path.parent / str(named), path)
+        notes = load_file_scenario(path.parent / str(named), path).notes
+        if warnings is None:
+            return list(notes)
+        warnings += notes
         return []
     odd: list[str] = []
     scenario = openscenario_read.read(path, warnings=odd)

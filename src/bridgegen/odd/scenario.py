@@ -86,6 +86,7 @@ class SearchedScenario:
         driver: default driver of the ego; None leaves it to a file.
         budget: evaluations, likewise.
         seed: of the search, likewise.
+        notes: what is searched otherwise than its files may lead one to expect.
     """
 
     name: str
@@ -100,11 +101,12 @@ class SearchedScenario:
     driver: str | None
     budget: int = field(default=1000, kw_only=True)
     seed: int = field(default=0, kw_only=True)
+    notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
 
     @property
     def fingerprint(self) -> str:
         """A digest of its contents: the same for the same scenario on any machine."""
-        return sha256(_content(self).encode()).hexdigest()
+        return sha256(content_of(self).encode()).hexdigest()
 
     @property
     def rules(self) -> Constraints:
@@ -180,7 +182,7 @@ class LogicalScenario(SearchedScenario):
     @property
     def fingerprint(self) -> str:
         """See `SearchedScenario`; that of a scenario without drivers does not depend on them."""
-        content = _content(self)
+        content = content_of(self)
         drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
         return sha256((content + repr(drivers) if drivers else content).encode()).hexdigest()
 
@@ -229,7 +231,7 @@ class LogicalScenario(SearchedScenario):
         return replace(self, parameters=parameters, bounds=bounds)
 
 
-def _content(scenario: SearchedScenario) -> str:
+def content_of(scenario: SearchedScenario) -> str:
     """Return the contents of a scenario as text.
 
     `Thresholds` is written as the class was called when the first runs recorded a digest of it.

@@ -14,8 +14,8 @@ from types import MappingProxyType
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.objectives import HARM
-from bridgegen.odd.parameters import Axis, Parameter
-from bridgegen.odd.scenario import SearchedScenario
+from bridgegen.odd.parameters import Axis
+from bridgegen.odd.scenario import SearchedScenario, content_of
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -56,6 +56,19 @@ class RoadFile:
 
 
 @dataclass(frozen=True)
+class Variant:
+    """A scenario file with some values of its texts.
+
+    Attributes:
+        storyboard: the scenario file.
+        roads: the map that it names.
+    """
+
+    storyboard: osc.OpenScenario
+    roads: RoadFile
+
+
+@dataclass(frozen=True)
 class FileScenario(SearchedScenario):
     """A logical scenario that is a scenario file and a file with a distribution.
 
@@ -63,11 +76,30 @@ class FileScenario(SearchedScenario):
         storyboard: the scenario file.
         roads: the map that it names.
         definition: the distribution, or None: then nothing varies.
+        texts: of each text that varies its values; a row holds the number of one.
+        variant_names: those of them on which the storyboard depends.
+        variants: the file by the values of these.
     """
 
     storyboard: osc.OpenScenario
     roads: RoadFile
     definition: dst.Deterministic | dst.Stochastic | None
+    texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict, repr=False)
+    variant_names: tuple[str, ...] = field(default=(), repr=False)
+    variants: Mapping[tuple[float, ...], Variant] = field(default_factory=dict, repr=False)
+
+    @property
+    def fingerprint(self) -> str:
+        """See `SearchedScenario`; that of one storyboard does not depend on there being more."""
+        content = content_of(self)
+        more = repr((self.texts, self.variant_names, self.variants)) if self.variants else ""
+        return hashlib.sha256((content + more).encode()).hexdigest()
+
+    def variant(self, values: Mapping[str, float]) -> Variant:
+        """Return the scenario file with the texts that a row has."""
+        if not self.variants:
+            return Variant(self.storyboard, self.roads)
+        return self.variants[tuple(values[name] for name in self.variant_names)]
 
 
 def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScenario:
@@ -85,6 +117,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     """
     storyboard = read(path)
     definition: dst.Deterministic | dst.Stochastic | None = None
+    texts: dict[str, str] = {}
     if distribution is not None:
         given = dst.read_distribution(distribution)
         named = distribution.parent / str(given.scenario_file.filepath)
@@ -96,17 +129,14 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         texts, definition = fixed_texts(storyboard, given.definition)
         if texts:
             storyboard = read(path, texts=texts)
-    road = logic_path(storyboard, path)
-    data = read_bytes(road)
-    roads = RoadFile(
-        road.name,
-        hashlib.sha256(data).hexdigest(),
-        data,
-        read_roads(data, str(road), may_be_empty=True),
-    )
-    if problems := validate.problems(storyboard, roads.model):
-        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     ranges = ranges_of(storyboard, definition, str(distribution))
+    known: dict[Path, RoadFile] = {}
+    roads = _roads_of(path, storyboard, known)
+    variants = {}
+    for combination in ranges.combinations:
+        codes = zip(ranges.variants, combination, strict=True)
+        chosen = {name: ranges.texts[name][int(code)] for name, code in codes}
+        variants[combination] = _variant(path, texts | chosen, chosen, known)
     varied = {one.axis for one in ranges.parameters.values() if one.low < one.high}
     description = str(storyboard.file_header.description).strip()
     return FileScenario(
@@ -124,7 +154,60 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         storyboard=storyboard,
         roads=roads,
         definition=definition,
+        texts=ranges.texts,
+        notes=ranges.notes,
+        variant_names=ranges.variants,
+        variants=variants,
     )
+
+
+def _roads_of(path: Path, storyboard: osc.OpenScenario, known: dict[Path, RoadFile]) -> RoadFile:
+    """Return the map that a scenario file names, once it is found that the two fit.
+
+    Args:
+        path: of the scenario file.
+        storyboard: its contents.
+        known: the maps that have been read; takes another one.
+
+    Raises:
+        FileFormatError: see ``load_file_scenario``.
+        UnsupportedError: likewise.
+    """
+    road = logic_path(storyboard, path)
+    if road not in known:
+        data = read_bytes(road)
+        known[road] = RoadFile(
+            road.name,
+            hashlib.sha256(data).hexdigest(),
+            data,
+            read_roads(data, str(road), may_be_empty=True),
+        )
+    if problems := validate.problems(storyboard, known[road].model):
+        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
+    return known[road]
+
+
+def _variant(
+    path: Path, texts: dict[str, str], chosen: dict[str, str], known: dict[Path, RoadFile]
+) -> Variant:
+    """Return a scenario file with other texts; what is wrong with it says which these are.
+
+    Args:
+        path: of the scenario file.
+        texts: the values of its texts that are not the declared ones.
+        chosen: those of them that vary.
+        known: see ``_roads_of``.
+
+    Raises:
+        FileFormatError: see ``load_file_scenario``.
+        UnsupportedError: likewise.
+    """
+    try:
+        storyboard = read(path, texts=texts)
+        return Variant(storyboard, _roads_of(path, storyboard, known))
+    except InputError as error:
+        said = ", ".join(f"{name} = '{text}'" for name, text in chosen.items())
+        raise type(error)(*(f"{problem} [with {said}]" for problem in error.problems)) from None
 
 
 def _of_draws(definition: dst.Deterministic | dst.Stochastic | None, place: str) -> dict[str, int]:
@@ -159,27 +242,31 @@ class FileSource:
     constraints = None
 
     def __init__(self, scenario: FileScenario, driver: str | None, ideal: str = "") -> None:
-        self._scenario = scenario
-        self._base = _self_contained(scenario)
-        if driver is not None:
-            self._base = with_driver(self._base, driver, ideal)
+        self._scenario, self._driver, self._ideal = scenario, driver, ideal
+
+    @property
+    def variant_names(self) -> tuple[str, ...]:
+        """See `Source`."""
+        return self._scenario.variant_names
+
+    @property
+    def variants(self) -> tuple[tuple[float, ...], ...]:
+        """See `Source`."""
+        return tuple(self._scenario.variants)
 
     @property
     def road(self) -> str:
         """See `Source`."""
         return self._scenario.roads.name
 
-    @property
-    def bodies(self) -> Mapping[str, str]:
+    def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
-        return {
-            str(one.name): _type_of(one.entity_object)
-            for one in self._base.entities.scenario_objects
-        }
+        objects = self._scenario.variant(values).storyboard.entities.scenario_objects
+        return {str(one.name): _type_of(one.entity_object) for one in objects}
 
     def roads(self, values: Mapping[str, float]) -> OpenDrive:
         """See `Source`."""
-        return self._scenario.roads.model
+        return self._scenario.variant(values).roads.model
 
     def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
         """See `Source`: the file is the same for all rows."""
@@ -187,12 +274,13 @@ class FileSource:
 
     def concrete(self, values: Mapping[str, float], road_file: str = "") -> "ConcreteFile":
         """See `Source`."""
-        road_file = road_file or self._scenario.roads.name
-        storyboard = with_values(self._base, values, self._scenario.parameters)
+        variant = self._scenario.variant(values)
+        road_file = road_file or variant.roads.name
+        storyboard = with_values(_self_contained(variant.storyboard), values, self._scenario.texts)
+        if self._driver is not None:
+            storyboard = with_driver(storyboard, self._driver, self._ideal)
         network = replace(storyboard.road_network, logic_file=osc.File(road_file))
-        return ConcreteFile(
-            replace(storyboard, road_network=network), self._scenario.roads, road_file
-        )
+        return ConcreteFile(replace(storyboard, road_network=network), variant.roads, road_file)
 
 
 @dataclass(frozen=True)
@@ -232,14 +320,14 @@ def ego_of(storyboard: osc.OpenScenario) -> str:
 def with_values(
     storyboard: osc.OpenScenario,
     values: Mapping[str, float],
-    parameters: Mapping[str, Parameter] = MappingProxyType({}),
+    texts: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
 ) -> osc.OpenScenario:
     """Return a scenario file in which parameters have other values.
 
     Args:
         storyboard: the file.
         values: by name; those that the file does not declare are passed over.
-        parameters: what is known of them; needed of categories.
+        texts: what the numbers of those that are texts stand for.
     """
     declared = storyboard.parameter_declarations
     if declared is None:
@@ -247,14 +335,14 @@ def with_values(
     changed = []
     for one in declared.parameters:
         if one.name in values:
-            one = replace(one, value=_literal(one, values[one.name], parameters.get(one.name)))
+            one = replace(one, value=_literal(one, values[one.name], texts.get(one.name)))
         changed.append(one)
     return replace(storyboard, parameter_declarations=osc.ParameterDeclarations(tuple(changed)))
 
 
-def _literal(one: osc.ParameterDeclaration, value: float, known: Parameter | None) -> str:
-    if known is not None and known.kind.names:
-        return known.kind.text(value, str)
+def _literal(one: osc.ParameterDeclaration, value: float, texts: tuple[str, ...] | None) -> str:
+    if texts is not None:
+        return texts[int(value)]
     whole = parameters.kind_of(one.parameter_type) is not Kind.DOUBLE
     return str(int(value)) if whole else format_double(value)
 
@@ -289,7 +377,14 @@ def with_others(scenario: FileScenario, drivers: Mapping[str, str]) -> FileScena
         )
         if name != ego and (driver is not None or named):
             found[name] = (osc.Property(DRIVER, driver),) if driver is not None else ()
-    return replace(scenario, storyboard=_with_drivers(scenario.storyboard, found))
+    return replace(
+        scenario,
+        storyboard=_with_drivers(scenario.storyboard, found),
+        variants={
+            key: replace(one, storyboard=_with_drivers(one.storyboard, found))
+            for key, one in scenario.variants.items()
+        },
+    )
 
 
 def _with_drivers(
@@ -315,12 +410,10 @@ def _with_drivers(
     return replace(storyboard, entities=entities)
 
 
-def _self_contained(scenario: FileScenario) -> osc.OpenScenario:
-    """Return the file without references to files beside it: it is exported elsewhere."""
-    network = replace(scenario.storyboard.road_network, scene_graph_file=None)
-    return replace(
-        scenario.storyboard, road_network=network, catalog_locations=osc.CatalogLocations()
-    )
+def _self_contained(storyboard: osc.OpenScenario) -> osc.OpenScenario:
+    """Return a file without references to files beside it: it is exported elsewhere."""
+    network = replace(storyboard.road_network, scene_graph_file=None)
+    return replace(storyboard, road_network=network, catalog_locations=osc.CatalogLocations())
 
 
 def _type_of(body: Element) -> str:

@@ -65,12 +65,19 @@ class Source(Protocol):
         """The parameters that nothing depends on: a map defines their values."""
 
     @property
-    def bodies(self) -> Mapping[str, str]:
-        """What the entities are, by name: a car, a pedestrian, a cone."""
+    def variant_names(self) -> tuple[str, ...]:
+        """The parameters whose values each have a storyboard of their own: texts."""
+
+    @property
+    def variants(self) -> tuple[tuple[float, ...], ...]:
+        """The values of ``variant_names`` that come together."""
 
     @property
     def constraints(self) -> LogicalScenario | None:
         """The scenario whose constraints its individuals keep; None: the ontology's alone."""
+
+    def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
+        """Return what the entities of a row are, by name: a car, a pedestrian, a cone."""
 
     def roads(self, values: Mapping[str, float]) -> OpenDrive:
         """Return the road network, of the values of ``static_names``."""
@@ -148,6 +155,8 @@ class OntologySource:
     """
 
     course_names: tuple[str, ...] = ()
+    variant_names: tuple[str, ...] = ()
+    variants: tuple[tuple[float, ...], ...] = ()
 
     def __init__(
         self,
@@ -174,8 +183,7 @@ class OntologySource:
         """See `Source`."""
         return self._map.site.junction_id if self._map else None
 
-    @property
-    def bodies(self) -> Mapping[str, str]:
+    def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
         types = {one.name: str(one.type) for one in self._scenario.participants}
         for works in self._scenario.story.works:

@@ -13,7 +13,7 @@ from bridgegen.confirmation.schema import Record
 from bridgegen.conflict import quantities
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.errors import ScenarioError
-from bridgegen.evaluation import Replay
+from bridgegen.evaluation import Replays
 from bridgegen.objective import Objective
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.pipeline import Pipeline
@@ -51,7 +51,7 @@ def build_report(
     summary: Summary,
     *,
     kept: Sequence[tuple[str, int, tuple[str, ...]]],
-    replay: Replay | None = None,
+    replays: Replays | None = None,
     algorithm: str,
     seed: int,
     budget: int,
@@ -77,7 +77,7 @@ def build_report(
         summary: of the same rows.
         kept: name, evaluation and files of the exported scenarios, most critical first; an
             exported scenario satisfies all constraints.
-        replay: of these scenarios; simulated here by default.
+        replays: of these scenarios; simulated here by default.
         algorithm: its name.
         seed: of the run.
         budget: of the run.
@@ -144,7 +144,7 @@ def build_report(
     return ReportData(
         head,
         _evaluations(pipeline, rows),
-        playbacks(pipeline, rows, kept, replay=replay),
+        playbacks(pipeline, rows, kept, replays=replays),
         _coverage(pipeline, rows) if coverage else None,
         tables(notes, pipeline.space),
         regions,

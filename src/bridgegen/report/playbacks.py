@@ -1,7 +1,7 @@
 """Scenarios of a run with all that their playback shows."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from bridgegen.conflict.outcomes import with_outcomes
 from bridgegen.conflict.summary import summarise
 from bridgegen.ego import _weather_columns as column
 from bridgegen.errors import FileFormatError
-from bridgegen.evaluation import Replay
+from bridgegen.evaluation import Replay, Replays
 from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
@@ -60,7 +60,7 @@ def playbacks(
     kept: Sequence[tuple[str, int, tuple[str, ...]]],
     *,
     brief: bool = False,
-    replay: Replay | None = None,
+    replays: Replays | None = None,
 ) -> tuple[Playback, ...]:
     """Return the playbacks of some of a run's scenarios.
 
@@ -70,7 +70,7 @@ def playbacks(
         kept: name, evaluation and files of each, most critical first.
         brief: without the individuals' picture and the ego's planned course, which take most of the
             time.
-        replay: of these scenarios; simulated here by default.
+        replays: of these scenarios; simulated here by default.
     """
     if not kept:
         return ()
@@ -82,8 +82,8 @@ def playbacks(
         )
         for k, (name, evaluation, files) in enumerate(kept)
     ]  # fmt: skip
-    replay = pipeline.replay(some.X, plans=not brief) if replay is None else replay
-    return _played(pipeline, shown, replay, brief=brief)
+    replays = pipeline.replays(some.X, plans=not brief) if replays is None else replays
+    return _all_played(pipeline, shown, replays, brief=brief)
 
 
 def minimal_playbacks(
@@ -99,14 +99,16 @@ def minimal_playbacks(
         return ()
     X = np.array([one.x for *_, one in wanted])
     noise = np.array([one.noise_key for *_, one in wanted], dtype=np.uint64)
-    replay = pipeline.replay(X, plans=False, noise=noise)
-    metrics = quantities.evaluate(replay.rollout, pipeline.metrics)
+    replays = pipeline.replays(X, plans=False, noise=noise)
+    metrics = np.empty((len(X), len(pipeline.metrics)))
+    for at, replay in replays.parts:
+        metrics[at] = quantities.evaluate(replay.rollout, pipeline.metrics)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
     shown = [
         Shown(name, evaluation, files, X[k], metrics[k], bool(critical[k]), "")
         for k, (name, evaluation, files, _) in enumerate(wanted)
     ]
-    return _played(pipeline, shown, replay, brief=True)
+    return _all_played(pipeline, shown, replays, brief=True)
 
 
 def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
@@ -128,14 +130,26 @@ def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
     return _played(pipeline, [shown], replay, brief=True)[0]
 
 
+def _all_played(
+    pipeline: Pipeline, shown: Sequence[Shown], replays: Replays, *, brief: bool
+) -> tuple[Playback, ...]:
+    """Return the playbacks of rows that were rolled out, of one storyboard or of several."""
+    found: dict[int, Playback] = {}
+    for at, replay in replays.parts:
+        some = [shown[i] for i in at.tolist()]
+        played = _played(pipeline, some, replay, brief=brief)
+        found |= zip(at.tolist(), played, strict=True)
+    return tuple(replace(found[i], rank=i + 1) for i in sorted(found))
+
+
 def _played(
     pipeline: Pipeline, shown: Sequence[Shown], replay: Replay, *, brief: bool
 ) -> tuple[Playback, ...]:
-    """Return the playbacks of rows that were rolled out."""
+    """Return the playbacks of rows of one storyboard that were rolled out."""
     rollout, objective = replay.rollout, getattr(pipeline, "objective", None)
     count: Count = objective.count if objective else "ego"
     conflicts = analyse(rollout)
-    entities, scenery = bodies(rollout, pipeline.source.bodies), Scenery(pipeline)
+    entities, scenery = bodies(rollout, pipeline.bodies(shown[0].x)), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
     ttc, detections = ttc_over_time(rollout), sensed(rollout)
     checked = constraints_in_words(pipeline.source.constraints)

@@ -45,7 +45,8 @@ class Scenery:
     def road(self, x: Float) -> RoadPicture:
         """Return the drawing of a row's road network, the same objects for the same network."""
         space, source = self._pipeline.space, self._pipeline.source
-        key = x[[space.index(name) for name in source.static_names]].tobytes()
+        names = (*source.variant_names, *source.static_names)
+        key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
             model = self._pipeline.concrete(x).roads
             shapes = (Outline(kind, points) for kind, points in outline(model, source.junction))
@@ -65,7 +66,7 @@ def street_lights(model: OpenDrive) -> Float:
 
 
 def bodies(rollout: Rollout, types: Mapping[str, str]) -> tuple[Entity, ...]:
-    """Return the bodies of a rollout with their types (`Source.bodies`)."""
+    """Return the bodies of a rollout with their types (`Pipeline.bodies`)."""
     return tuple(
         Entity(name, length, width, ahead, types.get(name, "obstacle"))
         for name, (length, width, ahead) in zip(rollout.names, rollout.box.tolist(), strict=True)

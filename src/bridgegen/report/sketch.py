@@ -74,7 +74,7 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
     distance = rollout.distance[0].min(axis=0)[:n]
     closest = int(distance.argmin()) if np.isfinite(distance).any() else n - 1
     last = min(n - 1, closest + round(_AFTER / rollout.time_step))
-    entities = bodies(rollout, pipeline.source.bodies)
+    entities = bodies(rollout, pipeline.bodies(x))
     where = np.stack([rollout.x[0], rollout.y[0], rollout.h[0]], axis=-1)  # (E, T, 3)
     there = rollout.present[0] if rollout.present.size else np.ones(where.shape[:2], np.bool_)
     moving = [e == 0 or bool((rollout.v[0, e, :n] > _MOVES).any()) for e in range(len(entities))]

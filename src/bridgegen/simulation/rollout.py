@@ -15,6 +15,7 @@ STATUS_MESSAGES = {
     1: "a state became NaN or infinite",
     2: "a parameter value puts an entity off its route",
     3: "a lane change where there is no such lane",
+    9: "the values of the parameters make no scenario",
     20: "the driver raised an error",
     21: "the driver did not answer in time",
     22: "the driver's process ended",
@@ -35,6 +36,9 @@ FAILURES = {"raised": 20, "timed out": 21, "died": 22, "answered nonsense": 23}
 
 SIMULATOR_FAILURES = {"raised": 40, "died": 41, "timed out": 42}
 """The status of a row whose simulator failed, by `CallError.kind`."""
+
+NO_SCENARIO = 9
+"""The status of a row whose storyboard cannot be made or run."""
 
 WORKER_ENDED = 30
 """The status of a row whose simulation ended its worker, twice."""
@@ -178,13 +182,25 @@ _BY_ROW = (
     "stop_lines", "present", "claims", "crosswalks", "friction",
 )  # fmt: skip
 
+_BY_INSTANT = ("x", "y", "h", "v", "a", "offset", "lights", "present", "detections")
+
 
 def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     """Return the rollout of N scenarios from those of parts of them.
 
     Args:
         parts: the rows ``(n,)`` of each, every one of 0 … N − 1 once, and its rollout.
+
+    Raises:
+        ValueError: the entities of one are not as large as those of another.
     """
+    first = parts[0][1]
+    if len(parts) == 1:
+        return first
+    if any(not np.array_equal(one.box, first.box) for _, one in parts):
+        raise ValueError("rollouts of bodies of different sizes are no one rollout")
+    most = max(one.shape[2] for _, one in parts)
+    parts = [(each, _lengthened(one, most)) for each, one in parts]
     rows = np.concatenate([each for each, _ in parts])
     order = np.argsort(rows)
     whole: dict[str, Any] = {}
@@ -200,3 +216,16 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}
     incidents = {int(each[row]): what for each, one in parts for row, what in one.incidents.items()}
     return replace(parts[0][1], **whole, messages=messages, incidents=incidents)
+
+
+def _lengthened(rollout: Rollout, most: int) -> Rollout:
+    """Return a rollout over more instants; each scenario's last state is repeated."""
+    missing = most - rollout.shape[2]
+    if not missing:
+        return rollout
+    longer: dict[str, Any] = {
+        name: np.concatenate([array, np.repeat(array[:, :, -1:], missing, axis=2)], axis=2)
+        for name in _BY_INSTANT
+        if len(array := getattr(rollout, name))
+    }
+    return replace(rollout, **longer)

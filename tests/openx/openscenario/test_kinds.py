@@ -134,15 +134,10 @@ def test_weights_of_texts_are_kept():
     ("name", "words", "message"),
     [
         ("manner", ("gentle", "wild"), "parameter manner must be equalTo"),
-        ("fractional_cloud_cover", ("oneOktas",), "is a text that the storyboard takes"),
-        ("idle", ("x", "y"), "parameter idle is a text that no formula of the header compares"),
         ("nobody", ("x",), "declares no parameter 'nobody'"),
     ],
 )
 def test_texts_that_cannot_vary_are_refused(name, words, message):
     made = exported()
-    idle = osc.ParameterDeclaration("idle", osc.ParameterType.STRING, "x")
-    more = (*made.parameter_declarations.parameters, idle)
-    made = replace(made, parameter_declarations=osc.ParameterDeclarations(more))
     with pytest.raises(FileFormatError, match=message):
         ranges_of(made, of(name, *words))

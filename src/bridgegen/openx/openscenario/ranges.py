@@ -6,7 +6,8 @@ What the standard leaves open, and what is chosen here, is in docs/decisions.md.
 import math
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import product
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
@@ -26,6 +27,9 @@ from bridgegen.openx.openscenario.values import (
     parse_literal,
     parse_value,
 )
+
+MOST_VARIANTS = 200
+"""Combinations of texts, each of which is read, checked and compiled by itself."""
 
 UNIT = "?"
 """The unit of a parameter whose file states none."""
@@ -93,11 +97,19 @@ class Ranges:
             distribution takes.
         derived: those that value sets give, or a formula.
         bounds: the limits of parameters by others.
+        texts: of each text or truth that varies its values; a row holds the number of one.
+        variants: those of them on which the storyboard depends, not formulas of the header alone.
+        combinations: the values of these that come together, one for each of `variants`.
+        notes: what is searched otherwise than the distribution says, a sentence each.
     """
 
     parameters: dict[str, Parameter]
     derived: tuple[Derived, ...] = ()
     bounds: tuple[Bound, ...] = ()
+    texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    variants: tuple[str, ...] = ()
+    combinations: tuple[tuple[float, ...], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def ranges_of(
@@ -116,7 +128,7 @@ def ranges_of(
         FileFormatError: what does not fit the scenario's parameters, or is no distribution; all of
             it at once, with its line.
     """
-    builder = _Builder(scenario)
+    builder = _Builder(scenario, place)
     for one in definition.distributions if definition else ():
         builder.add(one)
     if builder.problems:
@@ -153,7 +165,7 @@ def _bounds(one: osc.ParameterDeclaration, known: Collection[str]) -> Iterator[B
 
 
 def _is_text(one: osc.ParameterDeclaration | None) -> bool:
-    return one is not None and kind_of(one.parameter_type) is Kind.STRING
+    return one is not None and kind_of(one.parameter_type) in (Kind.STRING, Kind.BOOLEAN)
 
 
 def _referred(one: Element) -> Iterator[str]:
@@ -168,19 +180,23 @@ class _Builder:
 
     Attributes:
         problems: why one is none, or does not fit, with its line.
+        notes: what is searched otherwise than the distribution says.
     """
 
-    def __init__(self, scenario: osc.OpenScenario) -> None:
+    def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
+        self._place = place
         declared = scenario.parameter_declarations
         self._declared = {one.name: one for one in declared.parameters} if declared else {}
         self._numbers, self._values = numbers(scenario), values(scenario)
         header = scenario.file_header.properties
         self._said = {str(one.name): str(one.value) for one in header.properties} if header else {}
         self._single: dict[str, Distribution] = {}
-        self._categories: dict[str, Parameter] = {}
+        self._categories: dict[str, FileParameter] = {}
+        self._words: dict[str, tuple[str, ...]] = {}
         self._used = {name for one in walk(scenario) for name in _referred(one)}
         self._joint: list[dict[str, list[float]]] = []
         self.problems: list[str] = []
+        self.notes: list[str] = []
 
     def add(
         self,
@@ -206,6 +222,8 @@ class _Builder:
                     f"parameter {name} is a whole number ({kind.value}), and a "
                     f"{type(one.distribution).__name__} gives others, too"
                 )
+            if isinstance(one.distribution, dst.DistributionRange | dst.UniformDistribution):
+                found = self._without_open_ends(name, found)
             if isinstance(found, Discrete):
                 for value in found.values:
                     self._check(name, kind, value, value)
@@ -213,25 +231,65 @@ class _Builder:
                 self._check(name, kind, found.low, found.high)
             self._single[name] = found
 
+    def _without_open_ends(self, name: str, found: Distribution) -> Distribution:
+        """Return a range without an end that the scenario's constraint just excludes, and note it.
+
+        ASAM's own examples vary from −1.75 to 1.75 what must be greater than −1.75.
+        """
+        limits = {
+            float(one.value): str(one.rule)
+            for group in self._declared[name].constraint_groups
+            for one in group.constraints
+            if one.rule in (osc.Rule.GREATER_THAN, osc.Rule.LESS_THAN) and not refers(one)
+        }
+        ends = [end for end in (found.low, found.high) if end in limits]
+        if not ends or found.low == found.high:
+            return found
+        self.notes += [
+            f"{self._place}: parameter {name} must be {limits[end]} {end:g}: its range is searched "
+            "without that end"
+            for end in ends
+        ]
+        if isinstance(found, Discrete):
+            kept = [value for value in found.values if value not in ends]
+            return Discrete.of(kept) if kept else found
+        low, high = found.low, found.high
+        return Uniform(
+            math.nextafter(low, high) if low in ends else low,
+            math.nextafter(high, low) if high in ends else high,
+        )
+
     def _add_category(
         self, name: str, given: dst.DistributionSet | dst.ProbabilityDistributionSet
     ) -> None:
-        """Take in the values of a text: nothing but formulas of the file's header may depend on it.
+        """Take in the values of a text.
 
         Raises:
-            InputError: the storyboard takes it, no formula compares it, a value that the scenario
-                does not allow, or a second distribution.
+            InputError: a value that the scenario does not allow, or a second distribution.
         """
-        if name in self._categories:
-            raise InputError(f"parameter {name} must have one distribution, got two")
-        if name in self._used:
-            raise InputError(
-                f"parameter {name} is a text that the storyboard takes, and one storyboard serves "
-                "every row; only a text that formulas of the header compare can vary"
-            )
-        if not any(name in parse(text, place).names for place, text in self._texts()):
-            raise InputError(f"parameter {name} is a text that no formula of the header compares")
         words = [str(one.value) for one in given.elements]
+        codes = self._codes(name, words)
+        weights = (
+            [one.weight for one in given.elements]
+            if isinstance(given, dst.ProbabilityDistributionSet)
+            else None
+        )
+        found = Discrete.of(codes, weights)
+        declared = float(self._words[name].index(str(self._declared[name].value)))
+        default = declared if declared in found.values else found.values[0]
+        self._categories[name] = FileParameter(
+            name, self._axis(name), self._unit(name), found.low, found.high, default,
+            Category(self._words[name]), distribution=found,
+        )  # fmt: skip
+
+    def _codes(self, name: str, words: list[str]) -> list[float]:
+        """Return the numbers of a text's values, and remember which text each stands for.
+
+        Raises:
+            InputError: a value that the scenario does not allow, or a second distribution.
+        """
+        if name in self._words:
+            raise InputError(f"parameter {name} must have one distribution, got two")
         declaration = self._declared[name]
         for word in words:
             if reasons := broken(declaration, word, self._values):
@@ -243,17 +301,8 @@ class _Builder:
             if one.rule is osc.Rule.EQUAL_TO
         ]
         names = tuple(dict.fromkeys(map(str, [*allowed, *words, declaration.value])))
-        weights = (
-            [one.weight for one in given.elements]
-            if isinstance(given, dst.ProbabilityDistributionSet)
-            else None
-        )
-        found = Discrete.of([float(names.index(word)) for word in words], weights)
-        default = float(names.index(str(declaration.value)))
-        self._categories[name] = FileParameter(
-            name, self._axis(name), self._unit(name), found.low, found.high,
-            min(max(default, found.low), found.high), Category(names), distribution=found,
-        )  # fmt: skip
+        self._words[name] = names
+        return [float(names.index(word)) for word in words]
 
     def _texts(self) -> Iterator[tuple[str, str]]:
         """Yield the formulas of the header, each after the name of its property."""
@@ -267,6 +316,9 @@ class _Builder:
         columns: dict[str, list[float]] = {}
         for name in names:
             with self._saying(given):
+                if _is_text(self._declared.get(name)):
+                    columns[name] = self._codes(name, [self._said_by(e, name) for e in given.sets])
+                    continue
                 kind = self._kind(name)
                 columns[name] = [self._of_set(each, name) for each in given.sets]
                 for value in columns[name]:
@@ -275,10 +327,20 @@ class _Builder:
 
     def _of_set(self, given: dst.ParameterValueSet, name: str) -> float:
         """Return a parameter's value in a set; what the scenario declares, if it is not in it."""
+        text = self._given(given, name)
+        return self._numbers[name] if text is None else dst.number(text)
+
+    def _said_by(self, given: dst.ParameterValueSet, name: str) -> str:
+        """Return a text in a set; what the scenario declares, if it is not in it."""
+        text = self._given(given, name)
+        return str(self._declared[name].value) if text is None else text
+
+    @staticmethod
+    def _given(given: dst.ParameterValueSet, name: str) -> str | None:
         texts = [str(one.value) for one in given.assignments if one.parameter_ref == name]
         if len(texts) > 1:
             raise InputError(f"a set must give {name} one value (line {given.line})")
-        return dst.number(texts[0]) if texts else self._numbers[name]
+        return texts[0] if texts else None
 
     def ranges(self) -> Ranges:
         """Return all that was taken in."""
@@ -310,7 +372,46 @@ class _Builder:
             for bound in _bounds(one, self._numbers.keys())
             if bound.names & made.keys()
         ]
-        return Ranges(made, tuple(derived), tuple(bounds))
+        names, combinations = self._combinations()
+        return Ranges(
+            made, tuple(derived), tuple(bounds), self._words, names, combinations,
+            tuple(self.notes),
+        )  # fmt: skip
+
+    def _combinations(self) -> tuple[tuple[str, ...], tuple[tuple[float, ...], ...]]:
+        """Return the texts on which the storyboard depends, and which values come together.
+
+        A text that formulas of the header compare, and the storyboard does not take, is none.
+
+        Raises:
+            FileFormatError: there are too many.
+        """
+        compared = {
+            name for place, text in self._texts() for name in parse(text, place, self._words).names
+        }
+        names: list[str] = []
+        choices: list[list[tuple[float, ...]]] = []
+        for name, one in self._categories.items():
+            if name in self._used or name not in compared:
+                assert isinstance(one.distribution, Discrete)
+                names.append(name)
+                choices.append([(value,) for value in one.distribution.values])
+        for columns in self._joint:
+            if together := [name for name in columns if name in self._words]:
+                names += together
+                rows = zip(*(columns[name] for name in together), strict=True)
+                choices.append(list(dict.fromkeys(rows)))
+        count = math.prod(map(len, choices))
+        if count > MOST_VARIANTS:
+            raise FileFormatError(
+                f"{self._place}: the values of {', '.join(names)} may come together in at most "
+                f"{MOST_VARIANTS} ways, for each is a storyboard of its own, got {count}"
+            )
+        if not names:
+            return (), ()
+        return tuple(names), tuple(
+            tuple(value for part in parts for value in part) for parts in product(*choices)
+        )
 
     def _formulas(self, joint: set[str]) -> Iterator[Derived]:
         """Yield the parameters that follow from others, as a file of ours says (`from_owl.notes`).
@@ -321,9 +422,8 @@ class _Builder:
             text = self._said.get(f"{PARAMETER}.{name}.expression")
             if text is None or name in self._single or name in joint:
                 continue
-            names = {one: each.kind.names for one, each in self._categories.items()}
-            formula = parse(text, f"{PARAMETER}.{name}.expression", names)
-            if formula.names <= self._numbers.keys() | names.keys():
+            formula = parse(text, f"{PARAMETER}.{name}.expression", self._words)
+            if formula.names <= self._numbers.keys() | self._words.keys():
                 yield DerivedParameter(
                     name, self._axis(name), self._unit(name), formula,
                     "The file's header says so.", "FileHeader",
@@ -353,7 +453,10 @@ class _Builder:
             raise InputError(f"the scenario declares no parameter '{name}'{hint}")
         kind = kind_of(self._declared[name].parameter_type)
         if not kind.is_number:
-            raise InputError(f"parameter {name} is a {kind.value}; only numbers can be searched")
+            raise InputError(
+                f"parameter {name} is a {kind.value}; it can take the values of a set, but not of "
+                "a range"
+            )
         if name in self._single or any(name in columns for columns in self._joint):
             raise InputError(f"parameter {name} must have one distribution, got two")
         return kind
@@ -389,6 +492,8 @@ class _Builder:
         return Axis(said) if said in list(Axis) and said != Axis.STATIC else Axis.PARTICIPANTS
 
     def _unit(self, name: str) -> str:
+        if name in self._words:
+            return "1"
         return self._said.get(f"{PARAMETER}.{name}.unit", UNIT)
 
     @contextmanager
