@@ -207,7 +207,9 @@ def uniform(name: str, low: float = 1.0, high: float = 2.0) -> str:
 
 REFUSED = {
     "declares no parameter 'EgoSped'; did you mean 'EgoSpeed'?": uniform("EgoSped"),
-    "parameter RoadId is a string; it can take the values of a set, but not of a range": uniform("RoadId"),
+    "parameter RoadId is a string; it can take the values of a set, but not of a range": (
+        uniform("RoadId")
+    ),
     "low <= high must hold for a range, got 3 and 2": uniform("Gap", 3, 2),
     "UserDefinedDistribution in StochasticDistribution is not supported": stochastic(
         ("Gap", '<UserDefinedDistribution type="mine">1</UserDefinedDistribution>')

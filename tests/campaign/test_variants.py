@@ -103,7 +103,7 @@ def test_each_row_is_what_its_own_storyboard_gives(both, tmp_path):
             ),
         )  # fmt: skip
         row = alone.space.row({"Gap": values["Gap"]})[np.newaxis]
-        assert not list(alone.by_variant(row))[0][1].source.variants
+        assert not next(iter(alone.by_variant(row)))[1].source.variants
         assert found.metrics[i].tobytes() == alone.evaluate(row).metrics[0].tobytes()
 
 
@@ -140,7 +140,8 @@ def test_a_search_plays_and_exports_each_with_its_own_body(tmp_path):
         assert float(said[1]) == LENGTHS[model]
         again = bg.simulate_file(path).metrics
         with Store.open(run.folder) as store:
-            kept = dict(zip(store.metrics, store.read().metrics[facts["row"]].tolist(), strict=True))
+            found = store.read().metrics[facts["row"]].tolist()
+            kept = dict(zip(store.metrics, found, strict=True))
         assert {name: again[name] for name in kept} == kept
     assert seen == set(LENGTHS)
 
@@ -189,7 +190,7 @@ def test_a_text_that_makes_no_scenario_is_refused_with_its_value(tmp_path):
 
 def test_too_many_combinations_are_refused(tmp_path):
     many = value_sets(*({"Model": f"m{k}"} for k in range(300)))
-    with pytest.raises(FileFormatError, match="in at most 200 ways.*got 300"):
+    with pytest.raises(FileFormatError, match=r"in at most 200 ways.*got 300"):
         pipeline_of(tmp_path, many)
 
 

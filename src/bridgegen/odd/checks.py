@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import suppress
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -17,8 +18,9 @@ from bridgegen.odd.roads import Quantity
 from bridgegen.odd.rules import cap, speeds_of
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import probes
+from bridgegen.odd.story import Participant
 from bridgegen.odd.units import has_unit, in_unit
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.participants import PARTICIPANTS, Body
 from bridgegen.weather import PARAMETERS
 
 MAX_STEPS = 100_000
@@ -155,12 +157,24 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
                     f"{one.name} must stay on leg {end.leg}: distance <= {limit} [m], "
                     f"'{end.distance}' can lie {beyond.max():.3g} m beyond ({scenario.place})"
                 )
+    for one in scenario.participants:
+        if one.end is None or (one.start.leg, one.start.way) != (one.end.leg, one.end.way):
+            continue
+        behind = _metres(one.start.distance, columns) - _metres(one.end.distance, columns)
+        behind = behind if one.start.way == "out" else -behind
+        if behind.max() >= 0.0:
+            yield (
+                f"the route of {one.name} must lead on along its lane: its end can lie "
+                f"{behind.max():.3g} m behind its start, and vehicles follow their lane's "
+                f"direction (one that drives against it has heading 180 and no end) "
+                f"({scenario.place})"
+            )
     on_lanes = [one for one in scenario.participants if not one.path]
     for one, other in combinations(on_lanes, 2):
         a, b = one.start, other.start
         if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):
             continue
-        body, others = PARTICIPANTS[one.type].body, PARTICIPANTS[other.type].body
+        body, others = (_room(each, columns) for each in (one, other))
         ahead = _metres(a.distance, columns) - _metres(b.distance, columns)
         ahead = ahead if a.way == "out" else -ahead
         aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
@@ -178,6 +192,18 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
             )
 
 
+def _room(one: Participant, columns: Mapping[str, Float]) -> Body:
+    """Return the body of a participant; of one that is turned, what holds it however it is."""
+    body = PARTICIPANTS[one.type].body
+    heading = _metres(one.heading, columns)
+    if not heading.any():
+        return body
+    if (np.abs(heading) == 180.0).all():
+        return replace(body, center_ahead=-body.center_ahead)
+    far = math.hypot(max(body.front, body.rear), 0.5 * body.width)
+    return replace(body, length=2.0 * far, width=2.0 * far, center_ahead=0.0)
+
+
 def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[str]:
     """Yield who may be faster than road, weather or legs allow; parameters have their bounds."""
     prefixes = sorted(
@@ -189,7 +215,7 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
             speed = _metres(value, columns)
             allowed = np.asarray(PARTICIPANTS[one.type].body.max_speed)
             why = f"a {one.type} can do"
-            if one.conduct == "vehicle" and value != 0.0:
+            if one.conduct == "vehicle" and value != 0.0 and not one.exceeds_limit:
                 allowed = np.minimum(limit, allowed)
                 why = "road and weather allow"
             over = speed - allowed

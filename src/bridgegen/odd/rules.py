@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Bound, Parameter
 from bridgegen.odd.roads import Quantity, RoadsSpec
-from bridgegen.odd.story import Participant, SpeedChange, Story
+from bridgegen.odd.story import KeepDistance, Participant, SpeedChange, Story
 from bridgegen.physics import DRY_FRICTION, GRAVITY
 
 GRIP_FORMULA = f"{DRY_FRICTION}*{GRAVITY}"
@@ -114,7 +114,9 @@ def bend(roads: RoadsSpec, one: Participant) -> str | None:
 
 def _speeds(story: Story) -> set[str]:
     """Return the parameters that are speeds of motor vehicles."""
-    vehicles = [one for one in story.participants if one.conduct == "vehicle"]
+    vehicles = [
+        one for one in story.participants if one.conduct == "vehicle" and not one.exceeds_limit
+    ]
     return set().union(*(_speeds_of(one, story) for one in vehicles))
 
 
@@ -124,13 +126,19 @@ def _speeds_of(one: Participant, story: Story) -> set[str]:
 
 def speeds_of(one: Participant, story: Story) -> list[Quantity]:
     """Return every speed [m/s] that a participant is told to have."""
-    return [one.speed] + [
-        action.speed
+    actions = [
+        action
         for event in story.events
         if event.participant == one.name
         for action in event.actions
-        if isinstance(action, SpeedChange)
     ]
+    later = [action.speed for action in actions if isinstance(action, SpeedChange)]
+    kept = [
+        action.max_speed
+        for action in actions
+        if isinstance(action, KeepDistance) and action.max_speed is not None
+    ]
+    return [one.speed, *later, *kept]
 
 
 def _least(names: list[str]) -> str:

@@ -181,10 +181,13 @@ class LogicalScenario(SearchedScenario):
 
     @property
     def fingerprint(self) -> str:
-        """See `SearchedScenario`; that of a scenario without drivers does not depend on them."""
+        """See `SearchedScenario`; what a scenario does without has no part in it."""
         content = content_of(self)
         drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
-        return sha256((content + repr(drivers) if drivers else content).encode()).hexdigest()
+        headings = {one.name: one.heading for one in self.participants if one.heading != 0.0}
+        lifted = {one.name: one.exceeds_limit for one in self.participants if one.exceeds_limit}
+        more = "".join(repr(one) for one in (drivers, headings, lifted) if one)
+        return sha256((content + more).encode()).hexdigest()
 
     @property
     def decisions(self) -> tuple[str, ...]:

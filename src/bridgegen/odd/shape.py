@@ -113,6 +113,7 @@ Length = Annotated[float | str, _quantity_in("m"), _QUANTITY]
 Duration = Annotated[float | str, _quantity_in("s"), _QUANTITY]
 Speed = Annotated[float | str, _quantity_in("m/s"), _QUANTITY]
 Acceleration = Annotated[float | str, _quantity_in("m/s²"), _QUANTITY]
+Angle = Annotated[float | str, _quantity_in("deg"), _QUANTITY]
 Curvature = Annotated[float | str, _quantity_in("1/m"), _QUANTITY]
 Percent = Annotated[float | str, _quantity_in("%"), _QUANTITY]
 LaneField = Annotated[

@@ -61,6 +61,9 @@ class Participant:
         speed: [m/s] at time 0; of the ego also its target.
         path: the points of its own way, ``start`` first; empty: it keeps to lanes.
         driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
+        heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
+            drives against the traffic.
+        exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
     """
 
     name: str
@@ -70,6 +73,8 @@ class Participant:
     speed: Quantity
     path: tuple[Waypoint, ...] = ()
     driver: str = field(default="", repr=False, kw_only=True)
+    heading: Quantity = field(default=0.0, repr=False, kw_only=True)
+    exceeds_limit: str = field(default="", repr=False, kw_only=True)
 
     @property
     def conduct(self) -> Conduct:
@@ -132,6 +137,74 @@ class LaneChange:
 
 
 @dataclass(frozen=True)
+class LaneOffset:
+    """A participant moves aside within its lane, or over its edge, and stays there.
+
+    Attributes:
+        offset: where to, left of its lane's centre positive [m].
+        acceleration: across the lane at most [m/s²].
+        shape: of the way aside over time.
+    """
+
+    offset: Quantity
+    acceleration: Quantity
+    shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
+
+    def __str__(self) -> str:
+        """Return what the participant does, to be said after its name."""
+        return (
+            f"moves to {in_words(self.offset, 'm')} left of its lane's centre with at most "
+            f"{in_words(self.acceleration, 'm/s²')}"
+        )
+
+
+@dataclass(frozen=True)
+class KeepDistance:
+    """A participant follows another one at a distance, bumper to bumper.
+
+    Attributes:
+        to: the other one.
+        distance: [m]; or
+        time: a gap [s].
+        acceleration: at most [m/s²].
+        braking: at most [m/s²].
+        max_speed: [m/s], if not only its body limits it.
+    """
+
+    to: str
+    distance: Quantity | None
+    time: Quantity | None
+    acceleration: Quantity
+    braking: Quantity
+    max_speed: Quantity | None = None
+
+    def __str__(self) -> str:
+        """Return what the participant does, to be said after its name."""
+        gap = in_words(self.distance, "m") if self.distance is not None else ""
+        return f"keeps {gap or in_words(self.time or 0.0, 's')} behind {self.to}"
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """A participant chooses its speed so that it arrives somewhere as another does elsewhere.
+
+    Attributes:
+        at: where it arrives.
+        other: the other participant.
+        place: where that one arrives.
+    """
+
+    at: Waypoint
+    other: str
+    place: Waypoint
+
+    def __str__(self) -> str:
+        """Return what the participant does, to be said after its name."""
+        here, there = (f"{one} at {in_words(one.distance, 'm')}" for one in (self.at, self.place))
+        return f"arrives at {here} when {self.other} arrives at {there}"
+
+
+@dataclass(frozen=True)
 class WeatherChange:
     """The weather becomes that of other parameters.
 
@@ -146,7 +219,7 @@ class WeatherChange:
         return f"becomes that of {self.prefix}…"
 
 
-Action = SpeedChange | LaneChange | WeatherChange
+Action = SpeedChange | LaneChange | LaneOffset | KeepDistance | Arrival | WeatherChange
 
 
 @dataclass(frozen=True)
@@ -158,7 +231,7 @@ class ConditionSpec:
         value: a parameter's name or a constant, in the kind's unit.
         to: the other participant, where the kind needs one.
         of: whose state is looked at; the event's own participant by default.
-        event: the event that must have ended, for "after".
+        event: the event that must have ended, for "after", or begun, for "began".
     """
 
     kind: str
@@ -182,12 +255,15 @@ CONDITIONS: Mapping[str, ConditionKind] = MappingProxyType(
     {
         "time": ConditionKind("s", "≥", False, "time since the start"),
         "distance": ConditionKind("m", "≤", True, "between reference points, as the crow flies"),
+        "gap": ConditionKind("m", "≤", True, "along the lane, between the bodies"),
         "ttc": ConditionKind("s", "≤", True, "time to collision at present speeds"),
         "headway": ConditionKind("s", "≤", True, "time until it is where the other is now"),
         "speed": ConditionKind("m/s", "≥", False, "its speed"),
         "travelled": ConditionKind("m", "≥", False, "distance since the start"),
         "standstill": ConditionKind("s", "≥", False, "time for which it has stood"),
+        "contact": ConditionKind("1", "=", True, "it has touched the other"),
         "after": ConditionKind("s", "≥", False, "time since another event ended"),
+        "began": ConditionKind("s", "≥", False, "time since another event began"),
     }
 )
 """What an event may wait for."""

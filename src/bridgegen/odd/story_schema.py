@@ -6,6 +6,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from bridgegen.odd.shape import (
     Acceleration,
+    Angle,
     Duration,
     LaneField,
     Length,
@@ -57,6 +58,10 @@ class ParticipantSection(ShapedSection):
     """Instead of start and end: straight lines through places; not of a vehicle or an obstacle."""
     speed: Speed = 0.0
     """At time 0 [m/s]; of the ego also its target."""
+    heading: Angle = 0.0
+    """Turned from its lane's direction [deg], left positive; at 180 it faces the traffic."""
+    exceeds_limit: Annotated[str, Field(strict=True, min_length=1, max_length=200)] | None = None
+    """Why it may be faster than road and weather allow: an emergency vehicle on a call, say."""
     driver: Word | None = None
     """attentive or scripted, instead of ``others``; not of the ego."""
 
@@ -65,18 +70,30 @@ class ConditionSection(ShapedSection):
     """One alternative of an event's ``when``; or several conditions that must hold together."""
 
     kind: (
-        Literal["time", "distance", "ttc", "headway", "speed", "travelled", "standstill", "after"]
+        Literal[
+            "time",
+            "distance",
+            "gap",
+            "ttc",
+            "headway",
+            "speed",
+            "travelled",
+            "standstill",
+            "contact",
+            "after",
+            "began",
+        ]
         | None
     ) = None
     """What is compared with the value."""
     value: QuantityField = 0.0
-    """In the kind's unit; of ``after`` a constant."""
+    """In the kind's unit; of ``after`` and ``began`` a constant; none of ``contact``."""
     to: Word | None = None
-    """The other participant, of distance, ttc and headway."""
+    """The other participant, of distance, gap, ttc, headway and contact."""
     of: Word | None = None
     """Whose state is looked at; the event's own participant by default."""
     event: Word | None = None
-    """The event that must have ended, of ``after``."""
+    """The event that must have ended, of ``after``, or begun, of ``began``."""
     all: "list[ConditionSection]" = []
     """Conditions that must hold together."""
 
@@ -100,7 +117,46 @@ class LaneChangeSection(ShapedSection):
     """Of the way aside over time, or distance."""
 
 
-ACTIONS = ("speed", "lane_change", "weather")
+class LaneOffsetSection(ShapedSection):
+    """A way aside: within its lane, or over its edge."""
+
+    offset: Length
+    """Where to, left of its lane's centre positive [m]."""
+    acceleration: Acceleration = 1.0
+    """Across the lane at most [m/s²]."""
+    shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
+    """Of the way aside over time."""
+
+
+class KeepDistanceSection(ShapedSection):
+    """A distance that it keeps behind another one, bumper to bumper, from then on."""
+
+    to: Word
+    """The other participant."""
+    distance: Length | None = None
+    """So far [m]."""
+    time: Duration | None = None
+    """Or so long, at its own speed [s]."""
+    acceleration: Acceleration = 2.0
+    """At most, to get there [m/s²]; ISO 15622 allows an adaptive cruise control as much."""
+    braking: Acceleration = 3.5
+    """At most [m/s²]; ISO 15622 again."""
+    max_speed: Speed | None = None
+    """At most [m/s], while it catches up."""
+
+
+class ArrivalSection(ShapedSection):
+    """It chooses its speed so that it arrives as another one does."""
+
+    at: WaypointSection
+    """Where it arrives."""
+    other: Word
+    """The other participant."""
+    place: WaypointSection
+    """Where that one arrives."""
+
+
+ACTIONS = ("speed", "lane_change", "lane_offset", "keep_distance", "arrive", "weather")
 """The keys of an event that are actions; it has one of them at least."""
 
 
@@ -121,6 +177,12 @@ class EventSection(ShapedSection):
     """Of the speed over time, or distance."""
     lane_change: LaneChangeSection | None = None
     """It changes lane."""
+    lane_offset: LaneOffsetSection | None = None
+    """It moves aside."""
+    keep_distance: KeepDistanceSection | None = None
+    """It follows another one."""
+    arrive: ArrivalSection | None = None
+    """It arrives somewhere as another one does elsewhere."""
     weather: Word | None = None
     """The weather becomes that of the parameters with this prefix."""
     when: Annotated[list[ConditionSection], Field(min_length=1)]

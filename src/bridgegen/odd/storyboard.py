@@ -12,16 +12,20 @@ from bridgegen.odd.shape import section
 from bridgegen.odd.story import (
     CONDITIONS,
     Action,
+    Arrival,
     Change,
     ConditionSpec,
     EventSpec,
+    KeepDistance,
     LaneChange,
+    LaneOffset,
     Participant,
     SpeedChange,
     Waypoint,
     WeatherChange,
 )
 from bridgegen.odd.story_schema import (
+    ACTIONS,
     ConditionSection,
     EventSection,
     ParticipantSection,
@@ -30,6 +34,11 @@ from bridgegen.odd.story_schema import (
 from bridgegen.participants import PARTICIPANTS, TYPES
 
 EGO = "ego"
+
+MOST_ASIDE = 4.0
+"""From the lane's centre [m]: a lane and a shoulder are seldom wider."""
+
+_OF_EVENTS = ("after", "began")
 
 _WALKERS = tuple(
     name
@@ -66,7 +75,8 @@ class Storyboard:
         self._report, self._check = quantities.report, quantities.check
         document = quantities.document
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
-        self._event_names = [str(name) for name, _ in entries(document, "events")]
+        self._events_read = list(entries(document, "events"))
+        self._event_names = [str(name) for name, _ in self._events_read]
         self.participants = tuple(self._participants())
         self._acting = {one.name: one for one in self.participants}
         self.events = tuple(self._events())
@@ -86,6 +96,12 @@ class Storyboard:
             if not name.isidentifier() or not name.isascii():
                 self._report(f"a participant's name is a word, got '{name}'", path)
             self._check(given.speed, "m/s", (*path, "speed"))
+            self._check_heading(name, given, path)
+            if given.exceeds_limit and PARTICIPANTS[given.type].seen_as.conduct != "vehicle":
+                self._report(
+                    f"a speed limit is for vehicles, {name} has none to exceed",
+                    (*path, "exceeds_limit"),
+                )
             self._check_driver(name, given, path)
             if given.path:
                 yield self._walker(name, given, path)
@@ -152,7 +168,46 @@ class Storyboard:
             )
         if conduct == "vehicle" and start.lane == "sidewalk":
             self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
-        return Participant(name, given.type, start, end, given.speed, driver=given.driver or "")
+        return Participant(
+            name, given.type, start, end, given.speed, driver=given.driver or "",
+            heading=given.heading, exceeds_limit=given.exceeds_limit or "",
+        )  # fmt: skip
+
+    def _check_heading(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check how a participant is turned from its lane's direction, if it is."""
+        heading, place = given.heading, (*path, "heading")
+        if heading == 0.0:
+            return
+        self._check(heading, "deg", place, low=-180.0)
+        one = self._quantities.parameters.get(heading) if isinstance(heading, str) else None
+        most = one.high if one else heading
+        if not isinstance(most, str) and most > 180.0:
+            self._report(f"heading of {name} [deg] must be -180 to 180, got {most:g}", place)
+        if name == EGO:
+            self._report("the ego drives along its route, it has no heading", place)
+        elif given.path:
+            self._report(f"{name} goes along its path, it has no heading of its own", place)
+        elif given.end is not None:
+            self._report(
+                f"a route leads along lanes in their direction: {name} has an end, so no heading",
+                place,
+            )
+        elif self._moves(name, given) and heading not in (180.0, -180.0):
+            self._report(
+                f"{name} moves, so it drives along its lane or against the traffic: heading 0 or "
+                f"180 deg, got {heading}",
+                place,
+            )
+
+    def _moves(self, name: str, given: ParticipantSection) -> bool:
+        """Return whether a participant is given a speed, at the start or by an event."""
+        events = (section(EventSection, one) for _, one in self._events_read)
+        return given.speed != 0.0 or any(
+            one is not None
+            and one.participant == name
+            and (one.speed not in (None, 0.0) or one.keep_distance or one.arrive)
+            for one in events
+        )
 
     def _check_driver(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check a participant's driver, if it has one."""
@@ -209,7 +264,7 @@ class Storyboard:
     # -- what and when -------------------------------------------------------------------------
 
     def _events(self) -> Iterator[EventSpec]:
-        for key, data in entries(self._quantities.document, "events"):
+        for key, data in self._events_read:
             name, path = str(key), ("events", key)
             given = section(EventSection, data)
             if given is None:
@@ -218,7 +273,7 @@ class Storyboard:
                 self._report(f"an event's name is a word, got '{name}'", path)
             actions = tuple(self._actions(name, given, path))
             if not actions:
-                self._report(f"{name} must change a speed, a lane or the weather", path)
+                self._report(f"{name} must have an action: {', '.join(ACTIONS)}", path)
             if given.participant is not None:
                 self._check_participant(given.participant, (*path, "participant"))
                 if given.participant == EGO:
@@ -266,6 +321,75 @@ class Storyboard:
                     f"{actor.name}, a {actor.type}, runs on rails and changes no lane", path
                 )
             yield LaneChange(int(one.lanes), change)
+        yield from self._moves_aside(name, given, path)
+        yield from self._beside_others(name, given, path)
+
+    def _moves_aside(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
+        aside, place = given.lane_offset, (*path, "lane_offset")
+        if aside is None:
+            return
+        self._check(aside.offset, "m", (*place, "offset"), low=-MOST_ASIDE)
+        one = self._quantities.parameters.get(str(aside.offset))
+        most = one.high if one else aside.offset
+        if not isinstance(most, str) and most > MOST_ASIDE:
+            self._report(
+                f"offset of {name} [m] must be {-MOST_ASIDE:g} to {MOST_ASIDE:g}, beyond that it "
+                f"changes lane, got {most:g}",
+                (*place, "offset"),
+            )
+        self._check(aside.acceleration, "m/s²", (*place, "acceleration"), above=True)
+        actor = self._acting.get(str(given.participant))
+        if actor is not None and (actor.path or PARTICIPANTS[actor.type].on_rails):
+            self._report(f"{actor.name} keeps to its path and cannot move aside", place)
+        yield LaneOffset(aside.offset, aside.acceleration, aside.shape)
+
+    def _beside_others(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
+        """Yield the actions whose speed depends on another participant."""
+        keeps, arrives = given.keep_distance, given.arrive
+        if sum(one is not None for one in (given.speed, keeps, arrives)) > 1:
+            self._report(
+                f"{name} must have one of speed, keep_distance and arrive: each sets the speed",
+                path,
+            )
+        actor = self._acting.get(str(given.participant))
+        for other, key in (
+            (keeps.to if keeps else None, "keep_distance"),
+            (arrives.other if arrives else None, "arrive"),
+        ):
+            if other is None:
+                continue
+            self._check_participant(other, (*path, key))
+            if other == given.participant:
+                self._report(f"{key} is to another participant, got '{other}' twice", (*path, key))
+            if actor is not None and (actor.driver == ATTENTIVE):
+                self._report(
+                    f"{actor.name} is attentive, its driver keeps the distance; {key} is for one "
+                    "that is scripted",
+                    (*path, key),
+                )
+        if keeps is not None:
+            place = (*path, "keep_distance")
+            if (keeps.distance is None) == (keeps.time is None):
+                self._report(f"{name} keeps a distance or a time, one of them", place)
+            for value, unit, part in (
+                (keeps.distance, "m", "distance"),
+                (keeps.time, "s", "time"),
+                (keeps.acceleration, "m/s²", "acceleration"),
+                (keeps.braking, "m/s²", "braking"),
+                (keeps.max_speed, "m/s", "max_speed"),
+            ):
+                if value is not None:
+                    self._check(value, unit, (*place, part), above=True)
+            yield KeepDistance(
+                keeps.to, keeps.distance, keeps.time, keeps.acceleration, keeps.braking,
+                keeps.max_speed,
+            )  # fmt: skip
+        if arrives is not None:
+            places = [
+                self._places.waypoint(one, (*path, "arrive", key))
+                for one, key in ((arrives.at, "at"), (arrives.place, "place"))
+            ]
+            yield Arrival(places[0], arrives.other, places[1])
 
     def _change(
         self,
@@ -291,6 +415,12 @@ class Storyboard:
             if one.kind is not None:
                 self._report("an alternative is a condition, or 'all' of several, not both", path)
             for number, each in enumerate(one.all):
+                if each.kind == "began":
+                    self._report(
+                        "a 'began' condition holds for an instant, so it stands alone, not in "
+                        "'all'",
+                        (*path, "all", number),
+                    )
                 yield from self._conditions(event, each, (*path, "all", number))
             return
         if one.kind is None:
@@ -298,10 +428,12 @@ class Storyboard:
             return
         kind, subject = CONDITIONS[one.kind], one.of or event.participant
         self._check(one.value, kind.unit, (*path, "value"))
-        if one.kind == "after" and isinstance(one.value, str):
+        if one.kind == "contact" and one.value != 0.0:
+            self._report(f"a contact condition has no value, got {one.value}", (*path, "value"))
+        if one.kind in _OF_EVENTS and isinstance(one.value, str):
             self._report(
-                f"value of an 'after' condition [s] must be a constant, got '{one.value}': delays "
-                "are part of the storyboard, which is the same for all rows",
+                f"value of an '{one.kind}' condition [s] must be a constant, got '{one.value}': "
+                "delays are part of the storyboard, which is the same for all rows",
                 (*path, "value"),
             )
         if not kind.pair and one.to is not None:
@@ -314,10 +446,10 @@ class Storyboard:
                 self._report(f"a {one.kind} is to another participant, got '{one.to}' twice", path)
         if one.of is not None:
             self._check_participant(one.of, (*path, "of"))
-        elif subject is None and one.kind not in ("time", "after"):
+        elif subject is None and one.kind not in ("time", *_OF_EVENTS):
             self._report(f"a {one.kind} condition needs 'of', whose it is", path)
-        if (one.kind == "after") != (one.event is not None):
-            self._report("an 'after' condition, and no other, names an event", path)
+        if (one.kind in _OF_EVENTS) != (one.event is not None):
+            self._report("an 'after' or 'began' condition, and no other, names an event", path)
         elif one.event is not None and one.event not in self._event_names:
             hint = nearest(one.event, self._event_names)
             self._report(f"unknown event '{one.event}'{hint}", path)

@@ -120,6 +120,16 @@ def _vehicles() -> Iterator[Rule]:
         f"FILTER(ABS(?aside) > 0.5e0 * ?width + {_SLACK}) }}",
         ("Vehicle", "has_lateral_offset"),
     )  # fmt: skip
+    yield about(
+        "faces-its-way", "Scenario", "has_relative_heading",
+        "must be 0 or 180 deg while it moves, and -180 to 180 deg otherwise, got {?got}",
+        "A vehicle that moves goes where it looks: along its lane, or against its traffic.", "ours",
+        f"SELECT DISTINCT $this ?value ({shown('?turned')} AS ?got) WHERE {{ {vehicle} "
+        f"?value {_PLACES}/bg:has_relative_heading ?turned . OPTIONAL {{ {moves} }} "
+        "FILTER(ABS(?turned) > 180 || "
+        f"(BOUND(?speed) && ?turned != 0 && ABS(ABS(?turned) - 180) > {_SLACK})) }}",
+        ("Vehicle", "has_relative_heading"),
+    )  # fmt: skip
 
 
 # -- how fast --------------------------------------------------------------------------------------
@@ -141,7 +151,8 @@ def _speeds() -> Iterator[Rule]:
         'FILTER(STRENDS(?name, "speed_factor")) '
         "?bearer bg:has_parameter ?parameter ; bg:has_value ?share } GROUP BY $this } "
         "BIND(xsd:double(?road_limit) * COALESCE(xsd:double(?factor), 1.0e0) AS ?most) "
-        f"?value {_DOES}/bg:has_target_speed ?speed . FILTER(?speed > {slack('?most', 1)}) }}",
+        f"?value {_DOES}/bg:has_target_speed ?speed . FILTER(?speed > {slack('?most', 1)}) "
+        "FILTER NOT EXISTS { ?value bg:has_reason_to_exceed ?reason } }",
         ("Vehicle", "has_speed_limit"),
     )  # fmt: skip
     yield about(

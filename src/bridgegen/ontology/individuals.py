@@ -68,7 +68,7 @@ def build(
     for participant in story.participants:
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
     for event in story.events:
-        put(top, "has_event", add_event(builder, event, declared))
+        put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():
         put(top, "has_event", add_course(builder, name, course))
     for jam in story.jams:

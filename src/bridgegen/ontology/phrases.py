@@ -178,6 +178,8 @@ def _trajectory(speaker: _Speaker, node: Subject) -> str:
 def _lane_position(speaker: _Speaker, node: Subject) -> str:
     aside = "has_lateral_offset"
     beside = f", {speaker.value(node, aside)} aside" if speaker.has(node, aside) else ""
+    if speaker.has(node, "has_relative_heading"):
+        beside += f", turned by {speaker.value(node, 'has_relative_heading')}"
     return f"{speaker.link(node, 'on_lane')}, {speaker.value(node, 'has_distance')}{beside}"
 
 
@@ -204,7 +206,24 @@ def _compared(quantity_: str, unit: str, usual: str, link: str = "has_entity_ref
     return say
 
 
+def _aside(speaker: _Speaker, node: Subject) -> str:
+    return f"{speaker.value(node, 'has_target_offset')} left of the lane's centre"
+
+
+def _keeps(speaker: _Speaker, node: Subject) -> str:
+    kept = "has_kept_distance" if speaker.has(node, "has_kept_distance") else "has_kept_time"
+    return f"{speaker.value(node, kept)} behind {speaker.link(node, 'has_entity_ref')}"
+
+
+def _arrives(speaker: _Speaker, node: Subject) -> str:
+    other = speaker.link(node, "has_entity_ref")
+    there = speaker.inner(node, "has_master_position")
+    return f"at {speaker.inner(node, 'has_position')} when {other} is at {there}"
+
+
 def _distance(speaker: _Speaker, node: Subject) -> str:
+    if speaker.has(node, "has_distance_measure"):
+        return _compared("gap to", "m", "≤")(speaker, node)
     if speaker.has(node, "has_rule"):
         return _compared("distance to", "m", "≤")(speaker, node)
     subject = f"{speaker.link(node, 'has_subject')} to " if speaker.has(node, "has_subject") else ""
@@ -214,7 +233,8 @@ def _distance(speaker: _Speaker, node: Subject) -> str:
 
 def _after(speaker: _Speaker, node: Subject) -> str:
     value = speaker.value(node, "has_value", "s")
-    return f"{value} after {speaker.link(node, 'has_event_ref')}"
+    begins = " begins" if speaker.has(node, "has_event_state") else ""
+    return f"{value} after {speaker.link(node, 'has_event_ref')}{begins}"
 
 
 def _reached(speaker: _Speaker, node: Subject) -> str:
@@ -240,6 +260,9 @@ def _driver(speaker: _Speaker, node: Subject) -> str:
 _SAYINGS: dict[str, Saying] = {
     "SpeedAction": _speed,
     "LaneChangeAction": _lane_change,
+    "LaneOffsetAction": _aside,
+    "LongitudinalDistanceAction": _keeps,
+    "SynchronizeAction": _arrives,
     "TeleportAction": lambda speaker, node: speaker.inner(node, "has_position"),
     "FollowTrajectoryAction": _trajectory,
     "EnvironmentAction": lambda speaker, node: f"weather {speaker.link(node, 'has_weather')}",

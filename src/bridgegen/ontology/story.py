@@ -8,11 +8,14 @@ from bridgegen.errors import OntologyError
 from bridgegen.odd.others import ATTENTIVE
 from bridgegen.odd.story import (
     Action,
+    Arrival,
     Change,
     ConditionSpec,
     EventSpec,
     Jam,
+    KeepDistance,
     LaneChange,
+    LaneOffset,
     Participant,
     RoadWorks,
     SpeedChange,
@@ -34,12 +37,15 @@ WEATHER = tuple(
 CONDITIONS = {
     "time": "SimulationTimeCondition",
     "distance": "RelativeDistanceCondition",
+    "gap": "RelativeDistanceCondition",
     "ttc": "TimeToCollisionCondition",
     "headway": "TimeHeadwayCondition",
     "speed": "SpeedCondition",
     "travelled": "TraveledDistanceCondition",
     "standstill": "StandStillCondition",
+    "contact": "CollisionCondition",
     "after": "StoryboardElementStateCondition",
+    "began": "StoryboardElementStateCondition",
 }
 """The class of each kind of condition."""
 
@@ -65,6 +71,8 @@ def add_participant(
     put, name = builder.put, one.name
     node = builder.node(name, PARTICIPANTS[one.type].owl_class)
     put(node, "has_name", name)
+    if one.exceeds_limit:
+        put(node, "has_reason_to_exceed", one.exceeds_limit)
     _add_body(builder, node, one.type)
     driver = driver if name == EGO else one.driver
     if name == EGO or driver == ATTENTIVE:
@@ -75,6 +83,8 @@ def add_participant(
             put(controller, "has_ideal_stages", ideal)
         put(node, "has_controller", controller)
     start = add_position(builder, f"{name}_start", one.start, site)
+    if one.heading != 0.0:
+        builder.quantity(start, "has_relative_heading", one.heading)
     teleport = builder.node(f"{name}_teleport", "TeleportAction")
     put(teleport, "has_position", start)
     put(node, "has_init_action", teleport)
@@ -164,8 +174,17 @@ def add_position(builder: Builder, name: str, waypoint: Waypoint, site: Site) ->
 # -- events ----------------------------------------------------------------------------------------
 
 
-def add_event(builder: Builder, event: EventSpec, declared: Mapping[str, object]) -> ox.NamedNode:
-    """Add an event: participant, actions and conditions."""
+def add_event(
+    builder: Builder, event: EventSpec, declared: Mapping[str, object], site: Site
+) -> ox.NamedNode:
+    """Add an event: participant, actions and conditions.
+
+    Args:
+        builder: takes the individuals.
+        event: what happens.
+        declared: parameters and derived quantities by name.
+        site: where it happens.
+    """
     put = builder.put
     kind = "EnvironmentChangeEvent" if event.participant is None else "StoryboardEvent"
     node = builder.node(event.name, kind)
@@ -175,7 +194,7 @@ def add_event(builder: Builder, event: EventSpec, declared: Mapping[str, object]
     for number, action in enumerate(event.actions, start=1):
         suffix = "" if number == 1 else f"_{number}"
         name = f"{event.name}_action{suffix}"
-        put(node, "has_what", _add_action(builder, name, action, declared))
+        put(node, "has_what", _add_action(builder, name, action, declared, site))
     trigger = builder.node(f"{event.name}_trigger", "Trigger")
     for number, conditions in enumerate(event.when, start=1):
         name = f"{event.name}_condition_{number}"
@@ -185,7 +204,7 @@ def add_event(builder: Builder, event: EventSpec, declared: Mapping[str, object]
 
 
 def _add_action(
-    builder: Builder, name: str, action: Action, declared: Mapping[str, object]
+    builder: Builder, name: str, action: Action, declared: Mapping[str, object], site: Site
 ) -> ox.NamedNode:
     if isinstance(action, SpeedChange):
         node = builder.node(name, "SpeedAction")
@@ -195,6 +214,30 @@ def _add_action(
         node = builder.node(name, "LaneChangeAction")
         builder.put(node, "has_lane_count", action.lanes)
         _add_change(builder, node, action.change)
+    elif isinstance(action, LaneOffset):
+        node = builder.node(name, "LaneOffsetAction")
+        builder.quantity(node, "has_target_offset", action.offset)
+        builder.quantity(node, "has_max_lateral_acceleration", action.acceleration)
+        if action.shape != "linear":
+            builder.put(node, "has_dynamics_shape", action.shape)
+    elif isinstance(action, KeepDistance):
+        node = builder.node(name, "LongitudinalDistanceAction")
+        builder.put(node, "has_entity_ref", builder.iri(action.to))
+        if action.distance is not None:
+            builder.quantity(node, "has_kept_distance", action.distance)
+        if action.time is not None:
+            builder.quantity(node, "has_kept_time", action.time)
+        builder.quantity(node, "has_max_acceleration", action.acceleration)
+        builder.quantity(node, "has_max_deceleration", action.braking)
+        if action.max_speed is not None:
+            builder.quantity(node, "has_max_speed", action.max_speed)
+    elif isinstance(action, Arrival):
+        node = builder.node(name, "SynchronizeAction")
+        builder.put(node, "has_entity_ref", builder.iri(action.other))
+        here = add_position(builder, f"{name}_place", action.at, site)
+        there = add_position(builder, f"{name}_master_place", action.place, site)
+        builder.put(node, "has_position", here)
+        builder.put(node, "has_master_position", there)
     else:
         node = builder.node(name, "EnvironmentAction")
         weather = add_weather(builder, declared, action.prefix)
@@ -236,7 +279,12 @@ def _add_condition(builder: Builder, name: str, condition: ConditionSpec) -> ox.
     ):
         if target is not None:
             builder.put(node, link, builder.iri(target))
-    builder.quantity(node, "has_value", condition.value)
+    if condition.kind == "gap":
+        builder.put(node, "has_distance_measure", "gap")
+    if condition.kind == "began":
+        builder.put(node, "has_event_state", "began")
+    if condition.kind != "contact":
+        builder.quantity(node, "has_value", condition.value)
     return node
 
 

@@ -30,12 +30,19 @@ def _participant(one: Participant) -> str:
     if one.path:
         way = " to ".join(_place(point) for point in one.path)
         return f"{one.name}, a {one.type}, goes from {way} at {in_words(one.speed, 'm/s')}."
+    turned = ""
+    if one.heading in (180.0, -180.0):
+        turned = ", against the traffic"
+    elif one.heading != 0.0:
+        turned = f", turned by {in_words(one.heading, 'deg')}"
     line = (
         f"{one.name}, a {one.type}, starts at {_place(one.start)} at {in_words(one.speed, 'm/s')}"
     )
+    if one.exceeds_limit:
+        turned += f", faster than allowed if need be ({one.exceeds_limit})"
     if one.conduct == "obstacle" or (one.speed == 0.0 and one.end is None):
-        return f"{one.name}, a {one.type}, stands at {_place(one.start)}."
-    return f"{line}{'' if one.end is None else f' and goes to {_place(one.end)}'}."
+        return f"{one.name}, a {one.type}, stands at {_place(one.start)}{turned}."
+    return f"{line}{turned}{'' if one.end is None else f' and goes to {_place(one.end)}'}."
 
 
 def _jam(jam: Jam, scenario: LogicalScenario) -> str:
@@ -64,6 +71,10 @@ def _condition(one: ConditionSpec, event: EventSpec) -> str:
     subject = f"the {kind.meaning}" if one.kind == "time" else f"{kind.meaning} of {whose}"
     if one.kind == "after":
         subject = f"the time since {one.event} ended"
+    if one.kind == "began":
+        subject = f"the time since {one.event} began"
+    if one.kind == "contact":
+        return f"{whose} has touched {one.to}"
     if one.to is not None:
         subject = f"the {one.kind} ({kind.meaning}) from {whose} to {one.to}"
     return f"{subject} is {kind.rule} {in_words(one.value, kind.unit)}"

@@ -1,6 +1,5 @@
 """Categories and angles in individuals, in OpenSCENARIO files, and back."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np

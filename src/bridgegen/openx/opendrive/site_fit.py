@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.story import Waypoint
+from bridgegen.odd.story import Arrival, Waypoint
 from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import plan_route
@@ -194,6 +194,10 @@ def _places(scenario: LogicalScenario) -> Iterator[Waypoint]:
         yield jam.tail
     for works in story.works:
         yield from (works.start, works.sign, *works.cones)
+    for event in story.events:
+        for action in event.actions:
+            if isinstance(action, Arrival):
+                yield from (action.at, action.place)
 
 
 def _missing(site: Site, place: Waypoint, ends: bool) -> str:

@@ -77,6 +77,7 @@ class Actions:
             "LaneOffsetAction": self._lane_offset,
             "TeleportAction": self._teleport,
             "SynchronizeAction": self._synchronize,
+            "LongitudinalDistanceAction": self._keep_distance,
             "FollowTrajectoryAction": self._follow,
             "AssignRouteAction": self._assign_route,
         }
@@ -141,6 +142,39 @@ class Actions:
         )
         other = self._cast.name(node, "has_entity_ref")
         return osc.PrivateAction(osc.SynchronizeAction(other, master, there))
+
+    def _keep_distance(self, actor: str, node: Subject) -> osc.PrivateAction:
+        """Return the following of another entity, from now on, between the bodies."""
+        del actor
+        ind = self._individuals
+        distance, time, faster, slower, fastest = (
+            None if ind.optional_number(node, name) is None else self._quantities.get(node, name)
+            for name in (
+                "has_kept_distance", "has_kept_time", "has_max_acceleration",
+                "has_max_deceleration", "has_max_speed",
+            )
+        )  # fmt: skip
+        limits = None
+        if any(one is not None for one in (faster, slower, fastest)):
+            limits = osc.DynamicConstraints(faster, slower, fastest)
+        if (distance is None) == (time is None):
+            raise OntologyError(
+                f"{ind.describe(node)} must have one of has_kept_distance and has_kept_time"
+            )
+        return osc.PrivateAction(
+            osc.LongitudinalAction(
+                osc.LongitudinalDistanceAction(
+                    entity_ref=self._cast.name(node, "has_entity_ref"),
+                    continuous=True,
+                    freespace=True,
+                    distance=distance,
+                    time_gap=time,
+                    displacement=osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY,
+                    coordinate_system=osc.CoordinateSystem.LANE,
+                    dynamic_constraints=limits,
+                )
+            )
+        )
 
     def _dynamics(self, node: Subject) -> osc.TransitionDynamics:
         ind = self._individuals

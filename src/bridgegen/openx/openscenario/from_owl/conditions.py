@@ -11,6 +11,8 @@ from bridgegen.openx.openscenario.from_owl.signals import lamp_states
 
 AnyCondition = osc.ByEntityCondition | osc.ByValueCondition
 _EUCLIDIAN = osc.RelativeDistanceType.EUCLIDIAN_DISTANCE
+_LONGITUDINAL = osc.RelativeDistanceType.LONGITUDINAL
+_ENDED = osc.StoryboardElementState.COMPLETE_STATE
 _ENTITY = osc.CoordinateSystem.ENTITY
 _LEAST, _MOST = osc.Rule.GREATER_OR_EQUAL, osc.Rule.LESS_OR_EQUAL
 
@@ -76,8 +78,10 @@ class Conditions:
         ind = self._individuals
         if ind.is_a(node, "StoryboardElementStateCondition"):
             event = plain_text(ind, ind.link(node, "has_event_ref"), "has_name")
+            said = ind.optional_text(node, "has_event_state")
+            began, ended = osc.StoryboardElementState.START_TRANSITION, _ENDED
             state = osc.StoryboardElementStateCondition(
-                osc.StoryboardElementType.EVENT, event, osc.StoryboardElementState.COMPLETE_STATE
+                osc.StoryboardElementType.EVENT, event, began if said == "began" else ended
             )
             return osc.ByValueCondition(state), self._quantities.get(node, "has_value")
         if ind.is_a(node, "TrafficSignalCondition"):
@@ -97,14 +101,15 @@ class Conditions:
             return osc.EntityCondition(osc.CollisionCondition(osc.EntityRef(self._other(node))))
         value = self._quantities.get(node, "has_value")
         if ind.is_a(node, "RelativeDistanceCondition"):
+            is_gap = ind.optional_text(node, "has_distance_measure") == "gap"
             return osc.EntityCondition(
                 osc.RelativeDistanceCondition(
                     entity_ref=self._other(node),
-                    relative_distance_type=_EUCLIDIAN,
+                    relative_distance_type=_LONGITUDINAL if is_gap else _EUCLIDIAN,
                     value=value,
-                    freespace=False,
+                    freespace=is_gap,
                     rule=self._rule(node, _MOST),
-                    coordinate_system=_ENTITY,
+                    coordinate_system=osc.CoordinateSystem.LANE if is_gap else _ENTITY,
                 )
             )
         if ind.is_a(node, "TimeToCollisionCondition"):

@@ -11,6 +11,7 @@ from bridgegen.openx.openscenario.values import format_double
 from bridgegen.participants import PARTICIPANTS, ParticipantKind
 
 MAX_SPEED = "max_speed"
+EXCEEDS = "exceeds_limit"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
 
 _ESMINI_CONTROLLER = "ExternalController"
@@ -83,6 +84,12 @@ def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
     return () if kind.written.is_exact else (osc.Property(KIND, kind.name),)
 
 
+def _lifted(individuals: Individuals, node: Subject) -> tuple[osc.Property, ...]:
+    """Return the property that says why a vehicle may exceed the speed limit."""
+    reason = individuals.optional_text(node, "has_reason_to_exceed")
+    return () if reason is None else (osc.Property(EXCEEDS, reason),)
+
+
 def _pedestrian(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Pedestrian:
     fastest = individuals.optional_number(node, "has_max_speed")
     said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
@@ -132,7 +139,7 @@ def _vehicle(individuals: Individuals, node: Subject, kind: ParticipantKind) -> 
             _axle(_MAX_STEERING, width, individuals.number(node, "has_wheelbase")),
             _axle(0.0, width, 0.0),
         ),
-        properties=osc.Properties(_stated(kind)),
+        properties=osc.Properties((*_stated(kind), *_lifted(individuals, node))),
         role=None if written.role is None else osc.Role(written.role),
         mass=individuals.optional_number(node, "has_mass"),
     )

@@ -14,6 +14,9 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
 from bridgegen.openx.openscenario.values import Double, format_double
 
+RADIANS = repr(math.pi / 180.0)
+"""In a degree, as a part of a formula."""
+
 _ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
 
 
@@ -113,9 +116,16 @@ class Places:
             lane_id=str(lane_id),
             s=self._station(roads[at], sum(road.length for road in roads[:at]), distance),
             offset=self._offset(node, lane_id),
-            orientation=_ALONG_LANE if oriented else None,
+            orientation=self._orientation(node) if oriented else None,
         )
         return osc.Position(position)
+
+    def _orientation(self, node: Subject) -> osc.Orientation:
+        if self._individuals.optional_number(node, "has_relative_heading") is None:
+            return _ALONG_LANE
+        heading = self._quantities.get(node, "has_relative_heading")
+        h = self._quantities.apply(f"x*{RADIANS}", heading)
+        return osc.Orientation(osc.ReferenceContext.RELATIVE, h=h)
 
     def _offset(self, node: Subject, lane_id: int) -> Double | None:
         """Return how far a place is from its lane's centre, left of the road's direction."""

@@ -56,6 +56,8 @@ def add_action(
         put_place(builder, node, "has_position", f"{name}_place", action.target_position)
         there = action.target_position_master
         put_place(builder, node, "has_master_position", f"{name}_master_place", there)
+    elif isinstance(inner, osc.LongitudinalDistanceAction):
+        node = _keep_distance(builder, name, inner)
     elif isinstance(inner, osc.SpeedAction):
         node = builder.node(name, "SpeedAction")
         put_speed(builder, node, inner)
@@ -102,6 +104,42 @@ def _put_change(builder: StoryBuilder, node: ox.NamedNode, how: osc.TransitionDy
     builder.number(node, _DIMENSIONS[dimension], how.value, how)
     if shape is not osc.DynamicsShape.LINEAR:
         builder.put(node, "has_dynamics_shape", shape.value)
+
+
+def _keep_distance(
+    builder: StoryBuilder, name: str, action: osc.LongitudinalDistanceAction
+) -> ox.NamedNode:
+    """Add the following of another entity, in the one way that the ontology defines.
+
+    Raises:
+        UnsayableError: not from now on, not between the bodies, within limits, or not behind.
+    """
+    what = "LongitudinalDistanceAction"
+    if action.continuous is not True or action.freespace is not True:
+        raise UnsayableError(action, f"{what} that is not continuous and between the bodies")
+    limits = action.dynamic_constraints or osc.DynamicConstraints()
+    unsaid = (limits.max_acceleration_rate, limits.max_deceleration_rate)
+    if any(one is not None for one in unsaid):
+        raise UnsayableError(limits, f"DynamicConstraints of {what} besides accelerations")
+    side, axes = action.displacement, action.coordinate_system
+    behind = osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY
+    if side is not None and builder.text(side) != behind:
+        raise UnsayableError(action, f'displacement="{side}" of {what}')
+    if axes is None or builder.text(axes) != osc.CoordinateSystem.LANE:
+        raise UnsayableError(action, f'coordinateSystem="{axes}" of {what}')
+    node = builder.node(name, what)
+    builder.put(node, "has_entity_ref", builder.entity(action.entity_ref, action))
+    if action.distance is not None:
+        builder.number(node, "has_kept_distance", action.distance, action)
+    if action.time_gap is not None:
+        builder.number(node, "has_kept_time", action.time_gap, action)
+    if limits.max_acceleration is not None:
+        builder.number(node, "has_max_acceleration", limits.max_acceleration, limits)
+    if limits.max_deceleration is not None:
+        builder.number(node, "has_max_deceleration", limits.max_deceleration, limits)
+    if limits.max_speed is not None:
+        builder.number(node, "has_max_speed", limits.max_speed, limits)
+    return node
 
 
 def _lateral(

@@ -76,12 +76,15 @@ def _add_condition(
         event = builder.text(one.storyboard_element_ref)
         kind = builder.text(one.storyboard_element_type)
         state = builder.text(one.state)
-        if (kind, state) != ("event", "completeState") or event not in builder.events:
+        known = ("completeState", "startTransition")
+        if kind != "event" or state not in known or event not in builder.events:
             raise UnsayableError(
                 one, f"StoryboardElementStateCondition on {state} of the {kind} {event}"
             )
         builder.referred.add(event)
         builder.put(node, "has_event_ref", builder.events[event])
+        if state == "startTransition":
+            builder.put(node, "has_event_state", "began")
         builder.number(node, "has_value", wrapped.delay, wrapped)
     return node
 
@@ -113,6 +116,8 @@ def _by_entity(
     else:
         builder.number(node, "has_value", one.value, one)
         if isinstance(one, Relative):
+            if _is_gap(builder, one):
+                builder.put(node, "has_distance_measure", "gap")
             builder.put(node, "has_entity_ref", builder.entity(_other(builder, one), one))
         if not isinstance(one, osc.TraveledDistanceCondition):
             _put_rule(builder, node, one)
@@ -125,6 +130,9 @@ def _other(builder: StoryBuilder, one: Relative) -> str | osc.ParameterRef:
     Raises:
         UnsayableError: another distance, other axes, between boxes, or to a position.
     """
+    if _is_gap(builder, one):
+        assert isinstance(one, osc.RelativeDistanceCondition)
+        return one.entity_ref
     what = type(one).__name__
     distance, axes = one.relative_distance_type, one.coordinate_system
     if distance is not None and builder.text(distance) not in (
@@ -142,6 +150,19 @@ def _other(builder: StoryBuilder, one: Relative) -> str | osc.ParameterRef:
     if not isinstance(target, osc.EntityRef):
         raise UnsayableError(target, "TimeToCollisionCondition with a Position")
     return target.entity_ref
+
+
+def _is_gap(builder: StoryBuilder, one: Relative) -> bool:
+    """Return whether a distance is measured along the lane and between the bodies."""
+    if not isinstance(one, osc.RelativeDistanceCondition) or one.freespace is not True:
+        return False
+    kind, axes = one.relative_distance_type, one.coordinate_system
+    return (
+        kind is not None
+        and builder.text(kind) == osc.RelativeDistanceType.LONGITUDINAL
+        and axes is not None
+        and builder.text(axes) == osc.CoordinateSystem.LANE
+    )
 
 
 def _put_rule(builder: StoryBuilder, node: ox.NamedNode, one: Element) -> None:

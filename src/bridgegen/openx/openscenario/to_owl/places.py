@@ -17,6 +17,7 @@ from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name
 from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.from_owl.places import RADIANS
 from bridgegen.openx.openscenario.to_owl.build import (
     StoryBuilder,
     UnsayableError,
@@ -29,6 +30,7 @@ _LENGTH_SLACK = 1e-6  # [m]
 _NAME = r"\(?\s*\$(?P<name>[A-Za-z_][A-Za-z0-9_]*)\s*\)?"
 _REST = re.compile(rf"\$\{{\s*(?P<length>\d+\.?\d*|\.\d+)\s*-\s*{_NAME}\s*\}}")
 _BEYOND = re.compile(rf"\$\{{\s*{_NAME}\s*-\s*(?P<length>\d+\.?\d*|\.\d+)\s*\}}")
+_TURNED = re.compile(rf"\$\{{\s*{_NAME}\s*\*\s*{re.escape(RADIANS)}\s*\}}")
 _MIRRORED = re.compile(rf"\$\{{\s*-\s*{_NAME}\s*\}}")
 
 
@@ -63,6 +65,9 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
     if where.offset is not None:
         offset = where.offset if lane_id < 0 else _mirrored(where)
         builder.number(node, "has_lateral_offset", offset, where)
+    turned = where.orientation
+    if turned is not None and turned.h not in (None, 0.0):
+        builder.number(node, "has_relative_heading", _in_degrees(builder, turned), turned)
     return node
 
 
@@ -90,6 +95,18 @@ def _check_orientation(where: osc.LanePosition) -> None:
         return
     if any(value is not None for value in (turned.h, turned.p, turned.r)):
         raise UnsayableError(turned, "an Orientation that is not relative to its lane")
+
+
+def _in_degrees(builder: StoryBuilder, turned: osc.Orientation) -> Any:
+    """Return how far a position is turned from its lane [deg], or the parameter that it is."""
+    if isinstance(turned.h, osc.Expr) and (found := _TURNED.fullmatch(turned.h.text)):
+        return osc.ParameterRef(f"${found['name']}")
+    if isinstance(turned.h, osc.ParameterRef | osc.Expr):
+        raise UnsayableError(
+            turned, f'h="{turned.h}" of Orientation, which must read ${{($name)*{RADIANS}}}'
+        )
+    assert turned.h is not None
+    return shortest(math.degrees(turned.h), turned.h, lambda angle: angle * float(RADIANS))
 
 
 def _distance(builder: StoryBuilder, road: Road, where: osc.LanePosition, now: float) -> Any:
