@@ -237,8 +237,9 @@ MISTAKES = [
     (
         "kind: time,",
         "kind: tim,",
-        "events.bv_sets_off.when.0.kind must be 'time', 'distance', 'ttc', 'headway', 'speed', "
-        "'travelled', 'standstill' or 'after', got 'tim'; did you mean 'time'?",
+        "events.bv_sets_off.when.0.kind must be 'time', 'distance', 'gap', 'ttc', 'headway', "
+        "'speed', 'travelled', 'standstill', 'contact', 'after' or 'began', got 'tim'; did you "
+        "mean 'time'?",
         "kind: tim,",
     ),
     (

@@ -147,7 +147,7 @@ def test_a_report_has_no_place_for_who_is_not_there(monkeypatch):
     present = np.ones(replay.rollout.x.shape, dtype=np.bool_)
     present[0, 1, 20:] = False
     gone = replace(replay, rollout=replace(replay.rollout, present=present))
-    monkeypatch.setattr(pipeline, "replay", lambda _, plans: gone)
+    monkeypatch.setattr(pipeline, "replay", lambda *_, **__: gone)
     rows = SimpleNamespace(
         X=X, metrics=np.zeros((1, len(pipeline.metrics))), critical=[True], cause=np.zeros(1, int),
         take=lambda at: rows,

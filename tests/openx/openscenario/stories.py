@@ -136,6 +136,12 @@ ACTIONS: tuple[Thing, ...] = (
     ("TeleportAction", {"has_position": ("WorldPosition", {
         "has_world_x": 1.0, "has_world_y": -2.0, "has_world_z": 0.5, "has_world_yaw": 30.0,
         "has_world_pitch": -1.0, "has_world_roll": 0.1})}),
+    ("LongitudinalDistanceAction", {"has_entity_ref": "<ego>", "has_kept_distance": 12.5}),
+    ("LongitudinalDistanceAction", {"has_entity_ref": "<ego>", "has_kept_time": 1.8,
+                                    "has_max_acceleration": 2.0, "has_max_deceleration": 3.5,
+                                    "has_max_speed": 20.0}),
+    ("TeleportAction", {"has_position": ("LanePosition", {
+        "on_lane": "<leg_A_in_1>", "has_distance": 12.5, "has_relative_heading": 90.0})}),
     ("SynchronizeAction", {"has_entity_ref": "<ego>",
                            "has_position": on_lane("leg_C_out_1", 5.0),
                            "has_master_position": on_lane("leg_B_in_1", 1.0)}),
@@ -153,6 +159,8 @@ CONDITIONS: tuple[Thing, ...] = (
     ("RelativeDistanceCondition", {"has_value": 20.0, "has_entity_ref": "<ego>"}),
     ("RelativeDistanceCondition", {"has_value": 20.0, "has_entity_ref": "<bv>",
                                    "has_subject": "<ego>", "has_rule": "greaterThan"}),
+    ("RelativeDistanceCondition", {"has_value": 5.0, "has_entity_ref": "<ego>",
+                                   "has_distance_measure": "gap"}),
     ("TimeToCollisionCondition", {"has_value": 2.5, "has_entity_ref": "<ego>"}),
     ("TimeHeadwayCondition", {"has_value": 1.5, "has_entity_ref": "<ego>",
                               "has_rule": "greaterOrEqual"}),
@@ -163,5 +171,7 @@ CONDITIONS: tuple[Thing, ...] = (
     ("ReachPositionCondition", {"has_value": 1.0, "has_position": on_lane("leg_C_out_1", 8.0)}),
     ("CollisionCondition", {"has_entity_ref": "<ego>"}),
     ("StoryboardElementStateCondition", {"has_value": 0.5, "has_event_ref": "<bv_sets_off>"}),
+    ("StoryboardElementStateCondition", {"has_value": 0.5, "has_event_ref": "<bv_sets_off>",
+                                         "has_event_state": "began"}),
 )  # fmt: skip
 """Of an event of ``bv``."""

@@ -93,6 +93,7 @@ def test_every_condition_can_be_run(individuals, condition):
                                 "has_master_position": stories.on_lane("leg_A_in_1", 1.0)}),
          "must be a participant"),
         (("LaneOffsetAction", {}), "has_target_offset"),
+        (("LongitudinalDistanceAction", {"has_entity_ref": "<ego>"}), "must have one of has_kept"),
         (("DeleteEntityAction", {}), "has_entity_ref"),
     ],
 )  # fmt: skip

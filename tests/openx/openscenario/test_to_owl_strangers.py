@@ -283,8 +283,8 @@ RELATIVE = (
         (over_time("12"), over_time("12").replace("greaterOrEqual", "greaterThan"),
          'rule="greaterThan" of SimulationTimeCondition', False),
         ("<LogicFile", '<SceneGraphFile filepath="x.osgb"/><LogicFile', "SceneGraphFile", False),
-        ('offset="0"/>', 'offset="0"><Orientation type="relative" h="1"/></LanePosition>',
-         'h="1.0" of Orientation', False),
+        ('offset="0"/>', 'offset="0"><Orientation type="relative" p="1"/></LanePosition>',
+         'p="1.0" of Orientation', False),
         ('author="somebody"/>', 'author="somebody"><License name="CC0"/></FileHeader>',
          "License", False),
         # what the reader does not know goes with the event, the action or the trigger around it

@@ -1,0 +1,284 @@
+"""What scenario files can say, as it moves; by hand-worked numbers, and there and back again."""
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import ScenarioError
+from bridgegen.odd.reader import load
+from bridgegen.ontology.check import check
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
+from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.pipeline import Pipeline
+from bridgegen.report.scenario_words import story_lines
+
+HEAD = """
+scenario: mine
+title: Everything that a file can say
+description: On a motorway of two lanes.
+source: ours
+template: road
+roads: {lanes: 2, length: 1200.0, speed_limit: 36.1, road_type: motorway}
+duration: 20.0
+time_step: 0.05
+axes: [participants]
+include: [motorway, weather]
+driver: reference
+objective: harm
+"""
+PARTICIPANTS = """
+participants:
+  ego:
+    type: car
+    start: {distance: 50.0, lane: 2}
+    end: {distance: 1180.0, lane: 2}
+    speed: 20.0
+  other:
+    type: car
+    start: {distance: other_at, lane: 1}
+    speed: 20.0
+"""
+PARAMETERS = """
+parameters:
+  other_at: {axis: participants, unit: m, low: 90, high: 150, default: 100, description: Where., source: ours}
+  turned: {axis: participants, unit: deg, low: -120, high: 120, default: 90, description: How., source: ours}
+  aside: {axis: participants, unit: m, low: -1.5, high: 1.5, default: -1.0, description: How., source: ours}
+"""  # noqa: E501
+
+
+@pytest.fixture
+def made(tmp_path):
+    def make(participants: str = PARTICIPANTS, events: str = "") -> Pipeline:
+        text = HEAD + participants + (f"events:\n{events}" if events else "") + PARAMETERS
+        for name in ("turned", "aside"):
+            if text.count(name) == 1:
+                text = "\n".join(one for one in text.splitlines() if f"  {name}:" not in one)
+        path = tmp_path / "mine.yaml"
+        path.write_text(text, "utf-8")
+        scenario = load(path)
+        return Pipeline(scenario, scenario.space())
+
+    return make
+
+
+def motion(pipeline: Pipeline, **values):
+    x = pipeline.space.row(values)
+    rollout = pipeline.rollout(x[np.newaxis])
+    assert rollout.status.tolist() == [0]
+    return {
+        name: {key: getattr(rollout, key)[0, e] for key in "xyhv"}
+        for e, name in enumerate(rollout.names)
+    }
+
+
+def there_and_back(pipeline: Pipeline) -> None:
+    """The files say it, the constraints hold, and what is read is what was written."""
+    concrete = pipeline.concrete(pipeline.space.row({}), "roads.xodr")
+    assert not list(check(concrete.individuals, pipeline.source.constraints))
+    found, lost = individuals_from_openscenario(
+        concrete.storyboard, concrete.roads, "roads.xodr", ""
+    )[:2]
+    assert not lost
+    assert to_xml(openscenario_from_owl(found, "roads.xodr")) == to_xml(concrete.storyboard)
+
+
+def test_wrong_way_driving(made):
+    """At 20 m/s from 700 m on: 600 m after 5 s, in its own lane's middle, face to the traffic."""
+    pipeline = made(
+        PARTICIPANTS
+        + """
+  ghost:
+    type: car
+    start: {distance: 700.0, lane: 1, offset: 0.5}
+    speed: 72 km/h
+    heading: 180°
+"""
+    )
+    ghost = motion(pipeline)["ghost"]
+    assert ghost["x"][[0, 100]] == pytest.approx([700.0, 600.0], abs=1e-9)
+    assert np.abs(ghost["h"]) == pytest.approx(np.pi)
+    lane = -0.5 * 3.75  # the left lane's middle, and 0.5 m to the left of the lane's own traffic
+    assert ghost["y"] == pytest.approx(lane + 0.5, abs=1e-9)
+    there_and_back(pipeline)
+    said = " ".join(story_lines(pipeline.scenario))
+    assert (
+        "ghost, a car, starts at 700 m on lane 1, 0.5 m left of its centre at 20 m/s, against"
+        in said
+    )
+
+
+def test_parked_across_at_a_searched_angle(made):
+    pipeline = made(
+        PARTICIPANTS
+        + """
+  parked:
+    type: van
+    start: {distance: 1000.0, lane: 1}
+    heading: turned
+"""
+    )
+    for degrees in (-120.0, 90.0):
+        parked = motion(pipeline, turned=degrees)["parked"]
+        assert np.degrees(parked["h"]) % 360.0 == pytest.approx(degrees % 360.0)
+        assert (parked["v"] == 0.0).all()
+    there_and_back(pipeline)
+
+
+def test_moving_aside(made):
+    """To 1 m right of the lane's centre, and there it stays."""
+    pipeline = made(
+        events="""
+  swerve:
+    participant: other
+    lane_offset: {offset: aside, acceleration: 2.0}
+    when:
+      - {kind: time, value: 2.0}
+"""
+    )
+    other = motion(pipeline, aside=-1.0)["other"]
+    lane = -0.5 * 3.75
+    assert other["y"][:40] == pytest.approx(lane)
+    assert other["y"][-1] == pytest.approx(lane - 1.0, abs=1e-6)
+    across = np.gradient(np.gradient(other["y"], 0.05), 0.05)
+    assert np.abs(across).max() < 2.1
+    there_and_back(pipeline)
+
+
+@pytest.mark.parametrize(("kept", "gap"), [("distance: 30 m", 30.0), ("time: 1.5 s", 33.0)])
+def test_keeping_a_distance(made, kept, gap):
+    """Behind a lead at 22 m/s, between the bodies: 30 m, or 1.5 s = 33 m; it brakes by 3.5 m/s²."""
+    pipeline = made(PARTICIPANTS.replace("speed: 20.0", "speed: 22.0") + """
+  lead:
+    type: car
+    start: {distance: 160.0, lane: 1}
+    speed: 22.0
+""", f"""
+  follow:
+    participant: other
+    keep_distance: {{to: lead, {kept}, max_speed: 25}}
+    when:
+      - {{kind: time, value: 1.0}}
+""")  # fmt: skip
+    found = motion(pipeline, other_at=100.0)
+    lead, other = found["lead"], found["other"]
+    between = lead["x"] - other["x"] - 4.6  # two cars' lengths are one of them
+    assert between[0] == pytest.approx(60.0 - 4.6)
+    assert between[-1] == pytest.approx(gap, abs=0.3)
+    assert other["v"].max() <= 25.0
+    assert (np.diff(other["v"]) / 0.05).min() >= -3.5 - 1e-9
+    assert (np.diff(other["v"]) / 0.05).max() <= 2.0 + 1e-9
+    there_and_back(pipeline)
+
+
+def test_arriving_together(made):
+    """Whenever the ego is at 250 m, the other is at 300 m."""
+    pipeline = made(
+        events="""
+  meets:
+    participant: other
+    arrive: {at: {distance: 300.0, lane: 1}, other: ego, place: {distance: 250.0, lane: 2}}
+    when:
+      - {kind: time, value: 0.0}
+"""
+    )
+    found = motion(pipeline)
+    k = int(np.argmin(np.abs(found["ego"]["x"] - 250.0)))
+    assert found["other"]["x"][k] == pytest.approx(300.0, abs=1.0)
+    there_and_back(pipeline)
+
+
+def test_a_gap_a_contact_and_a_beginning(made):
+    """The gap from a car at 100 m to one at 50 m beside it is 50 − 4.6 = 45.4 m."""
+    events = """
+  far:
+    participant: other
+    speed: 10.0
+    when:
+      - {kind: gap, to: ego, value: 45.3}
+  touched:
+    participant: other
+    speed: 0.0
+    rate: 6.0
+    when:
+      - {kind: contact, to: ego}
+  near:
+    participant: other
+    lane_offset: {offset: 0.5}
+    when:
+      - {kind: gap, to: ego, value: 45.5}
+  then:
+    participant: other
+    speed: 15.0
+    rate: 2.0
+    when:
+      - {kind: began, event: near, value: 2.0}
+"""
+    pipeline = made(events=events)
+    x = pipeline.space.row({"other_at": 100.0})
+    rollout = pipeline.rollout(x[np.newaxis])
+    began = dict(zip(rollout.event_names, rollout.began[0].tolist(), strict=True))
+    assert began["near"] == 0
+    assert began["then"] in (40, 41)
+    assert began["touched"] == -1
+    there_and_back(pipeline)
+
+
+def test_a_reason_lifts_the_limit_and_nothing_else(made):
+    text = PARTICIPANTS.replace(
+        "start: {distance: other_at, lane: 1}\n    speed: 20.0",
+        "start: {distance: other_at, lane: 1}\n    speed: 45.0",
+    )
+    with pytest.raises(ScenarioError, match="no faster than road and weather allow"):
+        made(text)
+    lifted = text.replace("speed: 45.0", 'speed: 45.0\n    exceeds_limit: "a race"')
+    pipeline = made(lifted)
+    assert motion(pipeline)["other"]["v"][0] == 45.0
+    there_and_back(pipeline)
+    with pytest.raises(ScenarioError, match="no faster than a car can do"):
+        made(lifted.replace("45.0", "95.0"))
+
+
+REFUSED = {
+    "its end can lie 30 m behind its start": PARTICIPANTS.replace("1180.0", "20.0"),
+    "the ego drives along its route, it has no heading": PARTICIPANTS.replace(
+        "speed: 20.0\n  other", "speed: 20.0\n    heading: 180\n  other"
+    ),
+    "heading 0 or 180 deg, got 90": PARTICIPANTS + "    heading: 90\n",
+    "must be -180 to 180, got 200": PARTICIPANTS + "    heading: 200\n",
+    "other has an end, so no heading": PARTICIPANTS.replace(
+        "start: {distance: other_at, lane: 1}",
+        "start: {distance: other_at, lane: 1}\n    end: {distance: 900, lane: 1}\n    heading: 180",
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_is_refused(made, message):
+    with pytest.raises(ScenarioError, match=message):
+        made(REFUSED[message])
+
+
+EVENTS = {
+    "keeps a distance or a time, one of them": "keep_distance: {to: ego}",
+    "must have one of speed, keep_distance and arrive": (
+        "speed: 3.0\n    keep_distance: {to: ego, time: 2}"
+    ),
+    "keep_distance is to another participant": "keep_distance: {to: other, time: 2}",
+    "unknown participant 'egg'": "keep_distance: {to: egg, time: 2}",
+    r"must be -4 to 4, beyond that it changes lane, got 6": "lane_offset: {offset: 6}",
+    r"acceleration \[m/s²\] must be greater than 0": "lane_offset: {offset: 1, acceleration: 0}",
+    "must have an action: speed, lane_change, lane_offset": "",
+}
+
+
+@pytest.mark.parametrize("message", EVENTS)
+def test_what_cannot_happen_is_refused(made, message):
+    event = f"""
+  acts:
+    participant: other
+    {EVENTS[message]}
+    when:
+      - {{kind: time, value: 1.0}}
+"""
+    with pytest.raises(ScenarioError, match=message):
+        made(events=event)
