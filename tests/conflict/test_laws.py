@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridgegen.conflict import quantities
@@ -125,10 +125,15 @@ MIRRORED = np.array(
 
 
 @given(SEEDS, st.lists(st.booleans(), min_size=4, max_size=4))
+@example(1211, [False, True, False, False])
 @settings(max_examples=60, deadline=None)
 def test_driving_backwards_is_driving_ahead_with_the_body_turned_round(seed, turned):
-    """Only the zones have other names: what was the front is the rear."""
+    """Only the zones have other names: what was the front is the rear.
+
+    Who stands drives neither way, and is another one when turned round; here, none does.
+    """
     ahead = drive_around(seed)
+    ahead = replace(ahead, v=np.where(ahead.v == 0.0, 0.01, ahead.v))
     back = np.array(turned)
     sign = np.where(back, -1.0, 1.0)
     box = ahead.box.copy()

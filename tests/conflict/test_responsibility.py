@@ -8,9 +8,9 @@ import pytest
 from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
 from bridgegen.conflict.harm import decisive
 from bridgegen.conflict.types import RULES, Responsible, Rule
+from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
 from bridgegen.ego.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
 from bridgegen.ego.preventable import avoids_cut_in
-from bridgegen.ego.right_of_way import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING
 
 DT = 0.05
 RIGHT_ANGLE = np.pi / 2
@@ -377,6 +377,15 @@ def test_who_runs_a_red_light_is_responsible(track, meeting):
     assert verdict(red) == (BV, Rule.RED_LIGHT)
     found = analyse(red)
     assert found.decided[0, 1] == 37  # its front, 2 m ahead, passes the line after 18.2 m
+
+
+def test_all_give_way_to_an_emergency_vehicle(track, meeting):
+    """StVO § 38: though it crosses at red; with due regard, so not where only it could brake."""
+    plain = crossing(track, meeting, -SIREN)
+    red = with_line(plain, 0.0, -9.8, RIGHT_ANGLE, 1, RED)
+    assert verdict(plain) == verdict(red) == (EGO, Rule.EMERGENCY_VEHICLE)
+    ours = crossing(track, meeting, SIREN)
+    assert verdict(ours) == (BV, Rule.EMERGENCY_VEHICLE)
 
 
 def test_a_red_light_far_behind_does_not_decide(track, meeting):

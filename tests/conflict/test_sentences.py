@@ -5,8 +5,8 @@ import pytest
 
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.sentences import sentence
+from bridgegen.ego._claims import BY_SIGNS
 from bridgegen.ego.kinds import CAR, PEDESTRIAN
-from bridgegen.ego.right_of_way import BY_SIGNS
 
 RIGHT_ANGLE = np.pi / 2
 

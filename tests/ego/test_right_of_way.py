@@ -6,12 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
 from bridgegen.ego.right_of_way import (
-    BY_MAP,
-    BY_SIGNS,
-    FROM_THE_RIGHT,
     NO_RULE,
-    ONCOMING,
     THEY_WAIT,
     WE_WAIT,
     claim,
@@ -170,9 +167,18 @@ def test_a_claim_is_antisymmetric_and_names_its_rule(
     model, (own, other) = routes(crossing(tmp_path, leg, to, **signs))
     assert claim(model, own, other) == expected
     assert claim(model, other, own) == -expected
-    assert claims(model, [own, None, other]).tolist() == [
+    assert claims(model, [own, None, other], [0, 0, 0]).tolist() == [
         [0, 0, expected], [0, 0, 0], [-expected, 0, 0]
     ]  # fmt: skip
+
+
+def test_all_give_way_to_a_siren_wherever_they_are(tmp_path: Path) -> None:
+    model, (own, other) = routes(crossing(tmp_path, "B", "D"))
+    assert claims(model, [own, None, other], [0, 0, 1]).tolist() == [
+        [0, 0, -SIREN], [0, 0, -SIREN], [SIREN, SIREN, 0]
+    ]  # fmt: skip
+    both = claims(model, [own, None, other], [0, 1, 1])
+    assert both[1, 2] == both[2, 1] == 0
 
 
 def test_a_priority_of_the_map_overrules_the_rule_of_the_right(tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ from bridgegen.conflict._codes import (
     DECIDED,
     EGO,
     EGO_STANDING,
+    EMERGENCY_VEHICLE,
     HEAD_ON,
     INTO_THE_SIDE,
     JUNCTION_OCCUPIED,
@@ -78,6 +79,7 @@ from bridgegen.conflict._limits import (
     TURN_TIME,
 )
 from bridgegen.conflict._type_kernels import strikes_with_front, turns
+from bridgegen.ego._claims import SIREN
 from bridgegen.ego._kind_tables import IS_ANIMAL, IS_CYCLE, IS_PEDESTRIAN, IS_VULNERABLE
 
 
@@ -130,6 +132,8 @@ def decide(
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
         last = ahead_until(scene, k, real[TTC]) if scene.near else k
         mine, its = ran_red(scene, 0, k, last), ran_red(scene, e, k, last)
+        if scene.claims[e] == -SIREN:
+            its = -1  # with due regard, it may
         if mine >= 0 or its >= 0:
             whole[DECIDED] = min(max(mine, its), k)
             if mine >= 0 and its >= 0:
@@ -153,7 +157,7 @@ def decide(
 @kernel
 def rule_of(claim):
     """Return the rule of a claim that is not 0."""
-    return MAP_PRIORITY + abs(claim) - 1
+    return EMERGENCY_VEHICLE if abs(claim) == SIREN else MAP_PRIORITY + abs(claim) - 1
 
 
 @kernel

@@ -128,6 +128,7 @@ class Rule(IntEnum):
     ASSUMED_RIGHT_BEFORE_LEFT = _codes.ASSUMED_RIGHT_BEFORE_LEFT
     UNSAFE_START = _codes.UNSAFE_START
     BRAKED_HARD_AHEAD = _codes.BRAKED_HARD_AHEAD
+    EMERGENCY_VEHICLE = _codes.EMERGENCY_VEHICLE
 
     @property
     def label(self) -> str:
@@ -216,6 +217,10 @@ RULES = {
     Rule.UNSAFE_START: (
         "from the start on, or from where a body appears, there was less time than it takes",
         f"UN R157, Annex 3: reaction {CAREFUL_REACTION:g} s, {CAREFUL_BRAKING_G:g} g",
+    ),
+    Rule.EMERGENCY_VEHICLE: (
+        "did not give way to an emergency vehicle with blue light and siren",
+        "Vienna Convention, Art. 34 (1); StVO § 38 (1)",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",

@@ -1,7 +1,8 @@
 """Right of way where two routes cross: by signs and the map, else priority to the right.
 
 Sources: StVO § 8 (right of way: signs, else priority to the right), § 9 (a left turn waits for
-oncoming traffic), § 10; sign numbers of the VzKat, which our own maps use, too.
+oncoming traffic), § 10, § 38 (blue light and siren; Vienna Convention, Art. 34); sign numbers of
+the VzKat, which our own maps use, too.
 """
 
 import math
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.arrays import Int
+from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive, Road
@@ -23,10 +25,6 @@ PRIORITY = ("301", "306")
 """Signs: right of way at this junction, priority road."""
 
 THEY_WAIT, NO_RULE, WE_WAIT = 1, 0, -1
-
-BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING = 1, 2, 3, 4
-"""Reason of a claim: the junction's priorities, signs, priority to the right, or the rule that
-a left turn waits for oncoming traffic."""
 
 AT_JUNCTION = 40.0
 """A sign within this distance before a junction [m] is for that junction."""
@@ -74,19 +72,22 @@ def claim(model: OpenDrive, own: Route, other: Route) -> int:
     return 0
 
 
-def claims(model: OpenDrive, routes: Sequence[Route | None]) -> Int:
+def claims(model: OpenDrive, routes: Sequence[Route | None], sirens: Sequence[int] | Int) -> Int:
     """Return the `claim` of each of E routes against each other, ``(E, E)`` int64.
 
     Args:
         model: the road network.
         routes: of the participants; None off the lanes, which claims nothing.
+        sirens: ``(E,)``: 1 of emergency vehicles on a call: all others give way to them, wherever.
     """
     found = np.zeros((len(routes), len(routes)), dtype=np.int64)
     for a, own in enumerate(routes):
         for b, other in enumerate(routes[:a]):
-            if own is not None and other is not None:
+            if sirens[a] != sirens[b]:
+                found[a, b] = SIREN if sirens[a] else -SIREN
+            elif own is not None and other is not None:
                 found[a, b] = claim(model, own, other)
-                found[b, a] = -found[a, b]
+            found[b, a] = -found[a, b]
     return found
 
 

@@ -13,7 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
-from bridgegen.ego.right_of_way import STOP_SIGN, claims, crossings, governs, right_of_way
+from bridgegen.ego.right_of_way import (
+    NO_RULE,
+    STOP_SIGN,
+    WE_WAIT,
+    claims,
+    crossings,
+    governs,
+    right_of_way,
+)
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
@@ -82,6 +90,7 @@ def survey(
     lights: Sequence[str],
     starts: Sequence[Sequence[tuple[Stretch, float]]],
     bodies: Float,
+    sirens: Int,
 ) -> Scene:
     """Return what the driver knows of one road network, P = 1.
 
@@ -93,6 +102,7 @@ def survey(
         lights: ids of the traffic lights that change.
         starts: per entity the lanes that it starts or changes to, and where [m along the road].
         bodies: ``(E, ≥2)``: length and width [m].
+        sirens: ``(E,)``: 1 of those to which all give way.
     """
     from bridgegen.ego._yielding_kernels import ZONE, find_zone  # numba is slow to import
 
@@ -122,7 +132,8 @@ def survey(
                 tables[-1], len(tables[-1]), way_step, bodies[e], zone,
             )  # fmt: skip
             zones.append(zone)
-            ranks.append(right_of_way(model, route, way) if route is not None else 0)
+            rank = right_of_way(model, route, way) if route is not None else NO_RULE
+            ranks.append(WE_WAIT if sirens[e] else rank)
         first.append(len(tables))
     ways = np.zeros((len(tables), max(map(len, tables), default=0), 6))
     for i, table in enumerate(tables):
@@ -141,12 +152,16 @@ def survey(
         np.array(
             [
                 [
-                    0 if one is None or route is None else right_of_way(model, route, one)
-                    for one in routes
+                    WE_WAIT
+                    if sirens[e]
+                    else NO_RULE
+                    if one is None or route is None
+                    else right_of_way(model, route, one)
+                    for e, one in enumerate(routes)
                 ]
             ]
         ),
-        claims(model, routes)[None],
+        claims(model, routes, sirens)[None],
     )
 
 

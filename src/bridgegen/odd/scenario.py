@@ -186,7 +186,8 @@ class LogicalScenario(SearchedScenario):
         drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
         headings = {one.name: one.heading for one in self.participants if one.heading != 0.0}
         lifted = {one.name: one.exceeds_limit for one in self.participants if one.exceeds_limit}
-        more = "".join(repr(one) for one in (drivers, headings, lifted) if one)
+        sirens = [one.name for one in self.participants if one.siren]
+        more = "".join(repr(one) for one in (drivers, headings, lifted, sirens) if one)
         return sha256((content + more).encode()).hexdigest()
 
     @property

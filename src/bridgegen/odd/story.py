@@ -63,6 +63,7 @@ class Participant:
         driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
         heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
             drives against the traffic.
+        siren: whether it is an emergency vehicle on a call, to which all give way.
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
     """
 
@@ -75,6 +76,7 @@ class Participant:
     driver: str = field(default="", repr=False, kw_only=True)
     heading: Quantity = field(default=0.0, repr=False, kw_only=True)
     exceeds_limit: str = field(default="", repr=False, kw_only=True)
+    siren: bool = field(default=False, repr=False, kw_only=True)
 
     @property
     def conduct(self) -> Conduct:

@@ -62,6 +62,8 @@ class ParticipantSection(ShapedSection):
     """Turned from its lane's direction [deg], left positive; at 180 it faces the traffic."""
     exceeds_limit: Annotated[str, Field(strict=True, min_length=1, max_length=200)] | None = None
     """Why it may be faster than road and weather allow: an emergency vehicle on a call, say."""
+    siren: Annotated[bool, Field(strict=True)] = False
+    """Of an emergency vehicle: blue light and siren are on, and all give way to it."""
     driver: Word | None = None
     """attentive or scripted, instead of ``others``; not of the ego."""
 

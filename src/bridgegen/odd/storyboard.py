@@ -97,6 +97,12 @@ class Storyboard:
                 self._report(f"a participant's name is a word, got '{name}'", path)
             self._check(given.speed, "m/s", (*path, "speed"))
             self._check_heading(name, given, path)
+            if given.siren and (given.type != "emergency" or name == EGO):
+                self._report(
+                    f"a siren is for emergency vehicles other than the ego, {name} is a "
+                    f"{given.type}",
+                    (*path, "siren"),
+                )
             if given.exceeds_limit and PARTICIPANTS[given.type].seen_as.conduct != "vehicle":
                 self._report(
                     f"a speed limit is for vehicles, {name} has none to exceed",
@@ -170,7 +176,7 @@ class Storyboard:
             self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
         return Participant(
             name, given.type, start, end, given.speed, driver=given.driver or "",
-            heading=given.heading, exceeds_limit=given.exceeds_limit or "",
+            heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
         )  # fmt: skip
 
     def _check_heading(self, name: str, given: ParticipantSection, path: Path) -> None:

@@ -98,16 +98,23 @@ def _pedestrians() -> Iterator[Rule]:
 def _vehicles() -> Iterator[Rule]:
     source = f"{_PAPER} (vehicles on drivable lanes only)"
     vehicle = f"{_PARTICIPANT} {is_a('?value', 'Vehicle')}"
+    leaves = (
+        "$this bg:has_event ?event . ?event bg:has_who ?value ; bg:has_what ?change . "
+        f"{is_a('?change', 'LaneChangeAction')} "
+        "FILTER NOT EXISTS { ?value bg:has_init_action/bg:has_target_speed ?at_once . "
+        "FILTER(?at_once > 0) }"
+    )
     moves = f"?value {_DOES}/bg:has_target_speed ?speed . FILTER(?speed > 0)"
     yield about(
         "on-drivable-lane", "Scenario", "on_lane",
-        "must be a lane to drive on (or a shoulder to stand on), got {?got}",
+        "must be a lane to drive on (or a shoulder to stand on, or to pull out from), got {?got}",
         "Vehicles keep to the lanes that are made for them; a shoulder is for stopping.", source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) WHERE {{ {vehicle} "
         f"?value {_PLACES}/bg:on_lane ?lane . "
         f"FILTER NOT EXISTS {{ {is_a('?lane', 'Lane')} }} "
-        f"OPTIONAL {{ {moves} }} "
-        f"FILTER(BOUND(?speed) || NOT EXISTS {{ {is_a('?lane', 'Shoulder')} }}) }}",
+        f"OPTIONAL {{ {moves} }} OPTIONAL {{ {leaves} }} "
+        "FILTER((BOUND(?speed) && !BOUND(?change)) || "
+        f"NOT EXISTS {{ {is_a('?lane', 'Shoulder')} }}) }}",
         ("Vehicle",),
     )  # fmt: skip
     yield about(

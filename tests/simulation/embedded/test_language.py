@@ -223,6 +223,15 @@ def test_a_gap_a_contact_and_a_beginning(made):
     there_and_back(pipeline)
 
 
+def test_a_siren_is_in_the_files(made):
+    text = PARTICIPANTS.replace("other:\n    type: car", "other:\n    type: emergency")
+    pipeline = made(text.replace("other_at, lane: 1}", "other_at, lane: 1}\n    siren: true"))
+    assert pipeline.simulator.embedded.program.sirens.tolist() == [0, 1]
+    there_and_back(pipeline)
+    with pytest.raises(ScenarioError, match="a siren is for emergency vehicles"):
+        made(PARTICIPANTS + "    siren: true\n")
+
+
 def test_a_reason_lifts_the_limit_and_nothing_else(made):
     text = PARTICIPANTS.replace(
         "start: {distance: other_at, lane: 1}\n    speed: 20.0",

@@ -39,6 +39,9 @@ SEVERITY = "severity"
 KIND = "participant_kind"
 """Property of a body: its kind, where its category is only the nearest that the standard has."""
 
+SIREN = "siren"
+"""Property of a vehicle: "on" of an emergency vehicle with blue light and siren."""
+
 DRIVER = "driver"
 """Property of a controller: the driver's name."""
 

@@ -190,6 +190,7 @@ class Program:
         bodies: ``(E, 8)``: length, width, centre ahead of the reference point [m], maximum speed
             [m/s], acceleration and deceleration [m/s²], curvature at full lock [1/m], height [m].
         kinds: ``(E,)``: what they are, see `bridgegen.ego.kinds`.
+        sirens: ``(E,)``: 1 of an emergency vehicle on a call, to which all give way.
         objects: ``(E,)``: OpenSCENARIO's ObjectType of each: vehicle, pedestrian, miscellaneous.
         parameters: the numeric parameters with their declared values.
         slots: S distinct values.
@@ -268,6 +269,7 @@ class Program:
     names: tuple[str, ...]
     bodies: Float
     kinds: Int
+    sirens: Int
     objects: Int
     parameters: Mapping[str, float]
     slots: tuple[Value, ...]

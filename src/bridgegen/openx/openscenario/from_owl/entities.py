@@ -6,13 +6,15 @@ from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, KIND
+from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, KIND, SIREN
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.participants import PARTICIPANTS, ParticipantKind
 
 MAX_SPEED = "max_speed"
-EXCEEDS = "exceeds_limit"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
+
+LIFTED = {"has_reason_to_exceed": "exceeds_limit", "has_siren": SIREN}
+"""Properties of individuals of vehicles, and what they are called in files."""
 
 _ESMINI_CONTROLLER = "ExternalController"
 # An axle as on a mid-size saloon; the ontology has no more of it than the wheelbase.
@@ -85,9 +87,9 @@ def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
 
 
 def _lifted(individuals: Individuals, node: Subject) -> tuple[osc.Property, ...]:
-    """Return the property that says why a vehicle may exceed the speed limit."""
-    reason = individuals.optional_text(node, "has_reason_to_exceed")
-    return () if reason is None else (osc.Property(EXCEEDS, reason),)
+    """Return the properties that say which rules of the traffic are not for a vehicle."""
+    found = ((name, individuals.optional_text(node, key)) for key, name in LIFTED.items())
+    return tuple(osc.Property(name, text) for name, text in found if text is not None)
 
 
 def _pedestrian(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Pedestrian:

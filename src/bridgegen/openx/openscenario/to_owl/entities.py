@@ -4,7 +4,7 @@ import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
-from bridgegen.openx.openscenario.from_owl.entities import EXCEEDS, MAX_SPEED
+from bridgegen.openx.openscenario.from_owl.entities import LIFTED, MAX_SPEED
 from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.to_owl.actions import (
     add_route,
@@ -120,9 +120,9 @@ def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: st
     node = builder.node(name, cls)
     builder.put(node, "has_name", name)
     if isinstance(body, osc.Vehicle) and body.properties is not None:
-        reason = body.properties.get(EXCEEDS)
-        if reason is not None:
-            builder.put(node, "has_reason_to_exceed", builder.text(reason))
+        for key, name in LIFTED.items():
+            if (said := body.properties.get(name)) is not None:
+                builder.put(node, key, builder.text(said))
     for key, value in values.items():
         builder.check(key, value, body)
         builder.put(node, key, value)

@@ -4,6 +4,7 @@ import math
 
 from bridgegen.ego.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import SIREN
 from bridgegen.openx.openscenario.participant_kinds import object_class_of
 from bridgegen.simulation.embedded.compiler.tables import Tables
 
@@ -15,6 +16,13 @@ _STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
 def kind(body: Body) -> int:
     """Return what an entity is, see `bridgegen.ego.kinds`."""
     return NAMES.index(object_class_of(body).name)
+
+
+def has_siren(body: Body) -> bool:
+    """Return whether a body is an emergency vehicle whose blue light and siren are on."""
+    if not isinstance(body, osc.Vehicle) or body.properties is None:
+        return False
+    return str(body.properties.get(SIREN)).lower() in ("on", "true", "1")
 
 
 def measures(tables: Tables, body: Body) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded.compiler import declared
 from bridgegen.simulation.embedded.compiler.actions import Actions
-from bridgegen.simulation.embedded.compiler.bodies import Body, kind, measures
+from bridgegen.simulation.embedded.compiler.bodies import Body, has_siren, kind, measures
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
 from bridgegen.simulation.embedded.compiler.nodes import nodes
@@ -176,6 +176,7 @@ class _Compiler:
             bodies=bodies,
             objects=np.array([self.tables.type_of(one) for one in objects], dtype=np.int64),
             kinds=np.array([kind(one) for one in objects], dtype=np.int64),
+            sirens=np.array([has_siren(one) for one in objects], dtype=np.int64),
             parameters=self.tables.parameters,
             slots=self.tables.slots,
             init=np.array(self.start.speeds, dtype=np.int64),

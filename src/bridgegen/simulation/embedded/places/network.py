@@ -298,7 +298,10 @@ def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
                 for lane in beside(road, section, step.lane_id)
             ]
     path = ways.paths[0]
-    return survey(model, ways.routes, path.table, path.step, program.lights, starts, program.bodies)
+    return survey(
+        model, ways.routes, path.table, path.step, program.lights, starts, program.bodies,
+        program.sirens,
+    )  # fmt: skip
 
 
 def _numbers(rows: Sequence[Sequence[int]]) -> Int:

@@ -1,0 +1,5 @@
+"""Why one of two participants goes first: the reasons of a claim (`right_of_way.claim`)."""
+
+BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN = 1, 2, 3, 4, 5
+"""The junction's priorities, signs, priority to the right, the rule that a left turn waits for
+oncoming traffic, or that all give way to an emergency vehicle on a call."""
