@@ -174,6 +174,28 @@ class Pipeline:
         Yields:
             Their numbers in X, ascending; and the pipeline, this one where one serves every row.
         """
+        if self.scenario.checks and not self._refused:
+            table = {name: X[:, i] for i, name in enumerate(self.space.names)}
+            wrong = np.zeros(len(X), np.bool_)
+            for rule, rows in self.scenario.broken(table).items():
+                if (fresh := rows & ~wrong).any():
+                    yield np.flatnonzero(fresh), self._refusing(rule)
+                wrong |= rows
+            if wrong.any():
+                right = np.flatnonzero(~wrong)
+                if right.size:
+                    yield from ((right[at], one) for at, one in self._by_key(X[right]))
+                return
+        yield from self._by_key(X)
+
+    def _refusing(self, rule: str) -> "Pipeline":
+        """Return a pipeline in which every row fails, for it breaks a rule."""
+        one = copy(self)
+        one._variants, one._refused = replace(self._variants, names=()), rule
+        return one
+
+    def _by_key(self, X: Float) -> "Iterator[tuple[Int, Pipeline]]":
+        """Yield rows that keep all checks, see ``by_variant``."""
         names = self._variants.names
         if not (names and len(X)):
             yield np.arange(len(X)), self

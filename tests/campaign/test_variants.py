@@ -217,6 +217,43 @@ def test_an_end_that_the_constraint_excludes_is_left_out_with_a_note(tmp_path):
     assert any("without that end" in one for one in said)
 
 
+LIMIT = (
+    '<ConstraintGroup><ValueConstraint rule="lessOrEqual" value="${$EgoSpeed - 8}"/>'
+    "</ConstraintGroup></ParameterDeclaration>"
+)
+
+
+@pytest.mark.parametrize(
+    ("speed", "braking"),
+    [
+        ('<DistributionSet><Element value="10"/><Element value="16"/></DistributionSet>',
+         '<DistributionSet><Element value="1"/><Element value="7"/></DistributionSet>'),
+        (f'<DistributionRange stepWidth="2">{limits(6, 20)}</DistributionRange>',
+         f'<DistributionRange stepWidth="1">{limits(1, 8)}</DistributionRange>'),
+    ],
+)  # fmt: skip
+def test_a_constraint_that_a_row_breaks_costs_that_row(tmp_path, speed, braking):
+    """Deceleration <= EgoSpeed - 8: what is drawn from sets does not heed it."""
+    whole = text().replace(
+        'name="Deceleration" parameterType="double" value="6"/>',
+        f'name="Deceleration" parameterType="double" value="6">{LIMIT}',
+    )
+    write(tmp_path, deterministic(GAPS))
+    body = deterministic(("EgoSpeed", speed), ("Deceleration", braking))
+    scenario = load_file_scenario(*write_pair(tmp_path, body, text=whole))
+    assert any("Deceleration <= " in one for one in scenario.notes), scenario.notes
+    made = Pipeline(scenario, scenario.space())
+    made.choose_objective()
+    X = sample(made, 60)
+    found = made.evaluate(X)
+    ego, brakes = (X[:, made.space.index(name)] for name in ("EgoSpeed", "Deceleration"))
+    wrong = brakes > ego - 8.0
+    assert 5 < wrong.sum() < 55
+    assert found.status.tolist() == np.where(wrong, 9, 0).tolist()
+    assert all("must hold" in found.messages[i] for i in np.flatnonzero(wrong).tolist())
+    assert (made.try_all(X).ok == ~wrong).all()
+
+
 def test_a_playback_shows_the_row_s_own_body(both):
     shown = nominal_playback(both, "nominal")
     (lead,) = (one for one in shown.entities if one.name == "Lead")

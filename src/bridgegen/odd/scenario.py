@@ -5,8 +5,12 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from typing import Literal
 
+import numpy as np
+
+from bridgegen.arrays import Bool, Float
 from bridgegen.odd.constraints import Constraints
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.odd.kinds import slack
+from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.odd.space import SearchSpace
 from bridgegen.odd.story import Adversary, EventSpec, Participant, Story
@@ -86,6 +90,8 @@ class SearchedScenario:
         driver: default driver of the ego; None leaves it to a file.
         budget: evaluations, likewise.
         seed: of the search, likewise.
+        checks: limits that a row may break, for they leave some combinations no value, or do not
+            shape how a value is drawn: it is no scenario then.
         notes: what is searched otherwise than its files may lead one to expect.
     """
 
@@ -101,6 +107,7 @@ class SearchedScenario:
     driver: str | None
     budget: int = field(default=1000, kw_only=True)
     seed: int = field(default=0, kw_only=True)
+    checks: tuple[Bound, ...] = field(default=(), kw_only=True, compare=False, repr=False)
     notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
 
     @property
@@ -117,6 +124,26 @@ class SearchedScenario:
     def decisions(self) -> tuple[str, ...]:
         """The parameters that are an adversary's decisions."""
         return ()
+
+    def broken(self, table: Mapping[str, Float]) -> dict[str, Bool]:
+        """Return which rows break a check, ``(N,)`` by the rule; a rule that all keep is left out.
+
+        Args:
+            table: ``(N,)`` per parameter and derived quantity.
+        """
+        found: dict[str, Bool] = {}
+        for check in self.checks:
+            value = table[check.target]
+            kept = np.ones(len(value), np.bool_)
+            if check.lo is not None:
+                limit = np.asarray(check.lo.evaluate(table))
+                kept &= value >= limit - slack(limit)
+            if check.hi is not None:
+                limit = np.asarray(check.hi.evaluate(table))
+                kept &= value <= limit + slack(limit)
+            if not kept.all():
+                found[f"{check} must hold{at(check.place)}"] = ~kept
+        return found
 
     def space(
         self, axes: Iterable[str] | None = None, fixed: Mapping[str, float | str] | None = None

@@ -12,10 +12,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError
+from bridgegen.errors import FileFormatError, InputError, ScenarioError
+from bridgegen.odd.constraints import Constraints
 from bridgegen.odd.objectives import HARM
-from bridgegen.odd.parameters import Axis
+from bridgegen.odd.parameters import Axis, Bound
 from bridgegen.odd.scenario import SearchedScenario, content_of
+from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -28,7 +30,7 @@ from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.fixed_texts import fixed_texts
 from bridgegen.openx.openscenario.from_owl.scenario import EGO
 from bridgegen.openx.openscenario.participant_kinds import kind_of
-from bridgegen.openx.openscenario.ranges import ranges_of
+from bridgegen.openx.openscenario.ranges import FileParameter, Ranges, ranges_of
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
@@ -137,6 +139,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         codes = zip(ranges.variants, combination, strict=True)
         chosen = {name: ranges.texts[name][int(code)] for name, code in codes}
         variants[combination] = _variant(path, texts | chosen, chosen, known)
+    bounds, checks = _kept(ranges)
     varied = {one.axis for one in ranges.parameters.values() if one.low < one.high}
     description = str(storyboard.file_header.description).strip()
     return FileScenario(
@@ -146,7 +149,8 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         place=str(distribution or path),
         axes=tuple(axis for axis in Axis if axis in varied),
         parameters=ranges.parameters,
-        bounds=ranges.bounds,
+        bounds=bounds,
+        checks=checks,
         derived=ranges.derived,
         objective=HARM,
         driver=None,
@@ -155,10 +159,32 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         roads=roads,
         definition=definition,
         texts=ranges.texts,
-        notes=ranges.notes,
+        notes=(
+            *ranges.notes,
+            *(f"{path}: {one}, or an evaluation fails ({one.place})" for one in checks),
+        ),
         variant_names=ranges.variants,
         variants=variants,
     )
+
+
+def _kept(ranges: Ranges) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:
+    """Return the limits that shape the search space, and those that a row may break.
+
+    What a distribution gives does not heed a limit; and limits may leave some combinations nothing.
+    """
+    parameters = ranges.parameters
+    even = {
+        name
+        for name, one in parameters.items()
+        if not isinstance(one, FileParameter) or one.distribution is None
+    }
+    shape = tuple(one for one in ranges.bounds if one.target in even)
+    try:
+        SearchSpace(Constraints(parameters, shape, ranges.derived, tuple(Axis)))
+    except ScenarioError:
+        shape = ()
+    return shape, tuple(one for one in ranges.bounds if one not in shape)
 
 
 def _roads_of(path: Path, storyboard: osc.OpenScenario, known: dict[Path, RoadFile]) -> RoadFile:
