@@ -17,6 +17,7 @@ from bridgegen.errors import FileFormatError, UnknownNameError
 from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
@@ -64,6 +65,7 @@ def simulate_file(
     ego: str | None = None,
     ideal: Iterable[str] | None = None,
     others: str | None = None,
+    empty_trigger: str = NEVER,
     time_limit: float | None = None,
     metrics: Sequence[str] | None = None,
     also: Sequence[str] = (),
@@ -80,6 +82,7 @@ def simulate_file(
             with another ``ego``.
         others: "attentive" or "scripted": who drives the other participants; what their
             controllers say by default.
+        empty_trigger: when acts and events start whose StartTrigger is empty: "never", or "now".
         time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.
         also: names of metrics that must be among them.
@@ -93,7 +96,7 @@ def simulate_file(
             is not where it should be.
         FileFormatError: a file is missing, malformed or inconsistent.
         UnsupportedError: an element that the simulator cannot run, by name and line.
-        UnknownNameError: no such driver, stage or metric.
+        UnknownNameError: no such driver, stage, metric or reading of empty triggers.
     """
     path = Path(path)
     if path.suffix.lower() in (".yaml", ".yml"):
@@ -106,6 +109,7 @@ def simulate_file(
         raise UnknownNameError("driver of other participants", others, egos.OTHERS)
     warnings: list[str] = []
     scenario = read_scenario(path, skipped=skipped, warnings=warnings)
+    scenario = read_empty_triggers(scenario, empty_trigger)
     roads = roads_of(scenario, path)
     problems = openscenario_validate.problems(scenario, roads)
     if problems:

@@ -96,7 +96,9 @@ def run_search(given: SearchArguments) -> Run:
         Interrupted: Ctrl-C; likewise.
     """
     callbacks = given.callbacks or SearchCallbacks()
-    catalogue = driven_by(load(given.scenario, given.distribution), given.others)
+    catalogue = driven_by(
+        load(given.scenario, given.distribution, given.empty_trigger), given.others
+    )
     budget = catalogue.budget if given.budget is None else given.budget
     seed = catalogue.seed if given.seed is None else given.seed
     if problems := range_problems(replace(given, budget=budget, seed=seed)):

@@ -111,7 +111,8 @@ def searched(run: Run) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
         InputError: the scenario or the map is missing.
     """
     settings, folder = run.settings, run.folder
-    logical = driven_by(load(settings.scenario, settings.distribution), settings.others)
+    read = load(settings.scenario, settings.distribution, settings.empty_trigger)
+    logical = driven_by(read, settings.others)
     if logical.fingerprint != settings.fingerprint:
         what = " or its distribution" if settings.distribution else ""
         raise StorageError(

@@ -7,7 +7,7 @@ from bridgegen.errors import InputError
 from bridgegen.odd import reader
 from bridgegen.odd.others import ATTENTIVE, require, with_others
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
-from bridgegen.openx.file_scenario import FileScenario, load_file_scenario
+from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with_triggers
 from bridgegen.openx.file_scenario import with_others as drive_file_by
 from bridgegen.openx.openscenario.parameters import values
 from bridgegen.simulation.embedded.compiler import compile_storyboard
@@ -21,18 +21,30 @@ def is_file(scenario: str | Path) -> bool:
     return Path(scenario).suffix.lower() in (".yaml", ".yml", STORYBOARD)
 
 
-def load(scenario: str | Path, distribution: str | Path | None = None) -> SearchedScenario:
+def load(
+    scenario: str | Path,
+    distribution: str | Path | None = None,
+    empty_trigger: str | None = None,
+) -> SearchedScenario:
     """Read a logical scenario.
 
     Args:
         scenario: a name of the catalogue, or the path of a YAML file or of an OpenSCENARIO file.
         distribution: of the parameters of an OpenSCENARIO file.
+        empty_trigger: when what has an empty StartTrigger starts there, "never" or "now".
 
     Raises:
-        InputError: a distribution for another kind of scenario; or as the readers say.
+        UnknownNameError: no such reading of empty triggers.
+        InputError: a distribution, or that reading, for another kind of scenario; or as the
+            readers say.
     """
     if Path(scenario).suffix.lower() == STORYBOARD:
-        return load_file_scenario(Path(scenario), Path(distribution) if distribution else None)
+        found = load_file_scenario(Path(scenario), Path(distribution) if distribution else None)
+        return found if empty_trigger is None else with_triggers(found, empty_trigger)
+    if empty_trigger is not None:
+        raise InputError(
+            f"empty triggers are those of an OpenSCENARIO file ({STORYBOARD}), got {scenario}"
+        )
     if distribution is not None:
         raise InputError(
             f"a distribution is for the parameters of an OpenSCENARIO file ({STORYBOARD}), got "

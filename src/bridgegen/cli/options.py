@@ -33,6 +33,7 @@ OnlyMetrics = Annotated[
         autocompletion=completing("metric"),
     ),
 ]
+EmptyTrigger = Annotated[str | None, declaration("empty_trigger")]
 Others = Annotated[str | None, declaration("others", shown="the file's")]
 Simulator = Annotated[
     str | None,

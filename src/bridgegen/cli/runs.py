@@ -225,6 +225,7 @@ def simulate(
     ] = None,
     ideal: common.Ideal = None,
     others: common.Others = None,
+    empty_trigger: common.EmptyTrigger = None,
     time_limit: common.TimeLimit = None,
     dt: Annotated[
         float | None,
@@ -264,6 +265,7 @@ def simulate(
         ego=ego,
         ideal=stages,
         others=others,
+        empty_trigger=empty_trigger or "never",
         time_limit=time_limit,
         metrics=read_names(metrics),
         also=criteria.metrics,

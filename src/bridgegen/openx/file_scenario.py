@@ -27,6 +27,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, validate
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.empty_triggers import read_empty_triggers
 from bridgegen.openx.openscenario.fixed_texts import fixed_texts
 from bridgegen.openx.openscenario.from_owl.scenario import EGO
 from bridgegen.openx.openscenario.participant_kinds import kind_of
@@ -408,6 +409,22 @@ def with_others(scenario: FileScenario, drivers: Mapping[str, str]) -> FileScena
         storyboard=_with_drivers(scenario.storyboard, found),
         variants={
             key: replace(one, storyboard=_with_drivers(one.storyboard, found))
+            for key, one in scenario.variants.items()
+        },
+    )
+
+
+def with_triggers(scenario: FileScenario, reading: str) -> FileScenario:
+    """Return a scenario file in which empty StartTriggers are read so; see `read_empty_triggers`.
+
+    Raises:
+        UnknownNameError: no such reading.
+    """
+    return replace(
+        scenario,
+        storyboard=read_empty_triggers(scenario.storyboard, reading),
+        variants={
+            key: replace(one, storyboard=read_empty_triggers(one.storyboard, reading))
             for key, one in scenario.variants.items()
         },
     )

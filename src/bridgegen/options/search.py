@@ -230,6 +230,17 @@ class CommonOptions(PipelineOptions):
             group=OF_DRIVER,
         ),
     )
+    empty_trigger: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "When acts and events of a scenario file start whose StartTrigger is empty: never, as "
+            "the standard says, or now, as in esmini.",
+            shown="never",
+            before=None,
+            group=OF_DRIVER,
+        ),
+    )
     others: str | None = field(
         default=None,
         metadata=option(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.empty_triggers import is_empty
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.actions import Actions
 from bridgegen.simulation.embedded.compiler.nodes import Node
@@ -26,6 +27,12 @@ def elements(
         part = node.part
         start = stop = number = -1
         priority, count, first = 0, 1, len(actions.rows)
+        if isinstance(part, osc.Act | osc.Event) and is_empty(part.start_trigger):
+            tables.note(
+                part,
+                f"the {type(part).__name__} {part.name} has an empty StartTrigger, so it never "
+                "starts; esmini starts it at once, and so does --empty-trigger now",
+            )
         if isinstance(part, osc.Act):
             act_start = start = triggers.add(part.start_trigger)
             if part.stop_trigger is not None and part.stop_trigger.condition_groups:
