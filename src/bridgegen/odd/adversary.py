@@ -120,7 +120,7 @@ def _can_be_driven(one: Participant, story: Story) -> bool:
 def _adversary(
     scenario: LogicalScenario, driven: Participant, own: Iterable[EventSpec]
 ) -> Adversary:
-    body = PARTICIPANTS[driven.type].body
+    body = driven.body
     changes = [a.change for event in own for a in event.actions if isinstance(a, SpeedChange)]
     rates = [one.rate for one in changes if one.rate is not None]
     numbers = [f"{k:02d}" for k in range(1, ceil(scenario.duration / PERIOD) + 1)]

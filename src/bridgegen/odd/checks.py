@@ -20,7 +20,7 @@ from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import probes
 from bridgegen.odd.story import Participant
 from bridgegen.odd.units import has_unit, in_unit
-from bridgegen.participants import PARTICIPANTS, Body
+from bridgegen.participants import Body
 from bridgegen.weather import PARAMETERS
 
 MAX_STEPS = 100_000
@@ -194,7 +194,7 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
 
 def _room(one: Participant, columns: Mapping[str, Float]) -> Body:
     """Return the body of a participant; of one that is turned, what holds it however it is."""
-    body = PARTICIPANTS[one.type].body
+    body = one.body
     heading = _metres(one.heading, columns)
     if not heading.any():
         return body
@@ -213,7 +213,7 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
     for one in scenario.participants:
         for value in speeds_of(one, scenario.story):
             speed = _metres(value, columns)
-            allowed = np.asarray(PARTICIPANTS[one.type].body.max_speed)
+            allowed = np.asarray(one.body.max_speed)
             why = f"a {one.type} can do"
             if one.conduct == "vehicle" and value != 0.0 and not one.exceeds_limit:
                 allowed = np.minimum(limit, allowed)

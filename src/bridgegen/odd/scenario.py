@@ -214,7 +214,8 @@ class LogicalScenario(SearchedScenario):
         headings = {one.name: one.heading for one in self.participants if one.heading != 0.0}
         lifted = {one.name: one.exceeds_limit for one in self.participants if one.exceeds_limit}
         sirens = [one.name for one in self.participants if one.siren]
-        more = "".join(repr(one) for one in (drivers, headings, lifted, sirens) if one)
+        bodies = {one.name: one.own_body for one in self.participants if one.own_body}
+        more = "".join(repr(one) for one in (drivers, headings, lifted, sirens, bodies) if one)
         return sha256((content + more).encode()).hexdigest()
 
     @property

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from bridgegen.odd.roads import LETTERS, Quantity
-from bridgegen.participants import PARTICIPANTS, Conduct
+from bridgegen.participants import PARTICIPANTS, Body, Conduct
 
 Way = Literal["in", "out"]
 STRIPS = ("sidewalk", "shoulder")
@@ -63,6 +63,7 @@ class Participant:
         driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
         heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
             drives against the traffic.
+        own_body: its body, where it is not the type's.
         siren: whether it is an emergency vehicle on a call, to which all give way.
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
     """
@@ -77,6 +78,12 @@ class Participant:
     heading: Quantity = field(default=0.0, repr=False, kw_only=True)
     exceeds_limit: str = field(default="", repr=False, kw_only=True)
     siren: bool = field(default=False, repr=False, kw_only=True)
+    own_body: Body | None = field(default=None, repr=False, kw_only=True)
+
+    @property
+    def body(self) -> Body:
+        """How large it is, and what it can do."""
+        return self.own_body or PARTICIPANTS[self.type].body
 
     @property
     def conduct(self) -> Conduct:

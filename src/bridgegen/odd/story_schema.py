@@ -11,6 +11,7 @@ from bridgegen.odd.shape import (
     LaneField,
     Length,
     Metres,
+    MetresPerSecond,
     Number,
     QuantityField,
     ShapedSection,
@@ -45,11 +46,32 @@ class WaypointSection(ShapedSection):
     """To the left of the lane's centre [m], kept while driving."""
 
 
+class BodySection(ShapedSection):
+    """A body of one's own; what is not said is the type's."""
+
+    length: Annotated[Metres | None, Field(gt=0.0, le=60.0)] = None
+    """[m]"""
+    width: Annotated[Metres | None, Field(gt=0.0, le=60.0)] = None
+    """[m]"""
+    height: Annotated[Metres | None, Field(gt=0.0, le=60.0)] = None
+    """[m]"""
+    mass: Annotated[Number | None, Field(gt=0.0, le=1e6)] = None
+    """[kg]"""
+    max_speed: Annotated[MetresPerSecond | None, Field(gt=0.0, le=150.0)] = None
+    """[m/s]"""
+    max_acceleration: Annotated[Number | None, Field(gt=0.0, le=30.0)] = None
+    """[m/s²]"""
+    max_deceleration: Annotated[Number | None, Field(gt=0.0, le=30.0)] = None
+    """[m/s²]"""
+
+
 class ParticipantSection(ShapedSection):
     """One road user; the one that is called ``ego`` is under test."""
 
     type: Annotated[TypeName, AfterValidator(canonical)]
     """What it is."""
+    body: BodySection | None = None
+    """Its dimensions and what it can do, where they are not the type's."""
     start: WaypointSection | None = None
     """Where it stands at time 0."""
     end: WaypointSection | None = None

@@ -1,6 +1,7 @@
 """Participants and events of a scenario file: built, with the rules they must keep."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from bridgegen.odd.others import ATTENTIVE, DRIVERS
 from bridgegen.odd.parameters import nearest
@@ -31,7 +32,7 @@ from bridgegen.odd.story_schema import (
     ParticipantSection,
     WaypointSection,
 )
-from bridgegen.participants import PARTICIPANTS, TYPES
+from bridgegen.participants import PARTICIPANTS, TYPES, Body
 
 EGO = "ego"
 
@@ -97,6 +98,7 @@ class Storyboard:
                 self._report(f"a participant's name is a word, got '{name}'", path)
             self._check(given.speed, "m/s", (*path, "speed"))
             self._check_heading(name, given, path)
+            self._check_body(name, given, path)
             if given.siren and (given.type != "emergency" or name == EGO):
                 self._report(
                     f"a siren is for emergency vehicles other than the ego, {name} is a "
@@ -139,7 +141,10 @@ class Storyboard:
         if given.type == "pedestrian":
             self._places.check_crossing(name, points, path)
         driver = given.driver or ""
-        return Participant(name, given.type, points[0], None, given.speed, points, driver=driver)
+        return Participant(
+            name, given.type, points[0], None, given.speed, points, driver=driver,
+            own_body=_body(given),
+        )  # fmt: skip
 
     def _driver(
         self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
@@ -177,7 +182,15 @@ class Storyboard:
         return Participant(
             name, given.type, start, end, given.speed, driver=given.driver or "",
             heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
+            own_body=_body(given),
         )  # fmt: skip
+
+    def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check a body of one's own, if there is one: what the type's has none of, it has not."""
+        usual = PARTICIPANTS[given.type].body
+        for key, value in given.body.model_dump().items() if given.body else ():
+            if value is not None and getattr(usual, key) == 0.0 and key != "mass":
+                self._report(f"{name}, of type {given.type}, has no {key}", (*path, "body", key))
 
     def _check_heading(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check how a participant is turned from its lane's direction, if it is."""
@@ -464,6 +477,21 @@ class Storyboard:
     def _check_participant(self, name: str, path: Path) -> None:
         if name not in self.known:
             self._report(f"unknown participant '{name}'{nearest(name, self.known)}", path)
+
+
+def _body(given: ParticipantSection) -> Body | None:
+    """Return a body of one's own; the reference point and the axles move with the length."""
+    if given.body is None:
+        return None
+    usual = PARTICIPANTS[given.type].body
+    said = {key: value for key, value in given.body.model_dump().items() if value is not None}
+    longer = said.get("length", usual.length) / usual.length
+    return replace(
+        usual,
+        center_ahead=usual.center_ahead * longer,
+        wheelbase=usual.wheelbase * longer,
+        **said,
+    )
 
 
 def _point(place: Waypoint) -> int:

@@ -24,7 +24,7 @@ from bridgegen.odd.story import (
 from bridgegen.ontology.builder import Builder
 from bridgegen.ontology.roads import lane_name, road_name
 from bridgegen.ontology.site import Site
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.participants import PARTICIPANTS, Body
 from bridgegen.weather import PARTS
 
 WEATHER = tuple(
@@ -75,7 +75,7 @@ def add_participant(
         put(node, "has_siren", "on")
     if one.exceeds_limit:
         put(node, "has_reason_to_exceed", one.exceeds_limit)
-    _add_body(builder, node, one.type)
+    _add_body(builder, node, one.body)
     driver = driver if name == EGO else one.driver
     if name == EGO or driver == ATTENTIVE:
         controller = builder.node(f"{name}_controller", "Controller")
@@ -104,8 +104,7 @@ def add_participant(
     return node
 
 
-def _add_body(builder: Builder, node: ox.NamedNode, kind: str) -> None:
-    body = PARTICIPANTS[kind].body
+def _add_body(builder: Builder, node: ox.NamedNode, body: Body) -> None:
     values = {
         "has_box_length": body.length, "has_box_width": body.width, "has_box_height": body.height,
         "has_center_ahead": body.center_ahead,
@@ -322,7 +321,7 @@ def add_works(builder: Builder, works: RoadWorks, site: Site) -> ox.NamedNode:
         part = builder.node(element, PARTICIPANTS[kind].owl_class)
         put(node, "has_element", part)
         put(part, "has_name", element)
-        _add_body(builder, part, kind)
+        _add_body(builder, part, PARTICIPANTS[kind].body)
         put(part, "has_position", add_position(builder, f"{element}_place", place, site))
     return node
 

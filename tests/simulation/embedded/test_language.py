@@ -247,6 +247,63 @@ def test_a_reason_lifts_the_limit_and_nothing_else(made):
         made(lifted.replace("45.0", "95.0"))
 
 
+BUILDING = """
+  building:
+    type: obstacle
+    body: {length: 20 m, width: 8 m, height: 10 m}
+    start: {distance: 125.0, lane: 2, offset: -9.0}
+  parked:
+    type: motorcycle
+    body: {length: 2.6, max_speed: 200 km/h}
+    start: {distance: 150.0, lane: 2, offset: -1.8}
+    heading: 90
+"""
+
+
+def test_bodies_of_ones_own(made):
+    """A motorcycle 2.6 m long: reference point and axles as far from its middle, in proportion."""
+    pipeline = made(PARTICIPANTS + BUILDING)
+    names = pipeline.simulator.embedded.program.names
+    box = dict(zip(names, pipeline.simulator.embedded.program.box.tolist(), strict=True))
+    assert box["building"] == [20.0, 8.0, 0.0]
+    assert box["parked"] == pytest.approx([2.6, 0.8, 0.7 * 2.6 / 2.2])
+    there_and_back(pipeline)
+    for wrong, said in (
+        (
+            BUILDING.replace("length: 20 m", "max_speed: 5"),
+            "building, of type obstacle, has no max_speed",
+        ),
+        (BUILDING.replace("length: 20 m", "length: 0"), "length.* greater than 0"),
+    ):
+        with pytest.raises(ScenarioError, match=said):
+            made(PARTICIPANTS + wrong)
+
+
+@pytest.mark.parametrize(("height", "hidden"), [("10 m", True), ("30 cm", False)])
+def test_a_building_hides_who_is_behind_it(made, height, hidden):
+    """From (50, −5.6) to (160, −14.6) the line passes x = 115 to 135 at y = −10.9 to −12.6.
+
+    The building's sides are at y = −7.6 and −15.6; after 5 s the ego is beside it.
+    """
+    pipeline = made(
+        PARTICIPANTS
+        + f"""
+  building:
+    type: obstacle
+    body: {{length: 20 m, width: 8 m, height: {height}}}
+    start: {{distance: 125.0, lane: 2, offset: -6.0}}
+  deer:
+    type: animal
+    start: {{distance: 160.0, lane: 2, offset: -9.0}}
+"""
+    )
+    rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
+    seen = rollout.detections[0, rollout.names.index("deer"), :, 0]
+    early, late = seen[1:60], seen[110:160]
+    assert (early[early >= 0] == 0).all() == hidden
+    assert (late > 0).any()
+
+
 REFUSED = {
     "its end can lie 30 m behind its start": PARTICIPANTS.replace("1180.0", "20.0"),
     "the ego drives along its route, it has no heading": PARTICIPANTS.replace(
