@@ -35,7 +35,10 @@ def bus_on_a_shoulder(tmp_path, monkeypatch) -> Path:
     return path
 
 
-MESSAGE = "on_lane of lead (Bus) must be a lane to drive on (or a shoulder to stand on)"
+MESSAGE = (
+    "on_lane of lead (Bus) must be a lane to drive on (or a shoulder to stand on, or to pull out "
+    "from)"
+)
 
 
 def test_validate_says_what_would_be_refused_at_export(bus_on_a_shoulder):

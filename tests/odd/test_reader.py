@@ -216,7 +216,7 @@ def test_files_that_cannot_be_read(tmp_path, write):
 
 
 def test_a_name_without_a_path_is_a_name_of_the_catalogue():
-    with pytest.raises(UnknownNameError, match="unknown scenario 'mine'; known: crossroads-s1, "):
+    with pytest.raises(UnknownNameError, match="unknown scenario 'mine'; known: bus-pulls-out, "):
         load("mine")
 
 

@@ -298,10 +298,11 @@ def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
                 for lane in beside(road, section, step.lane_id)
             ]
     path = ways.paths[0]
+    sirens = np.zeros(len(ways.routes), np.int64)  # others than entities have none
+    sirens[: len(program.sirens)] = program.sirens
     return survey(
-        model, ways.routes, path.table, path.step, program.lights, starts, program.bodies,
-        program.sirens,
-    )  # fmt: skip
+        model, ways.routes, path.table, path.step, program.lights, starts, program.bodies, sirens
+    )
 
 
 def _numbers(rows: Sequence[Sequence[int]]) -> Int:
