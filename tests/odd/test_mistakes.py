@@ -116,8 +116,8 @@ MISTAKES = [
     ),
     (
         "low: 0.5",
-        "low: -0.5",
-        "events.bv_sets_off.speed [m/s] must be at least 0, 'bv_speed' goes down to -0.5",
+        "low: -5.5",
+        "events.bv_sets_off.speed [m/s] must be at least -5, 'bv_speed' goes down to -5.5",
         "speed: bv_speed",
     ),
     (

@@ -79,7 +79,7 @@ class ParticipantSection(ShapedSection):
     path: list[WaypointSection] = []
     """Instead of start and end: straight lines through places; not of a vehicle or an obstacle."""
     speed: Speed = 0.0
-    """At time 0 [m/s]; of the ego also its target."""
+    """At time 0 [m/s]; of the ego also its target; a vehicle reverses below 0."""
     heading: Angle = 0.0
     """Turned from its lane's direction [deg], left positive; at 180 it faces the traffic."""
     exceeds_limit: Annotated[str, Field(strict=True, min_length=1, max_length=200)] | None = None
@@ -190,7 +190,7 @@ class EventSection(ShapedSection):
     participant: Word | None = None
     """The participant that acts; none where the weather changes."""
     speed: Speed | None = None
-    """It takes up this speed [m/s]."""
+    """It takes up this speed [m/s]; a vehicle reverses below 0."""
     rate: Acceleration | None = None
     """At this rate [m/s²]."""
     time: Duration | None = None

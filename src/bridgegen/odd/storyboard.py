@@ -39,6 +39,9 @@ EGO = "ego"
 MOST_ASIDE = 4.0
 """From the lane's centre [m]: a lane and a shoulder are seldom wider."""
 
+FASTEST_REVERSE = -5.0
+"""[m/s]; 18 km/h is about what a reverse gear does."""
+
 _OF_EVENTS = ("after", "began")
 
 _WALKERS = tuple(
@@ -96,7 +99,8 @@ class Storyboard:
                 continue
             if not name.isidentifier() or not name.isascii():
                 self._report(f"a participant's name is a word, got '{name}'", path)
-            self._check(given.speed, "m/s", (*path, "speed"))
+            slowest = _slowest(name, given.type)
+            self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
             self._check_heading(name, given, path)
             self._check_body(name, given, path)
             if given.siren and (given.type != "emergency" or name == EGO):
@@ -318,7 +322,9 @@ class Storyboard:
         elif given.participant is None:
             self._report(f"{name} must have a participant", path)
         if given.speed is not None:
-            self._check(given.speed, "m/s", (*path, "speed"))
+            actor = self._acting.get(str(given.participant))
+            slowest = _slowest(actor.name, actor.type) if actor else 0.0
+            self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
             yield SpeedChange(
                 given.speed,
                 self._change(given.rate, given.time, given.distance, given.shape, path),
@@ -477,6 +483,13 @@ class Storyboard:
     def _check_participant(self, name: str, path: Path) -> None:
         if name not in self.known:
             self._report(f"unknown participant '{name}'{nearest(name, self.known)}", path)
+
+
+def _slowest(name: str, kind: str) -> float:
+    """Return the least speed that a participant may be given [m/s]; below 0 it reverses."""
+    one = PARTICIPANTS[kind]
+    reverses = name != EGO and one.seen_as.conduct == "vehicle" and not one.on_rails
+    return FASTEST_REVERSE if reverses else 0.0
 
 
 def _body(given: ParticipantSection) -> Body | None:

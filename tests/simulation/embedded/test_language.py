@@ -107,6 +107,33 @@ def test_wrong_way_driving(made):
     )
 
 
+def test_reversing(made):
+    """It brakes from 20 m/s by 15 m/s² and goes on to −2 m/s: 2 m back a second, nose ahead."""
+    pipeline = made(
+        events="""
+  backs_out:
+    participant: other
+    speed: -2.0
+    rate: 15.0
+    when:
+      - {kind: time, value: 1.0}
+"""
+    )
+    other = motion(pipeline)["other"]
+    assert np.abs(other["h"]).max() < 1e-9
+    assert other["v"][-1] == -2.0
+    assert other["x"][200] - other["x"][300] == pytest.approx(2.0 * 5.0)
+    there_and_back(pipeline)
+    for name, said in (("other", "at least -5"), ("ego", "at least 0")):
+        text = (
+            PARTICIPANTS.replace("speed: 20.0", "speed: -6.0")
+            if name == "other"
+            else (PARTICIPANTS.replace("speed: 20.0", "speed: -1.0", 1))
+        )
+        with pytest.raises(ScenarioError, match=said):
+            made(text)
+
+
 def test_parked_across_at_a_searched_angle(made):
     pipeline = made(
         PARTICIPANTS
