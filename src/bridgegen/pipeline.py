@@ -630,6 +630,11 @@ def _source(
         return source_of(scenario, None, road_map)
     source = source_of(scenario, driver.name, road_map, egos.join(driver.ideal))
     if isinstance(source, OntologySource) and source.constraints.adversary:
+        if source.variant_names:
+            raise InputError(
+                f"{scenario.place}: an adversary drives in one storyboard, so no type may vary "
+                f"({', '.join(source.variant_names)})"
+            )
         return AdversarySource(source, space.values(space.row({})))
     return source
 

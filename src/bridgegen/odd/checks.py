@@ -192,9 +192,17 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
             )
 
 
+def _hull(bodies: tuple[Body, ...]) -> Body:
+    """Return a body that takes as much room as each of some about the reference point."""
+    front, rear = (max(getattr(one, end) for one in bodies) for end in ("front", "rear"))
+    width = max(one.width for one in bodies)
+    ahead = 0.5 * (front - rear)
+    return replace(bodies[0], length=front + rear, width=width, center_ahead=ahead)
+
+
 def _room(one: Participant, columns: Mapping[str, Float]) -> Body:
     """Return the body of a participant; of one that is turned, what holds it however it is."""
-    body = one.body
+    body = _hull(one.bodies)
     heading = _metres(one.heading, columns)
     if not heading.any():
         return body
@@ -213,7 +221,7 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
     for one in scenario.participants:
         for value in speeds_of(one, scenario.story):
             speed = _metres(value, columns)
-            allowed = np.asarray(one.body.max_speed)
+            allowed = np.asarray(min(body.max_speed for body in one.bodies))
             why = f"a {one.type} can do"
             if one.conduct == "vehicle" and value != 0.0 and not one.exceeds_limit:
                 allowed = np.minimum(limit, allowed)

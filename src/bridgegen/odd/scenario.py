@@ -215,7 +215,9 @@ class LogicalScenario(SearchedScenario):
         lifted = {one.name: one.exceeds_limit for one in self.participants if one.exceeds_limit}
         sirens = [one.name for one in self.participants if one.siren]
         bodies = {one.name: one.own_body for one in self.participants if one.own_body}
-        more = "".join(repr(one) for one in (drivers, headings, lifted, sirens, bodies) if one)
+        types = {one.name: (one.type_by, one.types) for one in self.participants if one.type_by}
+        parts = (drivers, headings, lifted, sirens, bodies, types)
+        more = "".join(repr(one) for one in parts if one)
         return sha256((content + more).encode()).hexdigest()
 
     @property

@@ -63,6 +63,8 @@ class Participant:
         driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
         heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
             drives against the traffic.
+        type_by: the category that gives its type in each evaluation; empty: it is always the same.
+        types: the values of that.
         own_body: its body, where it is not the type's.
         siren: whether it is an emergency vehicle on a call, to which all give way.
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
@@ -79,11 +81,18 @@ class Participant:
     exceeds_limit: str = field(default="", repr=False, kw_only=True)
     siren: bool = field(default=False, repr=False, kw_only=True)
     own_body: Body | None = field(default=None, repr=False, kw_only=True)
+    type_by: str = field(default="", repr=False, kw_only=True)
+    types: tuple[str, ...] = field(default=(), repr=False, kw_only=True)
 
     @property
     def body(self) -> Body:
         """How large it is, and what it can do."""
         return self.own_body or PARTICIPANTS[self.type].body
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All that its body may be."""
+        return tuple(PARTICIPANTS[one].body for one in self.types) or (self.body,)
 
     @property
     def conduct(self) -> Conduct:

@@ -70,6 +70,8 @@ class ParticipantSection(ShapedSection):
 
     type: Annotated[TypeName, AfterValidator(canonical)]
     """What it is."""
+    type_by: Word | None = None
+    """A category that gives its type instead, in each evaluation; ``type`` is its default."""
     body: BodySection | None = None
     """Its dimensions and what it can do, where they are not the type's."""
     start: WaypointSection | None = None

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from bridgegen.odd.others import ATTENTIVE, DRIVERS
-from bridgegen.odd.parameters import nearest
+from bridgegen.odd.parameters import Axis, Parameter, nearest
 from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
 from bridgegen.odd.quantities import Quantities
@@ -103,6 +103,7 @@ class Storyboard:
             self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
             self._check_heading(name, given, path)
             self._check_body(name, given, path)
+            self._check_types(name, given, path)
             if given.siren and (given.type != "emergency" or name == EGO):
                 self._report(
                     f"a siren is for emergency vehicles other than the ego, {name} is a "
@@ -147,7 +148,7 @@ class Storyboard:
         driver = given.driver or ""
         return Participant(
             name, given.type, points[0], None, given.speed, points, driver=driver,
-            own_body=_body(given),
+            own_body=_body(given), type_by=given.type_by or "", types=self._types(given),
         )  # fmt: skip
 
     def _driver(
@@ -186,8 +187,52 @@ class Storyboard:
         return Participant(
             name, given.type, start, end, given.speed, driver=given.driver or "",
             heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
-            own_body=_body(given),
+            own_body=_body(given), type_by=given.type_by or "", types=self._types(given),
         )  # fmt: skip
+
+    def _check_types(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check the category that gives a participant's type, if there is one."""
+        if given.type_by is None:
+            return
+        place, parameter = (*path, "type_by"), self._types_of(given)
+        self._quantities.used.add(given.type_by)
+        if parameter is None:
+            hint = nearest(given.type_by, self._quantities.parameters)
+            self._report(f"type_by must name a category, got '{given.type_by}'{hint}", place)
+            return
+        usual = PARTICIPANTS[given.type]
+        for kind in parameter.kind.names:
+            if kind not in TYPES:
+                self._report(f"type_by needs types as values, '{kind}' is none", place)
+            elif (PARTICIPANTS[kind].seen_as.conduct, PARTICIPANTS[kind].on_rails) != (
+                usual.seen_as.conduct,
+                usual.on_rails,
+            ):
+                self._report(
+                    f"the types of {name} must be moved by the same rules, a {kind} is not as a "
+                    f"{given.type}",
+                    place,
+                )
+        if parameter.axis is Axis.STATIC:
+            self._report("the category of a type must not be of the static axis", place)
+        if parameter.kind.names[int(parameter.default)] != given.type:
+            default = parameter.kind.names[int(parameter.default)]
+            self._report(
+                f"type of {name} must be the default of {given.type_by}, {default}, got "
+                f"{given.type}",
+                place,
+            )
+        if given.body is not None:
+            self._report(f"{name} has a body of its own, or types that vary, not both", place)
+
+    def _types_of(self, given: ParticipantSection) -> Parameter | None:
+        """Return the category that gives a type; None if there is none of that name."""
+        found = self._quantities.parameters.get(given.type_by or "")
+        return found if found is not None and found.kind.names else None
+
+    def _types(self, given: ParticipantSection) -> tuple[str, ...]:
+        found = self._types_of(given)
+        return tuple(one for one in found.kind.names if one in TYPES) if found else ()
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check a body of one's own, if there is one: what the type's has none of, it has not."""

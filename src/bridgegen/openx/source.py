@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Protocol
 
 from bridgegen.arrays import Float
+from bridgegen.errors import InputError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.rules import speed_bounds
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
@@ -19,6 +21,7 @@ from bridgegen.openx.opendrive.site_fit import shortened
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.ranges import MOST_VARIANTS
 
 
 class ConcreteScenario(Protocol):
@@ -155,8 +158,6 @@ class OntologySource:
     """
 
     course_names: tuple[str, ...] = ()
-    variant_names: tuple[str, ...] = ()
-    variants: tuple[tuple[float, ...], ...] = ()
 
     def __init__(
         self,
@@ -170,6 +171,16 @@ class OntologySource:
         static = tuple(name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC)
         self.static_names = () if road_map else static
         self.unused_names = static if road_map else ()
+        types = {one.type_by: one.types for one in scenario.participants if one.type_by}
+        self.variant_names = tuple(types)
+        counts = (range(len(one)) for one in types.values())
+        self.variants = tuple(tuple(map(float, key)) for key in product(*counts)) if types else ()
+        if len(self.variants) > MOST_VARIANTS:
+            raise InputError(
+                f"{scenario.place}: the types of {', '.join(types)} may come together in at most "
+                f"{MOST_VARIANTS} ways, for each is a storyboard of its own, got "
+                f"{len(self.variants)}"
+            )
 
     @property
     def road(self) -> str:
@@ -185,7 +196,7 @@ class OntologySource:
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
-        types = {one.name: str(one.type) for one in self._scenario.participants}
+        types = {one.name: str(one.type) for one in self._typed(values).participants}
         for works in self._scenario.story.works:
             types |= {f"{works.name}_cone_{k}": "cone" for k in range(1, len(works.cones) + 1)}
             types[f"{works.name}_sign"] = "sign"
@@ -218,7 +229,7 @@ class OntologySource:
         if site and road_file:
             site = replace(site, map_file=road_file)
         individuals = build(
-            self._scenario,
+            self._typed(values),
             values,
             driver=self._driver,
             ideal=self._ideal,
@@ -226,6 +237,17 @@ class OntologySource:
             courses=courses,
         )
         return _OfOntology(individuals, road_file or f"{self._scenario.name}.xodr", self._map)
+
+    def _typed(self, values: Mapping[str, float]) -> LogicalScenario:
+        """Return the scenario with the types that a row gives its participants."""
+        if not self.variant_names:
+            return self._scenario
+        chosen = tuple(
+            replace(one, type=one.types[int(values[one.type_by])]) if one.type_by else one
+            for one in self._scenario.participants
+        )
+        story = replace(self._scenario.story, participants=chosen)
+        return replace(self._scenario, story=story)
 
 
 @dataclass(frozen=True)

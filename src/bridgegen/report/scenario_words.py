@@ -27,21 +27,20 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
 
 
 def _participant(one: Participant) -> str:
+    kind = " or ".join(one.types) or one.type
     if one.path:
         way = " to ".join(_place(point) for point in one.path)
-        return f"{one.name}, a {one.type}, goes from {way} at {in_words(one.speed, 'm/s')}."
+        return f"{one.name}, a {kind}, goes from {way} at {in_words(one.speed, 'm/s')}."
     turned = ""
     if one.heading in (180.0, -180.0):
         turned = ", against the traffic"
     elif one.heading != 0.0:
         turned = f", turned by {in_words(one.heading, 'deg')}"
-    line = (
-        f"{one.name}, a {one.type}, starts at {_place(one.start)} at {in_words(one.speed, 'm/s')}"
-    )
+    line = f"{one.name}, a {kind}, starts at {_place(one.start)} at {in_words(one.speed, 'm/s')}"
     if one.exceeds_limit:
         turned += f", faster than allowed if need be ({one.exceeds_limit})"
     if one.conduct == "obstacle" or (one.speed == 0.0 and one.end is None):
-        return f"{one.name}, a {one.type}, stands at {_place(one.start)}{turned}."
+        return f"{one.name}, a {kind}, stands at {_place(one.start)}{turned}."
     return f"{line}{turned}{'' if one.end is None else f' and goes to {_place(one.end)}'}."
 
 

@@ -1,5 +1,7 @@
 """What scenario files can say, as it moves; by hand-worked numbers, and there and back again."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -48,12 +50,12 @@ parameters:
 
 @pytest.fixture
 def made(tmp_path):
-    def make(participants: str = PARTICIPANTS, events: str = "") -> Pipeline:
-        text = HEAD + participants + (f"events:\n{events}" if events else "") + PARAMETERS
+    def make(participants: str = PARTICIPANTS, events: str = "", more: str = "") -> Pipeline:
+        text = HEAD + participants + (f"events:\n{events}" if events else "") + PARAMETERS + more
         for name in ("turned", "aside"):
             if text.count(name) == 1:
                 text = "\n".join(one for one in text.splitlines() if f"  {name}:" not in one)
-        path = tmp_path / "mine.yaml"
+        path = tmp_path / ("types.yaml" if more else "mine.yaml")
         path.write_text(text, "utf-8")
         scenario = load(path)
         return Pipeline(scenario, scenario.space())
@@ -329,6 +331,70 @@ def test_a_building_hides_who_is_behind_it(made, height, hidden):
     early, late = seen[1:60], seen[110:160]
     assert (early[early >= 0] == 0).all() == hidden
     assert (late > 0).any()
+
+
+LEAD = """
+  lead:
+    type: car
+    type_by: lead_type
+    start: {distance: 110.0, lane: 2}
+    speed: 15.0
+"""
+LEAD_TYPE = """
+  lead_type: {axis: participants, kind: category, values: [car, truck, motorcycle],
+    default: car, description: What it is., source: ours}
+"""
+
+
+def test_types_vary(made, tmp_path, monkeypatch):
+    """Each row is that of the scenario with that type alone, to the last bit."""
+    pipeline = made(PARTICIPANTS + LEAD, more=LEAD_TYPE)
+    space = pipeline.space
+    assert set(space.variables) == {"other_at", "lead_type"}
+    X = np.array([space.row({"lead_type": float(k)}) for k in (2, 0, 1, 1)])
+    pipeline.choose_objective()
+    found = pipeline.evaluate(X)
+    assert pipeline.kinds["lead"] == "car or truck or motorcycle"
+    lengths = {"car": 4.6, "truck": 10.0, "motorcycle": 2.2}
+    for k, kind in enumerate(("motorcycle", "car", "truck")):
+        ((_, one),) = pipeline.by_variant(X[k : k + 1])
+        rollout = one.rollout(X[k : k + 1])
+        lead = rollout.names.index("lead")
+        assert rollout.box[lead, 0] == pytest.approx(lengths[kind], abs=0.5)
+        assert pipeline.bodies(X[k])["lead"] == kind
+        alone = made(
+            PARTICIPANTS + LEAD.replace("    type_by: lead_type\n", "").replace("car", kind)
+        )
+        alone.choose_objective()
+        row = alone.space.row({})[np.newaxis]
+        assert alone.evaluate(row).metrics.tobytes() == found.metrics[k].tobytes()
+    there_and_back(pipeline)
+    said = " ".join(story_lines(pipeline.scenario))
+    assert "lead, a car or truck or motorcycle, starts" in said
+    import bridgegen as bg
+
+    run = bg.run_search(
+        tmp_path / "types.yaml", algorithm="random", budget=40, keep=6, ego="route-follower",
+        count="any", out=tmp_path / "run",
+    )  # fmt: skip
+    assert run.scenarios
+    kinds = {re.search(r'name="lead">\s*<Vehicle[^>]*vehicleCategory="(\w+)"', one.read_text())[1]
+             for one in run.scenarios}  # fmt: skip
+    assert len(kinds) > 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("car, truck, motorcycle", "car, pedestrian", "a pedestrian is not as a car"),
+        ("car, truck, motorcycle", "car, lorry", "'lorry' is none"),
+        ("default: car", "default: truck", "must be the default of lead_type, truck, got car"),
+        ("type_by: lead_type", "type_by: lead_typ", "must name a category, got 'lead_typ'; did"),
+    ],
+)
+def test_types_that_cannot_vary_are_refused(made, old, new, message):
+    with pytest.raises(ScenarioError, match=message):
+        made((PARTICIPANTS + LEAD).replace(old, new), more=LEAD_TYPE.replace(old, new))
 
 
 REFUSED = {
