@@ -222,10 +222,11 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
         for value in speeds_of(one, scenario.story):
             speed = _metres(value, columns)
             allowed = np.asarray(min(body.max_speed for body in one.bodies))
-            why = f"a {one.type} can do"
+            why = f"a {' or '.join(one.types) or one.type} can do"
             if one.conduct == "vehicle" and value != 0.0 and not one.exceeds_limit:
+                if np.min(limit) <= allowed:
+                    why = "road and weather allow"
                 allowed = np.minimum(limit, allowed)
-                why = "road and weather allow"
             over = speed - allowed
             if over.max() > slack(float(np.max(allowed))):
                 yield (
