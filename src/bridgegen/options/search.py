@@ -127,6 +127,16 @@ class CommonOptions(PipelineOptions):
             before=None,
         ),
     )
+    empty_trigger: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "When acts and events of a scenario file start whose StartTrigger is empty: never, as "
+            "the standard says, or now, as in esmini.",
+            shown="never",
+            before=None,
+        ),
+    )
     axes: Sequence[str] | None = field(
         default=None,
         metadata=option(
@@ -226,17 +236,6 @@ class CommonOptions(PipelineOptions):
             TEXT,
             "Participant that an adversary drives instead of the scenario's events.",
             shown="none; with ppo-adversary the first vehicle",
-            before=None,
-            group=OF_DRIVER,
-        ),
-    )
-    empty_trigger: str | None = field(
-        default=None,
-        metadata=option(
-            TEXT,
-            "When acts and events of a scenario file start whose StartTrigger is empty: never, as "
-            "the standard says, or now, as in esmini.",
-            shown="never",
             before=None,
             group=OF_DRIVER,
         ),
