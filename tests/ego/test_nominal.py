@@ -15,7 +15,7 @@ ROUND = {
     "jam-tail-in-fog": (("all ideal",), 1),
     "wrong-way-driver": (("perceiving",), -1),
 }
-"""Where, with which driver, and by the lane on which side (1 left) somebody is gone round."""
+"""By scenario: the drivers that pass somebody by another lane, and on which side (1 left)."""
 
 
 @pytest.mark.parametrize("ideal", IDEAL)

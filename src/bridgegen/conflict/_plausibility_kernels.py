@@ -95,6 +95,8 @@ def _motion(i, e, x, y, h, v, c, s, present, limits, last, window, dt, found):
         if j < since:
             continue
         gain = v[k + 1] - v[j]
+        if v[j] <= 0.0 and v[k + 1] <= 0.0:  # it reverses, and gains speed backwards
+            gain = v[j] - v[k + 1]
         if gain > limits[SPEEDS_UP] * span + SURGE:
             found[0], found[1], found[2] = ACCELERATION, k + 1, gain / span
             found[3] = limits[SPEEDS_UP]
@@ -104,7 +106,7 @@ def _motion(i, e, x, y, h, v, c, s, present, limits, last, window, dt, found):
             found[3] = limits[BRAKES]
             return moves, longest
         turn = abs(h[k + 1] - h[j])
-        mean = 0.5 * (v[k + 1] + v[j])
+        mean = 0.5 * (abs(v[k + 1]) + abs(v[j]))
         if turn > limits[CURVES] * mean * span + KINK:
             found[0], found[1], found[3] = CURVATURE, k + 1, limits[CURVES]
             found[2] = turn / (mean * span) if mean > 0.0 else math.inf

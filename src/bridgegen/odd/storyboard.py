@@ -203,7 +203,10 @@ class Storyboard:
         usual = PARTICIPANTS[given.type]
         for kind in parameter.kind.names:
             if kind not in TYPES:
-                self._report(f"type_by needs types as values, '{kind}' is none", place)
+                self._report(
+                    f"the values of {given.type_by} must be types of participants, got '{kind}'",
+                    place,
+                )
             elif (PARTICIPANTS[kind].seen_as.conduct, PARTICIPANTS[kind].on_rails) != (
                 usual.seen_as.conduct,
                 usual.on_rails,

@@ -5,7 +5,7 @@ other values of its parameters, on the same map.
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -404,14 +404,7 @@ def with_others(scenario: FileScenario, drivers: Mapping[str, str]) -> FileScena
         )
         if name != ego and (driver is not None or named):
             found[name] = (osc.Property(DRIVER, driver),) if driver is not None else ()
-    return replace(
-        scenario,
-        storyboard=_with_drivers(scenario.storyboard, found),
-        variants={
-            key: replace(one, storyboard=_with_drivers(one.storyboard, found))
-            for key, one in scenario.variants.items()
-        },
-    )
+    return _changed(scenario, lambda storyboard: _with_drivers(storyboard, found))
 
 
 def with_triggers(scenario: FileScenario, reading: str) -> FileScenario:
@@ -420,11 +413,18 @@ def with_triggers(scenario: FileScenario, reading: str) -> FileScenario:
     Raises:
         UnknownNameError: no such reading.
     """
+    return _changed(scenario, lambda storyboard: read_empty_triggers(storyboard, reading))
+
+
+def _changed(
+    scenario: FileScenario, change: Callable[[osc.OpenScenario], osc.OpenScenario]
+) -> FileScenario:
+    """Return a scenario file with a change of its storyboard, whatever texts it has."""
     return replace(
         scenario,
-        storyboard=read_empty_triggers(scenario.storyboard, reading),
+        storyboard=change(scenario.storyboard),
         variants={
-            key: replace(one, storyboard=read_empty_triggers(one.storyboard, reading))
+            key: replace(one, storyboard=change(one.storyboard))
             for key, one in scenario.variants.items()
         },
     )

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from bridgegen.conflict.plausibility import plausibility
 from bridgegen.errors import ScenarioError
 from bridgegen.odd.reader import load
 from bridgegen.ontology.check import check
@@ -125,6 +126,9 @@ def test_reversing(made):
     assert np.abs(other["h"]).max() < 1e-9
     assert other["v"][-1] == -2.0
     assert other["x"][200] - other["x"][300] == pytest.approx(2.0 * 5.0)
+    again = made(PARTICIPANTS.replace("lane: 1}\n    speed: 20.0", "lane: 1}\n    speed: -2.0"))
+    rollout = again.rollout(again.space.row({})[np.newaxis])
+    assert plausibility(rollout).labels == [""]  # nothing is odd about a vehicle that reverses
     there_and_back(pipeline)
     for name, said in (("other", "at least -5"), ("ego", "at least 0")):
         text = (
@@ -387,7 +391,7 @@ def test_types_vary(made, tmp_path, monkeypatch):
     ("old", "new", "message"),
     [
         ("car, truck, motorcycle", "car, pedestrian", "a pedestrian is not as a car"),
-        ("car, truck, motorcycle", "car, lorry", "'lorry' is none"),
+        ("car, truck, motorcycle", "car, lorry", "must be types of participants, got 'lorry'"),
         ("default: car", "default: truck", "must be the default of lead_type, truck, got car"),
         ("type_by: lead_type", "type_by: lead_typ", "must name a category, got 'lead_typ'; did"),
     ],

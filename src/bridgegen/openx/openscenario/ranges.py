@@ -381,7 +381,7 @@ class _Builder:
     def _combinations(self) -> tuple[tuple[str, ...], tuple[tuple[float, ...], ...]]:
         """Return the texts on which the storyboard depends, and which values come together.
 
-        A text that formulas of the header compare, and the storyboard does not take, is none.
+        A text that only formulas of the header compare is left out.
 
         Raises:
             FileFormatError: there are too many.
