@@ -14,6 +14,7 @@ from bridgegen.conflict._limits import HORIZON
 from bridgegen.conflict.analysis import Conflicts, Responsible, Zone, analyse
 from bridgegen.conflict.harm import COLLISION, decisive, harm_of_pairs
 from bridgegen.conflict.harm import NEAR_MISS as CRITICAL
+from bridgegen.conflict.plausibility import plausibility
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.05
@@ -148,6 +149,7 @@ def test_driving_backwards_is_driving_ahead_with_the_body_turned_round(seed, tur
     for name in ("severity", "ttc", "v_ego", "v_other"):
         if not back.any() or name != "severity":
             np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-6)
+    assert plausibility(ahead).labels == plausibility(backwards).labels
     for zone, there, flips in (
         (one.zone_ego, other.zone_ego, back[0]),
         (one.zone_other, other.zone_other, back),
