@@ -105,6 +105,36 @@ def test_a_lane_change_by_a_rate(shape, steepest):
     assert arrived == pytest.approx(1.0 + lasts, abs=0.11)
 
 
+@pytest.mark.parametrize("dynamics", ["cubic time 3", "linear distance 12"])
+def test_a_lane_change_while_reversing_is_one_ahead_played_backwards(dynamics):
+    """Its tail goes where a nose would, so its nose is turned the other way."""
+    ahead = driven(4.0, ("e", "bv", lateral(1, dynamics), after(1.0)), lane_id=2)
+    place = lane(3, 2, 50.0)
+    back = run(
+        scenario(
+            ("ego", "bv"),
+            EGO + start("bv", place, -4.0),
+            events(("e", "bv", lateral(1, dynamics), after(1.0))),
+        )
+    )
+    there, here = at(ahead, 4.9), at(back, 0.0)
+    n = there - here
+    for name, sign in (("x", 1.0), ("y", -1.0)):
+        one, other = (getattr(it, name)[0, 1, : n + 1] for it in (ahead, back))
+        assert other - other[0] == pytest.approx(sign * (one - one[0]), abs=1e-6)
+    tilt = ahead.h[0, 1, : n + 1] - ahead.h[0, 1, 0]
+    assert back.h[0, 1, : n + 1] - back.h[0, 1, 0] == pytest.approx(-tilt, abs=1e-6)
+    assert np.abs(tilt).max() > 0.1
+
+
+@pytest.mark.parametrize("dynamics", ["linear time 0", "sinusoidal distance 0"])
+def test_a_lane_change_over_nothing_is_at_once(dynamics):
+    rollout = driven(10.0, ("e", "bv", lateral(1, dynamics), after(1.0)), lane_id=2)
+    x, k = rollout.x[0, 1] - rollout.x[0, 1, 0], at(rollout, 1.0)
+    assert x[k] == pytest.approx(0.0)
+    assert x[k + 1] == pytest.approx(3.5)
+
+
 def test_at_once():
     rollout = driven(10.0, ("e", "bv", lateral(1, "step time 3"), after(1.0)), lane_id=2)
     x, k = rollout.x[0, 1] - rollout.x[0, 1, 0], at(rollout, 1.0)

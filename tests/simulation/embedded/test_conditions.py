@@ -126,6 +126,14 @@ relativeDistanceType="longitudinal" coordinateSystem="lane"/>"""
     assert instant(text.format("cv", "false"), behind_it)[0] == -1
 
 
+def test_no_headway_to_who_is_behind_as_the_crow_flies():
+    text = """<TimeHeadwayCondition entityRef="cv" value="50" freespace="false" rule="lessThan"
+alongRoute="false"/>"""
+    behind_it = start("bv", lane(3, 1, 70.0), 10.0) + start("cv", lane(3, 1, 90.0), 0.0)
+    assert instant(text, behind_it)[0] == -1
+    assert instant(text, behind(60.0))[0] == 0
+
+
 def test_distance_to_a_place():
     text = f"""<DistanceCondition value="20.25" freespace="{{}}" rule="lessOrEqual"
 relativeDistanceType="longitudinal" coordinateSystem="road">{lane(3, 1, 35.0)}

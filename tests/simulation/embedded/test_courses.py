@@ -191,6 +191,13 @@ def test_a_spring_closes_a_gap_within_the_limits(error, closing):
     assert v == pytest.approx(other, abs=0.02)
 
 
+def test_a_spring_is_as_stiff_as_the_end_of_the_approach_allows():
+    """Behind its place a body ends by braking; in front of it, by accelerating."""
+    limits = np.array([1.0, 4.0, 50.0, math.inf, math.inf])
+    assert spring(0.1, 0.0, 0.0, limits, 0.1) == pytest.approx(0.1 * 0.4 * 4.0)
+    assert spring(-0.1, 0.0, 0.0, limits, 0.1) == pytest.approx(-0.1 * 0.4 * 1.0)
+
+
 def test_a_spring_s_jerk_is_limited():
     limits = np.array([2.0, 3.0, 40.0, 1.0, 1.5])
     assert spring(50.0, 0.0, 0.0, limits, 0.1) == pytest.approx(0.1)

@@ -311,6 +311,32 @@ def test_backwards_along_a_trajectory_goes_tail_first():
         assert out.v[0, 1, 40] == -2.0
 
 
+@pytest.mark.parametrize("laid", [True, False])
+def test_who_came_tail_first_goes_back_the_way_it_came(laid):
+    """From -4 m/s at 2 m/s²: 4 m on in 2 s, back in 2 s, and on over where it began."""
+    ends = (road(60, 0), road(60, 40)) if laid else (world(0, 73), world(-40, 73))
+    shape = follow(line(*(vertex(one) for one in ends)))
+    back = start("bv", lane(3, 1, 90.0), -4.0)
+    forward = speeding(6.0, "linear rate 2")
+    out = told((shape, after(0.0)), (forward, after(0.0)), bv=back)
+    for seconds, x in ((1.0, -3.0), (2.0, -4.0), (3.0, -3.0), (4.0, 0.0), (5.0, 5.0)):
+        assert place(out, seconds)[0] == pytest.approx(x, abs=0.25)  # it begins an instant later
+    assert np.diff(out.h[0, 1, 2:]) == pytest.approx(0.0, abs=1e-9)  # its nose points east
+    moved = np.hypot(np.diff(out.x[0, 1, 2:]), np.diff(out.y[0, 1, 2:]))
+    v = out.v[0, 1, 2:]
+    assert moved == pytest.approx(0.05 * np.abs(v[:-1] + v[1:]) / 2, abs=2e-3)
+
+
+def test_an_initial_trajectory_may_be_followed_tail_first():
+    shape = follow(line(vertex(world(-1.75, 103)), vertex(world(-1.75, 63))))
+    bv = f"""<Private entityRef="bv"><PrivateAction>{shape}</PrivateAction>
+<PrivateAction>{speeding(-5.0, "step time 0")}</PrivateAction></Private>"""
+    out = told(bv=bv)
+    assert place(out, 0.0)[2] == pytest.approx(0.5 * math.pi)
+    x, y, h = place(out, 4.0)
+    assert (x, y, h) == pytest.approx((-1.75, 83.0, 0.5 * math.pi))
+
+
 def test_backwards_along_a_lane_ends_where_its_way_begins():
     """From 2 s on -1 m/s² to -3 m/s; 30 m are behind it to the road's end at y = 113."""
     slow = start("bv", lane(3, 1, 90.0), 0.0)

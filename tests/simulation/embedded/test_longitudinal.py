@@ -1,5 +1,7 @@
 """Actions along the road, from file to motion: hand-worked cases for each of them."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -170,6 +172,41 @@ def test_a_continuous_relative_speed_goes_on_with_the_other_s():
     assert at(once, "bv", 10.0) == pytest.approx(8.0)  # it has been reached
 
 
+@pytest.mark.parametrize("gap", [20.0, -20.0])
+def test_the_ego_without_a_driver_goes_by_others_as_others_do(gap):
+    """Whoever is written first: it is moved after the one by whom it goes."""
+    names = ("ego", "lead")
+    privates = start("ego", lane(1, 1, 200.0), 4.0) + start("lead", lane(1, 1, 200.0 - gap), 5.0)
+    rows = (
+        ("go", "ego", relative("lead", 1.0, dynamics="linear rate 2", continuous=True), after(1.0)),
+        ("e", "lead", speeding(9.0, "linear rate 1"), after(2.0)),
+    )
+    rollout = run(scenario(names, privates, events(*rows)), None, ROADS)
+    assert at(rollout, "ego", 1.5) == pytest.approx(5.0)
+    for seconds in (2.0, 3.0, 4.5, 8.0):
+        assert at(rollout, "ego", seconds) == pytest.approx(at(rollout, "lead", seconds) + 1.0)
+
+
+@pytest.mark.parametrize("speeds", [(0.0, 4.0, 10.0), (10.0, 4.0, 0.0)])
+def test_a_step_to_a_relative_speed_acts_from_its_instant(speeds):
+    """As a step to an absolute one: 1 s at 4 m/s, then 1 s at 1.5 times 10 m/s."""
+    other = "lead" if speeds[2] else "ego"
+    to = relative(other, 1.5, "factor", dynamics="step time 0", continuous=True)
+    rollout = story(("e", "bv", to, after(1.0)), speeds=speeds, gap=100.0)
+    way = travelled(rollout, "bv")
+    assert way[round(1.0 / DT)] == pytest.approx(4.0)
+    assert way[round(2.0 / DT)] == pytest.approx(4.0 + 15.0)
+
+
+@pytest.mark.parametrize("dynamics", ["linear time 0", "cubic distance 0"])
+def test_a_change_over_no_time_is_there_at_the_start(dynamics):
+    places = start("ego", lane(3, -1, 5.0), 0.0) + start("bv", lane(1, 1, 200.0), 0.0).replace(
+        speed_action(0.0), speed_action(8.0, dynamics)
+    )
+    rollout = run(scenario(("ego", "bv"), places), roads=ROADS)
+    assert rollout.v[0, 1] == pytest.approx(8.0)
+
+
 def test_a_relative_speed_over_a_time():
     dynamics = "sinusoidal time 4"
     rollout = story(("e", "bv", relative("lead", -4.0, dynamics=dynamics), after(1.0)))
@@ -214,27 +251,26 @@ def test_a_profile_relative_to_another_s_speed():
     assert at(rollout, "bv", 3.0) == pytest.approx(8.0)
 
 
-def test_one_that_stands_across_and_cannot_follow_has_the_speed_at_which_it_moves():
-    """Its own way leads off the road: it comes no nearer to its place, and is not said to drive."""
+def test_what_hangs_across_another_is_carried_along_the_road():
+    """A bicycle on a car's rack: its nose points aside, and it goes where the car goes."""
     turned = (
         '<Position><RelativeObjectPosition entityRef="lead" dx="0" dy="-0.6">'
         '<Orientation type="relative" h="1.57"/></RelativeObjectPosition></Position>'
     )
-    keep = longitudinal(
-        '<LongitudinalDistanceAction entityRef="lead" freespace="false" continuous="true" '
-        'distance="1.2" coordinateSystem="road"/>'
-    )
     names = ("ego", "bv", "lead")
     privates = [start("ego", lane(3, -1, 5.0), 0.0), start("lead", lane(1, 1, 200.0), 10.0)]
+    keep = distance("lead", metres=1.2, system="road")
     privates.append(
         f'<Private entityRef="bv"><PrivateAction><TeleportAction>{turned}</TeleportAction>'
         f"</PrivateAction><PrivateAction>{keep}</PrivateAction></Private>"
     )
     rollout = run(scenario(names, "".join(privates), events()), roads=ROADS)
-    e, n = rollout.names.index("bv"), int(rollout.n_steps[0])
-    x, y, v = (array[0, e, 1:n] for array in (rollout.x, rollout.y, rollout.v))
-    moved = np.hypot(np.diff(x), np.diff(y))[1:]
-    assert moved == pytest.approx(0.5 * (v[1:-1] + v[2:]) * DT, abs=1e-3)
+    bv, lead = rollout.names.index("bv"), rollout.names.index("lead")
+    assert rollout.v[0, bv] == pytest.approx(10.0)  # from the first instant on
+    assert apart(rollout) == pytest.approx(math.hypot(1.2, 0.6), abs=1e-6)
+    turn = rollout.h[0, bv] - rollout.h[0, lead]
+    assert turn == pytest.approx(1.57, abs=1e-6)
+    assert travelled(rollout, "bv") == pytest.approx(travelled(rollout, "lead"), abs=1e-6)
 
 
 def test_a_distance_without_limits_is_kept_at_once():

@@ -47,7 +47,8 @@ def before_driver(k, plan, roads, state, record):
     decide(k, plan, roads, state, record)
     if plan.attends:
         run_kernel_at(plan.begins_waiting, (k, plan, roads, state, record))
-    command_speed(0, k, plan, roads, state, record)
+    if plan.is_driven:  # else its turn comes with the others'
+        command_speed(0, k, plan, roads, state, record)
     drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
     if plan.is_driven and drives and state.on[0] < 0:  # drivers keep to lanes
         fail(OFF_LANES, state)
@@ -82,7 +83,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             stay_away(e, k, record)
             continue
         before = state.command[e]
-        if e > 0:
+        if e > 0 or not plan.is_driven:
             command_speed(e, k, plan, roads, state, record)
         if plan.moves_laid and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))

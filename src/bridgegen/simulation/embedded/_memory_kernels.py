@@ -178,6 +178,7 @@ class State(NamedTuple):
         laid: ``(E, V, 10)`` the segments of a trajectory that was laid, see ``_laying_kernels``,
         laid_count: ``(E,)`` int64, how many; 0: it is on none,
         passed: ``(E,)`` [m], how far along them.
+        tail_first: ``(E,)`` bool, it follows its trajectory tail first.
         pose: ``(3,)`` scratch: x, y [m], heading [rad] of a place along a trajectory.
         timed: ``(E,)`` bool, a timetable moves it at this instant.
         placed: ``(E,)`` bool, it was teleported at this instant, and does not move on.
@@ -258,6 +259,7 @@ class State(NamedTuple):
     laid: Annotated[Float, "laying", "vertices", 10]
     laid_count: Annotated[Int, "entities"]
     passed: Annotated[Float, "entities"]
+    tail_first: Annotated[Bool, "entities"]
     pose: Annotated[Float, 3]
     timed: Annotated[Bool, "entities"]
     placed: Annotated[Bool, "entities"]

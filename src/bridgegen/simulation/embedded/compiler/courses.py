@@ -44,7 +44,10 @@ def first_speed(action: object) -> Value | None:
     if not isinstance(action, osc.SpeedAction):
         return None
     target = action.speed_action_target.target
-    at_once = action.dynamics.dynamics_shape is osc.DynamicsShape.STEP
+    dynamics = action.dynamics
+    at_once = dynamics.dynamics_shape is osc.DynamicsShape.STEP or (
+        dynamics.value == 0.0 and dynamics.dynamics_dimension is not osc.DynamicsDimension.RATE
+    )
     return target.value if at_once and isinstance(target, osc.AbsoluteTargetSpeed) else None
 
 

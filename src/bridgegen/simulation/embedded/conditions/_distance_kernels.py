@@ -77,7 +77,8 @@ def look_ahead(p, k, plan, roads, state, record):
     if kind == DISTANCE:
         return True, abs(gap)
     if kind == TIME_HEADWAY:
-        return v > 0.0 and gap >= 0.0, gap / max(v, 1e-9)
+        is_ahead = gap >= 0.0 and (measure != EUCLIDIAN or in_frame(ox - x, oy - y, h)[0] >= 0.0)
+        return v > 0.0 and is_ahead, gap / max(v, 1e-9)
     if gap == 0.0:
         return True, 0.0
     closes = closing > 0.0 if gap > 0.0 else closing < 0.0

@@ -64,7 +64,8 @@ def look_at_pair(kind, rule, limit, dx, dy, v, h, other_v, other_h):
     if kind == DISTANCE:
         return compare(gap, rule, limit)
     if kind == TIME_HEADWAY:
-        return v > 0.0 and compare(gap / v, rule, limit)
+        is_ahead = dx * math.cos(h) + dy * math.sin(h) >= 0.0
+        return v > 0.0 and is_ahead and compare(gap / v, rule, limit)
     closing = dx * (v * math.cos(h) - other_v * math.cos(other_h)) + dy * (
         v * math.sin(h) - other_v * math.sin(other_h)
     )  # times the gap

@@ -19,14 +19,24 @@ from bridgegen.simulation.embedded.motion._presence_kernels import (
     leave_out_absent,
     stay_away,
 )
-from bridgegen.simulation.embedded.motion._pursuit_kernels import follow_course, start_at_speed
+from bridgegen.simulation.embedded.motion._pursuit_kernels import (
+    follow_course,
+    start_at_distance,
+    start_at_speed,
+)
 from bridgegen.simulation.embedded.motion._speed_kernels import command_speed, stop_longitudinal
 from bridgegen.simulation.embedded.motion._steering_kernels import note, steer
-from bridgegen.simulation.embedded.motion._travel_kernels import ENDS, move_along_path, pass_end
+from bridgegen.simulation.embedded.motion._travel_kernels import (
+    ENDS,
+    LANDS,
+    move_along_path,
+    pass_end,
+)
 
 __all__ = [
     "BEGINS",
     "ENDS",
+    "LANDS",
     "arrive",
     "at_time",
     "begin_lane_change",
@@ -41,6 +51,7 @@ __all__ = [
     "note",
     "pass_end",
     "pose_along",
+    "start_at_distance",
     "start_at_speed",
     "stay_away",
     "steer",

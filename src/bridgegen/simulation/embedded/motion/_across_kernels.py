@@ -146,7 +146,7 @@ def begin_lane_change(j, k, plan, roads, state, record):
     state.lateral_lasts[e] = lane_change_lasts(
         plan.actions[j, SHAPE], plan.actions[j, DIMENSION], value, metres
     )
-    if plan.actions[j, DIMENSION] == DISTANCE and plan.actions[j, SHAPE] != STEP:
+    if plan.actions[j, DIMENSION] == DISTANCE and state.lateral_lasts[e] > 0.0:
         least = least_length(plan.actions[j, SHAPE], plan.bodies[e, 6], metres)
         state.lateral_lasts[e] = max(state.lateral_lasts[e], least)
     state.lateral_passed[e] = 0.0

@@ -75,7 +75,7 @@ def keep_aside(j, k, step, plan, roads, state, record):
     if row[UNLIMITED]:
         state.aside[e] += left
         return step, 0.0, not row[CONTINUOUS]
-    if step <= SLOWEST:
+    if abs(step) <= SLOWEST:
         state.lateral_passed[e] = 0.0
         return 0.0, 0.0, abs(left) < REACHED and not row[CONTINUOUS]
     acceleration = _limit(row, 0, state)
@@ -88,7 +88,7 @@ def keep_aside(j, k, step, plan, roads, state, record):
         left, state.lateral_passed[e], _limit(row, 2, state), acceleration, deceleration, plan.dt
     )
     on_wheels = plan.bodies[e, 6] < math.inf
-    most = (MOST_ACROSS_ON_WHEELS if on_wheels else MOST_ACROSS) * step
+    most = (MOST_ACROSS_ON_WHEELS if on_wheels else MOST_ACROSS) * abs(step)
     if abs(across) > most:
         across = math.copysign(most, across)
         speed = across / plan.dt
@@ -96,7 +96,8 @@ def keep_aside(j, k, step, plan, roads, state, record):
     state.aside[e] += across
     slow = abs(speed) <= deceleration * plan.dt
     over = slow and abs(left - across) < REACHED and not row[CONTINUOUS]
-    return math.sqrt(step * step - across * across), math.asin(across / step), over
+    ahead = math.sqrt(step * step - across * across)
+    return math.copysign(ahead, step), math.asin(across / step), over
 
 
 @kernel

@@ -62,7 +62,8 @@ def changed(shape, before, after, share):
 def spring(gap_error, closing, acceleration, limits, dt):
     """Return the acceleration [m/s²] that brings a body to its place beside another one.
 
-    A critically damped spring: its stiffness goes with the strongest acceleration (`STIFFNESS`).
+    A critically damped spring: its stiffness goes with the acceleration that ends the approach
+    (`STIFFNESS`), which is a deceleration if the body is behind its place.
 
     Args:
         gap_error: how far it is behind its place [m].
@@ -71,7 +72,7 @@ def spring(gap_error, closing, acceleration, limits, dt):
         limits: acceleration, deceleration [m/s²], speed [m/s], rates of both [m/s³].
         dt: [s].
     """
-    stiffness = STIFFNESS * (limits[0] if gap_error > 0.0 else limits[1])
+    stiffness = STIFFNESS * (limits[1] if gap_error > 0.0 else limits[0])
     wanted = gap_error * stiffness - closing * 2.0 * math.sqrt(stiffness)
     wanted = min(max(wanted, -limits[1]), limits[0])
     if wanted < min(acceleration, 0.0):

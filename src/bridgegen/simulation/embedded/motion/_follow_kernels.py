@@ -130,6 +130,7 @@ def stop_follow(j, k, plan, roads, state, record):
     if state.follow_action[e] == j:
         state.follow_action[e] = state.follow[e] = -1
         state.laid_count[e] = 0
+        state.tail_first[e] = False
         put_in_world(e, record.x[e, k], record.y[e, k], record.h[e, k], roads, state)
 
 

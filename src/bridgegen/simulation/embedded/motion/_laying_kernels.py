@@ -53,6 +53,7 @@ from bridgegen.simulation.embedded.places._place_kernels import (
     fail,
     pose_of,
     put_in_world,
+    way_along,
 )
 
 PLACE, TIME, STATES = 0, 1, 2
@@ -192,7 +193,8 @@ def start_on_laid(e, state, record):
         state.passed[e] = passed
     else:
         x, y, h = at_distance(table, n, state.passed[e])
-        if record.v[e, 0] < 0.0:
+        if record.v[e, 0] < 0.0 and state.passed[e] <= 0.0:
+            state.tail_first[e] = True
             h += math.pi
     stand_at(e, x, y, h, state)
     record.x[e, 0], record.y[e, 0], record.h[e, 0] = x, y, h
@@ -216,15 +218,15 @@ def move_laid(e, k, plan, roads, state, record):
     else:
         v = state.command[e]
         mean = state.mean[e] if state.mean[e] >= 0.0 else 0.5 * (before + v)
-        step = 0.0 if state.placed[e] else abs(mean) * dt
+        step = 0.0 if state.placed[e] else way_along(e, mean * dt, state.passed[e], state)
         state.placed[e] = False
         passed = state.passed[e] + step
-        beyond = max(passed - length, 0.0)
-        ends = passed >= length
+        beyond = math.copysign(max(passed - length, -passed, 0.0), v)
+        ends = passed >= length or passed < 0.0
         x, y, h = at_distance(table, n, passed)
-        if v < 0.0:  # tail first
+        if state.tail_first[e]:
             h += math.pi
-    state.travelled[e] += step
+    state.travelled[e] += abs(step)
     state.passed[e] = passed
     state.stood[e] = standing(state.stood[e], before, v, dt)
     record.a[e, k] = (v - before) / dt

@@ -77,7 +77,7 @@ from bridgegen.simulation.embedded.motion._course_kernels import (
     spring,
 )
 from bridgegen.simulation.embedded.motion._laying_kernels import left_on_laid
-from bridgegen.simulation.embedded.places._place_kernels import place_at
+from bridgegen.simulation.embedded.places._place_kernels import body_pose, place_at, put_along
 
 NEAR = 0.1  # m, a distance that is missed by less is reached
 ASIDE = 10.0  # m, a place that is farther from a path does not lie on it
@@ -112,6 +112,9 @@ def begin_course(j, k, plan, roads, state, record):
             state.profile[e],
         )  # fmt: skip
     elif kind == KEEP_DISTANCE:
+        if not row[BY_BODY] and state.on[e] < 0:  # it is carried along the other's lane
+            x, y, h = record.x[e, k], record.y[e, k], record.h[e, k]
+            put_along(e, x, y, h, record.h[row[REF], k], roads, state)
         state.course[e, FOOT_PATH] = -1.0
         side = row[SIDE]
         if side == EITHER_SIDE:
@@ -134,6 +137,18 @@ def start_at_speed(j, plan, state, record):
     e = plan.actions[j, WHOM]
     v = _wanted(j, e, record.v[plan.courses[plan.actions[j, ROW], REF], 0], plan, state)
     state.command[e] = state.target[e] = record.v[e, 0] = v
+
+
+@kernel
+def start_at_distance(j, plan, roads, state, record):
+    """Let an entity start at the distance that action j keeps without limits, and at that speed."""
+    e, row = plan.actions[j, WHOM], plan.courses[plan.actions[j, ROW]]
+    if row[UNLIMITED] and e > 0 and state.ending[STATUS] == OK:
+        way = _behind_its_place(j, e, 0, 0, plan, roads, state, record)
+        state.station[e] = max(state.station[e] + way, 0.0)
+        v = min(record.v[row[REF], 0], plan.bodies[e, 3])
+        state.command[e] = state.target[e] = record.v[e, 0] = v
+        record.x[e, 0], record.y[e, 0], record.h[e, 0] = body_pose(e, roads, state)
 
 
 @kernel
@@ -168,6 +183,15 @@ def seen_at(e, other, k, plan, state, record):
 
 
 @kernel
+def _mean_seen(e, other, k, plan, state, record):
+    """Return the mean speed [m/s] at which an entity sees another one until the next instant."""
+    seen = seen_at(e, other, k, plan, state, record)
+    if seen > k and state.mean[other] >= 0.0:
+        return state.mean[other]
+    return 0.5 * (record.v[other, k] + record.v[other, seen])
+
+
+@kernel
 def _wanted(j, e, v, plan, state):
     """Return the speed that a relative one is, by the other's."""
     value = state.slots[plan.actions[j, TARGET]]
@@ -181,6 +205,8 @@ def _follow_speed(j, e, k, passed, plan, state, record):
     ref, shape = row[REF], plan.actions[j, SHAPE]
     target = _wanted(j, e, record.v[ref, seen_at(e, ref, k, plan, state, record)], plan, state)
     if shape == STEP:
+        if passed <= plan.dt + SAME_TIME and record.v[e, k] == state.command[e]:
+            state.mean[e] = _wanted(j, e, _mean_seen(e, ref, k, plan, state, record), plan, state)
         state.command[e] = target
         return not row[CONTINUOUS]
     before = state.command[e]
@@ -230,11 +256,10 @@ def _ahead(e, row, k, seen, plan, roads, state, record):
 
 
 @kernel
-def _keep_distance(j, e, k, plan, roads, state, record):
-    """Keep, or reach, a distance: at once if nothing limits it, else as by a spring."""
+def _behind_its_place(j, e, k, seen, plan, roads, state, record):
+    """Return how far it is to the place at the distance [m] that action j keeps."""
     row = plan.courses[plan.actions[j, ROW]]
     ref, side = row[REF], state.course[e, SIDE_TAKEN]
-    seen = seen_at(e, ref, k, plan, state, record) if row[UNLIMITED] and e > 0 else k
     gap = state.slots[plan.actions[j, TARGET]]
     if row[IS_TIME_GAP]:
         gap *= record.v[ref, seen]
@@ -242,7 +267,16 @@ def _keep_distance(j, e, k, plan, roads, state, record):
         centre, length = plan.bodies[e, 2], plan.bodies[e, 0]
         other, other_length = plan.bodies[ref, 2], plan.bodies[ref, 0]
         gap += 0.5 * (length + other_length) + side * (centre - other)
-    error = _ahead(e, row, k, seen, plan, roads, state, record) - side * gap
+    return _ahead(e, row, k, seen, plan, roads, state, record) - side * gap
+
+
+@kernel
+def _keep_distance(j, e, k, plan, roads, state, record):
+    """Keep, or reach, a distance: at once if nothing limits it, else as by a spring."""
+    row = plan.courses[plan.actions[j, ROW]]
+    ref = row[REF]
+    seen = seen_at(e, ref, k, plan, state, record) if row[UNLIMITED] and e > 0 else k
+    error = _behind_its_place(j, e, k, seen, plan, roads, state, record)
     if row[UNLIMITED] and e > 0:
         before = record.v[e, k]
         state.command[e] = min(record.v[ref, seen], plan.bodies[e, 3])

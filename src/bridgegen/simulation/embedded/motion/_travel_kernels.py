@@ -20,6 +20,7 @@ from bridgegen.simulation.embedded.places._place_kernels import (
     body_pose,
     end_follow,
     put_in_world,
+    way_along,
     way_from,
 )
 
@@ -35,8 +36,11 @@ def move_along_path(e, k, plan, roads, state, record):
     mean = state.mean[e] if state.mean[e] >= 0.0 else 0.5 * (before + state.command[e])
     step = 0.0 if state.placed[e] else mean * dt
     state.placed[e] = False
-    if step < 0.0 and state.follow_action[e] >= 0:  # on along its trajectory, tail first
-        step, state.turn[e] = -step, math.pi if state.command[e] < 0.0 else 0.0
+    p = state.on[e]
+    on_trajectory = state.follow_action[e] >= 0 or (p >= 0 and roads.follows[p] == LANDS)
+    if on_trajectory:
+        step = way_along(e, step, state.station[e], state)
+        state.turn[e] = math.pi if state.tail_first[e] else 0.0
     ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
     j = state.lateral_action[e]
     keeps_aside = j >= 0 and plan.actions[j, DOES] == KEEP_ASIDE
@@ -45,11 +49,12 @@ def move_along_path(e, k, plan, roads, state, record):
     elif j >= 0:
         state.aside[e], ahead, state.lateral_passed[e], tilt = glide(
             plan.actions[j, SHAPE], plan.actions[j, DIMENSION], state.lateral_lasts[e],
-            state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], step, dt,
-            plan.bodies[e, 6],
+            state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], abs(step),
+            dt, plan.bodies[e, 6],
         )  # fmt: skip
+        if step < 0.0:
+            ahead, tilt = -ahead, -tilt
         state.foot[e] += ahead
-    p = state.on[e]
     if p >= 0:
         middle, across = state.station[e] + 0.5 * ahead, 0.5 * (aside + state.aside[e])
         ahead /= shrinks(roads.paths[p], roads.counts[p], roads.steps[p], middle, across)
@@ -66,7 +71,14 @@ def move_along_path(e, k, plan, roads, state, record):
         else:
             station, step = length, 0.5 * before * dt
             state.command[e] = state.target[e] = 0.0
-    if p >= 0 and station < 0.0:  # backwards to where its way begins
+    if p >= 0 and station < 0.0 and on_trajectory:  # back over where it begins
+        beyond = math.copysign(station, state.command[e])
+        state.station[e] = 0.0
+        x, y, h = body_pose(e, roads, state)
+        end_follow(e, state)
+        put_in_world(e, x, y, h, roads, state)
+        station = state.station[e] + beyond
+    elif p >= 0 and station < 0.0:  # backwards to where its way begins
         station, step = 0.0, 0.5 * before * dt
         state.command[e] = state.target[e] = 0.0
     state.travelled[e] += abs(step)

@@ -94,6 +94,17 @@ def end_follow(e, state):
         state.action_ended[state.follow_action[e]] = True
     state.follow_action[e] = state.follow[e] = -1
     state.laid_count[e] = 0
+    state.tail_first[e] = False
+
+
+@kernel
+def way_along(e, step, passed, state):
+    """Return how far a step [m] leads an entity on along its trajectory, of which it has passed some.
+
+    Who reverses where it begins follows it tail first; who reverses later goes back along it.
+    """
+    state.tail_first[e] |= step < 0.0 and passed <= 0.0
+    return -step if state.tail_first[e] else step
 
 
 @kernel
@@ -157,10 +168,16 @@ def put_in_world(e, x, y, h, roads, state):
 
     An entity on no lane goes straight ahead.
     """
+    put_along(e, x, y, h, h, roads, state)
+
+
+@kernel
+def put_along(e, x, y, h, along, roads, state):
+    """Place an entity as ``put_in_world``, on a lane that leads the way of another heading."""
     if roads.ground.shape[0] == 0:
         ask(0, GROUND, state)
         return
-    node = nearest_lane(roads.ground, roads.ground_nodes, x, y, h)
+    node = nearest_lane(roads.ground, roads.ground_nodes, x, y, along)
     if node < 0:
         state.on[e], state.station[e], state.aside[e], state.turn[e] = -1, 0.0, 0.0, 0.0
         state.line[e, 0], state.line[e, 1], state.line[e, 2] = x, y, h

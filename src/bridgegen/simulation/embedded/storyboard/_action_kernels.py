@@ -9,6 +9,7 @@ from bridgegen.simulation.embedded._codes import (
     DOES,
     FIRST_GLOBAL,
     FIRST_MOTION,
+    KEEP_DISTANCE,
     RELATIVE_SPEED,
     SHAPE,
     TELEPORT,
@@ -19,6 +20,7 @@ from bridgegen.simulation.embedded.drivers import begin_control, is_steered
 from bridgegen.simulation.embedded.motion import (
     begin_motion,
     is_pointless,
+    start_at_distance,
     start_at_speed,
     steers,
 )
@@ -50,6 +52,8 @@ def begin_initially(plan, roads, state, record):
         begin(j, 0, plan, roads, state, record)
         if plan.actions[j, DOES] == RELATIVE_SPEED and plan.actions[j, SHAPE] == STEP:
             start_at_speed(j, plan, state, record)
+        elif plan.actions[j, DOES] == KEEP_DISTANCE:
+            start_at_distance(j, plan, roads, state, record)
         elif plan.actions[j, DOES] == TELEPORT:
             e = plan.actions[j, WHOM]
             state.placed[e] = False

@@ -10,7 +10,7 @@ from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS, STOPS
 from bridgegen.simulation.embedded._motion_kernels import shifted
-from bridgegen.simulation.embedded.motion import at_time
+from bridgegen.simulation.embedded.motion import LANDS, at_time
 from bridgegen.simulation.embedded.places._place_kernels import body_pose, put
 from bridgegen.simulation.embedded.storyboard._action_kernels import begin_initially
 from bridgegen.simulation.embedded.world import (
@@ -52,6 +52,9 @@ def start(plan, roads, state, record):
                 return
             x, y, h = pose(roads.paths[e], roads.counts[e], roads.steps[e], state.station[e])
             record.x[e, 0], record.y[e, 0] = shifted(x, y, h, state.aside[e])
+            if record.v[e, 0] < 0.0 and roads.follows[e] == LANDS and state.station[e] <= 0.0:
+                state.tail_first[e] = True
+                h += math.pi
             record.h[e, 0] = h
         state.command[e] = state.target[e] = record.v[e, 0]
     for i in range(plan.starts.shape[0]):
