@@ -14,7 +14,7 @@ from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._codes import DIMENSION, LASTS, ROW, SHAPE, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE
-from bridgegen.simulation.embedded._motion_kernels import DISTANCE, STEP, nearest
+from bridgegen.simulation.embedded._motion_kernels import DISTANCE, nearest
 from bridgegen.simulation.embedded.motion._lateral_kernels import (
     lane_change_lasts,
     least_length,

@@ -99,7 +99,7 @@ def end_follow(e, state):
 
 @kernel
 def way_along(e, step, passed, state):
-    """Return how far a step [m] leads an entity on along its trajectory, of which it has passed some.
+    """Return how far a step [m] leads an entity on along its trajectory, so far along it [m].
 
     Who reverses where it begins follows it tail first; who reverses later goes back along it.
     """
