@@ -130,9 +130,17 @@ def _appears(i, e, present, last):
 
 
 @kernel
+def _is_towed_by_ego(e, towed_by):
+    """Return whether a body is a trailer of the ego's."""
+    while e > 0:
+        e = towed_by[e]
+    return e == 0
+
+
+@kernel
 def judge(
-    box, limits, x, y, h, v, cosine, sine, distance, present, n_steps, failed, dt, window, code,
-    instant, entity, other, value, limit,
+    box, limits, x, y, h, v, cosine, sine, distance, present, towed_by, n_steps, failed, dt,
+    window, code, instant, entity, other, value, limit,
 ):  # fmt: skip
     """Fill the last six, each ``(N,)``; see ``plausibility.Plausibility`` and ``LIMITS``."""
     n_rows, n_entities, _ = x.shape
@@ -161,13 +169,16 @@ def judge(
                 value[i], limit[i] = found[2], found[3]
         for a in range(n_entities):
             for b in range(a + 1, n_entities):
+                if towed_by[a] == b or towed_by[b] == a:
+                    continue
+                is_ego_s = a == 0 or _is_towed_by_ego(a, towed_by) or _is_towed_by_ego(b, towed_by)
                 at = max(first[a], first[b])
                 if at > last or at > best:
                     continue
                 stand = a > 0 and not (moves[a] or moves[b])
                 if stand and limits[a, IS_PROP] > 0.0 and limits[b, IS_PROP] > 0.0:
                     continue
-                until = at if a == 0 or stand else min(best, last)
+                until = at if is_ego_s or stand else min(best, last)
                 k = at
                 while k <= until:
                     if comes and not (present[i, a, k] and present[i, b, k]):

@@ -1,6 +1,6 @@
 """The conflict analysis of rollouts: conflicts of the ego with each other participant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -81,6 +81,7 @@ class Conflicts:
         delta_v_ego: ``(N, E)`` [m/s], change of the ego's velocity; 0 unless they touch.
         delta_v_other: ``(N, E)`` [m/s], of the other's.
         ok: ``(N,)`` bool, False where the scenario failed; its rows are empty.
+        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own.
     """
 
     names: tuple[str, ...]
@@ -110,6 +111,7 @@ class Conflicts:
     delta_v_ego: Float
     delta_v_other: Float
     ok: Bool
+    body: Int
 
     @cached_property
     def at_fault(self) -> Bool:
@@ -133,6 +135,41 @@ def analyse(rollout: Rollout) -> Conflicts:
 
 
 def _analyse(rollout: Rollout) -> Conflicts:
+    own = [e for e in range(rollout.shape[1]) if rollout.is_ego_s(e)]
+    if len(own) == 1:
+        return _of_one_body(rollout)
+    found, *more = (_of_one_body(_seen_from(rollout, e, own)) for e in own)
+    for e, part in zip(own[1:], more, strict=True):
+        worse = part.kind > found.kind
+        worse |= (part.kind == found.kind) & (part.kind == CONTACT) & (part.instant < found.instant)
+        pairs = {
+            name: np.where(worse, getattr(part, name), array)
+            for name, array in vars(found).items()
+            if isinstance(array, np.ndarray) and array.ndim == 2
+        }
+        found = replace(found, **pairs | {"body": np.where(worse, e, found.body)})
+    return found
+
+
+def _seen_from(rollout: Rollout, e: int, own: list[int]) -> Rollout:
+    """Return a rollout in which a body of the ego's stands for it, and its others are absent."""
+    there = np.ones(rollout.shape, np.bool_)
+    if rollout.present.size:
+        there = rollout.present.copy()
+    there[:, [one for one in own if one != e]] = False
+    order = np.arange(rollout.shape[1])
+    order[[0, e]] = e, 0
+    swapped = {
+        name: getattr(rollout, name)[:, order] for name in ("x", "y", "h", "v", "a", "offset")
+    }
+    kinds = rollout.kinds[order] if len(rollout.kinds) else rollout.kinds
+    return replace(
+        rollout, **swapped, box=rollout.box[order], kinds=kinds, present=there[:, order],
+        towed_by=np.zeros(0, np.int64),
+    )  # fmt: skip
+
+
+def _of_one_body(rollout: Rollout) -> Conflicts:
     from bridgegen.conflict import _conflict_kernels as kernels
 
     n, e, t = rollout.shape
@@ -200,6 +237,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
         leads_ego=np.isin(leads_ego, _FRONT),
         preventable=whole[:, :, codes.PREVENTABLE] > 0,
         severity=harm, delta_v_ego=dv_ego, delta_v_other=dv_other, ok=ok,
+        body=np.zeros((n, e), np.int64),
     )  # fmt: skip
 
 

@@ -189,7 +189,8 @@ def plausibility(rollout: Rollout) -> Plausibility:
     value, limit = np.empty(n), np.empty(n)
     _plausibility_kernels.judge(
         rollout.box, limits, *(recorded(rollout, name) for name in "xyhv"), cosine, sine,
-        distance(rollout), np.ascontiguousarray(rollout.present), steps(rollout),
+        distance(rollout), np.ascontiguousarray(rollout.present),
+        rollout.towed_by if len(rollout.towed_by) else np.full(e, -1, np.int64), steps(rollout),
         np.asarray(rollout.status) != 0, rollout.time_step,
         max(1, round(WINDOW / rollout.time_step)), code, instant, entity, other, value, limit,
     )  # fmt: skip

@@ -64,11 +64,14 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     """Return the event, with the edges that meet and the speed."""
     closing = conflicts.closing_normal[row, other]
     own = Zone(int(conflicts.zone_ego[row, other])).label
+    mine, whole = f"ego's {own}", "the ego"
+    if conflicts.body[row, other] > 0:
+        mine, whole = f"{own} of the ego's trailer", "the ego's trailer"
     its = Zone(int(conflicts.zone_other[row, other])).label
     kind = ConflictType(int(conflicts.type[row, other]))
     if conflicts.kind[row, other] == NEAR_MISS:
         return (
-            f"The ego's {own} came within {conflicts.ttc[row, other]:.1f} s of the {its} of {name} "
+            f"The {mine} came within {conflicts.ttc[row, other]:.1f} s of the {its} of {name} "
             f"at {closing:.1f} m/s closing speed, which needed "
             f"{conflicts.needed[row, other]:.1f} m/s² of braking"
         )
@@ -76,13 +79,13 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     if kind == ConflictType.EGO_STANDING:
         stood = conflicts.stood_ego[row, other]
         return (
-            f"The {its} of {name} struck the {own} of the ego, which had stood for {stood:.1f} s, "
+            f"The {its} of {name} struck the {own} of {whole}, which had stood for {stood:.1f} s, "
             f"{speed}"
         )
     if kind in (ConflictType.REAR_END_STRUCK, ConflictType.VRU_INTO_SIDE):
-        return f"The {its} of {name} struck the ego's {own} {speed}"
+        return f"The {its} of {name} struck the {mine} {speed}"
     verb = "met" if kind == ConflictType.SIDE_SWIPE else "struck"
-    return f"The ego's {own} {verb} the {its} of {name} {speed}"
+    return f"The {mine} {verb} the {its} of {name} {speed}"
 
 
 def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> str:

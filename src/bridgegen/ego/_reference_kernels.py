@@ -145,7 +145,7 @@ def drive(k, plan_, roads, state, record):
     friction_limit = state.weather[FRICTION]
     curvature = keep_to_route(k, roads, state, record)
     perceive(
-        k, plan_.dt, state.key[0], plan_.ideal_perception, state.present, record.x, record.y,
+        k, plan_.dt, state.key[0], plan_.ideal_perception, state.visible, record.x, record.y,
         record.h, record.v, plan_.bodies, plan_.kinds, state.weather, state.sensors, state.tracks,
         record.detections,
     )  # fmt: skip

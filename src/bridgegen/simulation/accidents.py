@@ -54,6 +54,9 @@ def accidents(rollout: Rollout, row: int, standing: Iterable[str] = ()) -> tuple
         x, y, h = (one[[row]][:, rest, :steps] for one in (rollout.x, rollout.y, rollout.h))
         gaps = box_distance(rollout.box[rest], x, y, h, np.array([steps]))[0, 1:]
         contact = gaps <= 0.0
+        for i, other in enumerate(rest[1:]):
+            if rollout.coupled(rest[0], other):
+                contact[i] = False
         if rollout.present.size:
             there = rollout.present[row, rest, :steps]
             contact &= there[:1] & there[1:]

@@ -104,6 +104,8 @@ class Rollout:
             [m]; NaN where a road network has fewer.
         friction: ``(N,)`` float64 [m/s²], what the tyres could give (mu g) as the scenario ended;
             ``(0,)`` where unknown.
+        towed_by: ``(E,)`` int64, by which entity each is towed some time; -1: by none. Empty where
+            nobody is. Who is coupled does not collide.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.
@@ -133,6 +135,7 @@ class Rollout:
     claims: Int = field(default_factory=lambda: np.zeros((0, 0, 0), np.int64))
     crosswalks: Float = field(default_factory=lambda: np.zeros((0, 0, 5)))
     friction: Float = field(default_factory=lambda: np.zeros(0))
+    towed_by: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -155,14 +158,41 @@ class Rollout:
         """``(N, E, T)`` float64 [m]: from the ego's oriented box to each other's, 0 at contact.
 
         Row 0 of axis E, the ego's distance to itself, is +inf, and so is that to (or from) who is
-        not present. Padded instants repeat the last.
+        not present. Trailers of the ego's are part of it. Padded instants repeat the last.
         """
+        distance = self._distance_from(0)
+        own = [e for e in range(1, len(self.names)) if self.is_ego_s(e)]
+        for e in own:
+            np.minimum(distance, self._distance_from(e), out=distance)
+        distance[:, [0, *own]] = np.inf
+        return distance
+
+    def _distance_from(self, e: int) -> Float:
+        """Return the distances from one body to all, as ``distance``."""
         from bridgegen.simulation.boxes import box_distance
 
-        distance = box_distance(self.box, self.x, self.y, self.h, self.n_steps, self.direction)
+        order = [e, *(other for other in range(len(self.names)) if other != e)]
+        box, x, y, h = self.box, self.x, self.y, self.h
+        direction: tuple[Float, Float] | None = self.direction
+        if e:
+            box, x, y, h = box[order], x[:, order], y[:, order], h[:, order]
+            direction = None
+        found = box_distance(box, x, y, h, self.n_steps, direction)
+        if e:
+            found = found[:, np.argsort(order)]
         if self.present.size:
-            distance[~(self.present & self.present[:, :1])] = np.inf
-        return distance
+            found[~(self.present & self.present[:, e : e + 1])] = np.inf
+        return found
+
+    def is_ego_s(self, e: int) -> bool:
+        """Return whether an entity is the ego, or a trailer of its own."""
+        while e > 0:
+            e = int(self.towed_by[e]) if len(self.towed_by) else -1
+        return e == 0
+
+    def coupled(self, a: int, b: int) -> bool:
+        """Return whether one of two entities tows the other some time."""
+        return bool(len(self.towed_by)) and (self.towed_by[a] == b or self.towed_by[b] == a)
 
     def take(self, at: Int) -> "Rollout":
         """Return some of the scenarios, in the order of their positions ``at``."""

@@ -269,8 +269,9 @@ def chain(tmp_path, entries: dict[str, list[str]]):
 
 def test_entries_refer_to_further_ones(tmp_path):
     path = chain(tmp_path, {"a": ["b"], "b": []})
-    body = read(path).entities.scenario_objects[0].entity_object
-    assert body.trailer.trailer.entity_object.name == "b"
+    first, second = read(path).entities.scenario_objects
+    assert first.entity_object.trailer.trailer.entity_ref == second.name == "t0"
+    assert second.entity_object.name == "b"
 
 
 @pytest.mark.parametrize("entries", [{"a": ["a"]}, {"a": ["b"], "b": ["c"], "c": ["b"]}])

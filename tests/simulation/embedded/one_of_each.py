@@ -1,6 +1,6 @@
 """Every action, condition, position and shape of OpenSCENARIO once, in a scenario that may run."""
 
-from .storyboards import after, lane, scenario, speed_action, start
+from .storyboards import after, lane, scenario, speed_action, start, vehicle
 
 HERE = '<LanePosition roadId="2" laneId="1" s="40"/>'
 _DYNAMICS = 'dynamicsShape="linear" dynamicsDimension="time" value="1"'
@@ -104,7 +104,7 @@ vehicleLightType="indicatorLeft"/></LightType><LightState mode="on"/></LightStat
     "AnimationAction": """<AppearanceAction><AnimationAction><AnimationType><ComponentAnimation>
 <VehicleComponent vehicleComponentType="doorFrontRight"/></ComponentAnimation></AnimationType>
 <AnimationState state="1"/></AnimationAction></AppearanceAction>""",
-    "ConnectTrailerAction": '<TrailerAction><ConnectTrailerAction trailerRef="ego"/>'
+    "ConnectTrailerAction": '<TrailerAction><ConnectTrailerAction trailerRef="trailer"/>'
     "</TrailerAction>",
     "DisconnectTrailerAction": "<TrailerAction><DisconnectTrailerAction/></TrailerAction>",
 }
@@ -259,7 +259,19 @@ entityRef="bv"/></TriggeringEntities><EntityCondition>{x}</EntityCondition></ByE
         found[name] = _event(f"<PrivateAction>{there}</PrivateAction>", soon)
     for name, x in SHAPES.items():
         found[name] = _event(f"<PrivateAction>{_follow(x)}</PrivateAction>", soon)
-    return {name: _whole(event) for name, event in found.items()}
+    whole = {name: _whole(event) for name, event in found.items()}
+    return whole | {
+        "ConnectTrailerAction": _with_a_trailer(whole["ConnectTrailerAction"]),
+    }
+
+
+def _with_a_trailer(text: str) -> str:
+    """Return a file in which bv has a hitch, and a trailer stands somewhere."""
+    body = vehicle("trailer").replace("</Vehicle>", '<TrailerCoupler dx="4"/></Vehicle>')
+    at = text.index("</Vehicle>", text.index('<ScenarioObject name="bv">'))
+    text = text[:at] + '<TrailerHitch dx="-1"/>' + text[at:]
+    text = text.replace("</Entities>", body + "</Entities>")
+    return text.replace("<Init><Actions>", f"<Init><Actions>{start('trailer', lane(1, 1, 9), 0)}")
 
 
 def _whole(event: str) -> str:

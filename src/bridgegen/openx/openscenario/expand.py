@@ -5,7 +5,8 @@ All of it happens in this one place, when a file is read, so that users of a sce
 - no ``CatalogReference``: the entry stands there, with the parameters that it was given;
 - no parameters but the scenario's own, declared with a literal; all others are what they stand for
   (see ``scopes``), but where an action or a condition names one it is made one of the scenario's;
-- no ``EntitySelection``: its members stand wherever there may be several entities.
+- no ``EntitySelection``: its members stand wherever there may be several entities;
+- no entity within another: a trailer is one of its own (see ``towing``).
 
 Elements from a catalogue are marked in their lines (`catalogs.CatalogLine`).
 """
@@ -32,6 +33,7 @@ from bridgegen.openx.openscenario.reader import shorten
 from bridgegen.openx.openscenario.scopes import Binding, Scope, is_made, reads_as_number
 from bridgegen.openx.openscenario.selections import without_selections
 from bridgegen.openx.openscenario.storyboard import OpenScenario
+from bridgegen.openx.openscenario.towing import with_trailers_apart
 from bridgegen.openx.openscenario.values import Expr, Kind, Value
 from bridgegen.openx.xml import MAX_DEPTH
 
@@ -64,9 +66,9 @@ def expanded(
             are not there, or that go round in circles; all of it at once.
         UnsupportedError: an entry holds what this version does not know.
     """
-    if not any(map(_refers, walk(file))):
-        return without_selections(file)
-    return without_selections(_Expander(file, folder, place, skipped, warnings).result())
+    if any(map(_refers, walk(file))):
+        file = _Expander(file, folder, place, skipped, warnings).result()
+    return with_trailers_apart(without_selections(file))
 
 
 def _refers(element: Element) -> bool:

@@ -57,6 +57,12 @@ class Plan(NamedTuple):
     follows_courses: int
     moves_laid: int
     poses_along: int
+    tows: Int
+    towers: Int
+    couplings: Float
+    stands_apart: Int
+    tows_trailers: int
+    starts_towed: int
     laterals: Int
     values: Int
     first_states: npt.NDArray[np.int8]
@@ -155,7 +161,9 @@ class State(NamedTuple):
         lights: ``(L,)`` int8, the traffic lights' states.
         phase_now: ``(K,)`` int64, the phase that each controller is in,
         phase_until: ``(K,)`` [s], and until when.
-        present: ``(E,)`` bool, whether each is present.
+        present: ``(E,)`` bool, whether each is present,
+        visible: ``(E,)`` bool, and no trailer of the ego's; kept where there are trailers.
+        tower: ``(E,)`` int64, by which entity it is towed; -1: by none.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] for how long it has stood.
@@ -237,6 +245,8 @@ class State(NamedTuple):
     phase_now: Annotated[Int, "controllers"]
     phase_until: Annotated[Float, "controllers"]
     present: Annotated[Bool, "entities"]
+    visible: Annotated[Bool, "entities"]
+    tower: Annotated[Int, "entities"]
     drives: Annotated[Int, 2]
     travelled: Annotated[Float, "entities"]
     stood: Annotated[Float, "entities"]

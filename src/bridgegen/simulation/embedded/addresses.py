@@ -17,7 +17,14 @@ from bridgegen.simulation.embedded._codes import (
 from bridgegen.simulation.embedded._memory_kernels import Plan, Record, Roads, State
 from bridgegen.simulation.embedded.conditions import look_closely
 from bridgegen.simulation.embedded.drivers import begin_waiting, heed
-from bridgegen.simulation.embedded.motion import BEGINS, follow_course, move_laid, pose_along
+from bridgegen.simulation.embedded.motion import (
+    BEGINS,
+    follow_course,
+    move_laid,
+    pose_along,
+    start_towed,
+    tow,
+)
 
 
 def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Plan:
@@ -49,6 +56,8 @@ def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Pl
         follows_courses=at(follow_course, types.int64, types.int64) if chases else 0,
         poses_along=at(pose_along, types.int64, types.int64) if along else 0,
         moves_laid=at(move_laid, types.int64, types.int64) if len(plan.layouts) else 0,
+        tows_trailers=at(tow, types.int64) if len(plan.tows) else 0,
+        starts_towed=at(start_towed) if len(plan.tows) else 0,
         looks_closely=at(look_closely, types.int64) if plan.looks_closely else 0,
         heeds=at(heed, types.int64) if plan.attends else 0,
         begins_waiting=at(begin_waiting, types.int64) if plan.attends else 0,

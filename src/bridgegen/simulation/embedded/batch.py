@@ -256,6 +256,7 @@ class Batch:
             stop_lights=roads.stop_lights,
             stop_entities=roads.stop_entities,
             claims=roads.scene.claims[self._rows],
+            towed_by=_towed_by(program),
             crosswalks=roads.crosswalks[self._rows],
             friction=self.state.weather[:, FRICTION].copy(),
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
@@ -288,6 +289,13 @@ def noise_keys(
     return noise_key({**program.parameters, **_known(program, values)}, n)
 
 
+def _towed_by(program: Program) -> Int:
+    """Return by whom each entity is towed some time, -1 by nobody; empty where nobody is."""
+    found = np.full(len(program.names) if len(program.tows) else 0, -1, dtype=np.int64)
+    found[program.tows[:, 1]] = program.tows[:, 0]
+    return found
+
+
 def _known(program: Program, values: Mapping[str, npt.ArrayLike]) -> dict[str, npt.ArrayLike]:
     """Return the values of the parameters that the file has."""
     return {name: value for name, value in values.items() if name in program.parameters}
@@ -306,6 +314,8 @@ def _plan(program: Program) -> memory.Plan:
         "follows_courses": 0,
         "moves_laid": 0,
         "poses_along": 0,
+        "tows_trailers": 0,
+        "starts_towed": 0,
         "heeds": 0,
         "begins_waiting": 0,
         "is_driven": int(program.driver != STORYBOARD),

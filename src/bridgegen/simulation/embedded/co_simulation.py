@@ -145,7 +145,7 @@ class CoSimulation:
         """
         record = self._batch.record
         if record.present.size:
-            self._batch.state.present[0] = present
+            self._batch.state.present[0] = self._batch.state.visible[0] = present
             record.present[0, :, k] = present
 
     def impose_lights(self, k: int, states: npt.ArrayLike) -> None:

@@ -252,6 +252,11 @@ class Program:
         comes_and_goes: whether there are such, or an entity is deleted or leaves.
         leaves: whether others than the ego are gone where their road ends; else they stand there.
         drives: ``(2,)`` whether the driver steers, and sets the speed, at the start.
+        tows: ``(W, 2)`` which entity may tow which, each behind what it is towed by.
+        towers: ``(E,)`` by which one each is towed at the start, -1 by none.
+        couplings: ``(E, 2)`` where each tows and is towed, ahead of its reference point [m]; NaN
+            where it cannot.
+        stands_apart: ``(E,)`` whether it has a start of its own.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
@@ -304,6 +309,10 @@ class Program:
     shapes: Float
     most_vertices: int
     spots: tuple[Spot | None, ...]
+    tows: Int
+    towers: Int
+    couplings: Float
+    stands_apart: Int
     weathers: Int
     values: Int
     lights: tuple[str, ...]

@@ -9,7 +9,9 @@ from bridgegen.simulation.embedded._codes import (
     ACQUIRE,
     ADD_ENTITY,
     ASSIGN_ROUTE,
+    CONNECT_TRAILER,
     DELETE_ENTITY,
+    DISCONNECT_TRAILER,
     FOLLOW,
     FOLLOW_LAID,
     LANE_CHANGE,
@@ -23,6 +25,7 @@ from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
 from bridgegen.simulation.embedded.compiler.layouts import Layouts, is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.towing import Towing
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
 from bridgegen.simulation.embedded.program import (
     AlongTrajectory,
@@ -55,14 +58,15 @@ class Actions:
         positions: takes the places that they name.
         global_actions: compiles what concerns all.
         controllers: compiles who drives.
+        towing: compiles who tows whom.
     """
 
     def __init__(
         self, tables: Tables, paths: list[PathSpec], positions: Positions,
-        global_actions: GlobalActions, controllers: Controllers,
+        global_actions: GlobalActions, controllers: Controllers, towing: Towing,
     ) -> None:  # fmt: skip
         self._tables, self._paths, self._global_actions = tables, paths, global_actions
-        self._positions, self._controllers = positions, controllers
+        self._positions, self._controllers, self._towing = positions, controllers, towing
         self._driven: list[Element] = []
         self.routes: list[tuple[Spot, ...]] = []
         self.laterals: list[tuple[int, ...]] = []
@@ -138,6 +142,8 @@ class Actions:
             self.rows.append((entity, TELEPORT, 0, 0, slot, slot, place))
         elif isinstance(action, osc.RoutingAction):
             self._routing(action.action, entity)
+        elif isinstance(action, osc.TrailerAction):
+            self._coupling(action, entity)
         elif isinstance(action, CONTROLLING):
             if (row := self._controllers.row(action, entity)) is not None:
                 self.rows.append(row)
@@ -154,6 +160,16 @@ class Actions:
         if isinstance(action, osc.VisibilityAction):
             return self._tables.truth(action.sensors) and self._tables.truth(action.traffic)
         return False
+
+    def _coupling(self, action: osc.TrailerAction, entity: int) -> None:
+        """Add an action by which an entity takes a trailer, or leaves it."""
+        slot = self._tables.slot(0.0)
+        if isinstance(action.action, osc.DisconnectTrailerAction):
+            self.rows.append((entity, DISCONNECT_TRAILER, 0, 0, slot, slot, 0))
+            return
+        towed = self._tables.entity(action.action.trailer_ref)
+        if self._towing.takes(action.action, entity, towed):
+            self.rows.append((entity, CONNECT_TRAILER, 0, towed, slot, slot, 0))
 
     def _presence(self, action: osc.EntityAction) -> None:
         """Add an action by which an entity comes or goes."""

@@ -6,7 +6,7 @@ from bridgegen.ego.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import SIREN
 from bridgegen.openx.openscenario.participant_kinds import object_class_of
-from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.tables import TRAILERS, Tables
 
 Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReference
 
@@ -39,20 +39,21 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     )
     if not isinstance(body, osc.Vehicle):
         return (*size, math.inf, math.inf, math.inf, math.inf, height)
-    if body.trailer is not None:
-        tables.unsupported(body.trailer, "Trailer")
     limits, axles = body.performance, body.axles
     rear = tables.literal(axles.rear, "positionX", axles.rear.position_x)
     front = axles.front or axles.rear
     wheelbase = tables.literal(front, "positionX", front.position_x) - rear
     lock = tables.literal(front, "maxSteering", front.max_steering)
-    if wheelbase <= 0.0:
+    bend = math.tan(min(lock, _STEEPEST)) / max(wheelbase, 0.1)
+    if wheelbase <= 0.0 and body.vehicle_category in TRAILERS:
+        bend = math.inf  # it has nothing to steer with, and goes where it is led
+    elif wheelbase <= 0.0:
         tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
     return (
         *size,
         tables.literal(limits, "maxSpeed", limits.max_speed),
         tables.literal(limits, "maxAcceleration", limits.max_acceleration),
         tables.literal(limits, "maxDeceleration", limits.max_deceleration),
-        math.tan(min(lock, _STEEPEST)) / max(wheelbase, 0.1),
+        bend,
         height,
     )

@@ -30,6 +30,7 @@ from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.start import Start
 from bridgegen.simulation.embedded.compiler.storyboard import elements
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
+from bridgegen.simulation.embedded.compiler.towing import Towing
 from bridgegen.simulation.embedded.compiler.triggers import MAX_STEPS, Triggers
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
@@ -97,10 +98,14 @@ class _Compiler:
         self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
         self.global_actions = GlobalActions(self.tables, scenario)
         self.controllers = Controllers(self.tables, scenario)
+        self.towing = Towing(self.tables)
         self.actions = Actions(
-            self.tables, self.paths, self.positions, self.global_actions, self.controllers
+            self.tables, self.paths, self.positions, self.global_actions, self.controllers,
+            self.towing,
+        )  # fmt: skip
+        self.start = Start(
+            self.tables, self.paths, self.positions, self.actions, self.controllers, self.towing
         )
-        self.start = Start(self.tables, self.paths, self.positions, self.actions, self.controllers)
 
     def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
         """Return the scenario as it was given without what cannot be run."""
@@ -129,6 +134,7 @@ class _Compiler:
         bodies = np.array([measures(self.tables, one) for one in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
         self.controllers.has_driver, self.controllers.replaces = has_driver, driver is not None
+        self.towing.compile()
         self.start.compile(storyboard, has_driver)
         chosen = driver or self._declared_driver()
         self.controllers.has_driver = has_driver = chosen is not STORYBOARD
@@ -166,7 +172,7 @@ class _Compiler:
         conditions = table(self.triggers.conditions, 5)
         conditions[:, DELAY] = np.minimum(conditions[:, DELAY], n_steps)
         global_actions, signals = self.global_actions, self.global_actions.signals
-        time = global_actions.first_time
+        time, tows = global_actions.first_time, self.towing.tows()
         first_time = -1 if time is None else self.tables.slot(time[0])
         waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
         leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
@@ -212,6 +218,10 @@ class _Compiler:
             shapes=self.actions.layouts.shapes,
             most_vertices=self.actions.layouts.most_vertices,
             spots=tuple(self.positions.spots),
+            tows=tows,
+            towers=self.towing.towers,
+            couplings=self.towing.couplings(),
+            stands_apart=np.array(self.start.apart, dtype=np.int64),
             weathers=global_actions.environments.rows,
             values=np.array(global_actions.values.slots, dtype=np.int64),
             lights=tuple(signals.lights),
@@ -226,7 +236,10 @@ class _Compiler:
             first_time=first_time,
             time_passes=int(time is not None and time[1]),
             absent=np.array([e in self.start.absent for e in range(len(objects))], dtype=np.int64),
-            comes_and_goes=bool(self.start.absent) or self.actions.has_comings_and_goings or leaves,
+            comes_and_goes=bool(self.start.absent)
+            or self.actions.has_comings_and_goings
+            or leaves
+            or len(tows) > 0,
             leaves=leaves,
             drives=np.array(self.controllers.drives, dtype=np.int64),
             driver=chosen if ideal is None else chosen.idealised(ideal),
@@ -269,6 +282,8 @@ class _Compiler:
             return "it is an object, which does not move by itself"
         if self.actions.is_timed(e):
             return "it follows a trajectory with times"
+        if isinstance(body, osc.Vehicle) and (body.trailer or self.towing.towers[e] >= 0):
+            return "it tows, or is towed"
         drives = IS_VEHICLE[kind(body)]
         if drives and isinstance(self.paths[e], AlongTrajectory):
             return "it follows a trajectory, and is on no lane"

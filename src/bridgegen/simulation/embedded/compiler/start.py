@@ -12,6 +12,7 @@ from bridgegen.simulation.embedded.compiler.courses import LONGITUDINAL, first_s
 from bridgegen.simulation.embedded.compiler.layouts import gives_path, is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.towing import Towing
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
@@ -35,11 +36,13 @@ class Start:
         positions: where places are kept.
         actions: where actions that begin at the start are kept.
         controllers: who moves the ego.
+        towing: who tows whom.
 
     Attributes:
         speeds: the slot of each entity's speed.
         routes: the route of each entity that gets one.
         absent: the entities that are not there at the start.
+        apart: of each entity, whether it has a start of its own.
     """
 
     def __init__(
@@ -49,13 +52,16 @@ class Start:
         positions: Positions,
         actions: Actions,
         controllers: Controllers,
+        towing: Towing,
     ) -> None:
+        self._towing = towing
         self._tables, self._paths, self._positions = tables, paths, positions
         self._actions, self._controllers = actions, controllers
         self._places: dict[int, int] = {}
         self.speeds: list[int] = []
         self.routes: dict[int, int] = {}
         self.absent: list[int] = []
+        self.apart: list[bool] = []
 
     def compile(self, storyboard: osc.Storyboard, has_driver: bool) -> None:
         """Compile the start of a storyboard.
@@ -118,7 +124,10 @@ class Start:
         ]
         waiting = {self._tables.names[e] for e in self.absent}
         self.absent += self._deleted(actions.global_actions)
-        missing = [name for name in self._tables.names if name not in {*starts, *tracks, *waiting}]
+        self.apart = [name in {*starts, *tracks} for name in self._tables.names]
+        led = {name for e, name in enumerate(self._tables.names) if self._towing.towers[e] >= 0}
+        settled = {*starts, *tracks, *waiting, *led}
+        missing = [name for name in self._tables.names if name not in settled]
         if missing and not self._tables.problems:
             self._tables.culprits += [
                 one for one in self._tables.objects if str(one.name) in missing
@@ -135,7 +144,7 @@ class Start:
                 self._paths.append(tracks[name])
             elif name in starts:
                 self._paths.append(self._start(e, starts[name], routes.get(name), has_driver))
-            elif name in waiting:
+            elif name in waiting | led:
                 self._paths.append(self._nowhere(e, routes.get(name)))
         for one_more, entity in first:
             self._actions.begin(one_more, entity)

@@ -19,6 +19,9 @@ _OBJECTS = {
     osc.ObjectType.EXTERNAL: osc.ExternalObjectReference,
 }  # fmt: skip
 
+TRAILERS = (osc.VehicleCategory.TRAILER, osc.VehicleCategory.SEMITRAILER)
+"""The vehicles that are towed."""
+
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
@@ -39,7 +42,7 @@ class Tables:
     def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
         self.place = place
         objects = scenario.entities.scenario_objects
-        self.objects = sorted(objects, key=lambda one: str(one.name).lower() != "ego")
+        self.objects = sorted(objects, key=_rank)
         self._selections = {str(one.name): one for one in scenario.entities.entity_selections}
         self.names = tuple(str(one.name) for one in self.objects)
         self.parameters = numbers(scenario)
@@ -162,6 +165,13 @@ class Tables:
             self.unsupported(where, f'laneId="{where.lane_id}" (a whole number is needed)')
             return None
         return LanePoint(str(where.road_id), lane, where.s, where.line)
+
+
+def _rank(one: osc.ScenarioObject) -> tuple[bool, bool]:
+    """Return what the ego has least of: another name, and being a trailer."""
+    body = one.entity_object
+    is_trailer = isinstance(body, osc.Vehicle) and body.vehicle_category in TRAILERS
+    return str(one.name).lower() != "ego", is_trailer
 
 
 def table(rows: Sequence[tuple[int, ...]], width: int) -> Int:

@@ -21,7 +21,7 @@ def observe(k, plan, roads, state, record, step, route, tracks):
         the distance to the next stop line of a light [m], +inf if there is none; and its state.
     """
     perceive(
-        k, plan.dt, state.key[0], plan.ideal_perception, state.present, record.x, record.y,
+        k, plan.dt, state.key[0], plan.ideal_perception, state.visible, record.x, record.y,
         record.h, record.v, plan.bodies, plan.kinds, state.weather, state.sensors, state.tracks,
         record.detections,
     )  # fmt: skip

@@ -26,6 +26,7 @@ from bridgegen.simulation.embedded.motion._pursuit_kernels import (
 )
 from bridgegen.simulation.embedded.motion._speed_kernels import command_speed, stop_longitudinal
 from bridgegen.simulation.embedded.motion._steering_kernels import note, steer
+from bridgegen.simulation.embedded.motion._towing_kernels import start_towed, tow
 from bridgegen.simulation.embedded.motion._travel_kernels import (
     ENDS,
     LANDS,
@@ -53,10 +54,12 @@ __all__ = [
     "pose_along",
     "start_at_distance",
     "start_at_speed",
+    "start_towed",
     "stay_away",
     "steer",
     "steers",
     "stop_follow",
     "stop_longitudinal",
     "stop_motion",
+    "tow",
 ]

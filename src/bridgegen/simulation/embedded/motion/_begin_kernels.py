@@ -14,7 +14,9 @@ from bridgegen.simulation.embedded._codes import (
     ACQUIRE,
     ADD_ENTITY,
     ASSIGN_ROUTE,
+    CONNECT_TRAILER,
     DELETE_ENTITY,
+    DISCONNECT_TRAILER,
     DOES,
     FIRST_ACROSS,
     FIRST_ALONG,
@@ -52,6 +54,7 @@ from bridgegen.simulation.embedded.motion._speed_kernels import (
     stop_longitudinal,
     take_speed,
 )
+from bridgegen.simulation.embedded.motion._towing_kernels import begin_connect, begin_disconnect
 
 BEGINS: dict[int, Callable[..., Any]] = {
     SPEED_CHANGE: begin_speed_change,
@@ -61,6 +64,8 @@ BEGINS: dict[int, Callable[..., Any]] = {
     KEEP_ASIDE: begin_lateral_distance,
     ADD_ENTITY: begin_add,
     DELETE_ENTITY: begin_delete,
+    CONNECT_TRAILER: begin_connect,
+    DISCONNECT_TRAILER: begin_disconnect,
     TELEPORT: begin_teleport,
     **dict.fromkeys((ASSIGN_ROUTE, ACQUIRE), begin_route),
     FOLLOW: begin_follow,

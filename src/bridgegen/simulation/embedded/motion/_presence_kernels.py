@@ -31,6 +31,7 @@ from bridgegen.simulation.embedded._codes import (
     RELATIVE_SPEED,
     ROW,
     SPEED_DIFFERENCE,
+    TELEPORT,
     WHO,
     WHOM,
 )
@@ -54,11 +55,14 @@ def goes_by(j, plan):
 
 @kernel
 def is_pointless(j, plan, state):
-    """Return whether action j is of, or goes by, an entity that is not there."""
+    """Return whether action j is of, or goes by, who is not there, or moves who is towed."""
     kind, other = plan.actions[j, DOES], goes_by(j, plan)
     if kind >= FIRST_GLOBAL or kind == ADD_ENTITY:
         return False
-    return not state.present[plan.actions[j, WHOM]] or (other >= 0 and not state.present[other])
+    e = plan.actions[j, WHOM]
+    if other >= 0 and not state.present[other]:
+        return True
+    return not state.present[e] or (state.tower[e] >= 0 and kind >= TELEPORT)
 
 
 @kernel
@@ -74,7 +78,7 @@ def begin_add(j, k, plan, roads, state, record):
     put(e, plan.actions[j, ROW], k, plan, roads, state, record)
     if state.ending[STATUS] != OK:
         return
-    state.present[e] = record.present[e, k] = True
+    state.present[e] = state.visible[e] = record.present[e, k] = True
     record.x[e, k], record.y[e, k], record.h[e, k] = body_pose(e, roads, state)
     record.v[e, k] = state.command[e]
 
@@ -93,7 +97,8 @@ def begin_delete(j, k, plan, roads, state, record):
 @kernel
 def leave(gone, plan, roads, state):
     """Let an entity be there no more: what it does is over, and nobody goes by it any more."""
-    state.present[gone] = False
+    state.present[gone] = state.visible[gone] = False
+    state.tower[gone] = -1
     for e in range(state.present.shape[0]):
         running = state.speed_action[e]
         if running >= 0 and (e == gone or goes_by(running, plan) == gone):

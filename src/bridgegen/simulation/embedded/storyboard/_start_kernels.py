@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS, STOPS
@@ -34,7 +34,8 @@ def start(plan, roads, state, record):
         state.lateral_action[e] = state.speed_action[e] = state.follow_action[e] = -1
         state.goal_action[e] = state.waits[e] = -1
         state.rate[e], state.follow[e] = math.inf, plan.follows[e]
-        state.present[e] = plan.absent[e] == 0
+        state.present[e] = state.visible[e] = plan.absent[e] == 0
+        state.tower[e] = plan.towers[e]
         if plan.comes_and_goes:
             record.present[e, 0] = state.present[e]
         most = plan.bodies[e, 3]
@@ -65,6 +66,8 @@ def start(plan, roads, state, record):
             return
         record.x[e, 0], record.y[e, 0], record.h[e, 0] = body_pose(e, roads, state)
     begin_initially(plan, roads, state, record)
+    if plan.starts_towed:
+        run_kernel_at(plan.starts_towed, (plan, roads, state, record))
 
 
 @kernel
