@@ -142,12 +142,13 @@ def _analyse(rollout: Rollout) -> Conflicts:
     for e, part in zip(own[1:], more, strict=True):
         worse = part.kind > found.kind
         worse |= (part.kind == found.kind) & (part.kind == CONTACT) & (part.instant < found.instant)
-        pairs = {
+        pairs: dict[str, Any] = {
             name: np.where(worse, getattr(part, name), array)
             for name, array in vars(found).items()
             if isinstance(array, np.ndarray) and array.ndim == 2
         }
-        found = replace(found, **pairs | {"body": np.where(worse, e, found.body)})
+        pairs["body"] = np.where(worse, e, found.body)
+        found = replace(found, **pairs)
     return found
 
 

@@ -35,7 +35,8 @@ def drawn(h, dx, dy, length):
 
     Args:
         h: its heading before [rad].
-        dx, dy: of its coupler [m].
+        dx: of its coupler [m].
+        dy: of its coupler [m].
         length: from its coupler to its axle [m].
     """
     way = math.hypot(dx, dy)
