@@ -134,6 +134,14 @@ alongRoute="false"/>"""
     assert instant(text, behind(60.0))[0] == 0
 
 
+def test_lane_0_is_the_line_between_both_directions():
+    """bv drives 1.75 m beside it, from s = 95; s = 35 is within 5 m after 55.32 m."""
+    place = lane(3, 0, 35.0)
+    text = f'<ReachPositionCondition tolerance="5">{place}</ReachPositionCondition>'
+    reach = 60.0 - math.sqrt(25.0 - 1.75**2)
+    assert instant(text, behind(20.0))[0] == math.ceil(reach / 0.5)
+
+
 def test_distance_to_a_place():
     text = f"""<DistanceCondition value="20.25" freespace="{{}}" rule="lessOrEqual"
 relativeDistanceType="longitudinal" coordinateSystem="road">{lane(3, 1, 35.0)}

@@ -7,7 +7,17 @@ import pytest
 
 from bridgegen.errors import UnsupportedError
 
-from .storyboards import after, crossroads, events, lane, run, scenario, speed_action, start
+from .storyboards import (
+    after,
+    crossroads,
+    events,
+    lane,
+    run,
+    scenario,
+    simulator,
+    speed_action,
+    start,
+)
 
 DT = 0.05
 ROADS = crossroads(arm_length=300.0)
@@ -323,10 +333,24 @@ def test_a_distance_that_is_reached_once_is_over():
     assert apart(rollout)[-1] == pytest.approx(70.0 - 30.0 - 12.0, abs=0.05)
 
 
+def test_a_relative_speed_over_a_time_is_kept_from_then_on():
+    """The standard has none that is continuous over a time; a note says what is made of it."""
+    keep = relative("lead", 1.0, continuous=True, dynamics="linear time 2")
+    rows = (
+        ("e", "bv", keep, after(1.0)),
+        ("f", "lead", speeding(6.0, "linear rate 2"), after(5.0)),
+    )
+    rollout = story(*rows, speeds=(0.0, 5.0, 10.0))
+    assert at(rollout, "bv", 2.0) == pytest.approx(8.0)
+    for seconds in (3.0, 5.0, 6.0, 9.0):
+        assert at(rollout, "bv", seconds) == pytest.approx(at(rollout, "lead", seconds) + 1.0)
+    names = ("ego", "lead", "bv")
+    places = "".join(start(name, lane(1, 1, 90.0 - 20.0 * i), 0.0) for i, name in enumerate(names))
+    (note,) = simulator(scenario(names, places, events(*rows)), None).program.notes
+    assert 'continuous="true" over a time: there in time, and kept from then on' in note
+
+
 UNSUPPORTED = {
-    'continuous="true" over a time': relative(
-        "lead", 1.0, continuous=True, dynamics="linear time 2"
-    ),
     "LongitudinalDistanceAction without distance or timeGap": longitudinal(
         '<LongitudinalDistanceAction entityRef="lead" freespace="false" continuous="true"/>'
     ),

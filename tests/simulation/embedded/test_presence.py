@@ -16,6 +16,7 @@ from .storyboards import (
     after,
     condition,
     crossroads,
+    events,
     lane,
     near,
     run,
@@ -169,6 +170,51 @@ def test_sensors_do_not_see_who_is_gone():
     assert (seen[1, 40:] <= 0).all()
     assert (seen[2, 42:200:2] > 0).mean() > 0.9  # whom it hid
     assert (seen[2, 20:40:2] > 0).mean() < 0.5
+
+
+def hidden(sensors: bool = False, traffic: bool = True) -> str:
+    told = f'graphics="true" sensors="{str(sensors).lower()}" traffic="{str(traffic).lower()}"'
+    return f"<VisibilityAction {told}/>"
+
+
+@pytest.mark.parametrize("ego", ["careful", "careful-fsm", "reference"])
+def test_the_ego_does_not_see_who_is_hidden_from_sensors(ego):
+    """bv stands 50 m ahead and is hidden from the start on: the ego drives into it."""
+    privates = start("ego", lane(3, 1, 95.0), 15.0) + start("bv", lane(3, 1, 45.0), 0.0)
+    text = scenario(("ego", "bv"), privates)
+
+    def run_with(action):
+        told = f"</PrivateAction><PrivateAction>{action}</PrivateAction></Private>"
+        at = text.rindex("</PrivateAction>")
+        return run(text[:at] + told + text[text.index("</Private>", at) + 10 :], ego)
+
+    seen, unseen = run_with(hidden(sensors=True)), run_with(hidden(traffic=False))
+    assert seen.distance[0, 1].min() > 0.0
+    assert run_with(hidden(sensors=True, traffic=False)).distance[0, 1].min() > 0.0
+    assert unseen.distance[0, 1].min() == 0.0  # it is there all the same
+
+
+def test_who_is_hidden_may_be_seen_again():
+    privates = start("ego", lane(3, 1, 95.0), 0.0) + start("bv", lane(3, 1, 65.0), 0.0)
+    story = events(
+        ("hide", "bv", hidden(), after(2.0)), ("show", "bv", hidden(sensors=True), after(4.0))
+    )
+    rollout = run(scenario(("ego", "bv"), privates, story), "reference")
+    seen = rollout.detections[0, 1, :, 0] > 0
+    assert seen[20:40:2].all()
+    assert not seen[42:80].any()
+    assert seen[84::2].all()
+    assert not rollout.present.size  # it is there all the time
+
+
+def test_attentive_drivers_do_not_mind_who_is_hidden_from_traffic():
+    ahead = start("lead", lane(3, 1, 45.0), 0.0)
+    privates = start("ego", lane(1, 1, 90.0), 0.0) + start("bv", lane(3, 1, 95.0), 12.0) + ahead
+    names = ("ego", "bv", "lead")
+    for action, stops in ((hidden(True, True), True), (hidden(True, False), False)):
+        story = events(("hide", "lead", action, after(0.0)))
+        rollout = run(scenario(names, privates, story), None, others="attentive")
+        assert (rollout.v[0, 1, -1] < 1.0) == stops
 
 
 LATER = start("cv", lane(3, 2, 50.0), 0.0)

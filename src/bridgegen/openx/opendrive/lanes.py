@@ -82,16 +82,20 @@ def lane_at(road: Road, lane_id: int, s: float) -> Lane:
     Raises:
         InputError: the road is shorter, or has no such lane there.
     """
-    if not -SLACK <= s <= road.length + SLACK:
-        raise InputError(
-            f"0 <= s [m] <= {road.length:.9g} must hold on road {road.id}, got s={s:.9g}"
-        )
+    _check_station(road, s)
     section = road.sections[section_index(road, s)]
     lane = section.lane(lane_id)
     if lane is None:
         known = ", ".join(str(lane.id) for lane in section.lanes)
         raise InputError(f"road {road.id} has lanes {known} at s={s:g} m, got lane {lane_id}")
     return lane
+
+
+def _check_station(road: Road, s: float) -> None:
+    if not -SLACK <= s <= road.length + SLACK:
+        raise InputError(
+            f"0 <= s [m] <= {road.length:.9g} must hold on road {road.id}, got s={s:.9g}"
+        )
 
 
 def width_of(section: LaneSection, lane: Lane, s: float, inside: float) -> Coefficients:
@@ -124,23 +128,28 @@ def breaks(road: Road, section: LaneSection, lane: Lane) -> Iterable[float]:
 
 
 def lane_pose(road: Road, lane_id: int, s: float) -> LanePose:
-    """Return the centre of a lane at ``s`` [m] of its road.
+    """Return the centre of a lane at ``s`` [m] of its road; lane 0 is the line between both sides.
 
     Raises:
         InputError: the road is shorter, or has no such lane there.
     """
-    lane = lane_at(road, lane_id, s)
-    section = road.sections[section_index(road, s)]
-    t, slope = centre_of(road, section, lane, s, s)[:2]
+    section, width = road.sections[section_index(road, s)], 0.0
+    if lane_id == 0:
+        _check_station(road, s)
+        t, slope = rebased(road.lane_offsets, s, s)[:2]
+    else:
+        lane = lane_at(road, lane_id, s)
+        t, slope = centre_of(road, section, lane, s, s)[:2]
+        width = width_of(section, lane, s, s)[0]
     geometry = road.plan_view[geometry_index(road, s)]
     x, y, h, curvature = pose(geometry, s - geometry.s)
     tilt = math.atan2(slope, 1.0 - curvature * t)
-    turned = 0.0 if road.direction(lane_id) > 0 else math.pi
+    turned = 0.0 if lane_id == 0 or road.direction(lane_id) > 0 else math.pi
     return LanePose(
         x - t * math.sin(h),
         y + t * math.cos(h),
         h + tilt + turned,
-        width_of(section, lane, s, s)[0],
+        width,
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from bridgegen.errors import InputError
-from bridgegen.openx.opendrive.lanes import lane_at
+from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import plan_route
 from bridgegen.openx.openscenario import model as osc
@@ -135,8 +135,9 @@ class _Check:
             if isinstance(element, osc.LanePosition):
                 try:
                     place = self.place(element)
-                    lane_at(roads.road(place[0]), place[1], place[2])
-                    found[id(element)] = place
+                    lane_pose(roads.road(place[0]), place[1], place[2])
+                    if place[1]:  # where lanes lead
+                        found[id(element)] = place
                 except InputError as error:
                     yield element.line, f"LanePosition: {error}"
         for element in walk(self.scenario):

@@ -162,7 +162,9 @@ class State(NamedTuple):
         phase_now: ``(K,)`` int64, the phase that each controller is in,
         phase_until: ``(K,)`` [s], and until when.
         present: ``(E,)`` bool, whether each is present,
-        visible: ``(E,)`` bool, and no trailer of the ego's; kept where there are trailers.
+        hidden: ``(E, 2)`` bool, from whom; see ``_codes``,
+        visible: ``(E,)`` bool, whether the ego's sensors may see it,
+        minded: ``(E,)`` bool, and attentive drivers may,
         tower: ``(E,)`` int64, by which entity it is towed; -1: by none.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
         travelled: ``(E,)`` [m] since the start.
@@ -245,7 +247,9 @@ class State(NamedTuple):
     phase_now: Annotated[Int, "controllers"]
     phase_until: Annotated[Float, "controllers"]
     present: Annotated[Bool, "entities"]
+    hidden: Annotated[Bool, "entities", 2]
     visible: Annotated[Bool, "entities"]
+    minded: Annotated[Bool, "entities"]
     tower: Annotated[Int, "entities"]
     drives: Annotated[Int, 2]
     travelled: Annotated[Float, "entities"]

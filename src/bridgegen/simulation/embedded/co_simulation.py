@@ -145,7 +145,9 @@ class CoSimulation:
         """
         record = self._batch.record
         if record.present.size:
-            self._batch.state.present[0] = self._batch.state.visible[0] = present
+            state = self._batch.state
+            state.present[0] = present
+            state.visible[0], state.minded[0] = state.present[0] & ~state.hidden[0].T
             record.present[0, :, k] = present
 
     def impose_lights(self, k: int, states: npt.ArrayLike) -> None:

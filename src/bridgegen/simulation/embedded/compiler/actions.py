@@ -17,6 +17,7 @@ from bridgegen.simulation.embedded._codes import (
     LANE_CHANGE,
     LANE_OFFSET,
     LATERALLY,
+    SHOW,
     TELEPORT,
 )
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
@@ -144,6 +145,10 @@ class Actions:
             self._routing(action.action, entity)
         elif isinstance(action, osc.TrailerAction):
             self._coupling(action, entity)
+        elif isinstance(action, osc.VisibilityAction):
+            shown = (int(self._tables.truth(one)) for one in (action.sensors, action.traffic))
+            slot, (sensors, traffic) = self._tables.slot(0.0), shown
+            self.rows.append((entity, SHOW, 0, sensors, slot, slot, traffic))
         elif isinstance(action, CONTROLLING):
             if (row := self._controllers.row(action, entity)) is not None:
                 self.rows.append(row)
@@ -157,8 +162,6 @@ class Actions:
             who = self._tables.names[entity]
             self._tables.note(action, f"no driver here sees the {what} of '{who}'")
             return True
-        if isinstance(action, osc.VisibilityAction):
-            return self._tables.truth(action.sensors) and self._tables.truth(action.traffic)
         return False
 
     def _coupling(self, action: osc.TrailerAction, entity: int) -> None:

@@ -121,7 +121,10 @@ class Courses:
         continuous = self._flag(target, "continuous", target.continuous)
         if continuous and dimension != 0 and shape != 0:
             dimension_ = action.dynamics.dynamics_dimension
-            self._tables.unsupported(target, f'continuous="true" over a {dimension_}')
+            sentence = (
+                f'continuous="true" over a {dimension_}: there in time, and kept from then on'
+            )
+            self._tables.note(target, sentence)
         kind = self._tables.choice(osc.SpeedTargetValueType, target.speed_target_value_type)
         row = self._row(entity, target.entity_ref)
         row[codes.IS_FACTOR] = int(kind is osc.SpeedTargetValueType.FACTOR)

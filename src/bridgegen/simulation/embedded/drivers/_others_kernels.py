@@ -50,7 +50,7 @@ def heed(k, plan, roads, state, record):
                 target = state.lateral_target[e]
             mind[ASKED] = look(
                 e, state.command[e], stop, state.weather[FRICTION], roads.paths, roads.counts,
-                roads.steps, state.station, state.on, state.aside, target, state.present,
+                roads.steps, state.station, state.on, state.aside, target, state.minded,
                 state.seen, state.far, plan.bodies, plan.kinds, roads.meets[e], roads.meetings[e],
                 roads.claims[e], roads.lines[e], roads.signs[e], state.lights, mind,
             )  # fmt: skip

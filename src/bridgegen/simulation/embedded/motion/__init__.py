@@ -17,6 +17,7 @@ from bridgegen.simulation.embedded.motion._laying_kernels import move_laid, pose
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     is_pointless,
     leave_out_absent,
+    look_round,
     stay_away,
 )
 from bridgegen.simulation.embedded.motion._pursuit_kernels import (
@@ -46,6 +47,7 @@ __all__ = [
     "follow_course",
     "is_pointless",
     "leave_out_absent",
+    "look_round",
     "move_along_path",
     "move_by_timetable",
     "move_laid",

@@ -171,7 +171,7 @@ def _waits(j, k, p, station, way, plan, roads, state, record):
     if plan.actions[j, DIMENSION] == DISTANCE:
         lasts /= max(record.v[e, k], LEAST_PACE)
     if gap_is_free(
-        e, k, path, n, ds, s, target, lasts, state.weather[FRICTION], state.present, record.x,
+        e, k, path, n, ds, s, target, lasts, state.weather[FRICTION], state.minded, record.x,
         record.y, record.h, record.v, plan.bodies,
     ):  # fmt: skip
         return False

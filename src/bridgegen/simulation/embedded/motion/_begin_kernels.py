@@ -28,6 +28,7 @@ from bridgegen.simulation.embedded._codes import (
     LANE_CHANGE,
     LANE_OFFSET,
     RELATIVE_SPEED,
+    SHOW,
     SPEED_CHANGE,
     SPEED_PROFILE,
     SYNCHRONIZE,
@@ -47,7 +48,11 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     stop_route,
 )
 from bridgegen.simulation.embedded.motion._laying_kernels import begin_laid
-from bridgegen.simulation.embedded.motion._presence_kernels import begin_add, begin_delete
+from bridgegen.simulation.embedded.motion._presence_kernels import (
+    begin_add,
+    begin_delete,
+    begin_show,
+)
 from bridgegen.simulation.embedded.motion._pursuit_kernels import begin_course
 from bridgegen.simulation.embedded.motion._speed_kernels import (
     begin_speed_change,
@@ -66,6 +71,7 @@ BEGINS: dict[int, Callable[..., Any]] = {
     DELETE_ENTITY: begin_delete,
     CONNECT_TRAILER: begin_connect,
     DISCONNECT_TRAILER: begin_disconnect,
+    SHOW: begin_show,
     TELEPORT: begin_teleport,
     **dict.fromkeys((ASSIGN_ROUTE, ACQUIRE), begin_route),
     FOLLOW: begin_follow,

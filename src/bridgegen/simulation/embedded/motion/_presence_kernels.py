@@ -20,6 +20,8 @@ from bridgegen.simulation.embedded._codes import (
     FIRST_ACROSS,
     FIRST_BY_ENTITY,
     FIRST_GLOBAL,
+    FROM_SENSORS,
+    FROM_TRAFFIC,
     KEEP_ASIDE,
     OTHER,
     PROBE,
@@ -32,6 +34,8 @@ from bridgegen.simulation.embedded._codes import (
     ROW,
     SPEED_DIFFERENCE,
     TELEPORT,
+    TO_SENSORS,
+    TO_TRAFFIC,
     WHO,
     WHOM,
 )
@@ -78,7 +82,8 @@ def begin_add(j, k, plan, roads, state, record):
     put(e, plan.actions[j, ROW], k, plan, roads, state, record)
     if state.ending[STATUS] != OK:
         return
-    state.present[e] = state.visible[e] = record.present[e, k] = True
+    state.present[e] = record.present[e, k] = True
+    look_round(state)
     record.x[e, k], record.y[e, k], record.h[e, k] = body_pose(e, roads, state)
     record.v[e, k] = state.command[e]
 
@@ -95,10 +100,32 @@ def begin_delete(j, k, plan, roads, state, record):
 
 
 @kernel
+def begin_show(j, k, plan, roads, state, record):
+    """Begin, and end, action j: who sees its entity from instant k on."""
+    e = plan.actions[j, WHOM]
+    state.hidden[e, FROM_SENSORS] = plan.actions[j, TO_SENSORS] == 0
+    state.hidden[e, FROM_TRAFFIC] = plan.actions[j, TO_TRAFFIC] == 0
+    state.action_ended[j] = True
+    look_round(state)
+
+
+@kernel
+def look_round(state):
+    """Set whom drivers may see: who is there and not hidden; the ego's, none of its trailers."""
+    for e in range(state.present.shape[0]):
+        tower = state.tower[e]
+        while tower > 0:
+            tower = state.tower[tower]
+        there = state.present[e]
+        state.visible[e] = there and not state.hidden[e, FROM_SENSORS] and tower < 0
+        state.minded[e] = there and not state.hidden[e, FROM_TRAFFIC]
+
+
+@kernel
 def leave(gone, plan, roads, state):
     """Let an entity be there no more: what it does is over, and nobody goes by it any more."""
-    state.present[gone] = state.visible[gone] = False
-    state.tower[gone] = -1
+    state.present[gone], state.tower[gone] = False, -1
+    look_round(state)
     for e in range(state.present.shape[0]):
         running = state.speed_action[e]
         if running >= 0 and (e == gone or goes_by(running, plan) == gone):

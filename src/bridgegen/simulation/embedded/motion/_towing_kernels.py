@@ -17,7 +17,7 @@ from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import TOWED, WHOM
 from bridgegen.simulation.embedded._motion_kernels import standing
 from bridgegen.simulation.embedded.motion._follow_kernels import end_quest
-from bridgegen.simulation.embedded.motion._presence_kernels import leave, stay_away
+from bridgegen.simulation.embedded.motion._presence_kernels import leave, look_round, stay_away
 from bridgegen.simulation.embedded.places._lane_kernels import continued, turned
 from bridgegen.simulation.embedded.places._place_kernels import (
     end_follow,
@@ -67,17 +67,7 @@ def start_towed(plan, roads, state, record):
         turn = h - record.h[t, 0]
         record.v[e, 0] = state.command[e] = state.target[e] = record.v[t, 0] * math.cos(turn)
         record.offset[e, 0] = 0.0
-    look_round(plan, state)
-
-
-@kernel
-def look_round(plan, state):
-    """Set which entities the ego's driver may see: all that are there but its own trailers."""
-    for e in range(state.visible.shape[0]):
-        tower = e
-        while tower > 0:
-            tower = state.tower[tower]
-        state.visible[e] = state.present[e] and (e == 0 or tower < 0)
+    look_round(state)
 
 
 @kernel
@@ -117,7 +107,7 @@ def tow(k, plan, roads, state, record):
         record.a[e, k], record.offset[e, k + 1] = (v - was) / plan.dt, 0.0
         state.travelled[e] += 0.5 * abs(v + was) * plan.dt
         state.stood[e] = standing(state.stood[e], was, v, plan.dt)
-    look_round(plan, state)
+    look_round(state)
 
 
 @kernel
@@ -137,6 +127,7 @@ def begin_connect(j, k, plan, roads, state, record):
         if state.tower[other] == t and other != e:
             release(other, k, roads, state, record)
     state.tower[e], state.on[e] = t, -1
+    look_round(state)
 
 
 @kernel
@@ -152,5 +143,6 @@ def begin_disconnect(j, k, plan, roads, state, record):
 def release(e, k, roads, state, record):
     """Uncouple a trailer: it goes on at its speed, the way that it points."""
     state.tower[e] = -1
+    look_round(state)
     state.command[e] = state.target[e] = record.v[e, k]
     put_in_world(e, record.x[e, k], record.y[e, k], record.h[e, k], roads, state)

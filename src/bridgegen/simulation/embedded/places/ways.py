@@ -266,7 +266,8 @@ def _corner(program: Program, model: OpenDrive, point: Point) -> Corner:
     road_id, s = _known(program, point)
     road = model.road(road_id)
     pose = lane_pose(road, point.lane, s)
-    aside = point.aside * road.direction(point.lane)  # its sign is the road's, the pose the lane's
+    side = road.direction(point.lane) if point.lane else 1
+    aside = point.aside * side  # its sign is the road's, the pose the lane's
     return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h), None
 
 

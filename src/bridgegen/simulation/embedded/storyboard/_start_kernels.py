@@ -10,7 +10,7 @@ from bridgegen.ego._path_kernels import pose
 from bridgegen.ego._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS, STOPS
 from bridgegen.simulation.embedded._motion_kernels import shifted
-from bridgegen.simulation.embedded.motion import LANDS, at_time
+from bridgegen.simulation.embedded.motion import LANDS, at_time, look_round
 from bridgegen.simulation.embedded.places._place_kernels import body_pose, put
 from bridgegen.simulation.embedded.storyboard._action_kernels import begin_initially
 from bridgegen.simulation.embedded.world import (
@@ -34,7 +34,7 @@ def start(plan, roads, state, record):
         state.lateral_action[e] = state.speed_action[e] = state.follow_action[e] = -1
         state.goal_action[e] = state.waits[e] = -1
         state.rate[e], state.follow[e] = math.inf, plan.follows[e]
-        state.present[e] = state.visible[e] = plan.absent[e] == 0
+        state.present[e] = plan.absent[e] == 0
         state.tower[e] = plan.towers[e]
         if plan.comes_and_goes:
             record.present[e, 0] = state.present[e]
@@ -58,6 +58,7 @@ def start(plan, roads, state, record):
                 h += math.pi
             record.h[e, 0] = h
         state.command[e] = state.target[e] = record.v[e, 0]
+    look_round(state)
     for i in range(plan.starts.shape[0]):
         e = plan.starts[i, 0]
         put(e, plan.starts[i, 1], 0, plan, roads, state, record)
