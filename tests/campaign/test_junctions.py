@@ -1,11 +1,18 @@
 """The junctions of a map: which of them a scenario fits, and that what fits can be searched."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
+import bridgegen as bg
+from bridgegen.campaign import Run
 from bridgegen.campaign.junctions import junctions_of
+from bridgegen.campaign.restored import searched
+from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import InputError, StorageError, UnsupportedError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
@@ -13,7 +20,7 @@ from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.openx.source import on_map
+from bridgegen.openx.source import on_map, searchable
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.map_picture import write_map_picture
 
@@ -95,3 +102,92 @@ def test_the_picture_marks_each_junction(tmp_path: Path) -> None:
         write_map_picture(path, model, None)
     with pytest.raises(InputError, match=r"must end in \.svg"):
         write_map_picture(tmp_path / "town.png", model, None)
+
+
+def town(crossroads: Path, where: str = "all") -> Pipeline:
+    scenario = load("crossroads-s4")
+    roads = searchable(scenario, load_map(crossroads, where, scenario))
+    there = on_map(scenario, roads)
+    return Pipeline(there, there.space(), road_map=roads)
+
+
+def test_all_junctions_are_one_search_space(crossroads: Path) -> None:
+    """Each row is what it is where its junction is searched alone, to the last bit."""
+    pipeline = town(crossroads)
+    space, (_, roads) = pipeline.space, (None, load_map(crossroads, "all", load("crossroads-s4")))
+    assert space.variables[0] == "junction"
+    X = space.decode(np.random.default_rng(1).random((40, space.n_var)))
+    where = X[:, space.index("junction")].astype(int)
+    assert set(where) == {0, 1, 2, 3}
+    rollout = pipeline.rollout(X)
+    assert not rollout.messages
+    for number, site in enumerate(roads.sites):
+        scenario = load("crossroads-s4")
+        there = on_map(scenario, roads.at(site))
+        alone = Pipeline(there, there.space(), road_map=roads.at(site))
+        rows = np.flatnonzero(where == number)
+        own = np.array(
+            [
+                alone.space.row({n: X[i, space.index(n)] for n in alone.space.variables})
+                for i in rows
+            ]
+        )
+        other = alone.rollout(own)
+        for name in ("x", "y", "h", "v", "n_steps"):
+            np.testing.assert_array_equal(getattr(rollout, name)[rows], getattr(other, name))
+
+
+def test_what_a_town_s_search_exports_keeps_its_constraints(
+    crossroads: Path, tmp_path: Path
+) -> None:
+    run = bg.run_search(
+        "crossroads-s4", budget=300, algorithm="random", road_map=crossroads, junction="all",
+        out=tmp_path / "run",
+    )  # fmt: skip
+    assert run.settings.junction == "all"
+    words = {
+        json.loads(path.read_text())["parameters"]["junction"]["value"]
+        for path in sorted((run.folder / "critical").glob("0*.json"))
+    }
+    assert len(words) > 1
+    for path in sorted((run.folder / "critical").glob("*.owl")):
+        assert validate_file(path) == []
+    again, _, roads = searched(Run(run.folder))
+    assert roads is not None
+    assert len(roads.sites) == 4
+    assert "junction" in again.parameters
+
+
+def test_junctions_that_are_too_small_are_left_out(crossroads: Path) -> None:
+    scenario = load("crossroads-s4")
+    roads = load_map(crossroads, "all", scenario)
+    tight = replace(
+        roads.sites[1],
+        legs=tuple(
+            replace(leg, roads=(replace(leg.roads[0], length=6.0), *leg.roads[1:]))
+            for leg in roads.sites[1].legs
+        ),
+    )
+    small = replace(roads, sites=(roads.sites[0], tight, *roads.sites[2:]))
+    left = searchable(scenario, small)
+    assert left.sites == (roads.sites[0], *roads.sites[2:])
+    (warning,) = [one for one in left.warnings if "left out" in one]
+    assert "leaves no value to bv_start" in warning
+    alone = searchable(scenario, replace(roads, sites=(roads.sites[0], tight)))
+    assert (alone.site, alone.sites) == (roads.sites[0], ())
+    with pytest.raises(InputError, match="is left out"):
+        searchable(scenario, replace(roads, sites=(tight, tight)))
+
+
+def test_the_name_of_the_junction_is_taken(crossroads: Path) -> None:
+    scenario = load("crossroads-s4")
+    mine = replace(scenario.parameters["bv_start"], name="junction")
+    scenario = replace(scenario, parameters=scenario.parameters | {"junction": mine})
+    with pytest.raises(InputError, match="--junction all needs the name junction"):
+        on_map(scenario, load_map(crossroads, "all", load("crossroads-s4")))
+
+
+def test_a_scenario_that_fits_nowhere(crossroads: Path) -> None:
+    crossroads.write_text(crossroads.read_text().replace('type="sidewalk"', 'type="none"'))
+    with pytest.raises(UnsupportedError, match="fits no junction"):
+        load_map(crossroads, "all", load("pedestrian-at-night"))

@@ -230,3 +230,9 @@ def test_a_lookup_takes_values_by_number():
     assert float(one.evaluate({"k": 1.0})) == 80.0
     assert str(one) == "(60, 80, 70)[k]"
     assert pickle.loads(pickle.dumps(one)) == one
+
+
+def test_a_lookup_s_tree_keeps_every_bit():
+    values = [1.0 / 3.0, -2.0, 1e-17]
+    held = ast.literal_eval(ast.unparse(lookup("k", values).tree).removesuffix("[k]"))
+    assert list(held) == values

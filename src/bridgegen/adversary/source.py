@@ -51,10 +51,9 @@ class AdversarySource:
         """See `Source`."""
         return self._inner.road
 
-    @property
-    def junction(self) -> str | None:
+    def junction(self, values: Mapping[str, float]) -> str | None:
         """See `Source`."""
-        return self._inner.junction
+        return self._inner.junction(values)
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""

@@ -20,7 +20,8 @@ from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.openx.opendrive.site_fit import shortened
+from bridgegen.openx.opendrive.road_map import RoadMap
+from bridgegen.openx.opendrive.site_fit import ALL, shortened
 from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
@@ -110,7 +111,11 @@ def run_search(given: SearchArguments) -> Run:
     judged = logical
     logical, roads = placed(logical, given.road_map, given.junction)
     if roads is not None and isinstance(judged, LogicalScenario):
-        for note in (*roads.warnings, *shortened(judged, roads.site)[1]):
+        sites = roads.sites or (roads.site,)
+        shorter = [note for site in sites for note in shortened(judged, site)[1]]
+        if roads.sites and shorter:
+            shorter = [f"some routes end where their legs end ({len(shorter)}; {shorter[0]})"]
+        for note in (*roads.warnings, *dict.fromkeys(shorter)):
             callbacks.warning(note)
     driven: str | None = None
     if given.adversary is not None or getattr(method, "is_adversary", False):
@@ -157,7 +162,7 @@ def run_search(given: SearchArguments) -> Run:
             axes=[str(axis) for axis in space.axes],
             road_map=_absolute(roads.path) if roads else None,
             map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,
-            junction=roads.site.junction_id if roads else None,
+            junction=_junction(given, roads),
             adversary=driven,
             optimised=chosen.to_dict(),
         )
@@ -299,6 +304,13 @@ def _finish(
     there = np.flatnonzero(np.isin(best, [one.evaluation for one in exported]))
     write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
+
+
+def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:
+    """Return what to take the same junction by again."""
+    if roads is None or given.junction == ALL:
+        return given.junction
+    return roads.site.junction_id
 
 
 def _absolute(path: Path | str | None) -> str | None:

@@ -11,7 +11,7 @@ from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.road_map import RoadMap, map_of
 from bridgegen.openx.opendrive.site import road_ends, turned_sites
 from bridgegen.openx.opendrive.site_fit import missing, require_intersection
-from bridgegen.openx.source import on_map
+from bridgegen.openx.source import on_map, searchable
 from bridgegen.openx.xml import read_bytes
 from bridgegen.pipeline import Pipeline
 
@@ -93,12 +93,13 @@ def _fit(
     fitting = [site for site in sites if not missing(scenario, model, site)]
     if not fitting:
         return 0, "", "; ".join(missing(scenario, model, sites[0]))
-    site = fitting[0]
-    road_map = RoadMap(path, data, model, site)
     try:
-        there = on_map(scenario, road_map)
-        Pipeline(there, there.space(), road_map=road_map)
+        turned = RoadMap(path, data, model, fitting[0], sites=tuple(fitting))
+        road_map = searchable(scenario, turned)
+        fitting, site = list(road_map.sites or (road_map.site,)), road_map.site
+        there = on_map(scenario, road_map.at(site))
+        Pipeline(there, there.space(), road_map=road_map.at(site))
     except BridgeGenError as error:
-        return 0, "", error.problems[0]
+        return 0, "", error.problems[0].partition(" is left out: ")[2] or error.problems[0]
     placed = ", ".join(f"{leg.name} = road {leg.roads[0].road_id}" for leg in site.legs)
     return len(fitting), placed, ""

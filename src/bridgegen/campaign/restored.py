@@ -15,7 +15,7 @@ from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
-from bridgegen.openx.source import on_map
+from bridgegen.openx.source import on_map, searchable
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
@@ -142,5 +142,5 @@ def placed(
         return scenario, None
     if not isinstance(scenario, LogicalScenario):
         raise InputError(f"{scenario.name}: a scenario file names its map, it takes no other")
-    roads = load_map(Path(road_map), junction, scenario)
+    roads = searchable(scenario, load_map(Path(road_map), junction, scenario))
     return on_map(scenario, roads), roads

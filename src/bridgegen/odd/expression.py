@@ -188,7 +188,8 @@ def lookup(index: str, values: Sequence[float]) -> Lookup:
     """
     table = np.array(values, dtype=np.float64)
     source = f"({', '.join(f'{value:g}' for value in values)})[{index}]"
-    tree = ast.parse(source, mode="eval").body
+    exact = f"({', '.join(map(repr, table.tolist()))},)[{index}]"
+    tree = ast.parse(exact, mode="eval").body
 
     def take(columns: Mapping[str, Any]) -> Any:
         return table[columns[index].astype(np.int64)]

@@ -103,6 +103,8 @@ class _Compiler:
                 return f"({self.number(left)} {_ARITHMETIC[type(op)]} {self.number(right)})"
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 return f"IF({self.truth(test)}, {self.number(body)}, {self.number(orelse)})"
+            case ast.Subscript(value=ast.Tuple(elts=values), slice=ast.Name(id=index)):
+                return self.taken(variable(index), [self.number(value) for value in values])
             case ast.Call(func=ast.Name(id=name), args=arguments):
                 return self.call(name, [self.number(argument) for argument in arguments])
         return f"IF({self.truth(node)}, 1.0e0, 0.0e0)"
@@ -138,6 +140,15 @@ class _Compiler:
             "asin": self.asin, "acos": self.acos, "atan": self.atan,
         }[name]  # fmt: skip
         return function(x)
+
+    def taken(self, index: str, values: list[str]) -> str:
+        """Return the value of a `Lookup` at an index from 0."""
+        found = UNDEFINED
+        for first in range(0, len(values), 4):  # a few at a time, as in ``polynomial``
+            for k in range(first, min(first + 4, len(values))):
+                found = f"IF({index} = {literal(float(k))}, {values[k]}, {found})"
+            found = self.bind(found)
+        return found
 
     # -- what SPARQL lacks; x, a and b are variables -------------------------------------------
 

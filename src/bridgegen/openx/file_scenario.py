@@ -265,7 +265,6 @@ class FileSource:
     static_names: tuple[str, ...] = ()
     course_names: tuple[str, ...] = ()
     unused_names: tuple[str, ...] = ()
-    junction = None
     constraints = None
 
     def __init__(self, scenario: FileScenario, driver: str | None, ideal: str = "") -> None:
@@ -285,6 +284,10 @@ class FileSource:
     def road(self) -> str:
         """See `Source`."""
         return self._scenario.roads.name
+
+    def junction(self, values: Mapping[str, float]) -> str | None:
+        """See `Source`: none is chosen."""
+        return None
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""

@@ -170,7 +170,8 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TEXT,
-            "Id of the map's junction, or best: the one that fits and is most like the scenario's.",
+            "Id of the map's junction; best: the one that fits and is most like the scenario's; "
+            "all: each that fits, as one more parameter of the search.",
         ),
     )
     objective: Mapping[str, float | None] | None = field(

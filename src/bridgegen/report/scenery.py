@@ -49,7 +49,8 @@ class Scenery:
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
             model = self._pipeline.concrete(x).roads
-            shapes = (Outline(kind, points) for kind, points in outline(model, source.junction))
+            here = source.junction(space.values(x))
+            shapes = (Outline(kind, points) for kind, points in outline(model, here))
             self._known[key] = RoadPicture(tuple(shapes), lights(model), street_lights(model))
         return self._known[key]
 

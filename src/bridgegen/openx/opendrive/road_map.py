@@ -1,7 +1,7 @@
 """A map that was made elsewhere: its bytes as they came, its model, and the chosen intersection."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridgegen.errors import FileFormatError
@@ -12,7 +12,7 @@ from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.site import find_site
-from bridgegen.openx.opendrive.site_fit import site_for
+from bridgegen.openx.opendrive.site_fit import ALL, fitting_sites, site_for
 from bridgegen.openx.xml import read_bytes
 
 
@@ -26,6 +26,7 @@ class RoadMap:
         model: its contents.
         site: the intersection.
         warnings: what was not read as it stands.
+        sites: all that are searched together, the intersection first; empty where it is alone.
     """
 
     path: Path
@@ -33,6 +34,11 @@ class RoadMap:
     model: OpenDrive
     site: Site
     warnings: tuple[str, ...] = ()
+    sites: tuple[Site, ...] = ()
+
+    def at(self, site: Site) -> "RoadMap":
+        """Return the map with one of its intersections alone."""
+        return replace(self, site=site, sites=())
 
 
 def load_map(
@@ -45,7 +51,8 @@ def load_map(
             ``bridgegen import`` made of one: the file that it names is read then, which must be
             what it was.
         junction: the id of the junction; where the map has several, it must be named, or "best":
-            the one that fits the scenario and is most like its own.
+            the one that fits the scenario and is most like its own; or "all": each that fits, at
+            each rotation of its legs.
         scenario: what takes place there; a usual crossroads' legs are looked for by default.
 
     Raises:
@@ -67,11 +74,16 @@ def load_map(
         )
     warnings: list[str] = []
     model = read(data, str(path), warnings)
-    if scenario is None:
+    sites: list[Site] = []
+    if scenario is not None and junction == ALL:
+        sites = fitting_sites(scenario, model, path.name)
+        site = sites[0]
+    elif scenario is None:
         site = find_site(model, junction, map_name=path.name)
     else:
         site = site_for(scenario, model, junction, path.name)
-    return RoadMap(path, data, model, site, tuple(warnings))
+    together = tuple(sites) if len(sites) > 1 else ()
+    return RoadMap(path, data, model, site, tuple(warnings), together)
 
 
 def map_of(owl: Path) -> tuple[Path, str]:

@@ -18,6 +18,9 @@ TEMPLATES = ("crossroads", "t-junction")
 BEST = "best"
 """Stands for the junction of a map that fits and is most like the scenario's."""
 
+ALL = "all"
+"""Stands for every junction that fits, at every rotation at which it does."""
+
 TURN_TOLERANCE = 60.0
 """How far a turn may differ from the scenario's [deg]: half a T-junction's, and more."""
 
@@ -73,19 +76,40 @@ def _best_site(
     headings: Mapping[str, float],
 ) -> Site:
     """Return the fitting junction of a map that is most like the scenario's."""
+    found = fitting_sites(scenario, model, map_name)
+    return min(found, key=lambda site: unlikeness(headings, site))
+
+
+def fitting_sites(
+    scenario: LogicalScenario,
+    model: OpenDrive,
+    map_name: str | None = None,
+    junction_id: str | None = None,
+) -> list[Site]:
+    """Return every junction of a map that a scenario fits, once per rotation at which it does.
+
+    Args:
+        scenario: one of an intersection.
+        model: the road network.
+        map_name: of its file.
+        junction_id: the only junction to look at.
+
+    Raises:
+        UnsupportedError: the scenario is not one of an intersection, or fits none.
+    """
+    require_intersection(scenario)
+    headings = {name: leg.heading for name, leg in scenario.roads.legs.items()}
     found = []
     for junction in model.junctions:
+        if junction_id not in (None, junction.id):
+            continue
         try:
             sites = turned_sites(model, junction.id, map_name, headings)
         except UnsupportedError:
             continue
-        found += [
-            (unlikeness(headings, site), site)
-            for site in sites
-            if not missing(scenario, model, site)
-        ]
+        found += [site for site in sites if not missing(scenario, model, site)]
     if found:
-        return min(found, key=lambda one: one[0])[1]
+        return found
     raise UnsupportedError(
         f"{scenario.name} fits no junction of {map_name or 'the map'}; "
         "what each lacks: bridgegen junctions MAP SCENARIO"
