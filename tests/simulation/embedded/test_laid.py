@@ -288,6 +288,34 @@ def test_no_stated_time_means_the_entity_s_own_speed_and_is_noted():
     assert place(out, 3.0)[1] == pytest.approx(73.0)
 
 
+def part(where: str, length: float, time: float | None = None) -> str:
+    timed = "" if time is None else f' timeStart="{time}"'
+    start = f"<PositionStart>{where}</PositionStart>" if where else ""
+    return f"""<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0" length="{length}"{timed}>
+{start}</ClothoidSplineSegment>"""
+
+
+def test_a_chain_of_clothoids_may_start_anew():
+    """10 m east from (0, 73), and 6 m north from (10, 80): the 7 m between are a straight line."""
+    first, second = world(0, 73, 0.0), world(10, 80, 0.5 * math.pi)
+    shape = f"<ClothoidSpline>{part(first, 10)}{part(second, 4)}{part('', 2)}</ClothoidSpline>"
+    out = told((follow(shape), after(1.0)))
+    for seconds, wanted in (
+        (1.5, (5.0, 73.0)),
+        (2.3, (10.0, 76.0)),
+        (3.0, (10.0, 83.0)),
+    ):
+        assert place(out, seconds)[:2] == pytest.approx(wanted, abs=0.51)
+    assert place(out, 3.0)[2] == pytest.approx(0.5 * math.pi)
+    chain = part(first, 10, 0.0) + part(second, 4, 2.0) + part("", 2, 4.0)
+    shape = f'<ClothoidSpline timeEnd="5">{chain}</ClothoidSpline>'
+    out = told((follow(shape, RELATIVE), after(1.0)))
+    assert place(out, 2.0)[:2] == pytest.approx((5.0, 73.0), abs=0.3)
+    assert place(out, 3.0)[:2] == pytest.approx((10.0, 80.0), abs=0.01)
+    assert place(out, 5.0)[:2] == pytest.approx((10.0, 84.0), abs=0.01)
+    assert place(out, 5.95)[:2] == pytest.approx((10.0, 85.9), abs=0.01)
+
+
 def test_a_lane_change_ends_it():
     change = """<LateralAction><LaneOffsetAction continuous="false"><LaneOffsetActionDynamics
 dynamicsShape="step"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="0"/></LaneOffsetTarget>

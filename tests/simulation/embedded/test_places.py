@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
+from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.simulate import simulate_file
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
@@ -303,6 +303,16 @@ def test_a_position_on_a_route_faces_along_the_route(where, expected):
 <Waypoint routeStrategy="shortest">{lane(1, -1, 80.0)}</Waypoint></Route></RouteRef>
 <InRoutePosition><{where}/></InRoutePosition></RoutePosition></Position>"""
     there(placed(text), *expected)
+
+
+def test_a_lane_of_a_route_that_is_no_number():
+    text = f"""<Position><RoutePosition><RouteRef><Route name="r" closed="false">
+<Waypoint routeStrategy="shortest">{lane(3, 1, 80.0)}</Waypoint>
+<Waypoint routeStrategy="shortest">{lane(1, -1, 80.0)}</Waypoint></Route></RouteRef>
+<InRoutePosition><FromLaneCoordinates pathS="30" laneId="left"/></InRoutePosition></RoutePosition>
+</Position>"""
+    with pytest.raises(UnsupportedError, match=r'laneId="left" \(a whole number is needed\)'):
+        placed(text)
 
 
 def test_acquiring_a_position_is_over_when_it_is_reached():

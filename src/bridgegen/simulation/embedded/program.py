@@ -83,12 +83,21 @@ class AlongLanes:
 
 @dataclass(frozen=True)
 class Bend:
-    """A clothoid: its first and last curvature [1/m], its length [m], a kink at its start [rad]."""
+    """A clothoid.
+
+    Attributes:
+        first: its curvature where it starts [1/m].
+        last: where it ends [1/m].
+        length: [m].
+        kink: at its start [rad].
+        starts: whether it starts at a place of its own, and not where the one before it ends.
+    """
 
     first: float
     last: float
     length: float
     kink: float = 0.0
+    starts: bool = False
 
 
 @dataclass(frozen=True)
@@ -205,7 +214,7 @@ class Program:
         anchors: ``(·, 3)`` of these: a position, the slot of a time or -1, whether it states a
             heading.
         shapes: ``(·, W)`` of these: x, y [m], heading [rad], time [s] of vertices in the frame of
-            the anchor; or the weights of the anchors.
+            an anchor, and its number; or the weights of the anchors.
         most_vertices: how many the longest of these has.
         spots: per position what its road network has to resolve.
         routes: ``(E,)`` the route that each starts with, 0 for none; route r has the places of

@@ -46,14 +46,13 @@ def bends(
     found: list[Bend] = []
     times: list[float | None] = []
     for segment in line.segments:
-        if found and segment.position_start is not None:
-            tables.unsupported(segment.position_start, "a PositionStart after the first segment's")
         found.append(
             Bend(
                 number(segment, "curvature_start"),
                 number(segment, "curvature_end"),
                 number(segment, "length"),
                 number(segment, "h_offset"),
+                starts=bool(found) and segment.position_start is not None,
             )
         )
         times.append(time(segment.time_start))

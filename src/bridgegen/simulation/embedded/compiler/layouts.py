@@ -37,8 +37,8 @@ def is_laid(action: osc.FollowTrajectoryAction) -> bool:
     if isinstance(line, osc.Clothoid):
         return not is_fixed(line.position)
     if isinstance(line, osc.ClothoidSpline):
-        start = line.segments[0].position_start
-        return start is None or not is_fixed(start)
+        first, *others = (one.position_start for one in line.segments)
+        return first is None or not is_fixed(first) or any(others)
     timed = any(vertex.time is not None for vertex in line.vertices)
     return any(
         not is_fixed(vertex.position)
@@ -66,6 +66,8 @@ def gives_path(action: osc.FollowTrajectoryAction) -> bool:
     elif isinstance(line, osc.Clothoid):
         places = [line.position]
     elif isinstance(line, osc.ClothoidSpline):
+        if any(one.position_start for one in line.segments[1:]):
+            return False
         places = [line.segments[0].position_start]
     else:
         return False
@@ -128,9 +130,11 @@ class Layouts:
     def add_line(self, where: osc.TrajectoryPosition) -> int:
         """Return the number of the trajectory along which a position is; it is not followed."""
         line = where.trajectory_ref.trajectory.shape.shape
-        starts = not isinstance(line, osc.ClothoidSpline) or line.segments[0].position_start
-        if isinstance(line, osc.Nurbs) or not starts:
-            lacks = "" if starts else " without a start"
+        lacks = ""
+        if isinstance(line, osc.ClothoidSpline):
+            first, *others = (one.position_start for one in line.segments)
+            lacks = " with several starts" if any(others) else "" if first else " without a start"
+        if isinstance(line, osc.Nurbs) or lacks:
             what = f"a TrajectoryPosition on a {type(line).__name__}{lacks}"
             self._tables.unsupported(where, what)
             return 0
@@ -194,25 +198,36 @@ class Layouts:
         """Return bends from a start, the entity's own place where they state none."""
         origin, curve, ends = bends(self._tables, line)
         place = self._positions.add_own(entity) if origin is None else self._positions.add(origin)
-        drawn = _Drawn(RIGID, [(place, UNTIMED, 1)])
+        anchors = [(place, UNTIMED, 1)]
+        if isinstance(line, osc.ClothoidSpline):
+            others = (one.position_start for one in line.segments[1:])
+            anchors += [(self._positions.add(one), UNTIMED, 1) for one in others if one]
+        drawn = _Drawn(RIGID, anchors)
         length = sum(bend.length for bend in curve)
         if not 0.0 < length <= SAMPLE * (MOST_VERTICES - 1):
             self._tables.unsupported(line, f"a clothoid {length:g} m long")
             return drawn
-        try:
-            samples, step = sampled(0.0, 0.0, 0.0, curve, SAMPLE)
-        except InputError as error:
-            self._tables.unsupported(line, str(error))
+        known = [time for time in ends if time is not None]
+        if timing is not None and len(known) < len(ends):
+            self._tables.unsupported(line, "a clothoid with some of its times")
             return drawn
-        times = np.zeros(len(samples))
-        if timing is not None:
-            known = [time for time in ends if time is not None]
-            if len(known) < len(ends):
-                self._tables.unsupported(line, "a clothoid with some of its times")
+        knots = np.cumsum([0.0, *(bend.length for bend in curve)])
+        begins = [0, *(k for k, bend in enumerate(curve) if bend.starts), len(curve)]
+        parts: list[Float] = []
+        for number, (first, past) in enumerate(pairwise(begins)):
+            try:
+                samples, step = sampled(0.0, 0.0, 0.0, curve[first:past], SAMPLE)
+            except InputError as error:
+                self._tables.unsupported(line, str(error))
                 return drawn
-            knots = np.cumsum([0.0, *(bend.length for bend in curve)])
-            times = np.interp(np.arange(len(samples)) * step, knots, known)
-        return replace(drawn, shape=np.column_stack((samples[:, :3], times)))
+            times = np.zeros(len(samples))
+            if timing is not None:
+                times = np.interp(knots[first] + np.arange(len(samples)) * step, knots, known)
+            part = np.column_stack((samples[:, :3], times, np.full(len(samples), float(number))))
+            if timing is not None and past < len(curve):
+                part = part[:-1]  # the next one starts then
+            parts.append(part)
+        return replace(drawn, shape=np.concatenate(parts))
 
     def _weighted(self, line: osc.Nurbs, timing: osc.Timing | None) -> "_Drawn":
         """Return a spline: its points are weighted means of its control points."""

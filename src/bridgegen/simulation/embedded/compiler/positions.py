@@ -150,15 +150,20 @@ class Positions:
         return None
 
     def _lane_spot(self, where: osc.LanePosition) -> LaneSpot | None:
-        text = self._tables.text(where.lane_id)
-        try:
-            lane = int(text)
-        except ValueError:
-            self._tables.unsupported(where, f'laneId="{text}" (a whole number is needed)')
+        lane = self._lane_id(where)
+        if lane is None:
             return None
         varies = isinstance(where.s, osc.ParameterRef | Expr)
         s = None if varies else self._tables.declared(where.s)
         return LaneSpot(self._tables.text(where.road_id), lane, s, where.line)
+
+    def _lane_id(self, where: osc.LanePosition | osc.PositionInLaneCoordinates) -> int | None:
+        text = self._tables.text(where.lane_id)
+        try:
+            return int(text)
+        except ValueError:
+            self._tables.unsupported(where, f'laneId="{text}" (a whole number is needed)')
+            return None
 
     def _route_spot(self, where: osc.RoutePosition) -> RouteSpot | None:
         literal = self._tables.literal
@@ -172,7 +177,7 @@ class Positions:
         if isinstance(inner, osc.PositionInRoadCoordinates):
             return RouteSpot(waypoints, s, None, literal(inner, "t", inner.t), where.line)
         aside = literal(inner, "laneOffset", inner.lane_offset or 0.0)
-        return RouteSpot(waypoints, s, int(self._tables.text(inner.lane_id)), aside, where.line)
+        return RouteSpot(waypoints, s, self._lane_id(inner), aside, where.line)
 
     def _is_absolute(self, turned: osc.Orientation | None) -> bool:
         """Return whether an orientation counts from the world's x axis."""

@@ -59,6 +59,9 @@ from bridgegen.simulation.embedded.places._place_kernels import (
 PLACE, TIME, STATES = 0, 1, 2
 """Columns of ``plan.anchors``: a position, the slot of a time, whether it states a heading."""
 
+ANCHOR = 4
+"""Column of ``plan.shapes`` in a rigid layout: the anchor in whose frame a vertex is."""
+
 SHORTEST = 1e-9  # m, a shorter segment has no direction
 ABREAST = 5.0  # m, a place is passed so far aside at most
 
@@ -117,6 +120,8 @@ def lay(q, e, k, plan, roads, state, record):
         elif row[LAYOUT_SHAPE] == RIGID:
             c, s = math.cos(h), math.sin(h)
             for m in range(n):
+                if plan.shapes[samples + m, ANCHOR] != i - first:
+                    continue
                 u, w = plan.shapes[samples + m, 0], plan.shapes[samples + m, 1]
                 table[m, X_END], table[m, Y_END] = x + c * u - s * w, y + s * u + c * w
                 table[m, H_END] = h + plan.shapes[samples + m, 2]
