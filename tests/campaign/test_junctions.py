@@ -17,10 +17,10 @@ from bridgegen.errors import InputError, StorageError, UnsupportedError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 from bridgegen.ontology.individuals import build_static
+from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.openx.source import on_map, searchable
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.map_picture import write_map_picture
 

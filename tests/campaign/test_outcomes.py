@@ -27,6 +27,7 @@ from bridgegen.ontology.vocabulary import bg as tbox_property
 from bridgegen.ontology.vocabulary import local_name, tbox
 from bridgegen.openx.convert import convert_file, import_file
 from bridgegen.openx.file_scenario import load_file_scenario
+from bridgegen.openx.on_map import on_map
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml as road_xml
@@ -34,7 +35,6 @@ from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.openx.source import on_map
 from bridgegen.pipeline import Pipeline
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from bridgegen.errors import BridgeGenError, UnsupportedError
 from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.road_map import RoadMap, map_of
 from bridgegen.openx.opendrive.site import road_ends, turned_sites
 from bridgegen.openx.opendrive.site_fit import missing, require_intersection
-from bridgegen.openx.source import on_map, searchable
 from bridgegen.openx.xml import read_bytes
 from bridgegen.pipeline import Pipeline
 

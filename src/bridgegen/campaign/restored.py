@@ -14,8 +14,8 @@ from bridgegen.objective import Objective
 from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
+from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
-from bridgegen.openx.source import on_map, searchable
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice

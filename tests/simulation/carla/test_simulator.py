@@ -10,9 +10,9 @@ import pytest
 from bridgegen.ego import get
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
+from bridgegen.openx.on_map import on_map
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.source import on_map
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.carla import frame, server
