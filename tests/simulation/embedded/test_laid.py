@@ -316,6 +316,16 @@ def test_a_chain_of_clothoids_may_start_anew():
     assert place(out, 5.95)[:2] == pytest.approx((10.0, 85.9), abs=0.01)
 
 
+def test_a_sharp_bend_of_no_length_is_none():
+    chain = "".join(
+        f'<ClothoidSplineSegment curvatureStart="0" curvatureEnd="{k}" length="{length}"/>'
+        for k, length in ((1e7, 1e-300), (0.0, 10.0), (1e3, 1e-7), (0.0, 10.0))
+    )
+    out = told((follow(f"<ClothoidSpline>{chain}</ClothoidSpline>"), after(1.0)))
+    assert out.status[0] == 0
+    assert place(out, 2.0)[:2] == pytest.approx((-1.75, 83.0), abs=0.01)
+
+
 def test_a_lane_change_ends_it():
     change = """<LateralAction><LaneOffsetAction continuous="false"><LaneOffsetActionDynamics
 dynamicsShape="step"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="0"/></LaneOffsetTarget>

@@ -36,9 +36,7 @@ def move_along_path(e, k, plan, roads, state, record):
     mean = state.mean[e] if state.mean[e] >= 0.0 else 0.5 * (before + state.command[e])
     step = 0.0 if state.placed[e] else mean * dt
     state.placed[e] = False
-    p = state.on[e]
-    on_trajectory = state.follow_action[e] >= 0 or (p >= 0 and roads.follows[p] == LANDS)
-    if on_trajectory:
+    if (step < 0.0 or state.tail_first[e]) and is_on_trajectory(e, roads, state):
         step = way_along(e, step, state.station[e], state)
         state.turn[e] = math.pi if state.tail_first[e] else 0.0
     ahead, tilt, reached, aside = step, 0.0, False, state.aside[e]
@@ -55,6 +53,7 @@ def move_along_path(e, k, plan, roads, state, record):
         if step < 0.0:
             ahead, tilt = -ahead, -tilt
         state.foot[e] += ahead
+    p = state.on[e]
     if p >= 0:
         middle, across = state.station[e] + 0.5 * ahead, 0.5 * (aside + state.aside[e])
         ahead /= shrinks(roads.paths[p], roads.counts[p], roads.steps[p], middle, across)
@@ -71,16 +70,12 @@ def move_along_path(e, k, plan, roads, state, record):
         else:
             station, step = length, 0.5 * before * dt
             state.command[e] = state.target[e] = 0.0
-    if p >= 0 and station < 0.0 and on_trajectory:  # back over where it begins
-        beyond = math.copysign(station, state.command[e])
-        state.station[e] = 0.0
-        x, y, h = body_pose(e, roads, state)
-        end_follow(e, state)
-        put_in_world(e, x, y, h, roads, state)
-        station = state.station[e] + beyond
-    elif p >= 0 and station < 0.0:  # backwards to where its way begins
-        station, step = 0.0, 0.5 * before * dt
-        state.command[e] = state.target[e] = 0.0
+    if p >= 0 and station < 0.0:  # backwards to where its way begins
+        if is_on_trajectory(e, roads, state):
+            station = leave_backwards(e, station, roads, state)
+        else:
+            station, step = 0.0, 0.5 * before * dt
+            state.command[e] = state.target[e] = 0.0
     state.travelled[e] += abs(step)
     state.stood[e] = standing(state.stood[e], before, state.command[e], dt)
     record.a[e, k] = (state.command[e] - before) / dt
@@ -98,6 +93,24 @@ def move_along_path(e, k, plan, roads, state, record):
     record.offset[e, k + 1] = 0.0
     record.x[e, k + 1], record.y[e, k + 1], h = body_pose(e, roads, state)
     record.h[e, k + 1] = continued(h + tilt, record.h[e, k])  # another path may count them anew
+
+
+@kernel
+def is_on_trajectory(e, roads, state):
+    """Return whether a trajectory is the path that an entity is on."""
+    p = state.on[e]
+    return state.follow_action[e] >= 0 or (p >= 0 and roads.follows[p] == LANDS)
+
+
+@kernel
+def leave_backwards(e, station, roads, state):
+    """Put an entity so far back over where its trajectory begins; return its station there."""
+    beyond = math.copysign(station, state.command[e])
+    state.station[e] = 0.0
+    x, y, h = body_pose(e, roads, state)
+    end_follow(e, state)
+    put_in_world(e, x, y, h, roads, state)
+    return state.station[e] + beyond
 
 
 @kernel
