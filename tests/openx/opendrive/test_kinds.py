@@ -123,7 +123,8 @@ def test_lights_stand_where_vehicles_stop_and_change_by_pairs():
     lines = [o for road in made.roads for o in road.objects if o.subtype == "stopLine"]
     assert (len(crosswalks), len(lines)) == (4, 4)
     for one in crosswalks:
-        assert {(c.s, abs(c.t)) for c in one.outline.corners_road} == {(1.0, 7.0), (5.0, 7.0)}
+        assert {(s, abs(t)) for s, t in one.corners} == {(1.0, 7.0), (5.0, 7.0)}
+        assert len(one.outline.corners_local) == 5  # what CARLA and CommonRoad read
 
 
 def test_the_acceleration_lane_ends():

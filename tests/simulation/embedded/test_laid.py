@@ -186,6 +186,9 @@ def test_a_spline_is_that_of_scipy():
     wrong = inner.replace('<Knot value="2"/>', "", 1)
     with pytest.raises(UnsupportedError, match="a Nurbs with 8 knots"):
         told((follow(f'<Nurbs order="4">{wrong}</Nurbs>'), after(1.0)))
+    gap = inner.replace('<Knot value="1"/>', '<Knot value="2"/>')
+    with pytest.raises(UnsupportedError, match="a Nurbs whose knots leave a gap"):
+        told((follow(f'<Nurbs order="4">{gap}</Nurbs>'), after(1.0)))
 
 
 def test_a_spline_with_times_is_where_its_times_say():

@@ -2,6 +2,7 @@
 
 # ruff: noqa: RUF009  (fields are declared through functions that call dataclasses.field)
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -79,6 +80,18 @@ class Object:
     outlines: tuple[Outline, ...] = children("outlines/outline")
     validity: tuple[Validity, ...] = children("validity")
     user_data: tuple[UserData, ...] = children("userData")
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """The s and t of its outline's corners [m], as if the road were straight there."""
+        outline = self.outline or next(iter(self.outlines), None)
+        if outline is None:
+            return []
+        cos, sin = math.cos(self.hdg or 0.0), math.sin(self.hdg or 0.0)
+        return [(one.s, one.t) for one in outline.corners_road] + [
+            (self.s + one.u * cos - one.v * sin, self.t + one.u * sin + one.v * cos)
+            for one in outline.corners_local
+        ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,10 +56,8 @@ def crosswalk_stripes(road: Road) -> Iterator[Float]:
 def stop_lines(road: Road) -> Iterator[tuple[float, Float]]:
     """Yield the stop lines that a road's objects are: s [m], and both ends ``(2, 2)`` [m]."""
     for one in road.objects:
-        if (one.subtype or "").lower() != "stopline" or one.outline is None:
-            continue
-        t = [corner.t for corner in one.outline.corners_road]
-        if t:
+        t = [corner for _, corner in one.corners]
+        if t and (one.subtype or "").lower() == "stopline":
             yield one.s, points(road, np.array([one.s, one.s]), np.array([min(t), max(t)]))
 
 

@@ -8,7 +8,7 @@ from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.opendrive.furniture import (
     Control,
     Controller,
-    CornerRoad,
+    CornerLocal,
     Object,
     Outline,
     Signal,
@@ -219,11 +219,14 @@ def _area(
     object_id: str, name: str | None, kind: str, at: float, width: float, low: float, high: float,
     subtype: str | None = None,
 ) -> Object:  # fmt: skip
-    """Return a rectangle across a road: ``at`` along it, from t = ``low`` to ``high`` [m]."""
-    first, last = max(at - 0.5 * width, 0.0), at + 0.5 * width
+    """Return a rectangle across a road: ``at`` along it, from t = ``low`` to ``high`` [m].
+
+    Its corners are in its own coordinates: CARLA and CommonRoad's converter read no others.
+    """
+    first, last = max(-0.5 * width, -at), 0.5 * width
     corners = ((first, low), (first, high), (last, high), (last, low), (first, low))
     outline = Outline(
-        corners_road=tuple(CornerRoad(s, t, 0.0, 0.0) for s, t in corners),
+        corners_local=tuple(CornerLocal(u, v, 0.0, 0.0) for u, v in corners),
     )
     return Object(
         id=object_id,

@@ -249,23 +249,17 @@ def _between(road: Road, s: float, right: float, left: float) -> list[int]:
 
 def _box(item: Object) -> Box:
     """Return an object's extent; its position only, if it states no size."""
-    outline = item.outline or next(iter(item.outlines), None)
+    corners = item.corners
     hdg = item.hdg or 0.0
     length, width = item.length, item.width
-    if length is not None and width is not None and (outline is None or hdg == 0.0):
+    if length is not None and width is not None and (not corners or hdg == 0.0):
         along, across = length, width
         if hdg != 0.0:
             cos, sin = abs(math.cos(hdg)), abs(math.sin(hdg))
             along, across = length * cos + width * sin, length * sin + width * cos
         low = item.s - 0.5 * along
-        middle = 0.5 * sum(_extent(one.t for one in outline.corners_road)) if outline else item.t
+        middle = 0.5 * sum(_extent(t for _, t in corners)) if corners else item.t
         return low, low + along, middle - 0.5 * across, middle + 0.5 * across
-    corners = [(one.s, one.t) for one in outline.corners_road] if outline else []
-    cos, sin = math.cos(hdg), math.sin(hdg)
-    corners += [
-        (item.s + one.u * cos - one.v * sin, item.t + one.u * sin + one.v * cos)
-        for one in (outline.corners_local if outline else ())
-    ]
     if not corners:
         return item.s, item.s, item.t, item.t
     return (*_extent(s for s, _ in corners), *_extent(t for _, t in corners))

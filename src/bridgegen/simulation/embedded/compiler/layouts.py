@@ -250,7 +250,11 @@ class Layouts:
             self._tables.unsupported(line, f"a Nurbs {problem}")
             return _Drawn(WEIGHTED, anchors)
         count = min(max(LEAST_SAMPLES, SAMPLES_PER_POINT * len(points)), MOST_VERTICES)
-        return _Drawn(WEIGHTED, anchors, basis(order, knots, weights, count))
+        shares = basis(order, knots, weights, count)
+        if not np.isfinite(shares).all():
+            self._tables.unsupported(line, "a Nurbs whose knots leave a gap")
+            return _Drawn(WEIGHTED, anchors)
+        return _Drawn(WEIGHTED, anchors, shares)
 
 
 def _has_times(line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs) -> bool:

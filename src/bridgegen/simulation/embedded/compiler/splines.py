@@ -20,7 +20,8 @@ def basis(order: int, knots: Sequence[float], weights: Sequence[float], count: i
         count: of points, the two ends among them.
 
     Returns:
-        ``(count, control points)`` float64; each row adds up to 1.
+        ``(count, control points)`` float64; each row adds up to 1, or is NaN where the knots leave
+        a gap.
     """
     knot, degree, n = np.asarray(knots, dtype=np.float64), order - 1, len(weights)
     u = np.linspace(knot[degree], knot[n], count)
@@ -34,5 +35,6 @@ def basis(order: int, knots: Sequence[float], weights: Sequence[float], count: i
             right = (knot[i + p + 1] - u) / falling * functions[:, i + 1] if falling > 0.0 else 0.0
             functions[:, i] = left + right
     rational = functions[:, :n] * np.asarray(weights)
-    made: Float = rational / rational.sum(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        made: Float = rational / rational.sum(axis=1, keepdims=True)
     return made
