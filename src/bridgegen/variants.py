@@ -15,6 +15,9 @@ from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.source import ConcreteScenario, Source
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
+MOST_SHOWN = 60
+"""Characters of what a parameter is used for, in a note."""
+
 
 @dataclass(frozen=True)
 class Variants:
@@ -63,8 +66,8 @@ class Variants:
         varied = texts | (moving & fixed.keys())
         notes = [note for one in programs for note in one.notes]
         notes += [
-            f"{scenario.place}: parameter '{name}' is used for {fixed[name]}: each of its values "
-            "is compiled by itself, which takes longer than its simulation"
+            f"{scenario.place}: parameter '{name}' is used for {_short(fixed[name])}: each of its "
+            "values is compiled by itself, which takes longer than its simulation"
             for name in space.names
             if name in varied - texts
         ]
@@ -77,6 +80,11 @@ class Variants:
             tuple(dict.fromkeys(notes)),
             {name: " or ".join(found) for name, found in kinds.items()},
         )
+
+
+def _short(use: str) -> str:
+    """Return what a parameter is used for, a long formula cut."""
+    return use if len(use) <= MOST_SHOWN else f"{use[: MOST_SHOWN - 1]}…"
 
 
 def nominal_of(source: Source, space: SearchSpace, values: Mapping[str, float]) -> ConcreteScenario:
