@@ -27,6 +27,7 @@ from bridgegen.simulation.embedded.motion import (
     command_speed,
     move_along_path,
     move_by_timetable,
+    note_presence,
     stay_away,
 )
 from bridgegen.simulation.embedded.places._place_kernels import fail
@@ -70,14 +71,14 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         move_paced(k, demanded, plan, roads, state, record)
         first = 1
     for e in range(first, record.x.shape[0]):  # entities that depend on no other come first
-        state.timed[e] = state.present[e] and state.follow[e] >= 0 and state.tower[e] < 0
+        state.timed[e] = state.present[e] and state.follow[e] >= 0
         if plan.moves_laid and state.timed[e] and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
         elif state.timed[e]:
             move_by_timetable(e, k, plan, roads, state, record)
     for i in range(record.x.shape[0]):
         e = plan.order[0, i]
-        if e < first or state.timed[e] or state.tower[e] >= 0:
+        if e < first or state.timed[e]:
             continue
         if not state.present[e]:
             stay_away(e, k, record)
@@ -91,10 +92,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             move_heeding(e, before, k, plan, roads, state, record)
         else:
             move_along_path(e, k, plan, roads, state, record)
-    if plan.tows_trailers:
-        run_kernel_at(plan.tows_trailers, (k, plan, roads, state, record))
-    for e in range(record.present.shape[0] if k < record.x.shape[1] - 1 else 0):
-        record.present[e, k + 1] = state.present[e]
+    if record.present.shape[0] > 0:
+        note_presence(k, plan, roads, state, record)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):
         state.ending[STATUS], state.ending[STOPS] = NOT_FINITE, 1
     if state.ending[STOPS]:

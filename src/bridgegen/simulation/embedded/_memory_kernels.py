@@ -165,7 +165,8 @@ class State(NamedTuple):
         hidden: ``(E, 2)`` bool, from whom; see ``_codes``,
         visible: ``(E,)`` bool, whether the ego's sensors may see it,
         minded: ``(E,)`` bool, and attentive drivers may,
-        tower: ``(E,)`` int64, by which entity it is towed; -1: by none.
+        tower: ``(E,)`` int64, by which entity it is towed; -1: by none,
+        straight: ``(E,)`` bool, it is put straight behind that one, which was teleported.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
         travelled: ``(E,)`` [m] since the start.
         stood: ``(E,)`` [s] for how long it has stood.
@@ -251,6 +252,7 @@ class State(NamedTuple):
     visible: Annotated[Bool, "entities"]
     minded: Annotated[Bool, "entities"]
     tower: Annotated[Int, "entities"]
+    straight: Annotated[Bool, "entities"]
     drives: Annotated[Int, 2]
     travelled: Annotated[Float, "entities"]
     stood: Annotated[Float, "entities"]

@@ -18,6 +18,7 @@ from bridgegen.simulation.embedded.motion._presence_kernels import (
     is_pointless,
     leave_out_absent,
     look_round,
+    note_presence,
     stay_away,
 )
 from bridgegen.simulation.embedded.motion._pursuit_kernels import (
@@ -52,6 +53,7 @@ __all__ = [
     "move_by_timetable",
     "move_laid",
     "note",
+    "note_presence",
     "pass_end",
     "pose_along",
     "start_at_distance",

@@ -44,8 +44,9 @@ def begin_teleport(j, k, plan, roads, state, record):
     put(e, plan.actions[j, ROW], k, plan, roads, state, record)
     state.placed[e] = True
     for w in range(plan.tows.shape[0]):  # its trailers go with it
-        if state.tower[plan.tows[w, 1]] == plan.tows[w, 0] and state.placed[plan.tows[w, 0]]:
-            state.placed[plan.tows[w, 1]] = True
+        t, towed = plan.tows[w, 0], plan.tows[w, 1]
+        if state.tower[towed] == t and (t == e or state.straight[t]):
+            state.straight[towed] = True
     state.action_ended[j] = True
 
 

@@ -8,7 +8,7 @@ not, its states are those of its last instant, and its actions are over before t
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.compiled import kernel, run_kernel_at
 from bridgegen.ego._prediction_kernels import LOST
 from bridgegen.ego._tracking_kernels import forget
 from bridgegen.simulation.embedded._codes import (
@@ -147,6 +147,15 @@ def leave(gone, plan, roads, state):
     first = roads.hypothesis_first
     if gone + 1 < first.shape[0]:
         state.feet[first[gone] : first[gone + 1]] = LOST
+
+
+@kernel
+def note_presence(k, plan, roads, state, record):
+    """Record who is there at the instant after k, where all but the trailers are already."""
+    if plan.tows_trailers:
+        run_kernel_at(plan.tows_trailers, (k, plan, roads, state, record))
+    for e in range(record.present.shape[0] if k < record.x.shape[1] - 1 else 0):
+        record.present[e, k + 1] = state.present[e]
 
 
 @kernel

@@ -15,7 +15,6 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.simulation.embedded._codes import TOWED, WHOM
-from bridgegen.simulation.embedded._motion_kernels import standing
 from bridgegen.simulation.embedded.motion._follow_kernels import end_quest
 from bridgegen.simulation.embedded.motion._presence_kernels import leave, look_round, stay_away
 from bridgegen.simulation.embedded.places._lane_kernels import continued, turned
@@ -72,7 +71,10 @@ def start_towed(plan, roads, state, record):
 
 @kernel
 def tow(k, plan, roads, state, record):
-    """Move the trailers to instant k + 1, where what tows them is already."""
+    """Move the trailers to instant k + 1, where what tows them is already.
+
+    They have gone straight on at their speed like all others; that is corrected here.
+    """
     last = k == record.x.shape[1] - 1
     for w in range(plan.tows.shape[0]):
         t, e = plan.tows[w, 0], plan.tows[w, 1]
@@ -88,13 +90,13 @@ def tow(k, plan, roads, state, record):
         before, length = record.h[e, k], plan.couplings[e, COUPLER]
         h, hitch = record.h[t, k + 1], plan.couplings[t, HITCH]
         x, y = record.x[t, k + 1] + hitch * math.cos(h), record.y[t, k + 1] + hitch * math.sin(h)
-        if comes or state.placed[e]:
+        if comes or state.straight[e]:
             mine = h
         else:
             dx = x - record.x[e, k] - length * math.cos(before)
             dy = y - record.y[e, k] - length * math.sin(before)
             mine = drawn(before, dx, dy, length)
-        state.placed[e] = False
+        state.straight[e] = False
         record.h[e, k + 1] = continued(mine, before)
         record.x[e, k + 1], record.y[e, k + 1] = (
             x - length * math.cos(mine),
@@ -105,8 +107,6 @@ def tow(k, plan, roads, state, record):
         was = record.v[e, k]
         record.v[e, k + 1] = state.command[e] = state.target[e] = v
         record.a[e, k], record.offset[e, k + 1] = (v - was) / plan.dt, 0.0
-        state.travelled[e] += 0.5 * abs(v + was) * plan.dt
-        state.stood[e] = standing(state.stood[e], was, v, plan.dt)
     look_round(state)
 
 
