@@ -31,9 +31,9 @@ from bridgegen.ontology.check import check
 from bridgegen.ontology.files import save
 from bridgegen.ontology.individuals import build
 from bridgegen.openx.convert import import_file
+from bridgegen.openx.on_map import on_map
 from bridgegen.openx.opendrive.read import read as read_map
 from bridgegen.openx.opendrive.road_map import load_map
-from bridgegen.openx.source import on_map
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.search import Problem, Results, get, names
