@@ -77,7 +77,7 @@ def test_its_command_has_every_option():
     for said in (
         "--set mutate_best=true", "--budget 60", "--seed 3", "--ego reference",
         "--ideal perception,prediction", "--axes participants,weather", "--fix fog_density=80.0",
-        "--map /maps/town.xodr", "--junction 965", "--keep 2", "--cause planning",
+        "--map /maps/town.xodr", "--place 965", "--keep 2", "--cause planning",
         "--adversary bv", "--others attentive", "--simulator esmini", "--simulator-set steps=4",
         "--objective d_min=0.5,ttc", "--weights entropy", "--scale raw", "--objectives one",
         "--count any", "--metrics pet",

@@ -130,6 +130,18 @@ def test_a_lane_change_is_no_turn(track, meeting, course):
     assert (found.kind, found.type) == (CONTACT, ConflictType.SIDE_SWIPE)
 
 
+def test_a_bend_is_no_turn(track, meeting, course):
+    # the ego comes along a bend of 86 m radius, which goes on, 46 degrees in all;
+    # a bus that stood beside the road there pulls out into its side
+    rate = 12.0 / 86.0
+    h = course((0.0, -4.25 * rate), (6.0, 1.75 * rate))
+    ego = track(v=12.0, h=h)
+    at = 85
+    bus = track(x=ego["x"][at] - 0.5, y=ego["y"][at] - 1.9 - 0.4 * 0.05 * at, v=0.1, slide=0.4)
+    found = one(meeting(ego, bus))
+    assert found.type in (ConflictType.SIDE_SWIPE, ConflictType.REAR_END_STRIKING)
+
+
 def test_a_standing_ego_is_struck(track, meeting):
     found = one(meeting(track(), track(x=-30.0, v=10.0)))
     assert (found.kind, found.type) == (CONTACT, ConflictType.EGO_STANDING)

@@ -126,7 +126,7 @@ class Protocol:
         if self.road_map:
             words += ["--map", str(self.road_map)]
         if self.junction:
-            words += ["--junction", self.junction]
+            words += ["--place", self.junction]
         return shlex.join([*words, "--out", str(self.out)])
 
 

@@ -9,6 +9,7 @@ from bridgegen.arrays import Float
 from bridgegen.ego import DRIVERS
 from bridgegen.odd.adversary import first_speed, limits, room, top_speed
 from bridgegen.odd.story import Adversary
+from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.source import ConcreteScenario, OntologySource
 from bridgegen.simulation.embedded.places.ways import Ways
@@ -51,9 +52,9 @@ class AdversarySource:
         """See `Source`."""
         return self._inner.road
 
-    def junction(self, values: Mapping[str, float]) -> str | None:
+    def place(self, values: Mapping[str, float]) -> Site | None:
         """See `Source`."""
-        return self._inner.junction(values)
+        return self._inner.place(values)
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""

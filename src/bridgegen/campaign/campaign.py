@@ -19,9 +19,11 @@ from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_stands
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
+from bridgegen.odd.parameters import Axis
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.openx.opendrive.road_map import RoadMap
-from bridgegen.openx.opendrive.site_fit import ALL, shortened
+from bridgegen.openx.opendrive.site_adapted import adapted
+from bridgegen.openx.opendrive.site_fit import ALL
 from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
@@ -112,16 +114,18 @@ def run_search(given: SearchArguments) -> Run:
     logical, roads = placed(logical, given.road_map, given.junction)
     if roads is not None and isinstance(judged, LogicalScenario):
         sites = roads.sites or (roads.site,)
-        shorter = [note for site in sites for note in shortened(judged, site)[1]]
-        if roads.sites and shorter:
-            shorter = [f"some routes end where their legs end ({len(shorter)}; {shorter[0]})"]
-        for note in (*roads.warnings, *dict.fromkeys(shorter)):
+        changes = [note for site in sites for note in adapted(judged, roads.model, site)[1]]
+        if roads.sites and changes:
+            changes = [f"some lanes and routes are the map's ({len(changes)}; {changes[0]})"]
+        for note in (*roads.warnings, *dict.fromkeys(changes)):
             callbacks.warning(note)
     driven: str | None = None
     if given.adversary is not None or getattr(method, "is_adversary", False):
         logical = adversarial(logical, given.adversary)
         driven = logical.adversary.participant if logical.adversary else None
     space = logical.space(given.axes, given.fixed)
+    if roads is not None and roads.sites and Axis.STATIC not in space.axes:
+        raise InputError("--place all searches the axis static: name it in --axes, too")
     if space.n_var == 0:
         refuse_standstill(logical)
     n_obj = 1 if columns == "one" else len(spec.terms)
@@ -310,7 +314,7 @@ def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:
     """Return what to take the same junction by again."""
     if roads is None or given.junction == ALL:
         return given.junction
-    return roads.site.junction_id
+    return roads.site.place_id
 
 
 def _absolute(path: Path | str | None) -> str | None:

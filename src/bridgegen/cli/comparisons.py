@@ -10,13 +10,15 @@ from bridgegen.cli.app import app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import SEARCH
+from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.options import CommonOptions
 from bridgegen.options.forms import read_names
-from bridgegen.options.option import OUTPUT
+from bridgegen.options.option import OUTPUT, WHAT
 from bridgegen.options.option import SEARCH as HOW
 
 
 @app.command(rich_help_panel=SEARCH)
+@with_map_folder(WHAT)
 @with_declared_options
 def compare(
     scenarios: Annotated[

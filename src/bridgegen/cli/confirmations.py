@@ -10,10 +10,12 @@ from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
 from bridgegen.cli.groups import RESULTS
+from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.options.option import SIMULATOR
 
 
 @app.command(rich_help_panel=RESULTS)
+@with_map_folder()
 @with_connection_options
 def confirm(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],

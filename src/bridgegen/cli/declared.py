@@ -47,7 +47,7 @@ def _declaration(one: Option) -> Any:
         spelling = f"{spelling}/--no-{spelling.removeprefix('--')}"
     text = f"{one.help} {one.hint}".rstrip()
     return typer.Option(
-        spelling,
+        *filter(None, (spelling, one.also)),
         help=text,
         show_default=one.shown or True,
         rich_help_panel=one.group,

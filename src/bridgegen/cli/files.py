@@ -10,11 +10,13 @@ from bridgegen.cli import options
 from bridgegen.cli.app import app, ontology
 from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import FILES, ONTOLOGY, RESULTS
+from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_names
 
 
 @app.command(rich_help_panel=RESULTS)
+@with_map_folder()
 def export(
     source: Annotated[Path, typer.Argument(help="The folder of a run, or one .xosc file.")],
     flavour: Annotated[
@@ -95,6 +97,7 @@ def convert(
 
 
 @app.command("import", rich_help_panel=ONTOLOGY)
+@with_map_folder()
 def import_(
     file: Annotated[
         Path, typer.Argument(help="An OpenDRIVE map (.xodr) or an OpenSCENARIO file (.xosc).")
@@ -110,17 +113,24 @@ def import_(
         str | None,
         typer.Option(help="The entity under test in an .xosc, if it is not called ego."),
     ] = None,
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict", help="Refuse an .xosc of which any detail would be lost, or computed."
+        ),
+    ] = False,
 ) -> None:
     """Convert a map, or a scenario file, to individuals."""
     from bridgegen.openx.convert import import_file
 
-    written, notes = import_file(file, out, partial=partial, ego=ego)
+    written, notes = import_file(file, out, partial=partial, ego=ego, strict=strict)
     print(written)
     for note in notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)
 
 
 @app.command(rich_help_panel=FILES)
+@with_map_folder()
 def validate(
     files: Annotated[list[Path], typer.Argument(help="Files: .owl, .xodr, .xosc or .yaml.")],
     reason: Annotated[

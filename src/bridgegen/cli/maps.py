@@ -1,8 +1,8 @@
-"""The command that lists the junctions of a map."""
+"""The command that lists the places of a map."""
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,56 +10,74 @@ from bridgegen.cli import options
 from bridgegen.cli.app import app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import FILES
+from bridgegen.cli.map_folder import with_map_folder
+
+if TYPE_CHECKING:
+    from bridgegen.campaign.places import PlaceFit
 
 
 @app.command(rich_help_panel=FILES)
-def junctions(
+@app.command("junctions", hidden=True)
+@with_map_folder()
+def places(
     road_map: Annotated[
         Path, typer.Argument(metavar="MAP", help="An OpenDRIVE map (.xodr), or its import (.owl).")
     ],
     scenario: Annotated[
         str | None,
         typer.Argument(
-            help="Say which junctions this scenario fits: a catalogue name, or a YAML file.",
+            help="Say which places this scenario fits: a catalogue name, or a YAML file.",
             autocompletion=completing("scenario"),
         ),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Draw the map with its junctions: an .svg file, new.")
+        Path | None, typer.Option(help="Draw the map with its places: an .svg file, new.")
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """List the junctions of a map.
+    """List the places of a map: junctions, roads and others.
 
-    With a scenario: which of them it fits, at how many rotations of its legs, and what the others
-    lack. What fits can be searched (search SCENARIO --map MAP --junction ID).
+    Also roundabouts, and merges. With a scenario: which of them it fits (junctions at how many
+    rotations of its legs), and what the others lack. What fits can be searched (search SCENARIO
+    --map MAP --place ID).
     """
-    from bridgegen.campaign.junctions import junctions_of
+    from bridgegen.campaign.places import places_of
     from bridgegen.odd.reader import load
     from bridgegen.report.map_picture import write_map_picture
     from bridgegen.screen.tables import print_table
 
-    found, model, warnings = junctions_of(road_map, load(scenario) if scenario else None)
+    found, model, warnings = places_of(road_map, load(scenario) if scenario else None)
     for warning in warnings:
         print(f"bridgegen: warning: {warning}", file=sys.stderr)
-    columns = ("junction", "legs", "lights")
-    rows = [(one.id, ", ".join(one.legs), one.lights) for one in found]
     if scenario:
-        fits = [
-            (
-                f"{one.rotations} of {len(one.legs)}" if one.rotations else "none",
-                one.placed or one.lacks,
-            )
-            for one in found
-        ]
         print_table(
-            (*columns, "rotations that fit", "where, or what is missing"),
-            [(*row, *fit) for row, fit in zip(rows, fits, strict=True)],
+            ("place", "what there is", "fits", "where, or what is missing"),
+            [
+                (one.id, one.size, _fits(one), one.placed or one.lacks)
+                for one in sorted(found, key=lambda one: not one.rotations)
+            ],
             as_json=as_json,
         )
     else:
-        print_table(columns, rows, as_json=as_json)
+        print_table(
+            ("place", "kind", "what there is", "roads"),
+            [(one.id, one.kind, one.size, ", ".join(one.legs)) for one in found],
+            as_json=as_json,
+        )
     if picture is not None:
-        fitting = {one.id for one in found if one.rotations} if scenario else None
-        write_map_picture(picture, model, fitting)
+        fits = [one for one in found if one.rotations]
+        junctions = {one.id for one in fits if one.kind == "junction"} if scenario else None
+        roads = {one.id: one.legs[0] for one in fits if one.kind != "junction"}
+        write_map_picture(picture, model, junctions, roads)
         print(picture, file=sys.stderr if as_json else sys.stdout)
+
+
+def _fits(place: "PlaceFit") -> str:
+    """Return whether a scenario fits a place, in a word: a junction at how many rotations."""
+    if not place.rotations:
+        return "no"
+    return (
+        "yes"
+        if place.kind in ("road", "merge")
+        else f"{place.rotations} of {len(place.legs)} rotations"
+    )

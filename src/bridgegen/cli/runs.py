@@ -20,12 +20,13 @@ from bridgegen.cli.connection import (
 )
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import FILES, RESULTS, SEARCH
+from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.cli.run_files import keys_of, schema, with_run_files
 from bridgegen.cli.several_runs import search_all
 from bridgegen.ego import split
 from bridgegen.options import SearchOptions
 from bridgegen.options.forms import read_names
-from bridgegen.options.option import DRIVER, OUTPUT
+from bridgegen.options.option import DRIVER, OUTPUT, WHAT
 from bridgegen.simulation.choice import EMBEDDED
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 
 @app.command(rich_help_panel=SEARCH)
+@with_map_folder(WHAT)
 @with_run_files(search_all)
 @with_connection_options
 @with_declared_options
@@ -114,6 +116,7 @@ def new(
 
 
 @app.command(rich_help_panel=SEARCH)
+@with_map_folder()
 @with_connection_options
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
@@ -212,6 +215,7 @@ def regions(
 
 
 @app.command(rich_help_panel=FILES)
+@with_map_folder()
 @with_connection_options
 def simulate(
     file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],

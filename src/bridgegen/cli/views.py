@@ -14,10 +14,12 @@ from bridgegen.cli.connection import (
     with_connection_options,
 )
 from bridgegen.cli.groups import RESULTS
+from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.errors import InputError
 
 
 @app.command(rich_help_panel=RESULTS)
+@with_map_folder()
 @with_connection_options
 def view(
     run: Annotated[
@@ -61,6 +63,7 @@ def view(
 
 
 @app.command(rich_help_panel=RESULTS)
+@with_map_folder()
 def video(
     run: Annotated[Path, typer.Argument(help="The folder of a run, or an OpenSCENARIO file.")],
     out: Annotated[

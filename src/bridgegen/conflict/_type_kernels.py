@@ -3,8 +3,6 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-import math
-
 from bridgegen.compiled import kernel
 from bridgegen.conflict._codes import (
     CROSSING,
@@ -59,20 +57,21 @@ def is_turning(before, later, limit):
 def turns(c, s, e, first, n, k, dt):
     """Return whether the ego, and whether body e, turns off; following the same bend is no turn.
 
-    Of two bodies with the same direction throughout, one that changes lane does not turn off: it
-    would have to leave the common direction.
+    Of two bodies with the same direction throughout, one that changes lane does not turn off, nor
+    one that comes round a bend to one that stands there: it would have to leave the direction that
+    the other has now.
     """
-    j = max(k - int(TURN_TIME / dt), first)
-    mine, my_all = turning_of(c[0], s[0], first, n, k, dt)
-    its, its_all = turning_of(c[e], s[e], first, n, k, dt)
+    steps = int(TURN_TIME / dt)
+    j, later = max(k - steps, first), min(k + steps // 2, n - 1)
     now = c[0, k] * c[e, k] + s[0, k] * s[e, k]
     before = c[0, j] * c[e, j] + s[0, j] * s[e, j]
-    limit = TURNS
     if now >= SAME_WAY and before >= SAME_WAY:
-        limit = math.acos(SAME_WAY)
-    one, other = is_turning(mine, my_all, limit), is_turning(its, its_all, limit)
-    if now >= SAME_WAY and before >= SAME_WAY and one == other:
-        return False, False
+        one = c[0, later] * c[e, k] + s[0, later] * s[e, k] < SAME_WAY
+        other = c[e, later] * c[0, k] + s[e, later] * s[0, k] < SAME_WAY
+        return one and not other, other and not one
+    mine, my_all = turning_of(c[0], s[0], first, n, k, dt)
+    its, its_all = turning_of(c[e], s[e], first, n, k, dt)
+    one, other = is_turning(mine, my_all, TURNS), is_turning(its, its_all, TURNS)
     if now <= -SAME_WAY and before <= -SAME_WAY and one and other and mine * its < 0.0:
         return False, False
     return one, other

@@ -6,16 +6,17 @@ the VzKat, which our own maps use, too.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from bridgegen.arrays import Int
 from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
-from bridgegen.openx.opendrive.furniture import Signal, SignalReference
+from bridgegen.openx.opendrive.furniture import Signal
 from bridgegen.openx.opendrive.lanes import lane_pose
-from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.openx.opendrive.legs import governs, signals_on
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Route, Step
 
 STOP_SIGN = "206"
@@ -40,25 +41,39 @@ class Crossing(NamedTuple):
     inside: Step
 
 
-def right_of_way(model: OpenDrive, own: Route, other: Route) -> int:
+def right_of_way(
+    model: OpenDrive, own: Route, other: Route, lights: Collection[str] | None = None
+) -> int:
     """Return which route gives way at the first junction that two routes have in common.
 
     ``THEY_WAIT`` only if a sign or the map makes them; a driver does not rely on priority to the
     right. ``NO_RULE`` where lights control the junction, or where the routes share none.
+
+    Args:
+        model: the road network.
+        own: a route.
+        other: another one.
+        lights: ids of the traffic lights that are switched; others are off. None: all of the map's.
     """
     theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
     for ours in crossings(model, own):
         if ours.junction in theirs:
-            return _waiting(model, ours, theirs[ours.junction])
+            return _waiting(model, ours, theirs[ours.junction], lights)
     return NO_RULE
 
 
-def claim(model: OpenDrive, own: Route, other: Route) -> int:
+def claim(model: OpenDrive, own: Route, other: Route, lights: Collection[str] | None = None) -> int:
     """Return which of two routes goes first at the first junction that they have in common.
 
     Unlike ``right_of_way``, on which a driver may rely, this is the law: it is antisymmetric, and
     includes priority to the right in both directions. Where lights control the junction, the claim
     only holds what they leave open: a left turn waits for oncoming traffic.
+
+    Args:
+        model: as for `right_of_way`.
+        own: likewise.
+        other: likewise.
+        lights: likewise.
 
     Returns:
         > 0: the other route gives way; < 0: this one does; 0: no rule applies. The absolute value
@@ -68,17 +83,23 @@ def claim(model: OpenDrive, own: Route, other: Route) -> int:
     for ours in crossings(model, own):
         if ours.junction in theirs:
             they = theirs[ours.junction]
-            return _claim(model, ours, they) - _claim(model, they, ours)
+            return _claim(model, ours, they, lights) - _claim(model, they, ours, lights)
     return 0
 
 
-def claims(model: OpenDrive, routes: Sequence[Route | None], sirens: Sequence[int] | Int) -> Int:
+def claims(
+    model: OpenDrive,
+    routes: Sequence[Route | None],
+    sirens: Sequence[int] | Int,
+    lights: Collection[str] | None = None,
+) -> Int:
     """Return the `claim` of each of E routes against each other, ``(E, E)`` int64.
 
     Args:
         model: the road network.
         routes: of the participants; None off the lanes, which claims nothing.
         sirens: ``(E,)``: 1 of emergency vehicles on a call: all others give way to them, wherever.
+        lights: as for `right_of_way`.
     """
     found = np.zeros((len(routes), len(routes)), dtype=np.int64)
     for a, own in enumerate(routes):
@@ -86,7 +107,7 @@ def claims(model: OpenDrive, routes: Sequence[Route | None], sirens: Sequence[in
             if sirens[a] != sirens[b]:
                 found[a, b] = SIREN if sirens[a] else -SIREN
             elif own is not None and other is not None:
-                found[a, b] = claim(model, own, other)
+                found[a, b] = claim(model, own, other, lights)
             found[b, a] = -found[a, b]
     return found
 
@@ -99,15 +120,9 @@ def crossings(model: OpenDrive, route: Route) -> Iterator[Crossing]:
             yield Crossing(road.junction, before, step)
 
 
-def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
-    """Return whether a signal is for the traffic of a lane."""
-    if signal.validity:
-        return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
-    way = {"+": 1, "-": -1}.get(signal.orientation)
-    return way in (None, road.direction(lane_id))
-
-
-def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
+def _claim(
+    model: OpenDrive, ours: Crossing, theirs: Crossing, lights: Collection[str] | None
+) -> int:
     """Return the reason why the other gives way at a junction, 0 if there is none."""
     if ours.before.road_id == theirs.before.road_id:
         return 0
@@ -116,7 +131,7 @@ def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
     if inside in pairs or inside[::-1] in pairs:
         return BY_MAP if inside in pairs else 0
     our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
-    by_lights = any(sign.dynamic == "yes" for sign in (*our_signs, *their_signs))
+    by_lights = _is_lit(model, ours, lights) or _is_lit(model, theirs, lights)
     difference = _priority(our_signs) - _priority(their_signs)
     if difference and not by_lights:
         return BY_SIGNS if difference > 0 else 0
@@ -127,7 +142,9 @@ def _claim(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
     return FROM_THE_RIGHT if from_theirs > ASIDE and not by_lights else 0
 
 
-def _waiting(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
+def _waiting(
+    model: OpenDrive, ours: Crossing, theirs: Crossing, lights: Collection[str] | None
+) -> int:
     if ours.before.road_id == theirs.before.road_id:
         return NO_RULE
     for one in model.junction(ours.junction).priorities:
@@ -136,7 +153,7 @@ def _waiting(model: OpenDrive, ours: Crossing, theirs: Crossing) -> int:
         if (one.low, one.high) == (ours.inside.road_id, theirs.inside.road_id):
             return WE_WAIT
     our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
-    if any(sign.dynamic == "yes" for sign in (*our_signs, *their_signs)):
+    if _is_lit(model, ours, lights) or _is_lit(model, theirs, lights):
         return NO_RULE
     difference = _priority(our_signs) - _priority(their_signs)
     if difference:
@@ -152,14 +169,31 @@ def _signs(model: OpenDrive, step: Step) -> list[Signal]:
     """Return the signals that a lane passes just before a junction."""
     road = model.road(step.road_id)
     by_id = {signal.id: signal for each in model.roads for signal in each.signals}
-    near: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
     return [
         by_id[one.id]
-        for one in near
+        for one in signals_on(road)
         if one.id in by_id
         and governs(road, one, step.lane_id)
         and abs(one.s - step.s_end) <= AT_JUNCTION
     ]
+
+
+def _is_lit(model: OpenDrive, crossing: Crossing, lights: Collection[str] | None) -> bool:
+    """Return whether a light that is switched controls a way through a junction.
+
+    It stands before the junction or on the way itself.
+    """
+    way = model.road(crossing.inside.road_id)
+    within = [one.id for one in signals_on(way) if governs(way, one, crossing.inside.lane_id)]
+    ids = {one.id for one in _signs(model, crossing.before) if one.dynamic == "yes"}
+    if within:
+        ids |= {
+            one.id
+            for road in model.roads
+            for one in road.signals
+            if one.dynamic == "yes" and one.id in within
+        }
+    return bool(ids if lights is None else ids.intersection(lights))
 
 
 def _priority(signs: list[Signal]) -> int:

@@ -19,11 +19,10 @@ from bridgegen.ego.right_of_way import (
     WE_WAIT,
     claims,
     crossings,
-    governs,
     right_of_way,
 )
-from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
+from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
 from bridgegen.openx.opendrive.outline_furniture import outline_of
 from bridgegen.openx.opendrive.routes import Place, Route, Step, Stretch, next_stretches, plan_route
@@ -132,7 +131,7 @@ def survey(
                 tables[-1], len(tables[-1]), way_step, bodies[e], zone,
             )  # fmt: skip
             zones.append(zone)
-            rank = right_of_way(model, route, way) if route is not None else NO_RULE
+            rank = right_of_way(model, route, way, lights) if route is not None else NO_RULE
             ranks.append(WE_WAIT if sirens[e] else rank)
         first.append(len(tables))
     ways = np.zeros((len(tables), max(map(len, tables), default=0), 6))
@@ -156,12 +155,12 @@ def survey(
                     if sirens[e]
                     else NO_RULE
                     if one is None or route is None
-                    else right_of_way(model, route, one)
+                    else right_of_way(model, route, one, lights)
                     for e, one in enumerate(routes)
                 ]
             ]
         ),
-        claims(model, routes, sirens)[None],
+        claims(model, routes, sirens, lights)[None],
     )
 
 
@@ -240,11 +239,11 @@ def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[St
     for step in route.steps:
         road = model.road(step.road_id)
         low, high = min(step.s, step.s_end), max(step.s, step.s_end)
-        signals: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
-        for signal in signals:
+        for signal in signals_on(road):
             if signal.id not in lights or not governs(road, signal, step.lane_id):
                 continue
-            s = _line_of(road, signal.s, step.lane_id)
+            # Inside a junction it is for those who enter: one does not stop within.
+            s = step.s if road.is_connecting else _line_of(road, signal.s, step.lane_id)
             if low <= s <= high:
                 a, b = route.station(road.id, s)
                 found.append(StopLine(signal.id, a + b * s))

@@ -53,13 +53,8 @@ def bounds_between_layers(
     for one in story.participants:
         if one.conduct != "vehicle" or one.name == "ego":
             continue  # the ego's driver is under test: what it dares is its own affair
-        radius = bend(roads, one)
-        if radius is None:
-            continue
-        friction = _least([f"{prefix}friction" for prefix in weathers])
-        hi = parse(f"sqrt({GRIP_FORMULA} * {friction} * ({radius}))")
-        for name in sorted(_speeds_of(one, story) & parameters.keys()):
-            yield Bound(name, None, hi, _BEND_WHY, _BEND_SOURCE, place)
+        if (radius := bend(roads, one)) is not None:
+            yield from bend_bounds(radius, one, story, parameters, prefixes, place)
     for name, limit in roads.closes.items():
         for prefix in weathers:
             if f"{prefix}{name}" in parameters:
@@ -78,6 +73,21 @@ def speed_bounds(
     hi = parse(cap(limit, ("", *prefixes)))
     for name in sorted(_speeds(story) & parameters.keys()):
         yield Bound(name, None, hi, _SPEED_WHY, _SPEED_SOURCE, place)
+
+
+def bend_bounds(
+    radius: str,
+    one: Participant,
+    story: Story,
+    parameters: Mapping[str, Parameter],
+    prefixes: Iterable[str],
+    place: str,
+) -> Iterator[Bound]:
+    """Yield what the tightest bend on a participant's way demands, by the formula of its radius."""
+    friction = _least([f"{prefix}friction" for prefix in ("", *prefixes)])
+    hi = parse(f"sqrt({GRIP_FORMULA} * {friction} * ({radius}))")
+    for name in sorted(_speeds_of(one, story) & parameters.keys()):
+        yield Bound(name, None, hi, _BEND_WHY, _BEND_SOURCE, place)
 
 
 def cap(limit: Quantity, weathers: Iterable[str] = ("",)) -> str:

@@ -248,6 +248,13 @@ class LogicalScenario(SearchedScenario):
         """
         return {one.name: one for one in self.participants}[name]
 
+    def usual_values(self) -> dict[str, float]:
+        """Return the defaults of the parameters, and the derived quantities that follow."""
+        values = {name: one.default for name, one in self.parameters.items()}
+        for one in self.derived:
+            values[one.name] = float(one.value.evaluate(values))
+        return values
+
     def measured(self, values: Mapping[str, float]) -> "LogicalScenario":
         """Return this scenario at a place where some parameters are what they are.
 

@@ -252,7 +252,7 @@ def _closed_roads() -> Iterator[Rule]:
 def _temporary_changes() -> Iterator[Rule]:
     yield about(
         "works-element", "Scenario", "has_position",
-        "must be on the lane that is closed ({?lane}) or beside its road, got {?got} with "
+        "must be on the lane that is closed ({?lane}) or beside the lanes, got {?got} with "
         "has_lateral_offset {?off} m",
         "What secures road works stands on the closed lane or beside the road, not in the traffic.",
         "RSA 21, lane closures",
@@ -265,10 +265,11 @@ def _temporary_changes() -> Iterator[Rule]:
         "OPTIONAL { ?road bg:has_lane ?closed ; bg:has_lane|bg:has_strip ?on ; "
         "bg:has_lane|bg:has_strip ?other . ?other bg:has_width ?wide ; bg:has_lane_id ?rank . "
         "FILTER(?rank * ?id > 0) } "
-        "BIND(IF(ABS(?rank) <= ABS(?id), ?wide, 0.0e0) AS ?inner) } "
+        "BIND(IF(ABS(?rank) <= ABS(?id), ?wide, 0.0e0) AS ?inner) "
+        "BIND(IF(EXISTS { ?road bg:has_lane ?other }, ?wide, 0.0e0) AS ?driven) } "
         "GROUP BY $this ?value ?closed ?on ?aside ?width HAVING("
         f"!((?on = ?closed && ABS(?aside) <= 0.5e0 * ?width + {_SLACK}) || "
-        "COALESCE(SUM(?inner) - 0.5e0 * ?width - ?aside >= SUM(?wide) && SUM(?wide) > 0.0e0, "
+        "COALESCE(SUM(?inner) - 0.5e0 * ?width - ?aside >= SUM(?driven) && SUM(?wide) > 0.0e0, "
         "false)))",
         ("RoadWorks",),
     )  # fmt: skip

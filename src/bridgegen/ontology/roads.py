@@ -30,7 +30,7 @@ def add_road_network(builder: Builder, site: Site) -> ox.NamedNode:
     if site.kind is not None:
         crossing = builder.node("intersection", site.kind)
         put(network, "has_area", crossing)
-        put(crossing, "has_junction_id", site.junction_id)
+        put(crossing, "has_junction_id", site.place_id)
         if site.size is not None:
             builder.quantity(crossing, "has_size", site.size)
         for name, value in site.measures_of.items():
@@ -63,6 +63,8 @@ def _add_road(builder: Builder, leg: Leg, index: int, road: ArmRoad) -> ox.Named
     put(node, "has_road_id", road.road_id)
     quantity(node, "has_length", road.length)
     put(node, "has_junction_end", road.junction_end)
+    if road.station is not None:
+        put(node, "has_station", float(road.station))
     builder.count(node, "has_inbound_lanes", len(lanes["in"]), road.counts.get("in"))
     builder.count(node, "has_outbound_lanes", len(lanes["out"]), road.counts.get("out"))
     widths = {lane.width for lane in road.lanes if lane.type == "driving"}
@@ -114,12 +116,15 @@ def _add_facility(
     put = builder.put
     leg = site.leg(facility.leg)
     assert leg is not None  # the template that made the site made both
-    node = builder.node(f"{_NAMES[facility.cls]}_{leg.name}", facility.cls)
+    node = builder.node(facility_name(facility), facility.cls)
     put(network, "has_area" if facility.cls == "Crosswalk" else "has_facility", node)
-    put(node, "has_name", f"{_NAMES[facility.cls]}_{leg.name}")
+    put(node, "has_name", facility_name(facility))
     put(node, "on_road", builder.iri(road_name(leg, 0)))
     put(node, "has_distance", float(facility.distance))
-    put(node, "has_object_id", f"{leg.roads[0].road_id}{_OBJECTS.index(facility.cls) + 1:02}")
+    own_id = f"{leg.roads[0].road_id}{_OBJECTS.index(facility.cls) + 1:02}"
+    put(node, "has_object_id", facility.object_id or own_id)
+    if facility.s is not None:
+        put(node, "has_s", float(facility.s))
     if facility.t is not None:
         put(node, "has_t", float(facility.t))
     if facility.width is not None:
@@ -143,9 +148,9 @@ def _add_controller(builder: Builder, site: Site) -> ox.NamedNode:
     put(controller, "has_name", "signals")
     put(controller, "has_object_id", "1")
     builder.quantity(controller, "has_offset", site.signal_offset)
-    for facility in site.facilities:
-        if facility.cls == "TrafficLight":
-            put(controller, "has_light", builder.iri(f"light_{facility.leg}"))
+    lights = [one for one in site.facilities if one.cls == "TrafficLight"]
+    for light in lights:
+        put(controller, "has_light", builder.iri(facility_name(light)))
     for number, phase in enumerate(site.phases, start=1):
         node = builder.node(f"signals_phase_{number}", "SignalPhase")
         put(controller, "has_phase", node)
@@ -154,9 +159,15 @@ def _add_controller(builder: Builder, site: Site) -> ox.NamedNode:
         builder.quantity(node, "has_duration", phase.duration)
         for link, legs in (("gives_green_to", phase.green), ("gives_yellow_to", phase.yellow)):
             for leg in legs:
-                if any(one.cls == "TrafficLight" and one.leg == leg for one in site.facilities):
-                    put(node, link, builder.iri(f"light_{leg}"))
+                for light in (one for one in lights if one.leg == leg):
+                    put(node, link, builder.iri(facility_name(light)))
     return controller
+
+
+def facility_name(facility: Facility) -> str:
+    """Return the name of the individual of a crosswalk, line, light or sign."""
+    number = f"_{facility.number}" if facility.number > 1 else ""
+    return f"{_NAMES[facility.cls]}_{facility.leg}{number}"
 
 
 def road_name(leg: Leg, index: int) -> str:

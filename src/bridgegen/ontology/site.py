@@ -75,6 +75,9 @@ class ArmRoad:
         segments: of its reference line; empty: straight.
         counts: number of lanes in and out, where a parameter gives it.
         closes: weather parameters beyond which it is closed, with the limits [%].
+        station: where on the reference line distances begin [m], if not at the road's end.
+        bends: of a map: absolute curvature of its reference line [1/m] at even steps from its
+            nearer end to its farther one.
     """
 
     road_id: str
@@ -86,11 +89,28 @@ class ArmRoad:
     segments: tuple[SiteSegment, ...] = ()
     counts: Mapping[Direction, float] = field(default_factory=lambda: MappingProxyType({}))
     closes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    station: float | None = None
+    bends: tuple[float, ...] = field(default=(), compare=False, repr=False)
 
     def along(self, direction: Direction) -> tuple[SiteLane, ...]:
         """Return the driving lanes of a direction, the innermost (nearest to the centre) first."""
         lanes = [one for one in self.lanes if one.direction == direction and one.type == "driving"]
         return tuple(sorted(lanes, key=lambda lane: abs(lane.lane_id)))
+
+    @property
+    def near(self) -> float:
+        """Where distances begin along its reference line [m]."""
+        if self.station is not None:
+            return self.station
+        return self.length if self.junction_end == "end" else 0.0
+
+    def distance(self, s: float) -> float | None:
+        """Return how far from its nearer end a place along its reference line lies [m].
+
+        None: not on the part that the leg has of it.
+        """
+        found = self.near - s if self.junction_end == "end" else s - self.near
+        return min(max(found, 0.0), self.length) if -0.5 <= found <= self.length + 0.5 else None
 
     @property
     def strips(self) -> tuple[SiteLane, ...]:
@@ -122,6 +142,21 @@ class Leg:
         """Length of the whole leg [m]."""
         return sum(road.length for road in self.roads)
 
+    def turning(self, first: float, last: float) -> float:
+        """Return by how much it turns between two distances [m], bend by bend [rad]."""
+        found, begin = 0.0, 0.0
+        for road in self.roads:
+            if len(road.bends) > 1:
+                step = road.length / (len(road.bends) - 1)
+                within = (first <= begin + k * step <= last for k in range(len(road.bends)))
+                found += step * sum(k for k, there in zip(road.bends, within, strict=True) if there)
+            begin += road.length
+        return found
+
+    def road_end(self, distance: float) -> float:
+        """Return how far the road reaches [m along the leg] that lies at a distance."""
+        return sum(road.length for road in self.roads[: self.road_at(distance) + 1])
+
     def road_at(self, distance: float) -> int:
         """Return the index of the road that lies ``distance`` [m] from the junction.
 
@@ -147,6 +182,9 @@ class Facility:
         width: [m] along the road, of a crosswalk.
         governs: directions whose lanes it governs (of a stop line: those that it marks).
         speed_limit: [m/s], of a speed limit sign.
+        object_id: OpenDRIVE's id on a map; None: by its class and its road.
+        number: which of its class on its leg it is.
+        s: on a map, where along its road's reference line [m].
     """
 
     cls: str
@@ -156,6 +194,9 @@ class Facility:
     width: float | None = None
     governs: tuple[Direction, ...] = ()
     speed_limit: float | None = None
+    object_id: str | None = None
+    number: int = 1
+    s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +216,8 @@ class Site:
     Attributes:
         name: of the road network.
         map_file: the OpenDRIVE file it is part of; None where it is generated.
-        junction_id: OpenDRIVE's id.
+        place_id: OpenDRIVE's id of the junction; of a stretch of road see
+            `openx.opendrive.stretches`.
         size: from a leg's end to the opposite leg's [m], where it is one number.
         legs: in the order of their names.
         kind: the class of the area in which the legs meet; None of a road without one.
@@ -187,7 +229,7 @@ class Site:
 
     name: str
     map_file: str | None
-    junction_id: str
+    place_id: str
     size: float | None
     legs: tuple[Leg, ...]
     kind: str | None = "Intersection"
@@ -200,21 +242,35 @@ class Site:
         """Return a leg by name, or None."""
         return next((leg for leg in self.legs if leg.name == name), None)
 
-    def measures(self, legs: Iterable[str]) -> dict[str, float]:
-        """Return the static parameters as this site has them.
+    @property
+    def where(self) -> str:
+        """Which place of its map it is, in words."""
+        known = {None: "road", "Roundabout": "roundabout", "Merge": "merge"}
+        kind = known.get(self.kind, "junction")
+        return f"{kind} {self.place_id}"
+
+    def measures(self, starts: Iterable[tuple[str, float]]) -> dict[str, float]:
+        """Return the measures of a template as this site has them.
 
         Args:
-            legs: names of the legs along which a start is searched: as ``arm_length`` counts the
-                shortest of their roads at the junction, for a start must not leave its road.
+            starts: the legs along which a start is searched, and where it usually is [m]: as
+                ``arm_length`` (of a road: ``length``) counts where the nearest of these roads
+                ends, for a start must not leave its road.
         """
         roads = {leg.name: leg.roads[0] for leg in self.legs}
         lanes = [lane for road in roads.values() for lane in road.lanes if lane.type == "driving"]
         ways: tuple[Direction, ...] = ("in", "out")
         counts = [len(road.along(way)) for road in roads.values() for way in ways]
-        starts = [roads[name] for name in legs if name in roads] or list(roads.values())
-        found = {
-            "lane_width": min(lane.width for lane in lanes),
+        legs = {leg.name: leg for leg in self.legs}
+        ends = [legs[name].road_end(at) for name, at in starts if name in legs]
+        length = min(ends or [road.length for road in roads.values()])
+        found = {"lane_width": min(lane.width for lane in lanes)}
+        if self.kind is None:
+            (road,) = roads.values()
+            ahead, against = (float(len(road.along(way))) for way in ("out", "in"))
+            return found | {"length": length, "lanes": ahead, "lanes_against": against}
+        found |= {
             "lanes_per_direction": float(min(count for count in counts if count)),
-            "arm_length": min(road.length for road in starts),
+            "arm_length": length,
         }
         return found if self.size is None else found | {"intersection_size": self.size}

@@ -300,7 +300,9 @@ def add_jam(builder: Builder, jam: Jam, site: Site) -> ox.NamedNode:
         builder.put(node, "has_who", builder.iri(name))
     leg = site.leg(jam.tail.leg)
     assert leg is not None  # its vehicles stand there
-    lane = lane_name(leg, 0, jam.tail.way, jam.tail.lane)
+    distance = jam.tail.distance
+    at = float(builder.values[distance] if isinstance(distance, str) else distance)
+    lane = lane_name(leg, leg.road_at(at), jam.tail.way, jam.tail.lane)
     builder.put(node, "on_lane", builder.iri(lane))
     return node
 

@@ -87,16 +87,17 @@ class _Template:
         measures: Mapping[str, float],
     ) -> Site:
         facilities = tuple(self.facilities(legs))
+        headings = {name: leg.heading for name, leg in self.roads.legs.items()}
         return Site(
             name=self.roads.template,
             map_file=None,
-            junction_id=JUNCTION_ID,
+            place_id=JUNCTION_ID,
             size=size,
             legs=legs,
             kind=kind,
             measures_of=measures,
             facilities=facilities,
-            phases=tuple(self.phases()),
+            phases=tuple(phases_of(self.roads, headings)),
             signal_offset=self.knobs.get("signal_offset", 0.0),
         )
 
@@ -220,26 +221,38 @@ class _Template:
             if at is not None or roads.signals != "none" or spec.sign == "stop":
                 yield Facility("StopLine", leg.name, stop, governs=("in",))
 
-    def phases(self) -> Iterator[Phase]:
-        """Yield green, yellow and red to all, for one group of opposite legs after the other."""
-        if self.roads.signals == "none":
-            return
-        groups: list[list[str]] = []
-        legs = self.roads.legs
-        for name, leg in legs.items():
-            for group in groups:
-                turns = (leg.heading - legs[other].heading for other in group)
-                if all(abs(math.remainder(turn, 180.0)) < OPPOSITE for turn in turns):
-                    group.append(name)
-                    break
-            else:
-                groups.append([name])
-        for together in map(tuple, groups):
-            name = "".join(together)
-            yield Phase(f"{name}_green", self.knobs["green_time"], green=together)
-            yield Phase(f"{name}_yellow", self.knobs["yellow_time"], yellow=together)
-            if self.knobs["all_red_time"] > 0.0:
-                yield Phase(f"{name}_clearing", self.knobs["all_red_time"])
+
+def phases_of(roads: RoadsSpec, headings: Mapping[str, float]) -> Iterator[Phase]:
+    """Yield the phases of traffic lights: green, yellow and red, one group of legs after another.
+
+    Args:
+        roads: the scenario's, with the times of its lights.
+        headings: of the legs that have lights, by name [deg]; opposite ones are green together.
+    """
+    if roads.signals == "none":
+        return
+    groups: list[list[str]] = []
+    for name, heading in headings.items():
+        for group in groups:
+            turns = (heading - headings[other] for other in group)
+            if all(abs(math.remainder(turn, 180.0)) < OPPOSITE for turn in turns):
+                group.append(name)
+                break
+        else:
+            groups.append([name])
+    green, yellow, red = (_time(roads, name) for name in ("green", "yellow", "all_red"))
+    for together in map(tuple, groups):
+        name = "".join(together)
+        yield Phase(f"{name}_green", green, green=together)
+        yield Phase(f"{name}_yellow", yellow, yellow=together)
+        if red > 0.0:
+            yield Phase(f"{name}_clearing", red)
+
+
+def _time(roads: RoadsSpec, name: str) -> float:
+    value = roads.knobs[f"{name}_time"]
+    assert not isinstance(value, str)  # `knob_problems` refuses it
+    return value
 
 
 def crossroads(values: Mapping[str, float]) -> Site:

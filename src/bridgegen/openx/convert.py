@@ -67,9 +67,18 @@ def road_bytes(individuals: Individuals, beside: Path) -> bytes:
 
 
 def import_file(
-    file: Path, out: Path | None = None, *, partial: bool = False, ego: str | None = None
+    file: Path,
+    out: Path | None = None,
+    *,
+    partial: bool = False,
+    ego: str | None = None,
+    strict: bool = False,
 ) -> tuple[Path, list[str]]:
     """Write a whole OpenDRIVE map, or a scenario file on its map, as an ontology.
+
+    Of other people's scenario files, details are left out on which nothing depends that happens
+    (names of models, wheels, controllers that are not known here, …), and an expression is stated
+    by the value that it has. What else the ontology cannot express is refused.
 
     Args:
         file: the map (``.xodr``, or by CARLA's name), or the scenario (``.xosc``), which
@@ -77,6 +86,7 @@ def import_file(
         out: the file to write, new; beside the first by default.
         partial: leave out contents that the ontology cannot express, instead of refusing the file.
         ego: of a scenario, the entity under test, if it is not called so.
+        strict: take every detail of a scenario for one that must not be lost.
 
     Returns:
         The file written, and a sentence for each content that it lacks, or has in part.
@@ -91,9 +101,11 @@ def import_file(
     out = out or (file if file == named else Path(named.name)).with_suffix(".owl")
     notes: list[str] = []
     if file.suffix.lower() == ".xosc":
-        individuals, notes = _import_storyboard(file, out, partial, ego)
-    elif partial or ego is not None:
-        raise InputError(f"{file}: only a scenario (.xosc) can be imported in part, or has an ego")
+        individuals, notes = _import_storyboard(file, out, partial, ego, strict)
+    elif partial or strict or ego is not None:
+        raise InputError(
+            f"{file}: only a scenario (.xosc) can be imported in part or strictly, or has an ego"
+        )
     else:
         data = read_bytes(file)
         model = opendrive_read.read(data, str(file), notes)
@@ -106,7 +118,7 @@ def import_file(
 
 
 def _import_storyboard(
-    file: Path, out: Path, partial: bool, ego: str | None
+    file: Path, out: Path, partial: bool, ego: str | None, strict: bool
 ) -> tuple[Individuals, list[str]]:
     skipped: list[str] = []
     scenario = openscenario_read.read(file, skipped=skipped if partial else None)
@@ -115,7 +127,12 @@ def _import_storyboard(
     roads = roads_of(scenario, file)
     road_map = logic_path(scenario, file)
     individuals, lost = individuals_from_openscenario(
-        scenario, roads, _seen_from(out, road_map), str(file), partial=partial
+        scenario,
+        roads,
+        _seen_from(out, road_map),
+        str(file),
+        partial=partial,
+        in_substance=not strict,
     )
     return individuals, [f"left out: {sentence}" for sentence in (*skipped, *lost)]
 

@@ -19,6 +19,7 @@ from bridgegen.odd.parameters import Axis, Bound
 from bridgegen.odd.scenario import SearchedScenario, content_of
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.site import Site
 from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
@@ -285,7 +286,7 @@ class FileSource:
         """See `Source`."""
         return self._scenario.roads.name
 
-    def junction(self, values: Mapping[str, float]) -> str | None:
+    def place(self, values: Mapping[str, float]) -> Site | None:
         """See `Source`: none is chosen."""
         return None
 

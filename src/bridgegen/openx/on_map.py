@@ -1,23 +1,37 @@
 """Scenarios on maps that were made elsewhere: what a map has for their static parameters."""
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from bridgegen.arrays import Float
 from bridgegen.errors import InputError
 from bridgegen.odd.expression import Lookup, lookup
-from bridgegen.odd.kinds import MOST_NAMES, Category
+from bridgegen.odd.kinds import MOST_NAMES, Category, slack
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
-from bridgegen.odd.rules import speed_bounds
+from bridgegen.odd.roads import Quantity
+from bridgegen.odd.rules import bend_bounds, speed_bounds
 from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.space import SearchSpace, probes
+from bridgegen.odd.story import LaneChange
 from bridgegen.ontology.site import Site
+from bridgegen.openx.opendrive.merges import RAMP, through
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
-from bridgegen.openx.opendrive.site_fit import fitting_sites, shortened
+from bridgegen.openx.opendrive.site_adapted import adapted
+from bridgegen.openx.opendrive.site_fit import fitting_sites
 
-JUNCTION = "junction"
-"""The parameter that says where on a map a scenario takes place."""
+PLACE = "place"
+"""The parameter that says at which place on a map a scenario takes place."""
 
-_LIMIT = "junction_speed_limit"
+GENTLE = 1e-4
+"""A road with a smaller curvature is straight [1/m]."""
+
+_LIMIT, _SHARPEST = "place_speed_limit", "place_curvature"
 _NO_LIMIT = 1000.0  # m/s, where a road states none
+_SHOWN = 3  # places left out that are named
 
 
 def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
@@ -33,17 +47,99 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     """
     if road_map.sites:
         return _on_sites(scenario, road_map)
-    scenario, _ = shortened(scenario, road_map.site)
+    scenario, _ = adapted(scenario, road_map.model, road_map.site)
     moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
     static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
-    found = road_map.site.measures([start.leg for start in moving])
-    here = scenario.measured({one.name: found.get(one.name, one.default) for one in static})
-    limit = _lowest_limit(road_map.site)
-    if limit is None:
-        return here
-    story = scenario.story
-    slower = speed_bounds(limit, story, here.parameters, story.later_weathers, scenario.place)
+    usual = scenario.usual_values()
+    found = road_map.site.measures([(one.leg, usual[str(one.distance)]) for one in moving])
+    knobs = {name: knob for knob, name in scenario.roads.knobs.items() if isinstance(name, str)}
+    here = scenario.measured(
+        {one.name: found.get(knobs.get(one.name, one.name), one.default) for one in static}
+    )
+    slower = _slower(here, _lowest_limit(road_map.site), _sharpest(road_map.site))
     return replace(here, bounds=(*here.bounds, *slower))
+
+
+def _slower(
+    scenario: LogicalScenario, limit: Quantity | None, curvature: Quantity | None
+) -> Iterator[Bound]:
+    """Yield what a place's lowest speed limit [m/s] and sharpest bend [1/m] demand of speeds."""
+    story, place, parameters = scenario.story, scenario.place, scenario.parameters
+    if limit is not None:
+        yield from speed_bounds(limit, story, parameters, story.later_weathers, place)
+    if isinstance(curvature, str) or (curvature or 0.0) > GENTLE:
+        radius = f"1 / max({curvature}, {GENTLE})"
+        for one in story.participants:
+            if one.conduct == "vehicle" and one.name != "ego":  # see `bounds_between_layers`
+                yield from bend_bounds(radius, one, story, parameters, story.later_weathers, place)
+
+
+def _sharpest(site: Site) -> float:
+    """Return the greatest curvature of a stretch of road [1/m]; 0 of a junction.
+
+    Its turns have bounds of their own.
+    """
+    roads = [road for leg in site.legs for road in leg.roads] if site.kind is None else []
+    return max((bend for road in roads for bend in road.bends), default=0.0)
+
+
+def _require_room(scenario: LogicalScenario, road_map: RoadMap) -> None:
+    """Raise InputError where ranges do not fit a place, or a searched start leaves its road.
+
+    Starts are tried at the corners of the ranges and within, as a scenario file's are.
+    """
+    here = on_map(scenario, road_map)
+    space = here.space(Axis)
+    here.space()
+    X = space.decode(probes(space.n_var))
+    queued = {name: jam.participants for jam in here.story.jams for name in jam.participants}
+    ranges: dict[str, tuple[float, float]] = {}
+    for one in here.participants:
+        at = one.start.distance
+        column = _column(at, space, X)
+        ranges[one.name] = float(column.min()), float(column.max())
+    for one in here.participants:
+        leg = road_map.site.leg(one.start.leg)
+        if leg is None or not isinstance(one.start.distance, str):
+            continue
+        together = [ranges[name] for name in queued.get(one.name, (one.name,))]
+        nearest, farthest = min(low for low, _ in together), max(high for _, high in together)
+        end = leg.road_end(nearest)
+        if farthest > end + slack(end):
+            road = leg.roads[leg.road_at(nearest)]
+            raise InputError(
+                f"{one.name} starts {nearest:.4g} m to {farthest:.4g} m along its leg; road "
+                f"{road.road_id} ends at {end:.4g} m (a start that is searched stays on one road)"
+            )
+    if road_map.site.kind == "Merge":
+        _require_acceleration_lane(here, road_map, space, X)
+
+
+def _require_acceleration_lane(
+    scenario: LogicalScenario, road_map: RoadMap, space: SearchSpace, X: Float
+) -> None:
+    """Raise InputError where somebody may change lane only after the acceleration lane has ended.
+
+    Of an event that begins after a distance travelled.
+    """
+    room = through(road_map.model, road_map.site) + road_map.site.legs[2].roads[0].length
+    starts = {one.name: one.start for one in scenario.participants if one.start.leg == RAMP}
+    for event in scenario.story.events:
+        start = starts.get(event.participant or "")
+        if start is None or not any(isinstance(one, LaneChange) for one in event.actions):
+            continue
+        for condition in (one for group in event.when for one in group):
+            if condition.kind == "travelled":
+                beyond = _column(condition.value, space, X) - _column(start.distance, space, X)
+                if float(beyond.max()) > room:
+                    raise InputError(
+                        f"{event.participant} changes lane up to {beyond.max():.4g} m after its "
+                        f"ramp; the acceleration lane ends {room:.4g} m after it"
+                    )
+
+
+def _column(value: Quantity, space: SearchSpace, X: Float) -> Float:
+    return X[:, space.index(value)] if isinstance(value, str) else np.array([float(value)])
 
 
 def searchable(scenario: LogicalScenario, road_map: RoadMap) -> RoadMap:
@@ -59,13 +155,11 @@ def searchable(scenario: LogicalScenario, road_map: RoadMap) -> RoadMap:
     left, reasons = [], []
     for site in road_map.sites:
         try:
-            on_map(scenario, road_map.at(site)).space()
+            _require_room(scenario, road_map.at(site))
         except InputError as error:
             leg = site.legs[0]
-            reasons.append(
-                f"junction {site.junction_id} with road {leg.roads[0].road_id} as leg {leg.name} "
-                f"is left out: {error.problems[0]}"
-            )
+            turned = f" with road {leg.roads[0].road_id} as leg {leg.name}" if site.kind else ""
+            reasons.append(f"{site.where}{turned} is left out: {error.problems[0]}")
         else:
             left.append(site)
     if not left:
@@ -74,67 +168,99 @@ def searchable(scenario: LogicalScenario, road_map: RoadMap) -> RoadMap:
         road_map,
         site=left[0],
         sites=tuple(left) if len(left) > 1 else (),
-        warnings=(*road_map.warnings, *dict.fromkeys(reasons)),
+        warnings=(*road_map.warnings, *_shortly(list(dict.fromkeys(reasons)))),
     )
 
 
+def _shortly(reasons: list[str]) -> Iterator[str]:
+    """Yield why places are left out: of many the first ones, and how many more."""
+    more = len(reasons) - _SHOWN
+    yield from reasons if more <= 1 else reasons[:_SHOWN]
+    if more > 1:
+        yield f"{more} more places are left out; what each lacks: bridgegen places MAP SCENARIO"
+
+
 def _turned(scenario: LogicalScenario, road_map: RoadMap) -> RoadMap:
-    """Return a map at the first rotation of its junction's legs that a scenario's ranges fit."""
+    """Return a map at the first place, or rotation of its legs, that a scenario's ranges fit."""
+    others: Sequence[Site] = road_map.others
     try:
-        on_map(scenario, road_map).space()
+        _require_room(scenario, road_map)
     except InputError:
-        junction, name = road_map.site.junction_id, road_map.path.name
-        sites = fitting_sites(scenario, road_map.model, name, junction)
-        try:
-            left = searchable(scenario, replace(road_map, sites=(road_map.site, *sites)))
-        except InputError:
-            return road_map  # its own error says why
-        return replace(left.at(left.site), warnings=road_map.warnings)
+        if not others:
+            name = road_map.path.name
+            others = fitting_sites(scenario, road_map.model, name, road_map.site.place_id)
+        for site in others:
+            try:
+                _require_room(scenario, road_map.at(site))
+            except InputError:
+                continue
+            return road_map.at(site)
+        raise
     return road_map
 
 
 def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     """Return a scenario that takes place at one of several junctions; see `on_map`."""
-    taken = {*scenario.parameters, *(one.name for one in scenario.derived)} & {JUNCTION, _LIMIT}
+    taken = {*scenario.parameters, *(one.name for one in scenario.derived)} & {
+        PLACE,
+        _LIMIT,
+        _SHARPEST,
+    }
     if taken:
-        raise InputError(f"{scenario.place}: --junction all needs the name {sorted(taken)[0]}")
+        raise InputError(f"{scenario.place}: --place all needs the name {sorted(taken)[0]}")
     if len(road_map.sites) > MOST_NAMES:
         raise InputError(
-            f"{road_map.path}: at most {MOST_NAMES} junctions and rotations can be searched "
-            f"together, {scenario.name} fits {len(road_map.sites)}; choose one (--junction)"
+            f"{road_map.path}: at most {MOST_NAMES} places and rotations can be searched "
+            f"together, {scenario.name} fits {len(road_map.sites)}; choose one (--place)"
         )
     here = [on_map(scenario, road_map.at(site)) for site in road_map.sites]
     found, source = road_map.site.name, f"the map {road_map.path.name}"
     static = {name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC}
     names = site_names(road_map)
     index = Parameter(
-        JUNCTION, Axis.STATIC, "1", 0.0, len(names) - 1.0, 0.0, Category(names),
-        f"The junction of {found}, and which of its legs is leg A.", source,
+        PLACE, Axis.STATIC, "1", 0.0, len(names) - 1.0, 0.0, Category(names),
+        f"The place on {found}: a road, or a junction and the road that is leg A.", source,
     )  # fmt: skip
     why = "The map has it."
     measured = [
         Derived(
             name, Axis.STATIC, one.unit,
-            lookup(JUNCTION, [part.parameters[name].default for part in here]), why, source,
+            lookup(PLACE, [part.parameters[name].default for part in here]), why, source,
             one.description,
         )
         for name, one in scenario.parameters.items()
         if name in static
     ]  # fmt: skip
     limits = [_lowest_limit(site) or _NO_LIMIT for site in road_map.sites]
-    slower: tuple[Bound, ...] = ()
-    if min(limits) < _NO_LIMIT:
+    sharpest = [_sharpest(site) for site in road_map.sites]
+    limit = _LIMIT if min(limits) < _NO_LIMIT else None
+    if limit:
         measured.append(
-            Derived(_LIMIT, Axis.STATIC, "m/s", lookup(JUNCTION, limits), why, source,
-                    "The lowest speed limit on the legs.")
+            Derived(_LIMIT, Axis.STATIC, "m/s", lookup(PLACE, limits), why, source,
+                    "The lowest speed limit there.")
         )  # fmt: skip
-        moving = {name: one for name, one in scenario.parameters.items() if name not in static}
-        weathers = scenario.story.later_weathers
-        slower = tuple(speed_bounds(_LIMIT, scenario.story, moving, weathers, scenario.place))
+    curvature = _SHARPEST if max(sharpest) > GENTLE else None
+    if curvature:
+        measured.append(
+            Derived(_SHARPEST, Axis.STATIC, "1/m", lookup(PLACE, sharpest), why, source,
+                    "The greatest curvature of the road there.")
+        )  # fmt: skip
+    slower = tuple(
+        _slower(
+            replace(
+                scenario,
+                parameters={
+                    name: one for name, one in scenario.parameters.items() if name not in static
+                },
+            ),
+            limit,
+            curvature,
+        )
+    )
     kept = {name: one for name, one in scenario.parameters.items() if name not in static}
     return replace(
         scenario,
-        parameters={JUNCTION: index} | kept,
+        parameters={PLACE: index} | kept,
         bounds=(*(one for one in scenario.bounds if one.target not in static), *slower),
         derived=(*measured, *scenario.derived),
         axes=tuple(axis for axis in Axis if axis in {Axis.STATIC, *scenario.axes}),
@@ -142,36 +268,41 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
 
 
 def site_names(road_map: RoadMap) -> tuple[str, ...]:
-    """Return a word for each site: its junction, and the road that is leg A there."""
-    words = [
-        re.sub(r"[^a-z0-9]", "_", f"j{site.junction_id}_a{site.legs[0].roads[0].road_id}".lower())
-        for site in road_map.sites
-    ]
+    """Return a word for each site: its road; or its junction, and the road that is leg A there."""
+    words = [re.sub(r"[^a-z0-9]", "_", _word(site).lower()) for site in road_map.sites]
     return tuple(
         word[:56] if words.count(word) == 1 and len(word) < 57 else f"{word[:56]}_{k}"
         for k, word in enumerate(words)
     )
 
 
-def at_site(scenario: LogicalScenario, site: Site, number: int) -> LogicalScenario:
+def _word(site: Site) -> str:
+    if site.kind is None:
+        return f"r{site.place_id}"
+    return f"j{site.place_id}_a{site.legs[0].roads[0].road_id}"
+
+
+def at_site(
+    scenario: LogicalScenario, model: OpenDrive, site: Site, number: int
+) -> LogicalScenario:
     """Return what `_on_sites` made, as it is at one of the junctions."""
-    scenario, _ = shortened(scenario, site)
-    parameters, derived = {}, []
+    scenario, _ = adapted(scenario, model, site)
+    parameters, derived, helpers = {}, [], {_LIMIT, _SHARPEST}
     for one in scenario.derived:
-        if isinstance(one.value, Lookup) and one.value.names == {JUNCTION} and one.name != _LIMIT:
+        if isinstance(one.value, Lookup) and one.value.names == {PLACE} and one.name not in helpers:
             value = one.value.values[number]
             parameters[one.name] = Parameter(
                 one.name, one.axis, one.unit, value, value, value, description=one.description
             )
-        elif one.name != _LIMIT:
+        elif one.name not in helpers:
             derived.append(one)
-    kept = {name: one for name, one in scenario.parameters.items() if name != JUNCTION}
-    bounds = tuple(one for one in scenario.bounds if _LIMIT not in one.names)
+    kept = {name: one for name, one in scenario.parameters.items() if name != PLACE}
+    bounds = tuple(one for one in scenario.bounds if helpers.isdisjoint(one.names))
     return replace(scenario, parameters=parameters | kept, bounds=bounds, derived=tuple(derived))
 
 
 def _lowest_limit(site: Site) -> float | None:
-    """Return the lowest speed limit on the legs of a junction [m/s]; None where there is none."""
+    """Return the lowest speed limit on the legs of a junction [m/s], or None."""
     limits = [
         road.speed_limit for leg in site.legs for road in leg.roads if road.speed_limit is not None
     ]

@@ -14,7 +14,7 @@ from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build, build_static
 from bridgegen.ontology.site import Site
 from bridgegen.openx.file_scenario import FileScenario, FileSource
-from bridgegen.openx.on_map import JUNCTION, at_site
+from bridgegen.openx.on_map import PLACE, at_site
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
@@ -51,8 +51,8 @@ class Source(Protocol):
     def road(self) -> str:
         """The road network in words."""
 
-    def junction(self, values: Mapping[str, float]) -> str | None:
-        """Return the junction of a map that a row takes place at, if one was chosen."""
+    def place(self, values: Mapping[str, float]) -> Site | None:
+        """Return the place of a map that a row takes place at, if one was chosen."""
 
     @property
     def static_names(self) -> tuple[str, ...]:
@@ -148,7 +148,7 @@ class OntologySource:
         types = {one.type_by: one.types for one in scenario.participants if one.type_by}
         choices: dict[str, Sequence[object]] = dict(types)
         if road_map and road_map.sites:
-            choices = {JUNCTION: road_map.sites} | choices
+            choices = {PLACE: road_map.sites} | choices
         self.variant_names = tuple(choices)
         counts = (range(len(one)) for one in choices.values())
         self.variants = tuple(tuple(map(float, key)) for key in product(*counts)) if choices else ()
@@ -166,19 +166,16 @@ class OntologySource:
         if self._map is None:
             return f"generated {self._scenario.roads.template}"
         if self._map.sites:
-            junctions = len({site.junction_id for site in self._map.sites})
-            return f"{self._map.site.name}, {junctions} junctions in {len(self._map.sites)} ways"
-        return f"{self._map.site.name}, junction {self._map.site.junction_id}"
+            places = len({site.place_id for site in self._map.sites})
+            if self._map.site.kind is None:
+                return f"{self._map.site.name}, {places} stretches of road"
+            return f"{self._map.site.name}, {places} junctions in {len(self._map.sites)} ways"
+        return f"{self._map.site.name}, {self._map.site.where}"
 
-    def junction(self, values: Mapping[str, float]) -> str | None:
+    def place(self, values: Mapping[str, float]) -> Site | None:
         """See `Source`."""
-        site = self._site(values)
-        return site.junction_id if site else None
-
-    def _site(self, values: Mapping[str, float]) -> Site | None:
-        """Return where on its map a row takes place, None without a map."""
         if self._map and self._map.sites:
-            return self._map.sites[int(values[JUNCTION])]
+            return self._map.sites[int(values[PLACE])]
         return self._map.site if self._map else None
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
@@ -212,9 +209,9 @@ class OntologySource:
             road_file: what its OpenDRIVE file will be called.
             courses: see `bridgegen.ontology.individuals.build`.
         """
-        site, scenario = self._site(values), self._typed(values)
+        site, scenario = self.place(values), self._typed(values)
         if site and self._map and self._map.sites:
-            scenario = at_site(scenario, site, int(values[JUNCTION]))
+            scenario = at_site(scenario, self._map.model, site, int(values[PLACE]))
         if site and road_file:
             site = replace(site, map_file=road_file)
         individuals = build(

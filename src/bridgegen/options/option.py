@@ -34,6 +34,7 @@ class Option:
         group: one of GROUPS.
         names: what a shell completes its value with: "algorithm", "driver", "metric" … as
             `bridgegen.cli.completion` knows them; empty where it completes nothing.
+        also: another spelling on the command line; empty: none.
         help: what it means, in Python and on the command line; a whole sentence.
         name: of the field.
         default: of the field.
@@ -47,6 +48,7 @@ class Option:
     before: Any = ALWAYS
     group: str = WHAT
     names: str = ""
+    also: str = ""
     help: str = ""
     name: str = ""
     default: Any = None
@@ -69,9 +71,10 @@ def option(
     before: Any = ALWAYS,
     group: str = WHAT,
     names: str = "",
+    also: str = "",
 ) -> dict[str, Any]:
     """Return the metadata of a field that is an option; see `Option` for the arguments."""
-    declared = Option(form, spelling, hint, shown, limits, before, group, names)
+    declared = Option(form, spelling, hint, shown, limits, before, group, names, also)
     return {"help": help, "option": declared}
 
 

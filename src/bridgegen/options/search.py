@@ -170,8 +170,11 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TEXT,
-            "Id of the map's junction; best: the one that fits and is most like the scenario's; "
-            "all: each that fits, as one more parameter of the search.",
+            "Place on the map, as places lists them: a junction or a stretch of road; best: the "
+            "one that fits and is most like the scenario's; all: each that fits, as one more "
+            "parameter of the search.",
+            spelling="--place",
+            also="--junction",
         ),
     )
     objective: Mapping[str, float | None] | None = field(

@@ -1,8 +1,9 @@
-"""A map from above as SVG: its roads, and its junctions by their ids."""
+"""A map from above as SVG: its roads, and its places by their ids."""
 
 import html
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -27,24 +28,31 @@ svg { background: #eef1ea; font: 13px system-ui, sans-serif }
 .area { fill: #98a0a9; stroke: #98a0a9 } .beside { fill: #c6cbd0; stroke: none }
 .ring { fill: #ffffffcc; stroke: #4a5563; stroke-width: 2 }
 .fits { fill: #d4f0e4; stroke: #00805f; stroke-width: 3 }
+.road { fill: none; stroke: #00805f; stroke-width: 5; stroke-linecap: round }
 text { fill: #17202c; text-anchor: middle; dominant-baseline: central }
 .key { text-anchor: start }
 @media (prefers-color-scheme: dark) {
   svg { background: #1b2027 } .area { fill: #59626d; stroke: #59626d } .beside { fill: #3a424b }
   .ring { fill: #242b34dd; stroke: #aab4c0 } .fits { fill: #0d4736; stroke: #38d39f }
-  text { fill: #eef2f6 }
+  .road { stroke: #38d39f } text { fill: #eef2f6 }
 }
 """
 
 
-def write_map_picture(path: Path, model: OpenDrive, fitting: Collection[str] | None) -> None:
-    """Draw a map with its junctions.
+def write_map_picture(
+    path: Path,
+    model: OpenDrive,
+    fitting: Collection[str] | None,
+    roads: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Draw a map with its junctions, and the stretches of road that a scenario fits.
 
     Args:
         path: the picture (``.svg``), new.
         model: the road network.
         fitting: ids of the junctions to be marked as those that a scenario fits; None: no
             scenario was asked about.
+        roads: by the ids of the stretches that a scenario fits, the road that each begins on.
 
     Raises:
         InputError: the name does not end in .svg.
@@ -54,10 +62,14 @@ def write_map_picture(path: Path, model: OpenDrive, fitting: Collection[str] | N
         raise InputError(f"{path}: the picture's name must end in .svg")
     if path.exists():
         raise StorageError(f"{path}: exists already, and is not overwritten")
-    write_whole(path, [map_picture(model, fitting).encode()])
+    write_whole(path, [map_picture(model, fitting, roads).encode()])
 
 
-def map_picture(model: OpenDrive, fitting: Collection[str] | None) -> str:
+def map_picture(
+    model: OpenDrive,
+    fitting: Collection[str] | None,
+    roads: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Return the picture; see `write_map_picture`."""
     shapes = [(kind, line) for kind, line in outline(model, step=_STEP) if kind in AREAS]
     corners = np.concatenate([line for _, line in shapes] or [np.zeros((1, 2))])
@@ -69,13 +81,15 @@ def map_picture(model: OpenDrive, fitting: Collection[str] | None) -> str:
         x, y = (line - low).T * scale
         return np.stack((x + _MARGIN, height - _MARGIN - y), axis=1)
 
-    body = [*_areas(shapes, pixels), *_marks(model, fitting, pixels)]
+    body = [
+        *_areas(shapes, pixels), *_marks(model, fitting, pixels), *_lines(model, roads, pixels)
+    ]  # fmt: skip
     if fitting is not None:
-        key = f"green: the scenario fits ({len(fitting)})"
+        key = f"green: the scenario fits ({len(fitting) + len(roads)})"
         body.append(f'<text class="key" x="12" y="18">{key}</text>')
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
-        f'role="img" aria-label="Map with its junctions"><style>{_STYLE}</style>'
+        f'role="img" aria-label="Map with its places"><style>{_STYLE}</style>'
         f"{''.join(body)}</svg>\n"
     )
 
@@ -102,4 +116,24 @@ def _marks(model: OpenDrive, fitting: Collection[str] | None, pixels: _Pixels) -
         yield (
             f'<ellipse class="{name}" cx="{x:.1f}" cy="{y:.1f}" rx="{radius:g}" ry="12"/>'
             f'<text x="{x:.1f}" y="{y:.1f}">{html.escape(junction.id)}</text>'
+        )
+
+
+def _lines(model: OpenDrive, stretches: Mapping[str, str], pixels: _Pixels) -> Iterator[str]:
+    """Yield the roads that stretches begin on as lines, with the stretches' ids."""
+    names: dict[str, list[str]] = {}
+    for place, road_id in stretches.items():
+        names.setdefault(road_id, []).append(place)
+    for road_id, places in names.items():
+        road = model.road(road_id)
+        s = np.linspace(0.0, road.length, 2 + int(road.length / _STEP))
+        line = pixels(points(road, s, np.zeros(len(s))))
+        corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in line.tolist())
+        x, y = line[len(line) // 2].tolist()
+        text = ", ".join(places)
+        yield (
+            f'<polyline class="road" points="{corners}"/>'
+            f'<rect class="fits" x="{x - 4 * len(text) - 6:.1f}" y="{y - 11:.1f}" '
+            f'width="{8 * len(text) + 12}" height="22" rx="11"/>'
+            f'<text x="{x:.1f}" y="{y:.1f}">{html.escape(text)}</text>'
         )

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.outline import outline
+from bridgegen.openx.opendrive.outline import Shape, outline
 from bridgegen.openx.opendrive.outline_furniture import Light, lights
 from bridgegen.openx.opendrive.to_owl.furniture import class_of
 from bridgegen.pipeline import Pipeline
@@ -49,10 +50,18 @@ class Scenery:
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
             model = self._pipeline.concrete(x).roads
-            here = source.junction(space.values(x))
-            shapes = (Outline(kind, points) for kind, points in outline(model, here))
-            self._known[key] = RoadPicture(tuple(shapes), lights(model), street_lights(model))
+            found = tuple(Outline(*one) for one in _outline(model, source.place(space.values(x))))
+            self._known[key] = RoadPicture(found, lights(model), street_lights(model))
         return self._known[key]
+
+
+def _outline(model: OpenDrive, site: Site | None) -> list[Shape]:
+    """Return what to draw of a road network: all of it, or a place of a map with what is near."""
+    if site is None:
+        return outline(model)
+    if site.kind in (None, "Roundabout", "Merge"):
+        return outline(model, along=[road.road_id for leg in site.legs for road in leg.roads])
+    return outline(model, site.place_id)
 
 
 def street_lights(model: OpenDrive) -> Float:

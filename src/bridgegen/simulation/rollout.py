@@ -104,8 +104,8 @@ class Rollout:
             [m]; NaN where a road network has fewer.
         friction: ``(N,)`` float64 [m/s²], what the tyres could give (mu g) as the scenario ended;
             ``(0,)`` where unknown.
-        towed_by: ``(E,)`` int64, by which entity each is towed some time; -1: by none. Empty where
-            nobody is. Who is coupled does not collide.
+        towed_by: ``(E,)`` int64, which entity tows each at any time; -1: none. Empty where there
+            are no trailers. Coupled entities do not collide.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.

@@ -126,10 +126,10 @@ def test_town05(town05_path: Any, town05: OpenDrive) -> None:
     theirs = carla.Map("Town05", town05_path.read_text())
     site = find_site(town05, map_name=town05_path.name)
     arms = [town05.road(road.road_id) for leg in site.legs for road in leg.roads]
-    ways = list(town05.connecting_roads(site.junction_id))
+    ways = list(town05.connecting_roads(site.place_id))
     assert (len(arms), len(ways)) == (6, 12)
     assert compare(town05, theirs, arms + ways) > 500
-    assert check_branches(town05, theirs, site.junction_id) == 8
+    assert check_branches(town05, theirs, site.place_id) == 8
 
 
 def test_town05_as_we_write_it(town05: OpenDrive) -> None:

@@ -47,7 +47,7 @@ def test_import_writes_here_and_not_into_carla(
 
 def test_what_is_not_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CARLA_ROOT", raising=False)
-    with pytest.raises(FileFormatError, match="CARLA_ROOT does not say where CARLA is"):
+    with pytest.raises(FileFormatError, match="neither --maps nor CARLA_ROOT says where CARLA is"):
         map_path(Path("Town01"))
     monkeypatch.setenv("CARLA_ROOT", str(tmp_path))
     with pytest.raises(FileFormatError, match="Town99: neither a file nor the name"):

@@ -67,9 +67,9 @@ def test_any_four_legs(data: st.DataObject, sites: st.SearchStrategy[Site]) -> N
     model = opendrive_from_owl(build_static(place))
     assert problems(model) == []
     assert read(to_xml(model)) == model
-    junction = model.junction(place.junction_id)
+    junction = model.junction(place.place_id)
     ids = [road.id for road in model.roads]
-    assert len({*ids, place.junction_id}) == len(ids) + 1
+    assert len({*ids, place.place_id}) == len(ids) + 1
     served = Counter(
         (link.incoming_road, link.lane_links[0].from_lane) for link in junction.connections
     )

@@ -60,7 +60,7 @@ def test_what_we_write_is_right_on_every_road_network(individuals, scenario_name
         ('laneId="1"', 'laneId="inner"', "laneId must be a whole number, got 'inner'"),
         ('s="40.0"', 's="60.5"', "got s=60.5"),
         ('s="$bv_start"', 's="${$bv_start+60}"', "got s=76"),
-        ('roadId="4" laneId="-1"', 'roadId="4" laneId="-2"', "Route ego_route: "),
+        ('roadId="4" laneId="-1"', 'roadId="4" laneId="1"', "Route ego_route: "),
     ],
 )  # fmt: skip
 def test_planted_problems_are_found(s4, roads, old, new, text):

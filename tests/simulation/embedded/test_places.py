@@ -425,3 +425,16 @@ def test_without_roads_everybody_goes_by_the_world(tmp_path, network):
     file.write_text(text.replace("map.xodr", "none.xodr"))
     with pytest.raises(InputError, match=r"none\.xodr: cannot be read"):
         simulate_file(file)
+
+
+def test_a_route_may_change_lane_after_the_start():
+    """Lane 1 at x = -1.75, lane 2 at -5.25: 60 m from s = 80 on are a change between them."""
+    route = start("bv", lane(3, 1, 80.0), 10.0, lane(3, 1, 80.0), lane(3, 2, 10.0))
+    text = scenario(("ego", "bv"), EGO + route, events())
+    rollout = run(text)
+    x, y = rollout.x[0, 1], rollout.y[0, 1]
+    assert pose(rollout)[:2] == (pytest.approx(-1.75, abs=1e-4), pytest.approx(93.0))
+    for s, at in ((50.0, -3.5), (65.0, -1.75 - 3.5 * 5 / 32), (20.0, -5.25), (5.0, -5.25)):
+        assert np.interp(-(13.0 + s), -y, x) == pytest.approx(at, abs=2e-3)
+    steps = np.hypot(np.diff(x), np.diff(y))
+    np.testing.assert_allclose(steps, 0.5, atol=1e-3)  # 10 m/s along its path

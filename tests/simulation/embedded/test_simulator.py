@@ -271,7 +271,7 @@ def test_an_entity_needs_a_start():
 
 
 def test_a_route_that_no_lane_leads_along_is_named():
-    wrong = start("ego", lane(3, 1, 40.0), 9.0, lane(3, 1, 40.0), lane(4, -2, 50.0))
+    wrong = start("ego", lane(3, 1, 40.0), 9.0, lane(3, 1, 40.0), lane(4, 1, 50.0))
     with pytest.raises(InputError, match=r"route of 'ego'"):
         run(scenario(("ego",), wrong), roads=crossroads(lanes_per_direction=2))
 

@@ -15,6 +15,7 @@ from .storyboards import (
     after,
     condition,
     crossroads,
+    events,
     lane,
     run,
     scenario,
@@ -368,3 +369,25 @@ def test_an_element_that_is_not_there_is_refused():
     seen = act(marker("seen", state("event", "nobody", "completeState")))
     with pytest.raises(UnsupportedError, match='storyboardElementRef="nobody"'):
         told(seen)
+
+
+def without_end(*moves):
+    """A scenario of the ego, which stands, and one that drives at 5 m/s; no trigger ends it."""
+    privates = start("ego", lane(1, 1, 90.0), 0.0) + start("bv", lane(3, 1, 90.0), 5.0)
+    head, _, _ = scenario(("ego", "bv"), privates, events(*moves)).rpartition("<StopTrigger>")
+    return f"{head}</Storyboard></OpenSCENARIO>"
+
+
+def test_without_a_stop_trigger_the_first_act_ends_nothing():
+    """It lasts as long as by default, though acts and events start."""
+    faster = ("faster", "bv", speeding(20.0, "step time 0"), after(1.0))
+    rollout = run(without_end(faster))
+    assert int(rollout.n_steps[0]) * rollout.time_step > 3.0
+    assert rollout.v[0, 1, 40] == pytest.approx(20.0)
+
+
+def test_a_storyboard_without_stories_runs():
+    """Nobody does anything but go on; there is no trigger at all."""
+    rollout = run(without_end())
+    assert "<Story " not in without_end()
+    assert rollout.v[0, 1, 20] == pytest.approx(5.0)

@@ -31,11 +31,11 @@ def map_path(path: Path) -> Path:
     root = os.environ.get(ROOT)
     rule = f"{path}: neither a file nor the name of a map of CARLA"
     if not root:
-        raise FileFormatError(f"{rule}, as {ROOT} does not say where CARLA is")
+        raise FileFormatError(f"{rule}, as neither --maps nor {ROOT} says where CARLA is")
     if not all(one.isalnum() or one in "_-" for one in path.name):
         raise FileFormatError(f"{rule}, which has letters, digits, _ and - only")
     for place in _PLACES:
         found = sorted(Path(root).glob(place.format(name=path.name)))
         if found:
             return found[0]
-    raise FileFormatError(f"{rule} in {root} ({ROOT})")
+    raise FileFormatError(f"{rule} in {root} (--maps, or {ROOT})")

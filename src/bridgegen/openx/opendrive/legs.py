@@ -2,6 +2,7 @@
 
 import math
 
+from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.model import CONTACTS, Lane, Road
 
@@ -24,3 +25,16 @@ def junction_end(road: Road) -> str:
         if (link := road.link(end)) is not None and link.element_type == "junction"
     ]  # fmt: skip
     return "both" if len(ends) == 2 else ends[0] if ends else "none"
+
+
+def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
+    """Return whether a signal is for the traffic of a lane."""
+    if signal.validity:
+        return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
+    way = {"+": 1, "-": -1}.get(signal.orientation)
+    return way in (None, road.direction(lane_id))
+
+
+def signals_on(road: Road) -> tuple[Signal | SignalReference, ...]:
+    """Return the signals that stand on a road, and those of other roads that hold on it."""
+    return (*road.signals, *road.signal_references)

@@ -1,7 +1,7 @@
 """The road network as areas and lines, for a bird's-eye view."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -38,12 +38,19 @@ _BESIDE = {
 """How lanes are drawn that cars do not travel on; others are left out."""
 
 
-def outline(model: OpenDrive, junction_id: str | None = None, *, step: float = 1.0) -> list[Shape]:
+def outline(
+    model: OpenDrive,
+    junction_id: str | None = None,
+    *,
+    along: Collection[str] = (),
+    step: float = 1.0,
+) -> list[Shape]:
     """Return what to draw: areas first, lines after them.
 
     Args:
         model: the road network.
         junction_id: draw this junction and its legs only, each up to the next junction.
+        along: draw the roads of these ids only, what they touch, and what touches that.
         step: distance between points on curves [m]; straight parts have only their ends.
 
     Returns:
@@ -52,14 +59,29 @@ def outline(model: OpenDrive, junction_id: str | None = None, *, step: float = 1
     Raises:
         InputError: there is no such junction.
     """
-    junctions = [model.junction(junction_id)] if junction_id else list(model.junctions)
-    roads = _legs(model, junction_id) if junction_id else list(model.roads)
+    junctions, roads = list(model.junctions), list(model.roads)
+    if along:
+        touched = dict.fromkeys(_junctions_at(model, along))
+        junctions = [model.junction(one) for one in touched]
+        beside = {road.id: road for one in touched for road in _legs(model, one)}
+        roads = list((beside | {one: model.road(one) for one in along}).values())
+    elif junction_id:
+        junctions, roads = [model.junction(junction_id)], _legs(model, junction_id)
     shapes = [
         shape for road in roads if not road.is_connecting for shape in _road(model, road, step)
     ]
     for junction in junctions:
         shapes += _junction(model, junction, step)
     return sorted(shapes, key=lambda shape: (shape[0] in LINES, shape[0] == "stripe"))
+
+
+def _junctions_at(model: OpenDrive, roads: Collection[str]) -> Iterator[str]:
+    """Yield the ids of the junctions that roads touch."""
+    for road_id in roads:
+        road = model.road(road_id)
+        for link in (road.predecessor, road.successor):
+            if link is not None and link.element_type == "junction":
+                yield link.element_id
 
 
 def _legs(model: OpenDrive, junction_id: str) -> list[Road]:

@@ -82,6 +82,7 @@ class Piece(NamedTuple):
         s_end: of its end, along the road [m]; less than ``s`` against the reference line.
         width: the lane's width over the distance along the road from ``s``, in road direction.
         taper: what to follow where the centre is neither line nor arc.
+        is_aside: whether it leads from one lane to another, beside the lane's centre.
     """
 
     road_id: str
@@ -95,6 +96,7 @@ class Piece(NamedTuple):
     s_end: float
     width: Coefficients
     taper: "Taper | None" = None
+    is_aside: bool = False
 
     @property
     def rate(self) -> float:
@@ -196,9 +198,24 @@ class Taper:
 
 
 def pieces_of(
-    road: Road, section_index: int, lane_id: int, s: float, s_end: float, station: float
+    road: Road,
+    section_index: int,
+    lane_id: int,
+    s: float,
+    s_end: float,
+    station: float,
+    across: Coefficients | None = None,
 ) -> list[Piece]:
     """Cut a lane from ``s`` to ``s_end`` into pieces; ``station`` [m] is travelled before it.
+
+    Args:
+        road: the road.
+        section_index: of its lane section.
+        lane_id: OpenDRIVE's id.
+        s: where to begin [m along the road].
+        s_end: where to end.
+        station: see above.
+        across: t [m] over the distance from the lesser s, instead of the lane's centre.
 
     Raises:
         InputError: the road has no such lane there, or the lane folds over inside a bend.
@@ -213,18 +230,26 @@ def pieces_of(
     direction = 1 if s_end > s else -1
     found: list[Piece] = []
     for a, b in spans if direction > 0 else reversed(spans):
-        piece = _piece(road, section, lane, a, b, direction, station)
+        t = None if across is None else shifted(across, a - low)
+        piece = _piece(road, section, lane, a, b, direction, station, t)
         station += piece.length
         found.append(piece)
     return found
 
 
 def _piece(
-    road: Road, section: LaneSection, lane: Lane, a: float, b: float, direction: int, station: float
+    road: Road,
+    section: LaneSection,
+    lane: Lane,
+    a: float,
+    b: float,
+    direction: int,
+    station: float,
+    across: Coefficients | None,
 ) -> Piece:
     inside = 0.5 * (a + b)
     geometry = road.plan_view[geometry_index(road, inside)]
-    t = centre_of(road, section, lane, a, inside)
+    t = centre_of(road, section, lane, a, inside) if across is None else across
     width = width_of(section, lane, a, inside)
     s, s_end = (a, b) if direction > 0 else (b, a)
     if direction < 0:
@@ -242,7 +267,9 @@ def _piece(
     _check_fold(taper.least_stretch(), road, lane, inside)
     x, y, h, bend = (float(part[0]) for part in taper.at(np.zeros(1))[:4])
     length = float(taper.travelled[-1])
-    return Piece(road.id, station, length, x, y, h, bend, s, s_end, width, taper)
+    return Piece(
+        road.id, station, length, x, y, h, bend, s, s_end, width, taper, across is not None
+    )
 
 
 def _check_fold(stretch: float, road: Road, lane: Lane, s: float) -> None:

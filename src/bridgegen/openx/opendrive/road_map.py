@@ -1,4 +1,4 @@
-"""A map that was made elsewhere: its bytes as they came, its model, and the chosen intersection."""
+"""A map that was made elsewhere: its bytes as they came, its model, and the chosen place."""
 
 import hashlib
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.site import find_site
-from bridgegen.openx.opendrive.site_fit import ALL, fitting_sites, site_for
+from bridgegen.openx.opendrive.site_fit import ALL, BEST, alike, fitting_sites, site_for
 from bridgegen.openx.xml import read_bytes
 
 
@@ -24,9 +24,10 @@ class RoadMap:
         path: of the file.
         data: its bytes, exported unchanged.
         model: its contents.
-        site: the intersection.
+        site: the junction or the stretch of road.
         warnings: what was not read as it stands.
-        sites: all that are searched together, the intersection first; empty where it is alone.
+        sites: all that are searched together, the site first; empty where it is alone.
+        others: what else may be taken instead of the site, that most alike first.
     """
 
     path: Path
@@ -35,31 +36,32 @@ class RoadMap:
     site: Site
     warnings: tuple[str, ...] = ()
     sites: tuple[Site, ...] = ()
+    others: tuple[Site, ...] = ()
 
     def at(self, site: Site) -> "RoadMap":
-        """Return the map with one of its intersections alone."""
-        return replace(self, site=site, sites=())
+        """Return the map with one of its places alone."""
+        return replace(self, site=site, sites=(), others=())
 
 
 def load_map(
     path: Path, junction: str | None = None, scenario: LogicalScenario | None = None
 ) -> RoadMap:
-    """Read a map and find the intersection on it that a scenario takes place at.
+    """Read a map and find the place on it that a scenario takes place at.
 
     Args:
         path: an OpenDRIVE file (or a map of CARLA's by its name), or the ``.owl`` that
             ``bridgegen import`` made of one: the file that it names is read then, which must be
             what it was.
-        junction: the id of the junction; where the map has several, it must be named, or "best":
-            the one that fits the scenario and is most like its own; or "all": each that fits, at
-            each rotation of its legs.
+        junction: the id of the junction, or of the stretch of road; where the map has several,
+            it must be named, or "best": the one that fits the scenario and is most like its own;
+            or "all": each that fits, at each rotation of its legs.
         scenario: what takes place there; a usual crossroads' legs are looked for by default.
 
     Raises:
         FileFormatError: missing, unreadable, malformed or inconsistent; an ``.owl`` that names no
             map, or one that is missing or has changed.
-        UnsupportedError: the junction has not the legs, or the lanes, of the scenario.
-        InputError: the choice of the junction is open.
+        UnsupportedError: the place has not the legs, or the lanes, of the scenario.
+        InputError: the choice of the place is open.
     """
     path = map_path(path)
     owl = path if path.suffix.lower() == ".owl" else None
@@ -75,15 +77,18 @@ def load_map(
     warnings: list[str] = []
     model = read(data, str(path), warnings)
     sites: list[Site] = []
+    others: list[Site] = []
     if scenario is not None and junction == ALL:
         sites = fitting_sites(scenario, model, path.name)
         site = sites[0]
+    elif scenario is not None and junction == BEST:
+        site, *others = alike(scenario, fitting_sites(scenario, model, path.name))
     elif scenario is None:
         site = find_site(model, junction, map_name=path.name)
     else:
         site = site_for(scenario, model, junction, path.name)
     together = tuple(sites) if len(sites) > 1 else ()
-    return RoadMap(path, data, model, site, tuple(warnings), together)
+    return RoadMap(path, data, model, site, tuple(warnings), together, tuple(others))
 
 
 def map_of(owl: Path) -> tuple[Path, str]:

@@ -1,6 +1,7 @@
 """From one lane to another along the road network: which lanes, and where their centre runs.
 
-A route keeps to its lane until a lane link leads on: it changes roads, never lanes.
+A route keeps to its lane until a lane link leads on: it changes roads, not lanes, unless it is
+planned with lane changes (`bridgegen.openx.opendrive.lane_changes`).
 """
 
 import heapq
@@ -13,7 +14,7 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import InputError
-from bridgegen.openx.opendrive.lanes import lane_at, section_end, section_index
+from bridgegen.openx.opendrive.lanes import Coefficients, lane_at, section_end, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import LanePath, Piece, joined, pieces_of, sample
 
@@ -47,12 +48,22 @@ class Stretch(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A part of a route on one lane section, from ``s`` to ``s_end`` [m along the road]."""
+    """A part of a route on one lane section, from ``s`` to ``s_end`` [m along the road].
+
+    Attributes:
+        road_id: OpenDRIVE's id.
+        lane_id: OpenDRIVE's id.
+        s: where it begins.
+        s_end: where it ends.
+        across: where it leads instead of along the lane's centre: t [m] over the distance from
+            the lesser s, in a lane change.
+    """
 
     road_id: str
     lane_id: int
     s: float
     s_end: float
+    across: Coefficients | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,7 +158,7 @@ def plan_route(
         lane_at(model.road(place.road_id), place.lane_id, place.s)
     steps: list[Step] = []
     for a, b in pairwise(places):
-        steps += _leg(model, a, b)
+        steps += leg(model, a, b)
     return route_along(model, steps)
 
 
@@ -163,7 +174,7 @@ def route_along(model: OpenDrive, steps: Sequence[Step]) -> Route:
         road = model.road(step.road_id)
         if step.s != step.s_end:
             index = section_index(road, 0.5 * (step.s + step.s_end))
-            found = pieces_of(road, index, step.lane_id, step.s, step.s_end, station)
+            found = pieces_of(road, index, step.lane_id, step.s, step.s_end, station, step.across)
             pieces += found
             station = sum((piece.length for piece in found), station)
     if not pieces:
@@ -208,8 +219,12 @@ def _enter(model: OpenDrive, road_id: str, contact: str | None, lane_id: int) ->
         yield Stretch(road_id, 0 if inwards > 0 else len(road.sections) - 1, lane_id)
 
 
-def _leg(model: OpenDrive, start: Place, end: Place) -> list[Step]:
-    """Return the steps of the shortest way from one place to the next (Dijkstra)."""
+def leg(model: OpenDrive, start: Place, end: Place) -> list[Step]:
+    """Return the steps of the shortest way from one place to the next (Dijkstra).
+
+    Raises:
+        InputError: there is none without a lane change.
+    """
     first, last = _stretch(model, start), _stretch(model, end)
     way = model.roads_by_id[start.road_id].direction(start.lane_id)
     if first == last and (end.s - start.s) * way >= 0.0:

@@ -2,22 +2,21 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.odd.roads import HEADINGS
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.openx.opendrive.lanes import lane_pose
-from bridgegen.openx.opendrive.legs import heading, leads_to
+from bridgegen.ontology.site import ArmRoad, Leg, Site
+from bridgegen.openx.opendrive.chains import chain, run_at
+from bridgegen.openx.opendrive.legs import heading
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
+from bridgegen.openx.opendrive.rings import Ring
 
 KNOWN_SITES = {"Town05": "965"}
 """The default junction of a map, by the map's name.
 
 Source: Town05 is CARLA's (version of 2019); 965 has two lanes in and out on each of four legs.
 """
-
-ROAD_TYPES = ("town", "rural", "motorway")
-"""Types of road that a scenario distinguishes."""
 
 _KINDS = {3: "TJunction", 4: "Crossroads"}
 
@@ -31,10 +30,11 @@ def find_site(
     """Return a junction with its legs named as a scenario names them.
 
     A leg is the road that touches the junction and the roads that continue it, lane by lane,
-    until the next junction or the end. Legs are named as those of the scenario that they are
-    most like: both are taken in their order around the junction, and matched first by the angles
-    between them, then by where they lead. Of a usual crossroads, A is the leg nearest to south,
-    then B, C, D clockwise; of a T-junction, the side road is the side road, however it is turned.
+    until the next junction, the end, or where driving lanes begin or end. Legs are named as those
+    of the scenario that they are most like: both are taken in their order around the junction, and
+    matched first by the angles between them, then by where they lead. Of a usual crossroads, A is
+    the leg nearest to south, then B, C, D clockwise; of a T-junction, the side road is the side
+    road, however it is turned.
 
     Args:
         model: the road network.
@@ -46,7 +46,7 @@ def find_site(
     Raises:
         InputError: the map has no such junction, or none is named and several would do.
         UnsupportedError: the junction (or every junction) has more or fewer legs with a driving
-            lane, or a leg's lanes change on the road that touches the junction.
+            lane.
     """
     return turned_sites(model, junction_id, map_name, headings)[0]
 
@@ -68,37 +68,64 @@ def turned_sites(
         map_name: as for `find_site`.
         headings: as for `find_site`.
     """
-    name = (map_name or model.header.name or "map").rpartition("/")[2]
-    stem = name.removesuffix(".xodr")
+    stem = map_stem(model, map_name)
     junction = model.junction(junction_id or _default_junction(model, stem, len(headings)))
-    ends = sorted(road_ends(model, junction), key=lambda end: heading(*end))
+    ends = list(road_ends(model, junction))
+    what = f"junction {junction.id} of {stem}"
+    kind = _KINDS.get(len(ends), "Intersection")
+    site = Site(stem, map_name, junction.id, None, (), kind=kind)
+    return _turned(model, site, ends, headings, what)
+
+
+def ring_sites(
+    model: OpenDrive,
+    ring: Ring,
+    map_name: str | None = None,
+    headings: Mapping[str, float] = HEADINGS["roundabout"],
+) -> list[Site]:
+    """Return a roundabout once per rotation of its legs' names, as `turned_sites` a junction.
+
+    Raises:
+        UnsupportedError: it has more or fewer legs with a driving lane.
+    """
+    stem = map_stem(model, map_name)
+    site = Site(stem, map_name, ring.id, None, (), kind="Roundabout")
+    return _turned(model, site, list(ring.ends), headings, f"roundabout {ring.id} of {stem}")
+
+
+def map_stem(model: OpenDrive, map_name: str | None) -> str:
+    """Return what a map is called: its file's name without the suffix, or its header's."""
+    name = (map_name or model.header.name or "map").rpartition("/")[2]
+    return name.removesuffix(".xodr")
+
+
+def _turned(
+    model: OpenDrive,
+    site: Site,
+    ends: list[tuple[Road, str]],
+    headings: Mapping[str, float],
+    what: str,
+) -> list[Site]:
+    """Return a place once per rotation of its legs' names."""
+    ends = sorted(ends, key=lambda end: heading(*end))
     if len(ends) != len(headings):
         touching = {road.id for road, _ in ends}
         roads = ", ".join(road.id for road in model.roads if road.id in touching)
         raise UnsupportedError(
-            f"junction {junction.id} of {name} must have {len(headings)} legs with driving lanes, "
+            f"{what} must have {len(headings)} legs with driving lanes, "
             f"as the scenario has ({', '.join(headings)}), got {len(ends)} "
             f"(roads {roads or 'none'})"
         )
     if all(road.rule == "LHT" for road, _ in ends):
         headings = {leg: 180.0 - angle for leg, angle in headings.items()}
     names = sorted(headings, key=lambda leg: headings[leg] % 360.0)
-    arms = {id(end): tuple(_arm(model, *end)) for end in ends}
+    arms = {id(end): _arm(model, *end) for end in ends}
     sites = []
     for k in range(len(ends)):
         found = dict(zip(names, ends[k:] + ends[:k], strict=True))
         legs = tuple(Leg(leg, heading(*found[leg]), arms[id(found[leg])]) for leg in headings)
-        sites.append(
-            Site(
-                name=stem,
-                map_file=map_name,
-                junction_id=junction.id,
-                size=None,
-                legs=legs,
-                kind=_KINDS.get(len(legs), "Intersection"),
-            )
-        )
-    return sorted(sites, key=lambda site: unlikeness(headings, site))
+        sites.append(replace(site, legs=legs))
+    return sorted(sites, key=lambda one: unlikeness(headings, one))
 
 
 def unlikeness(headings: Mapping[str, float], site: Site) -> float:
@@ -151,85 +178,8 @@ def road_ends(model: OpenDrive, junction: Junction) -> Iterator[tuple[Road, str]
                     yield road, end
 
 
-def _arm(model: OpenDrive, road: Road, end: str) -> Iterator[ArmRoad]:
-    """Yield the roads of a leg, outwards from where it touches the junction."""
-    lanes = [lane for lane in road.section_at(end).lanes if lane.drivable]
-    ids = sorted((lane.id for lane in lanes), key=abs)
-    if not _steady(road, ids):
-        raise UnsupportedError(
-            f"the lanes of a leg must not change along it, but on road {road.id} they do; "
-            f"{len(road.sections)} lane sections"
-        )
-    inbound = {lane.id for lane in lanes if leads_to(road, lane, end)}
-    seen: set[str] = set()
-    while True:
-        seen.add(road.id)
-        yield _arm_road(road, end, ids, inbound)
-        following = _continuation(model, road, end, ids)
-        if following is None or following[0].id in seen:
-            return
-        onward, end, mapped = following
-        inbound = {mapped[lane_id] for lane_id in inbound}
-        ids = [mapped[lane_id] for lane_id in ids]
-        road = onward
-
-
-def _arm_road(road: Road, end: str, ids: list[int], inbound: set[int]) -> ArmRoad:
-    s = 0.0 if end == "start" else road.length
-    lanes = [
-        SiteLane(lane_id, "in" if lane_id in inbound else "out", lane_pose(road, lane_id, s).width)
-        for lane_id in sorted(ids, key=lambda one: (one not in inbound, abs(one)))
-    ]
-    speeds = [kind.speed for kind in road.types if kind.speed is not None]
-    kinds = [kind.type for kind in road.types if kind.type in ROAD_TYPES]
-    return ArmRoad(
-        road_id=road.id,
-        length=road.length,
-        junction_end="start" if end == "start" else "end",
-        lanes=tuple(lanes),
-        speed_limit=speeds[0].metres_per_second if speeds else None,
-        road_type=kinds[0] if kinds else None,
-    )
-
-
-def _steady(road: Road, ids: list[int]) -> bool:
-    """Return whether a road has the same drivable lanes in all its sections, linked one to one."""
-    last = len(road.sections) - 1
-    for index, section in enumerate(road.sections):
-        lanes = [lane for lane in section.lanes if lane.drivable]
-        if {lane.id for lane in lanes} != set(ids):
-            return False
-        for lane in lanes:
-            if index < last and lane.successors != (lane.id,):
-                return False
-            if index > 0 and lane.predecessors != (lane.id,):
-                return False
-    return True
-
-
-def _continuation(
-    model: OpenDrive, road: Road, end: str, ids: list[int]
-) -> tuple[Road, str, dict[int, int]] | None:
-    """Return the road that continues from the far end: it, its nearer end, its lane per lane.
-
-    None if there is none, or if not every lane continues.
-    """
-    far = "end" if end == "start" else "start"
-    link = road.link(far)
-    if link is None or link.element_type != "road" or link.contact_point is None:
-        return None
-    onward = model.road(link.element_id)
-    if onward.is_connecting:
-        return None
-    mapped: dict[int, int] = {}
-    for lane_id in ids:
-        lane = road.section_at(far).lane(lane_id)
-        assert lane is not None  # checked by `_steady`
-        links = lane.successors if far == "end" else lane.predecessors
-        if len(links) != 1:
-            return None
-        mapped[lane_id] = links[0]
-    drivable = {lane.id for lane in onward.section_at(link.contact_point).lanes if lane.drivable}
-    if set(mapped.values()) != drivable or not _steady(onward, sorted(drivable)):
-        return None
-    return onward, link.contact_point, mapped
+def _arm(model: OpenDrive, road: Road, end: str) -> tuple[ArmRoad, ...]:
+    """Return the roads of a leg, outwards from where it touches the junction."""
+    run = run_at(road, end)
+    assert run is not None  # `road_ends` yields those with driving lanes
+    return tuple(chain(model, run, end))

@@ -1,244 +1,206 @@
-"""Whether a scenario fits an intersection of a map, and at which rotation of its legs."""
+"""Whether a scenario fits a place of a map: a junction at a rotation of its legs, or a road."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator
 
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.story import Arrival, Waypoint
 from bridgegen.ontology.site import Site
+from bridgegen.openx.opendrive.merges import merges
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.routes import plan_route
-from bridgegen.openx.opendrive.site import turned_sites, unlikeness
+from bridgegen.openx.opendrive.rings import rings
+from bridgegen.openx.opendrive.site import ring_sites, turned_sites, unlikeness
+from bridgegen.openx.opendrive.site_furniture import furnished
+from bridgegen.openx.opendrive.site_lacks import all_places, missing, reach, turning, value
+from bridgegen.openx.opendrive.stretches import stretches
 
-TEMPLATES = ("crossroads", "t-junction")
-"""Templates whose scenarios can take place on a map."""
+INTERSECTIONS = ("crossroads", "t-junction")
+"""Templates whose scenarios take place at a junction of a map."""
+
+ROAD = "road"
+"""The template whose scenarios take place on a stretch of a map's road."""
+
+ROUNDABOUT = "roundabout"
+"""The template whose scenarios take place at a roundabout of a map."""
+
+MERGE = "merge"
+"""The template whose scenarios take place at an entry of a map."""
 
 BEST = "best"
-"""Stands for the junction of a map that fits and is most like the scenario's."""
+"""Stands for the place on a map that fits and is most like the scenario's."""
 
 ALL = "all"
-"""Stands for every junction that fits, at every rotation at which it does."""
-
-TURN_TOLERANCE = 60.0
-"""How far a turn may differ from the scenario's [deg]: half a T-junction's, and more."""
-
-END_MARGIN = 1.0
-"""How far before the end of its leg a shortened route ends [m]."""
+"""Stands for every place that fits, at every rotation at which it does."""
 
 
 def site_for(
     scenario: LogicalScenario,
     model: OpenDrive,
-    junction_id: str | None = None,
+    place_id: str | None = None,
     map_name: str | None = None,
 ) -> Site:
-    """Return a junction that has the legs and lanes of a scenario; see `find_site`.
+    """Return a place that has the legs and lanes of a scenario; see `find_site`, `stretches`.
 
     Raises:
-        InputError: as `find_site`.
-        UnsupportedError: as `find_site`; or the scenario is not one of an intersection, or the
-            junction lacks lanes that participants stand on or drive to, or these are too short
+        InputError: as `find_site`; no stretch of road is named.
+        UnsupportedError: as `find_site`; or scenarios of this template cannot take place on a map,
+            or the place lacks lanes that participants stand on or drive to, or these are too short
             (all of them are named).
     """
-    require_intersection(scenario)
-    headings = {name: leg.heading for name, leg in scenario.roads.legs.items()}
-    if junction_id == BEST:
-        return _best_site(scenario, model, map_name, headings)
-    sites = turned_sites(model, junction_id, map_name, headings)
+    if place_id == BEST:
+        return alike(scenario, fitting_sites(scenario, model, map_name))[0]
+    sites = sites_at(scenario, model, place_id, map_name)
     lacks = [missing(scenario, model, site) for site in sites]
     for site, lack in zip(sites, lacks, strict=True):
         if not lack:
             return site
     site = sites[0]
+    turned = f", at one of {len(sites)} rotations; it has {len(site.legs)} legs"
     raise UnsupportedError(
-        f"junction {site.junction_id} of {site.name} must have the lanes that {scenario.name} "
-        f"uses, at one of {len(sites)} rotations; it has {len(site.legs)} legs; missing: "
-        f"{'; '.join(lacks[0])}"
+        f"{site.where} of {site.name} must have what {scenario.name} uses"
+        f"{turned if site.kind else ''}; missing: {'; '.join(lacks[0])}"
     )
 
 
-def require_intersection(scenario: LogicalScenario) -> None:
-    """Raise UnsupportedError of a scenario that is not one of an intersection."""
-    template = scenario.roads.template
-    if template not in TEMPLATES:
-        raise UnsupportedError(
-            f"{scenario.name} takes place on the template {template}; on a map, scenarios of "
-            f"the templates {' and '.join(TEMPLATES)} can"
-        )
-
-
-def _best_site(
+def sites_at(
     scenario: LogicalScenario,
     model: OpenDrive,
-    map_name: str | None,
-    headings: Mapping[str, float],
-) -> Site:
-    """Return the fitting junction of a map that is most like the scenario's."""
-    found = fitting_sites(scenario, model, map_name)
-    return min(found, key=lambda site: unlikeness(headings, site))
+    place_id: str | None = None,
+    map_name: str | None = None,
+) -> list[Site]:
+    """Return a place of a map, once per rotation of the legs' names, that most alike first.
+
+    Raises:
+        InputError: as `site_for`.
+        UnsupportedError: as `site_for`, but for what the place lacks.
+    """
+    if scenario.roads.template in INTERSECTIONS:
+        headings = {name: leg.heading for name, leg in scenario.roads.legs.items()}
+        sites = turned_sites(model, place_id, map_name, headings)
+        return [furnished(model, site, scenario.roads) for site in sites]
+    if scenario.roads.template == ROUNDABOUT:
+        return _around(scenario, model, place_id, map_name)
+    if scenario.roads.template == MERGE:
+        found = {site.place_id: site for site in merges(model, map_name)}
+    else:
+        found = {site.place_id: site for site in stretches(model, map_name)}
+    place_id = _named(scenario, list(found), place_id, map_name)
+    return [furnished(model, found[place_id], scenario.roads)]
+
+
+def _named(
+    scenario: LogicalScenario, known: list[str], place_id: str | None, map_name: str | None
+) -> str:
+    """Return which of some places is meant: the one that is named, or the only one.
+
+    Raises:
+        InputError: it is open, or there is none of that name.
+    """
+    if place_id is None and len(known) == 1:
+        return known[0]
+    if place_id is None or place_id not in known:
+        few = ", ".join(known[:8]) + (", …" if len(known) > 8 else "")
+        raise InputError(
+            f"{scenario.name} takes place at a {kind_of_place(scenario)}; "
+            f"{map_name or 'the map'} has {len(known)}, one of them must be named, or best: "
+            f"{few or 'none'}" + (f"; got '{place_id}'" if place_id else "")
+        )
+    return place_id
+
+
+def _around(
+    scenario: LogicalScenario, model: OpenDrive, place_id: str | None, map_name: str | None
+) -> list[Site]:
+    """Return a roundabout, as `sites_at`."""
+    found = {ring.id: ring for ring in rings(model)}
+    place_id = _named(scenario, list(found), place_id, map_name)
+    headings = {name: leg.heading for name, leg in scenario.roads.legs.items()}
+    sites = ring_sites(model, found[place_id], map_name, headings)
+    return [furnished(model, site, scenario.roads) for site in sites]
+
+
+def kind_of_place(scenario: LogicalScenario) -> str:
+    """Return what a scenario takes place at: a "junction", "roundabout", "merge" or "road"."""
+    template = scenario.roads.template
+    return "junction" if template in INTERSECTIONS else template
 
 
 def fitting_sites(
     scenario: LogicalScenario,
     model: OpenDrive,
     map_name: str | None = None,
-    junction_id: str | None = None,
+    place_id: str | None = None,
 ) -> list[Site]:
-    """Return every junction of a map that a scenario fits, once per rotation at which it does.
+    """Return every place of a map that a scenario fits, once per rotation at which it does.
 
     Args:
-        scenario: one of an intersection.
+        scenario: what shall take place there.
         model: the road network.
         map_name: of its file.
-        junction_id: the only junction to look at.
+        place_id: the only place to look at.
 
     Raises:
-        UnsupportedError: the scenario is not one of an intersection, or fits none.
+        UnsupportedError: the scenario cannot take place on a map, or fits none of its places.
     """
-    require_intersection(scenario)
-    headings = {name: leg.heading for name, leg in scenario.roads.legs.items()}
-    found = []
-    for junction in model.junctions:
-        if junction_id not in (None, junction.id):
-            continue
-        try:
-            sites = turned_sites(model, junction.id, map_name, headings)
-        except UnsupportedError:
-            continue
-        found += [site for site in sites if not missing(scenario, model, site)]
+    found = [
+        site
+        for sites in candidates(scenario, model, map_name)
+        for site in sites
+        if place_id in (None, site.place_id) and not missing(scenario, model, site)
+    ]
     if found:
         return found
     raise UnsupportedError(
-        f"{scenario.name} fits no junction of {map_name or 'the map'}; "
-        "what each lacks: bridgegen junctions MAP SCENARIO"
+        f"{scenario.name} fits no {kind_of_place(scenario)} of {map_name or 'the map'}; "
+        "what each lacks: bridgegen places MAP SCENARIO"
     )
 
 
-def missing(scenario: LogicalScenario, model: OpenDrive, site: Site) -> list[str]:
-    """Return what a junction lacks of what a scenario uses: lanes, lengths, ways across.
+def candidates(
+    scenario: LogicalScenario, model: OpenDrive, map_name: str | None = None
+) -> Iterator[list[Site]]:
+    """Yield the places of a map that have as many legs as a scenario's, in their rotations."""
+    if scenario.roads.template in (ROAD, MERGE):
+        one_way = merges if scenario.roads.template == MERGE else stretches
+        for site in one_way(model, map_name):
+            yield [furnished(model, site, scenario.roads)]
+        return
+    if scenario.roads.template == ROUNDABOUT:
+        ids = [ring.id for ring in rings(model)]
+    else:
+        ids = [junction.id for junction in model.junctions]
+    for place_id in ids:
+        try:
+            yield sites_at(scenario, model, place_id, map_name)
+        except UnsupportedError:
+            continue
 
-    Args:
-        scenario: one of an intersection.
-        model: the road network.
-        site: the junction, with its legs named as the scenario's.
+
+def alike(scenario: LogicalScenario, sites: list[Site]) -> list[Site]:
+    """Return places of a map, that most like a scenario's own first."""
+    return sorted(sites, key=lambda site: _unlikeness(scenario, site))
+
+
+def _unlikeness(scenario: LogicalScenario, site: Site) -> float:
+    """Return how little a place is like the scenario's own; smaller is more alike.
+
+    Of a road: a difference of one lane counts as much as a leg that is too short by all its
+    length, or a speed limit that is twice too high.
     """
-    found = sorted({_missing(site, one, False) for one in _places(scenario)} - {""})
-    found += sorted({_missing(site, one, True) for one in _ends_of(scenario)} - {""})
-    if found:
-        return found
-    for one in scenario.story.participants:
-        if one.end is not None and isinstance(one.start.lane, int) and not one.path:
-            found.append(_no_way(scenario, model, site, one.name, one.start, one.end))
-    return sorted(set(found) - {""})
-
-
-def _no_way(
-    scenario: LogicalScenario,
-    model: OpenDrive,
-    site: Site,
-    name: str,
-    start: Waypoint,
-    end: Waypoint,
-) -> str:
-    """Return why a participant cannot drive from its start to its end; empty where it can."""
-    if start.leg == end.leg:
-        return ""
-    there = {leg.name: leg.heading_deg for leg in site.legs}
-    angle = there[end.leg] - there[start.leg]
-    legs = scenario.roads.legs
-    wanted = legs[end.leg].heading - legs[start.leg].heading
-    if _is_lht(model, site):
-        wanted = -wanted
-    off = math.remainder(angle - wanted, 360.0)
-    way = f"{name} from leg {start.leg} to leg {end.leg}"
-    if abs(off) > TURN_TOLERANCE:
-        return f"{way} must turn as in the scenario, and turns by {off:.0f}° more or less"
-    try:
-        plan_route(model, _on_lane(site, start), (), _on_lane(site, end))
-    except InputError:
-        return f"{way}: no way from lane {start.lane} to lane {end.lane}"
-    return ""
-
-
-def _is_lht(model: OpenDrive, site: Site) -> bool:
-    return all(model.road(leg.roads[0].road_id).rule == "LHT" for leg in site.legs)
-
-
-def _on_lane(site: Site, place: Waypoint) -> tuple[str, int, float]:
-    """Return a lane of the road that touches the junction, halfway along that road."""
-    leg = site.leg(place.leg)
-    assert leg is not None  # `_missing` says so
-    assert isinstance(place.lane, int)
-    road = leg.roads[0]
-    return road.road_id, road.along(place.way)[place.lane - 1].lane_id, 0.5 * road.length
-
-
-def shortened(scenario: LogicalScenario, site: Site) -> tuple[LogicalScenario, list[str]]:
-    """Return a scenario whose routes end on the legs of a site, and a sentence for each change.
-
-    Args:
-        scenario: one of an intersection.
-        site: the junction, with its legs named as the scenario's.
-    """
-    notes, participants = [], []
-    for one in scenario.story.participants:
-        end = one.end
-        leg = site.leg(end.leg) if end is not None else None
-        if end is not None and leg is not None and not isinstance(end.distance, str):
-            last = max(leg.length - END_MARGIN, 0.5 * leg.length)
-            if end.distance > last:
-                notes.append(
-                    f"the route of {one.name} ends {last:.4g} m along leg {leg.name} instead of "
-                    f"{end.distance:g} m: the leg has {leg.length:.4g} m"
-                )
-                one = replace(one, end=replace(end, distance=last))
-        participants.append(one)
-    if not notes:
-        return scenario, notes
-    story = replace(scenario.story, participants=tuple(participants))
-    return replace(scenario, story=story), notes
-
-
-def _ends_of(scenario: LogicalScenario) -> Iterator[Waypoint]:
-    """Yield where routes end."""
-    for one in scenario.story.participants:
-        if one.end is not None:
-            yield one.end
-
-
-def _places(scenario: LogicalScenario) -> Iterator[Waypoint]:
-    """Yield where a scenario's participants and things stand."""
-    story = scenario.story
-    for one in story.participants:
-        yield one.start
-        yield from one.path
-    for jam in story.jams:
-        yield jam.tail
-    for works in story.works:
-        yield from (works.start, works.sign, *works.cones)
-    for event in story.events:
-        for action in event.actions:
-            if isinstance(action, Arrival):
-                yield from (action.at, action.place)
-
-
-def _missing(site: Site, place: Waypoint, ends: bool) -> str:
-    """Return what is not there of a place, for a message; empty where nothing is missing.
-
-    A route that ends there may end sooner.
-    """
-    leg = site.leg(place.leg)
-    if leg is None:
-        return f"leg {place.leg}"
-    road = leg.roads[0]
-    if not isinstance(place.lane, int):
-        there = any((one.type, one.direction) == (place.lane, place.way) for one in road.strips)
-        return "" if there else f"{place} (road {road.road_id})"
-    count = len(road.along(place.way))
-    if place.lane > count:
-        return f"{place} (road {road.road_id} has {count})"
-    if not ends and not isinstance(place.distance, str) and place.distance > leg.length:
-        return f"{place}, {place.distance:g} m away (the leg has {leg.length:.4g} m)"
-    return ""
+    if site.kind == "Merge":
+        return -min(leg.length for leg in site.legs)  # the longer, the better
+    if site.kind is not None:
+        headings = {name: leg.heading for name, leg in scenario.roads.legs.items()}
+        return unlikeness(headings, site)
+    road, values = site.legs[0].roads[0], scenario.usual_values()
+    lanes = sum(
+        abs(len(road.along(way)) - value(scenario.roads.lanes("main", way), values))
+        for way in ("in", "out")
+    )
+    farthest = max((value(one.distance, values) for one in all_places(scenario)), default=0.0)
+    short = max(0.0, 1.0 - site.legs[0].length / max(farthest, 1.0))
+    wanted = value(scenario.roads.knobs["speed_limit"], values)
+    limit = math.log2(max(road.speed_limit or wanted, 1.0) / wanted)
+    within = reach(scenario)
+    turned = abs(site.legs[0].turning(*within) - turning(scenario, *within))
+    return lanes + short + abs(limit) + turned

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lane_changes import plan_with_changes
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.routes import plan_route
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, references
 from bridgegen.openx.openscenario.element import (
@@ -29,7 +29,7 @@ def problems(scenario: osc.OpenScenario, road_network: OpenDrive | None = None) 
     Checked: parameters; names that must differ; entities, parts of the storyboard and controllers
     of lights that are referred to; the standard's ranges; that actors are present when they act;
     and, on a road network, that every road and light is there, every lane position lies on a lane
-    and every route can be driven without a lane change.
+    and every route can be driven.
 
     Args:
         scenario: parameters are taken at their declared values.
@@ -144,9 +144,8 @@ class _Check:
             if isinstance(element, osc.Route):
                 stops = [id(waypoint.position.position) for waypoint in element.waypoints]
                 if all(stop in found for stop in stops):
-                    first, *via, last = [found[stop] for stop in stops]
                     try:
-                        plan_route(roads, first, via, last)
+                        plan_with_changes(roads, [found[stop] for stop in stops])
                     except InputError as error:
                         yield element.line, f"Route {element.name}: {error}"
 

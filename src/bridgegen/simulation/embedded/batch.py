@@ -290,7 +290,7 @@ def noise_keys(
 
 
 def _towed_by(program: Program) -> Int:
-    """Return by whom each entity is towed some time, -1 by nobody; empty where nobody is."""
+    """Return which entity tows each at any time, -1 for none; empty without trailers."""
     found = np.full(len(program.names) if len(program.tows) else 0, -1, dtype=np.int64)
     found[program.tows[:, 1]] = program.tows[:, 0]
     return found

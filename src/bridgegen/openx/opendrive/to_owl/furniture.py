@@ -66,7 +66,7 @@ class Furniture:
                 continue
             node = self._builder.node(part_name(cls.lower(), road.id, index), cls)
             put(self._network, "has_area" if cls == "Crosswalk" else "has_facility", node)
-            low, high, right, left = _box(item)
+            low, high, right, left = box_of(item)
             distance = self._place(node, road_node, road, item)
             if cls == "Crosswalk" and high > low:
                 put(node, "has_width", high - low)
@@ -109,7 +109,7 @@ class Furniture:
         """Add the traffic lights (signals that change) and signs (that do not) of a road."""
         put = self._builder.put
         for index, signal in enumerate(road.signals):
-            cls, limit = _sign(signal)
+            cls, limit = sign_of(signal)
             node = self._builder.node(part_name("signal", road.id, index), cls)
             self._signals.setdefault(signal.id, (cls, node))
             put(self._network, "has_facility", node)
@@ -201,7 +201,7 @@ def _phases(controller: Controller) -> Iterator[tuple[int, str, float, str]]:
             yield index, state, duration, words[3] if len(words) > 3 else ""
 
 
-def _sign(signal: Signal) -> tuple[str, float | None]:
+def sign_of(signal: Signal) -> tuple[str, float | None]:
     """Return the class of a signal, and the speed limit that it shows [m/s], if any."""
     if signal.dynamic == "yes":
         return "TrafficLight", None
@@ -247,7 +247,7 @@ def _between(road: Road, s: float, right: float, left: float) -> list[int]:
     ]  # fmt: skip
 
 
-def _box(item: Object) -> Box:
+def box_of(item: Object) -> Box:
     """Return an object's extent; its position only, if it states no size."""
     corners = item.corners
     hdg = item.hdg or 0.0

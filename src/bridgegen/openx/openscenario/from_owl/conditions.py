@@ -45,9 +45,9 @@ class Conditions:
     def group(self, name: str, actors: tuple[str, ...], node: Subject) -> osc.ConditionGroup:
         """Return conditions that suffice together.
 
-        Their edge is ``none``: a rising edge needs an earlier instant at which the condition was
-        false, and would miss one that is true from the start. What it triggers happens once all
-        the same.
+        Without a word about it their edge is ``none``: a rising edge needs an earlier instant at
+        which the condition was false, and would miss one that is true from the start. What it
+        triggers happens once all the same.
 
         Args:
             name: of the group.
@@ -68,8 +68,22 @@ class Conditions:
         for k, one in enumerate(nodes, start=1):
             label = name if len(nodes) == 1 else f"{name}_{k}"
             made, delay = self._condition(actors, one)
-            found.append(osc.Condition(label, delay, osc.ConditionEdge.NONE, made))
+            if ind.optional_number(one, "has_delay") is not None:
+                delay = self._quantities.get(one, "has_delay")
+            found.append(osc.Condition(label, delay, self._edge(one), made))
         return osc.ConditionGroup(tuple(found))
+
+    def _edge(self, node: Subject) -> osc.ConditionEdge:
+        said = self._individuals.optional_text(node, "has_condition_edge")
+        if said is None:
+            return osc.ConditionEdge.NONE
+        known = {str(one.value): one for one in osc.ConditionEdge}
+        if said not in known:
+            raise OntologyError(
+                f"has_condition_edge of {self._individuals.describe(node)} must be one of "
+                f"{', '.join(known)}, got '{said}'"
+            )
+        return known[said]
 
     def _condition(
         self, actors: tuple[str, ...], node: Subject

@@ -24,13 +24,15 @@ _ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
 class _Road:
     """A road of a leg; ``near`` is its end that is nearer to the junction.
 
-    Distances count from there, or from the start of a road that meets no junction, or two.
+    Distances count from there, or from the start of a road that meets no junction, or two; or
+    from ``station`` along its reference line.
     """
 
     node: Subject
     road_id: str
     length: float
     near: str
+    station: float
 
 
 class Places:
@@ -148,7 +150,11 @@ class Places:
                     f"or 'none' of a road that meets no junction, got '{near}'"
                 )
             road_id = individuals.text(node, "has_road_id")
-            roads.append(_Road(node, road_id, individuals.number(node, "has_length"), near))
+            length = individuals.number(node, "has_length")
+            station = individuals.optional_number(node, "has_station")
+            if station is None:
+                station = length if near == "end" else 0.0
+            roads.append(_Road(node, road_id, length, near, station))
             node = individuals.optional_link(node, "has_continuation")
         return tuple(roads)
 
@@ -188,11 +194,14 @@ class Places:
 
     def _station(self, road: _Road, before: float, distance: Quantity) -> Double:
         """Return s on a road that begins ``before`` metres from the junction."""
-        if road.near != "end" and before == 0.0:
+        near = road.station
+        if road.near == "end":
+            low, formula = near - road.length, f"{format_double(before + near)}-x"
+        elif before == near:
             return distance
-        if road.near != "end":
-            formula = f"x-{format_double(before)}"
+        elif before > near:
+            low, formula = near, f"x-{format_double(before - near)}"
         else:
-            formula = f"{format_double(before + road.length)}-x"
+            low, formula = near, f"x+{format_double(near - before)}"
         s = self._quantities.apply(formula, distance)
-        return min(max(s, 0.0), road.length) if isinstance(s, float) else s  # rounding
+        return min(max(s, low), low + road.length) if isinstance(s, float) else s  # rounding

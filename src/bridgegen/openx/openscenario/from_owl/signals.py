@@ -56,8 +56,8 @@ class Signals:
         duration: of the scenario [s].
 
     Raises:
-        OntologyError: a controller without phases, a phase without a duration, or one light that
-            two controllers switch.
+        OntologyError: a controller without lights or phases, a phase without a duration, or one
+            light that two controllers switch.
     """
 
     def __init__(self, individuals: Individuals, duration: float) -> None:
@@ -78,6 +78,8 @@ class Signals:
         phases = sorted(
             ind.links(node, "has_phase"), key=lambda phase: ind.integer(phase, "has_index")
         )
+        if not phases and ind.links(node, "has_light"):
+            return set()  # as maps have them: who is switched together, not when
         durations = [ind.number(phase, "has_duration") for phase in phases]
         if not phases or not all(0.0 < one < math.inf for one in durations):
             raise OntologyError(

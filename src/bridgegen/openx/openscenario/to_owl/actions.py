@@ -101,7 +101,11 @@ def _put_change(builder: StoryBuilder, node: ox.NamedNode, how: osc.TransitionDy
     dimension = builder.choice(osc.DynamicsDimension, how.dynamics_dimension)
     if dimension is not osc.DynamicsDimension.RATE and builder.now(how.value, how) == 0.0:
         return  # in no time, or on the spot: a step
-    builder.number(node, _DIMENSIONS[dimension], how.value, how)
+    value = how.value
+    if dimension is osc.DynamicsDimension.RATE and builder.in_substance:
+        rate = builder.now(value, how)
+        value = -rate if rate < 0.0 else value  # its size, whichever way
+    builder.number(node, _DIMENSIONS[dimension], value, how)
     if shape is not osc.DynamicsShape.LINEAR:
         builder.put(node, "has_dynamics_shape", shape.value)
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 from urllib.parse import quote
 
 import pyoxigraph as ox
@@ -24,18 +24,32 @@ E = TypeVar("E", bound=StrEnum)
 _JUST_A_NAME = re.compile(r"\$\{[\s(]*\$([A-Za-z_][A-Za-z0-9_]*)[\s)]*\}")
 
 
+class Lost(NamedTuple):
+    """Something in a file for which the ontology has no words.
+
+    Attributes:
+        line: where it stands.
+        text: what it is.
+        is_detail: whether the same happens without it, as far as the simulator knows.
+    """
+
+    line: int
+    text: str
+    is_detail: bool = False
+
+
 class UnsayableError(Exception):
     """Something for which the ontology has no words.
 
     Args:
         element: where it stands.
         text: what it is.
+        is_detail: see `Lost`.
     """
 
-    def __init__(self, element: Element, text: str) -> None:
+    def __init__(self, element: Element, text: str, *, is_detail: bool = False) -> None:
         super().__init__(text)
-        self.line = element.line
-        self.text = text
+        self.lost = Lost(element.line, text, is_detail)
 
 
 class StoryBuilder(Builder):
@@ -48,14 +62,18 @@ class StoryBuilder(Builder):
         cast: entities that have been stated, by name.
         events: events that are, or will be, stated, by name.
         referred: events whose end the event that is being stated waits for.
-        problems: lines, and their contents that cannot be expressed.
+        problems: what cannot be expressed.
+        in_substance: whether an expression may be stated by the value that it has.
         bindings: nodes, their properties, and the parameters that give these.
         free: nodes and those of their properties that have numbers of their own.
         parameters: the individuals of the file's numeric parameters, by name.
     """
 
-    def __init__(self, name: str, scenario: osc.OpenScenario, roads: OpenDrive) -> None:
+    def __init__(
+        self, name: str, scenario: osc.OpenScenario, roads: OpenDrive, *, in_substance: bool = False
+    ) -> None:
         self.scenario_file, self.roads = scenario, roads
+        self.in_substance = in_substance
         self.legs: dict[str, Stretch] = {}
         self.numbers = parameters.numbers(scenario)
         self._constants = parameters.values(scenario)
@@ -65,7 +83,7 @@ class StoryBuilder(Builder):
         self.cast: dict[str, ox.NamedNode] = {}
         self.events: dict[str, ox.NamedNode] = {}
         self.referred: set[str] = set()
-        self.problems: list[tuple[int, str]] = []
+        self.problems: list[Lost] = []
         self.bindings: list[tuple[ox.NamedNode, str, str]] = []
         self.free: list[tuple[ox.NamedNode, str]] = []
         self.parameters = {one: self.reserve(f"p_{one}") for one in self.numbers}
@@ -106,7 +124,7 @@ class StoryBuilder(Builder):
         try:
             yield
         except UnsayableError as error:
-            self.problems.append((error.line, error.text))
+            self.problems.append(error.lost)
             self.named.difference_update(self._names[lengths[1] :])
             del self.quads[lengths[0] :], self._names[lengths[1] :]
             del self.bindings[lengths[2] :], self.free[lengths[3] :]
@@ -138,10 +156,11 @@ class StoryBuilder(Builder):
         """State a number; one that a parameter gives is bound to it.
 
         Raises:
-            UnsayableError: an expression of parameters, not finite, or out of the property's range.
+            UnsayableError: not finite, or out of the property's range; an expression of parameters,
+                unless its value will do.
         """
         value = simplest(value)
-        if isinstance(value, osc.Expr) and value.names:
+        if isinstance(value, osc.Expr) and value.names and not self.in_substance:
             raise UnsayableError(element, f"the expression {value} in {type(element).__name__}")
         number = self.now(value, element)
         self.check(name, number, element)

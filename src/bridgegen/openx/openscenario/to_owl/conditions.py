@@ -60,6 +60,22 @@ def _add_group(
 def _add_condition(
     builder: StoryBuilder, name: str, actors: tuple[str, ...], wrapped: osc.Condition
 ) -> ox.NamedNode:
+    node = _stated(builder, name, actors, wrapped)
+    edge = builder.choice(osc.ConditionEdge, wrapped.condition_edge)
+    if edge is not osc.ConditionEdge.NONE:
+        builder.put(node, "has_condition_edge", edge.value)
+    delayed = isinstance(wrapped.delay, osc.ParameterRef | osc.Expr) or wrapped.delay != 0.0
+    by_state = isinstance(wrapped.condition, osc.ByValueCondition) and isinstance(
+        wrapped.condition.condition, osc.StoryboardElementStateCondition
+    )
+    if delayed and not by_state:  # of an event's state it is the condition's value
+        builder.number(node, "has_delay", wrapped.delay, wrapped)
+    return node
+
+
+def _stated(
+    builder: StoryBuilder, name: str, actors: tuple[str, ...], wrapped: osc.Condition
+) -> ox.NamedNode:
     if isinstance(wrapped.condition, osc.ByEntityCondition):
         return _by_entity(builder, name, actors, wrapped.condition)
     one = wrapped.condition.condition

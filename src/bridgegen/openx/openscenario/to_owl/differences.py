@@ -11,9 +11,11 @@ from typing import Any
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Attribute, Element, children_of, declaration
+from bridgegen.openx.openscenario.to_owl.build import Lost
 from bridgegen.openx.openscenario.values import Expr, Kind, Literal, ParameterRef
 
 _REL, _ABS = 1e-9, 1e-9
+_CLEAR = 1000.0  # m: what hides less is no fog (WMO)
 
 _LABELS: frozenset[tuple[type[Element], str]] = frozenset(
     {
@@ -44,6 +46,37 @@ _DEFAULTS: dict[tuple[type[Element], str], Any] = {
     **{(osc.Orientation, angle): 0.0 for angle in "hpr"},
     **{(osc.WorldPosition, field): 0.0 for field in "zhpr"},
 }
+DETAILS = (
+    osc.License
+    | osc.Property
+    | osc.Properties
+    | osc.Axle
+    | osc.ValueConstraint
+    | osc.ValueConstraintGroup
+    | osc.ObjectController
+    | osc.ControllerAction
+    | osc.ActivateControllerAction
+    | osc.LightStateAction
+    | osc.TrailerHitch
+    | osc.ParameterDeclaration
+    | osc.TimeOfDay
+)
+"""Elements on which nothing depends that happens.
+
+Who drives is chosen with the driver; where a parameter is needed, its value is stated.
+"""
+
+_DETAIL_FIELDS: frozenset[tuple[type[Element], str]] = frozenset(
+    {
+        *((cls, "name") for cls in (osc.Vehicle, osc.Pedestrian, osc.MiscObject)),
+        *((cls, "model3d") for cls in (osc.Vehicle, osc.Pedestrian, osc.MiscObject)),
+        (osc.Pedestrian, "model"),
+        (osc.Center, "z"),
+        (osc.Sun, "intensity"),
+        (osc.Sun, "illuminance"),
+        (osc.Weather, "cloud_state"),
+    }
+)
 _OLD_NAMES: dict[Any, Any] = {
     osc.Priority.OVERWRITE: osc.Priority.OVERRIDE,
     osc.RelativeDistanceType.CARTESIAN_DISTANCE: osc.RelativeDistanceType.EUCLIDIAN_DISTANCE,
@@ -62,12 +95,12 @@ class Differences:
     here: Mapping[str, Literal]
     there: Mapping[str, Literal]
 
-    def between(self, one: Element, other: Element | None) -> Iterator[tuple[int, str]]:
+    def between(self, one: Element, other: Element | None) -> Iterator[Lost]:
         """Yield lines of the first, and what stands there and not in the second."""
         tag = type(one).__name__
         if other is None or type(other) is not type(one):
             if not _is_nothing(one):
-                yield one.line, _called(one)
+                yield Lost(one.line, _called(one), isinstance(one, DETAILS))
             return
         step = isinstance(one, osc.TransitionDynamics) and (
             one.dynamics_shape == osc.DynamicsShape.STEP == getattr(other, "dynamics_shape", None)
@@ -85,13 +118,22 @@ class Differences:
                 continue
             shown = str(said).lower() if isinstance(said, bool) else said
             becomes = "" if again is None else f" (it would become {_text(again, self.there)})"
-            yield one.line, f'{attribute.name}="{shown}" of {tag}{becomes}'
+            detail = (
+                isinstance(one, DETAILS)
+                or (type(one), attribute.field) in _DETAIL_FIELDS
+                or self._is_size(one, other)
+            )
+            yield Lost(
+                one.line,
+                f'{attribute.name}="{shown}" of {tag}{becomes}',
+                detail or self._is_equal(attribute, said, again) or self._is_clear(one, other),
+            )
         text = declaration(type(one)).text
         if text is not None and getattr(one, text) != getattr(other, text):
-            yield one.line, f"the text of {tag}"
+            yield Lost(one.line, f"the text of {tag}", isinstance(one, DETAILS))
         yield from self._below(one, other)
 
-    def _below(self, one: Element, other: Element) -> Iterator[tuple[int, str]]:
+    def _below(self, one: Element, other: Element) -> Iterator[Lost]:
         before: dict[tuple[str, Any], list[Element]] = {}
         for tag, child in children_of(other):
             before.setdefault((tag, self._key(child, self.there)), []).append(child)
@@ -101,7 +143,7 @@ class Differences:
         for left in before.values():
             for child in left:
                 if isinstance(child, osc.ConditionGroup | osc.Condition):
-                    yield one.line, f"{type(one).__name__} without a further {_about(child)}"
+                    yield Lost(one.line, f"{type(one).__name__} without a further {_about(child)}")
 
     def _key(self, child: Element, values: Mapping[str, Literal]) -> Any:
         """Return what an element is found by among its like: a property's name, a limit's rule."""
@@ -123,9 +165,34 @@ class Differences:
             value.names if isinstance(value, ParameterRef | Expr) else frozenset[str]()
             for value in (one, other)
         ]
-        return names[0] == names[1] and math.isclose(
-            _number(one, self.here), _number(other, self.there), rel_tol=_REL, abs_tol=_ABS
-        )
+        return names[0] == names[1] and self._is_equal(attribute, one, other)
+
+    def _is_size(self, one: Element, other: Element) -> bool:
+        """Return whether two rates differ by their sign alone: they say how fast, not where to."""
+        if not (
+            isinstance(one, osc.TransitionDynamics) and isinstance(other, osc.TransitionDynamics)
+        ):
+            return False
+        rate = osc.DynamicsDimension.RATE
+        sizes = abs(_number(one.value, self.here)), abs(_number(other.value, self.there))
+        return one.dynamics_dimension == other.dynamics_dimension == rate and math.isclose(*sizes)
+
+    def _is_clear(self, one: Element, other: Element) -> bool:
+        """Return whether two fogs are none that a driver would notice."""
+        if not (isinstance(one, osc.Fog) and isinstance(other, osc.Fog)):
+            return False
+        seen = _number(one.visual_range, self.here), _number(other.visual_range, self.there)
+        return min(seen) >= _CLEAR
+
+    def _is_equal(self, attribute: Attribute, one: Any, other: Any) -> bool:
+        """Return whether two numbers are equal at the parameters' values."""
+        if attribute.kind is Kind.STRING or attribute.kind is Kind.DATE_TIME or other is None:
+            return False
+        try:
+            a, b = _number(one, self.here), _number(other, self.there)
+        except (TypeError, ValueError):
+            return False
+        return math.isclose(a, b, rel_tol=_REL, abs_tol=_ABS)
 
 
 def _called(one: Element) -> str:

@@ -11,7 +11,8 @@ from bridgegen.openx.openscenario.to_owl.actions import (
     add_trajectory,
     put_speed,
 )
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
+from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, UnsayableError
+from bridgegen.openx.openscenario.to_owl.differences import DETAILS
 from bridgegen.openx.openscenario.to_owl.places import add_position
 from bridgegen.participants import PARTICIPANTS
 
@@ -69,7 +70,7 @@ def add_element(
     for wrapped in actions:
         if not isinstance(wrapped.action, osc.TeleportAction):
             text = f"an initial {type(wrapped.action).__name__} of {name}"
-            builder.problems.append((wrapped.line, text))
+            builder.problems.append(Lost(wrapped.line, text))
     return node
 
 
@@ -195,4 +196,5 @@ def _add_init(
     elif isinstance(action, osc.AssignRouteAction):
         builder.put(node, "has_route", add_route(builder, name, action.route, start))
     else:
-        raise UnsayableError(wrapped, f"an initial {kind.__name__}")
+        is_detail = issubclass(kind, DETAILS)
+        raise UnsayableError(wrapped, f"an initial {kind.__name__}", is_detail=is_detail)

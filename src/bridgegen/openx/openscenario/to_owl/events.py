@@ -17,7 +17,7 @@ from bridgegen.openx.opendrive.map_names import lane_name, road_name
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.notes import CHANGES
 from bridgegen.openx.openscenario.to_owl.actions import add_action
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, UnsayableError, numbered
 from bridgegen.openx.openscenario.to_owl.conditions import add_trigger
 from bridgegen.openx.openscenario.to_owl.entities import as_number
 from bridgegen.openx.openscenario.to_owl.parameters import Facts
@@ -46,22 +46,22 @@ def happenings(builder: StoryBuilder) -> Iterator[Happening]:
     seen: set[str] = set()
     for act in (one for story in builder.scenario_file.storyboard.stories for one in story.acts):
         if not _begins_at_once(builder, act.start_trigger):
-            builder.problems.append((act.line, f"the Act {act.name}, which starts later,"))
+            builder.problems.append(Lost(act.line, f"the Act {act.name}, which starts later,"))
             continue
         if act.stop_trigger is not None and act.stop_trigger.condition_groups:
-            builder.problems.append((act.stop_trigger.line, "StopTrigger of Act"))
+            builder.problems.append(Lost(act.stop_trigger.line, "StopTrigger of Act"))
         for group in act.maneuver_groups:
             for maneuver in group.maneuvers:
                 for event in maneuver.events:
                     name = builder.text(event.name)
                     if name in seen:
                         text = f"a second Event of the name {name}"
-                        builder.problems.append((event.line, text))
+                        builder.problems.append(Lost(event.line, text))
                         continue
                     seen.add(name)
                     if len(maneuver.events) > 1 and event.priority in _ENDING:
                         text = f'priority="{event.priority}" of Event {name} among others'
-                        builder.problems.append((event.line, text))
+                        builder.problems.append(Lost(event.line, text))
                     yield Happening(name, group, _by_itself(event))
 
 
@@ -113,7 +113,7 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
                 done.discard(name)
                 lost.append(name)
                 text = f"the Event {name}, which waits for {gone},"
-                builder.problems.append((lines[name], text))
+                builder.problems.append(Lost(lines[name], text))
     problems = builder.problems[:]
     del builder.quads[kept[0] :], builder.bindings[kept[1] :], builder.free[kept[2] :]
     for one in all_:

@@ -5,12 +5,11 @@ from collections.abc import Callable, Iterator
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder
+from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder
 from bridgegen.openx.openscenario.to_owl.differences import Differences
 from bridgegen.openx.openscenario.to_owl.events import Happening
 
-Problem = tuple[int, str]
-Compare = Callable[[Element, Element | None], Iterator[Problem]]
+Compare = Callable[[Element, Element | None], Iterator[Lost]]
 
 
 def losses(
@@ -18,7 +17,7 @@ def losses(
     again: osc.OpenScenario,
     controllers: list[str],
     stated: list[Happening],
-) -> Iterator[Problem]:
+) -> Iterator[Lost]:
     """Yield lines of a file, and what stands there that is lost.
 
     What was not stated at all, and is a problem already, is not named again.
@@ -32,14 +31,14 @@ def losses(
     here = builder.scenario_file
     compare = Differences(parameters.values(here), parameters.values(again)).between
     if here.file_header.license is not None:
-        yield here.file_header.license.line, "License"
+        yield Lost(here.file_header.license.line, "License", is_detail=True)
     if here.file_header.properties is not None:
         yield from compare(here.file_header.properties, again.file_header.properties)
     declared = {one.name: one for one in _declarations(again)}
     for declaration in _declarations(here):
         yield from compare(declaration, declared.get(declaration.name))
     if here.road_network.scene_graph_file is not None:
-        yield here.road_network.scene_graph_file.line, "SceneGraphFile"
+        yield Lost(here.road_network.scene_graph_file.line, "SceneGraphFile", is_detail=True)
     for element in _unsaid(here):
         yield from compare(element, None)
     others = {str(one.name): one for one in _controllers(again)}
@@ -53,8 +52,9 @@ def losses(
     yield from _in_init(builder, compare, again.storyboard.init.actions)
     yield from _in_events(compare, again, stated)
     stop = here.storyboard.stop_trigger
-    if stop is not None:
-        yield from compare(stop, again.storyboard.stop_trigger)
+    if stop is not None:  # it says when one looks no further
+        for lost in compare(stop, again.storyboard.stop_trigger):
+            yield lost._replace(is_detail=True)
 
 
 def _unsaid(here: osc.OpenScenario) -> Iterator[Element]:
@@ -65,7 +65,7 @@ def _unsaid(here: osc.OpenScenario) -> Iterator[Element]:
     yield from here.storyboard.init.actions.user_defined_actions
 
 
-def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) -> Iterator[Problem]:
+def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) -> Iterator[Lost]:
     here = builder.scenario_file.storyboard.init.actions
     left = list(there.global_actions)
     for one in here.global_actions:
@@ -79,7 +79,7 @@ def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) ->
             left.remove(fitting[0])
             yield from compare(one, fitting[0])
         else:
-            yield one.line, f"{type(one.action).__name__} of Init"
+            yield Lost(one.line, f"{type(one.action).__name__} of Init")
     actions = {str(one.entity_ref): one.private_actions for one in there.privates}
     for private in here.privates:
         name = builder.text(private.entity_ref)
@@ -91,7 +91,7 @@ def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) ->
 
 def _in_events(
     compare: Compare, again: osc.OpenScenario, stated: list[Happening]
-) -> Iterator[Problem]:
+) -> Iterator[Lost]:
     events = {
         str(event.name): event
         for story in again.storyboard.stories
@@ -103,7 +103,7 @@ def _in_events(
     for one in stated:
         count = one.group.maximum_execution_count
         if count != 1:
-            yield one.group.line, f'maximumExecutionCount="{count}" of ManeuverGroup'
+            yield Lost(one.group.line, f'maximumExecutionCount="{count}" of ManeuverGroup')
         if (event := events.get(one.name)) is not None:
             yield from compare(one.event, event)
 

@@ -63,7 +63,7 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
     builder.put(node, "on_lane", builder.iri(lane))
     builder.number(node, "has_distance", _distance(builder, road, where, now), where)
     if where.offset is not None:
-        offset = where.offset if lane_id < 0 else _mirrored(where)
+        offset = where.offset if lane_id < 0 else _mirrored(builder, where)
         builder.number(node, "has_lateral_offset", offset, where)
     turned = where.orientation
     if turned is not None and turned.h not in (None, 0.0):
@@ -101,12 +101,12 @@ def _in_degrees(builder: StoryBuilder, turned: osc.Orientation) -> Any:
     """Return how far a position is turned from its lane [deg], or the parameter that it is."""
     if isinstance(turned.h, osc.Expr) and (found := _TURNED.fullmatch(turned.h.text)):
         return osc.ParameterRef(f"${found['name']}")
-    if isinstance(turned.h, osc.ParameterRef | osc.Expr):
+    if isinstance(turned.h, osc.ParameterRef | osc.Expr) and not builder.in_substance:
         raise UnsayableError(
             turned, f'h="{turned.h}" of Orientation, which must read ${{($name)*{RADIANS}}}'
         )
-    assert turned.h is not None
-    return shortest(math.degrees(turned.h), turned.h, lambda angle: angle * float(RADIANS))
+    now = builder.now(turned.h, turned)
+    return shortest(math.degrees(now), now, lambda angle: angle * float(RADIANS))
 
 
 def _distance(builder: StoryBuilder, road: Road, where: osc.LanePosition, now: float) -> Any:
@@ -124,7 +124,7 @@ def _distance(builder: StoryBuilder, road: Road, where: osc.LanePosition, now: f
         found = form.fullmatch(s.text)
         if found and abs(float(found["length"]) - known) <= _LENGTH_SLACK:
             return osc.ParameterRef(f"${found['name']}")
-    if isinstance(s, osc.ParameterRef | osc.Expr):
+    if isinstance(s, osc.ParameterRef | osc.Expr) and not builder.in_substance:
         wanted = f"${{{known!r}-($name)}}" if against else f"${{($name)-{known!r}}}"
         raise UnsayableError(where, f's="{s}" of LanePosition, which must read {wanted} there')
 
@@ -136,17 +136,16 @@ def _distance(builder: StoryBuilder, road: Road, where: osc.LanePosition, now: f
     return shortest(total - now if against else before + now, now, station)
 
 
-def _mirrored(where: osc.LanePosition) -> Any:
+def _mirrored(builder: StoryBuilder, where: osc.LanePosition) -> Any:
     """Return an offset left of the direction of travel, on a lane against the road's."""
     offset = where.offset
     if isinstance(offset, osc.Expr) and (found := _MIRRORED.fullmatch(offset.text)):
         return osc.ParameterRef(f"${found['name']}")
-    if isinstance(offset, osc.ParameterRef | osc.Expr):
+    if isinstance(offset, osc.ParameterRef | osc.Expr) and not builder.in_substance:
         raise UnsayableError(
             where, f'offset="{offset}" of LanePosition, which must read ${{-($name)}} on this lane'
         )
-    assert offset is not None
-    return -offset
+    return -builder.now(offset, where)
 
 
 def _world_position(builder: StoryBuilder, name: str, where: osc.WorldPosition) -> ox.NamedNode:

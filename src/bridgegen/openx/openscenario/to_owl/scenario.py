@@ -33,7 +33,7 @@ from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder
+from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder
 from bridgegen.openx.openscenario.to_owl.entities import add_element, add_participant, as_number
 from bridgegen.openx.openscenario.to_owl.events import (
     Happening,
@@ -45,12 +45,14 @@ from bridgegen.openx.openscenario.to_owl.legs import stretches, with_legs
 from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
+from bridgegen.openx.openscenario.to_owl.simplified import simplified
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
 
 DURATION = 60.0
 """The duration [s] of a file whose stop trigger names no time, if that is put up with."""
 
 MAX_PROBLEMS = 50
+_SHOWN = 6  # details that are named
 
 
 def individuals_from_openscenario(
@@ -60,6 +62,7 @@ def individuals_from_openscenario(
     place: str = "document",
     *,
     partial: bool = False,
+    in_substance: bool = False,
 ) -> tuple[Individuals, list[str]]:
     """Return the individuals of a scenario file, and its contents that they lack.
 
@@ -69,20 +72,29 @@ def individuals_from_openscenario(
         map_file: the path that the map has, seen from the ontology's file.
         place: the file's name, for messages.
         partial: leave out what cannot be said, instead of refusing the whole.
+        in_substance: leave out what nothing depends on that happens, and state expressions by the
+            values that they have.
 
     Returns:
-        The individuals, and a sentence for each thing left out: none unless ``partial``.
+        The individuals, and a sentence for each thing left out; one for all details together.
 
     Raises:
         UnsupportedError: contents cannot be expressed (at most 50 problems are named); also if
             ``partial``, if there is no entity ``ego`` that can.
     """
-    importer = _Importer(scenario, roads, map_file)
+    lost: list[Lost] = []
+    if in_substance:
+        scenario, lost = simplified(scenario, roads)
+    importer = _Importer(scenario, roads, map_file, in_substance)
     individuals = importer.build()
-    problems = sorted(dict.fromkeys(importer.problems(individuals)), key=lambda one: one[0])
+    found = dict.fromkeys((*lost, *importer.problems(individuals)))
+    problems = sorted(found, key=lambda one: one.line)
+    details = [one for one in problems if one.is_detail and in_substance]
     sentences = [
-        f"{place}: {text} cannot be said in the ontology" + (f" (line {line})" if line else "")
-        for line, text in problems
+        f"{place}: {one.text} cannot be said in the ontology"
+        + (f" (line {one.line})" if one.line else "")
+        for one in problems
+        if one not in details
     ]
     sentences += [f"{place}: {problem}" for problem in importer.refused]
     if EGO not in importer.builder.cast:
@@ -93,19 +105,31 @@ def individuals_from_openscenario(
         more = len(sentences) - MAX_PROBLEMS
         shown = sentences[:MAX_PROBLEMS] + ([f"… and {more} more problems"] if more > 0 else [])
         raise UnsupportedError(*shown)
-    return individuals, sentences
+    return individuals, [*sentences, *_of_details(place, details)]
+
+
+def _of_details(place: str, details: list[Lost]) -> Iterator[str]:
+    """Yield a sentence on details, if there are any: the first ones, and how many more."""
+    if details:
+        shown = ", ".join(one.text for one in details[:_SHOWN])
+        more = f" and {len(details) - _SHOWN} more" if len(details) > _SHOWN else ""
+        yield f"{place}: details on which nothing depends that happens: {shown}{more}"
 
 
 class _Importer:
     """States the parts of a file in their order, then compares."""
 
-    def __init__(self, scenario: osc.OpenScenario, roads: OpenDrive, map_file: str) -> None:
+    def __init__(
+        self, scenario: osc.OpenScenario, roads: OpenDrive, map_file: str, in_substance: bool
+    ) -> None:
         self.scenario, self.map_file = scenario, map_file
         header = scenario.file_header
         constants = parameters.values(scenario)
         said = header.description
         self.name = str(constants[said.name] if isinstance(said, osc.ParameterRef) else said)
-        self.builder = StoryBuilder(self.name or PurePath(map_file).stem, scenario, roads)
+        self.builder = StoryBuilder(
+            self.name or PurePath(map_file).stem, scenario, roads, in_substance=in_substance
+        )
         self.builder.legs = stretches(roads, self._ends_of_way())
         signals = scenario.road_network.traffic_signals
         whole = individuals_from_opendrive(
@@ -188,7 +212,10 @@ class _Importer:
                     builder.number(node, "has_duration", time.value, time)
                     return builder.now(time.value, time)
         line = self.scenario.storyboard.line if stop is None else stop.line
-        builder.problems.append((line, "a Storyboard that no SimulationTimeCondition alone stops"))
+        text = (
+            f"a Storyboard that no SimulationTimeCondition alone stops (it ends at {DURATION:g} s)"
+        )
+        builder.problems.append(Lost(line, text, is_detail=True))
         builder.put(node, "has_duration", DURATION)
         return DURATION
 
@@ -211,7 +238,7 @@ class _Importer:
         for one in self.scenario.entities.scenario_objects:
             name = builder.text(one.name)
             if name in builder.cast:
-                builder.problems.append((one.line, f"a second entity of the name {name}"))
+                builder.problems.append(Lost(one.line, f"a second entity of the name {name}"))
                 continue
             with builder.attempt():
                 add = add_element if name in elements else add_participant
@@ -237,14 +264,14 @@ class _Importer:
 
     # -- losses ------------------------------------------------------------------------------------
 
-    def problems(self, individuals: Individuals) -> Iterator[tuple[int, str]]:
+    def problems(self, individuals: Individuals) -> Iterator[Lost]:
         """Yield lines, and their contents that the individuals lack."""
         builder = self.builder
         yield from builder.problems
         entities = {builder.text(one.name) for one in self.scenario.entities.scenario_objects}
         for private in self.scenario.storyboard.init.actions.privates:
             if (name := builder.text(private.entity_ref)) not in entities:
-                yield private.line, f"Private of {name}, which is no entity,"
+                yield Lost(private.line, f"Private of {name}, which is no entity,")
         if EGO not in builder.cast:
             return
         file = self.scenario.road_network.logic_file

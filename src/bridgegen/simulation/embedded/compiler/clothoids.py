@@ -17,7 +17,7 @@ from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import Bend
 
 STEP = 0.2  # m, between two samples at most
-NONE = 1e-9  # m, a length that is none
+SHORTEST = 1e-9  # m, a shorter bend is left out
 LONGEST = 100_000.0  # m, a chain of clothoids
 
 
@@ -79,13 +79,13 @@ def sampled(
     table = np.empty((len(s), 6))
     station = 0.0
     for bend in line:
-        if bend.length <= NONE:
+        if bend.length <= SHORTEST:
             continue
         turn = bend.length * max(abs(bend.first), abs(bend.last))
         if not turn <= TURN_LIMIT:
             raise InputError(f"a clothoid must turn by at most {TURN_LIMIT:g} rad, got {turn:g}")
         geometry = Geometry(0.0, x, y, h + bend.kink, bend.length, _shape(bend))
-        here = (s >= station - NONE) & (s <= station + bend.length + NONE)
+        here = (s >= station - SHORTEST) & (s <= station + bend.length + SHORTEST)
         curve = evaluate(geometry, np.append(s[here] - station, bend.length))
         for column, values in enumerate((curve.x, curve.y, curve.h)):
             table[here, column] = values[:-1]

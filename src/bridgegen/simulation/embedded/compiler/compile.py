@@ -152,7 +152,8 @@ class _Compiler:
         aside_slots = [self._aside_slot(path) for path in self.paths]
         if has_driver:  # its path runs there
             aside_slots[0] = -1
-        self.triggers.add(storyboard.stop_trigger)
+        # Trigger 0 ends the scenario; without any, it never fires.
+        self.triggers.add(storyboard.stop_trigger or osc.Trigger(()))
         duration = self.triggers.stop_time or DEFAULT_DURATION
         rows = elements(found, self.tables, self.triggers, self.actions)
         self.actions.refuse_driven()

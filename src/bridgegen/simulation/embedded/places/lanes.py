@@ -6,12 +6,14 @@ depends on nothing else, so neither the time of planning nor the thread or row m
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lane_changes import change_lanes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
 from bridgegen.openx.opendrive.lanes import borders, lane_at, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
@@ -179,16 +181,35 @@ class Lanes:
         """Return the nodes of the shortest way over places.
 
         A place on a lane that no lane link leads to is passed on the lane beside it that is
-        reached soonest.
+        reached soonest; where no lane leads there at all, lanes change on the way.
         """
         numbers = [self.graph.node(*place) for place in places]
         way = numbers[:1]
         for place, number in zip(places[1:], numbers[1:], strict=True):
             leg = self._leg(way[-1], number)
-            if leg is None:
-                raise InputError(f"no lane leads from {places[0]} to {place}")
-            way += leg[1:]
+            way += self._changing(way[-1], place) if leg is None else leg[1:]
         return way
+
+    def _changing(self, node: int, place: Place) -> list[int]:
+        """Return the nodes after one on the way to a place, with lane changes.
+
+        Raises:
+            InputError: there is no such way.
+        """
+        graph = self.graph
+        last = graph.nodes[node]
+        start = Place(last.road_id, last.lane_id, float(graph.ends[node, 0]))
+        steps = change_lanes(graph.model, start, place)
+        middles = (Place(one.road_id, one.lane_id, 0.5 * (one.s + one.s_end)) for one in steps)
+        nodes = [graph.node(*one) for one in middles]
+        return [one for k, one in enumerate(nodes) if one != (nodes[k - 1] if k else node)]
+
+    def _changes(self, way: Sequence[int]) -> bool:
+        """Return whether a way leads from one lane to another beside it."""
+        nodes = [self.graph.nodes[one] for one in way]
+        return any(
+            one[:2] == other[:2] and one.lane_id != other.lane_id for one, other in pairwise(nodes)
+        )
 
     def _leg(self, start: int, end: int) -> list[int] | None:
         """Return the shortest way to a node, or to one abreast of it if that saves a detour."""
@@ -239,7 +260,9 @@ class Lanes:
         chain, i = [node], 0
         while i + 1 < len(way):
             for j in range(i + 1, min(i + 1 + AHEAD, len(way))):
-                leg = way[i : j + 1] if chain[-1] == way[i] else self._leg(chain[-1], way[j])
+                leg: Sequence[int] | None = way[i : j + 1]
+                if chain[-1] != way[i] or self._changes(way[i : j + 1]):
+                    leg = self._leg(chain[-1], way[j])
                 if leg and self.graph.length(leg) <= self.graph.length(way[i : j + 1]) + DETOUR:
                     chain += leg[1:]
                     i = j
@@ -274,6 +297,10 @@ class Lanes:
         edges = borders(road, node.section, s)
         inner = edges[node.lane_id - (1 if node.lane_id > 0 else -1)]
         t = 0.5 * (inner + edges[node.lane_id])
+        if piece.is_aside and piece.taper is not None:
+            a, b, c, d = piece.taper.t
+            local = s - min(piece.s, piece.s_end)
+            t = a + local * (b + local * (c + local * d))
         drivable = [one.id for one in road.sections[node.section].lanes if one.drivable]
         sides = [edges[0], *(edges[one] for one in drivable)]
         up, down = np.max(sides, axis=0) - t, t - np.min(sides, axis=0)
@@ -281,6 +308,13 @@ class Lanes:
         at = piece.station + station
         number_s = np.full(len(s) - 1, float(number))
         pairs = ((one[:-1], one[1:]) for one in (at, s, t, left, right))
-        (a, b), (c, d), *others = pairs
-        columns = (a, b, c, d, number_s, *(side for pair in others for side in pair))
+        (begins, ends), (enters, leaves), *others = pairs
+        columns = (
+            begins,
+            ends,
+            enters,
+            leaves,
+            number_s,
+            *(side for pair in others for side in pair),
+        )
         return list(zip(*(column.tolist() for column in columns), strict=True))

@@ -7,6 +7,7 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lane_changes import plan_with_changes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
 from bridgegen.openx.opendrive.lanes import lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -180,9 +181,13 @@ class Ways:
         last = waypoints[-1] if waypoints else start
         via = [_place(self._program, point) for point in waypoints[:-1]]
         first = _end(self._model, start.road, start.lane, entry=True)
-        return plan_route(
-            self._model, first, via, _end(self._model, last.road, last.lane, entry=False)
-        )
+        end = _end(self._model, last.road, last.lane, entry=False)
+        try:
+            return plan_route(self._model, first, via, end)
+        except InputError:
+            # One changes lane after the start, and before the places that are passed.
+            points = [_place(self._program, one) for one in (start, *waypoints)]
+            return plan_with_changes(self._model, [first, *points, end])
 
     def _onward(self, road_id: str, lane_id: int, s: float) -> Route:
         """Return the way from the start of a road along a lane, up to the first fork or the end."""

@@ -1,0 +1,203 @@
+"""Ways from one lane to another that change lanes where no lane leads on.
+
+A change takes place within one lane section, along a cubic from the one lane's centre to the
+other's that has their directions at its ends.
+"""
+
+import heapq
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.lanes import (
+    borders,
+    lane_at,
+    section_end,
+    section_index,
+    shifted,
+)
+from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.openx.opendrive.routes import (
+    Place,
+    Route,
+    Step,
+    Stretch,
+    leg,
+    next_stretches,
+    route_along,
+)
+
+USUAL = 60.0
+"""How long a lane change takes [m], where there is room; ours: 4 to 5 s at 50 km/h."""
+
+SHORTEST = 15.0
+"""With less room [m] one does not change lane; ours."""
+
+_COST = 200.0  # m of detour that a lane change is worth
+_SLOPE = 0.1  # m, over which the slope of a lane's centre is taken
+
+
+def plan_with_changes(model: OpenDrive, places: Sequence[tuple[str, int, float]]) -> Route:
+    """Return a route over given places that changes lanes where it must.
+
+    Args:
+        model: the road network.
+        places: road id, lane id and s [m] of each, the start first.
+
+    Raises:
+        InputError: a place is not on the road network, or there is no way from one to the next.
+    """
+    stops = [Place(*place) for place in places]
+    for one in stops:
+        lane_at(model.road(one.road_id), one.lane_id, one.s)
+    steps: list[Step] = []
+    for start, end in pairwise(stops):
+        try:
+            steps += leg(model, start, end)
+        except InputError:
+            steps += change_lanes(model, start, end)
+    return route_along(model, steps)
+
+
+def change_lanes(model: OpenDrive, start: Place, end: Place) -> list[Step]:
+    """Return the steps of the way from one place to another, with as few lane changes as may be.
+
+    Where there is too little room to reach the lane of the other place, it is passed on a lane
+    beside that.
+
+    Raises:
+        InputError: there is none, or too little room for its lane changes.
+    """
+    first, last = (
+        Stretch(one.road_id, section_index(model.road(one.road_id), one.s), one.lane_id)
+        for one in (start, end)
+    )
+    road = model.road(end.road_id)
+    way = road.direction(end.lane_id)
+    abreast = {
+        last._replace(lane_id=lane.id)
+        for lane in road.sections[last.section].lanes
+        if lane.drivable and road.direction(lane.id) == way
+    }
+    try:
+        return _steps(model, _chain(model, first, start, end, {last}), start, end)
+    except InputError as error:
+        try:
+            return _steps(model, _chain(model, first, start, end, abreast), start, end)
+        except InputError:
+            raise error from None
+
+
+def _steps(model: OpenDrive, chain: list[Stretch], start: Place, end: Place) -> list[Step]:
+    steps: list[Step] = []
+    groups = [list(same) for _, same in groupby(chain, key=lambda one: one[:2])]
+    for number, lanes in enumerate(groups):
+        road = model.road(lanes[0].road_id)
+        entry, leave = _ends(road, lanes[0])
+        entry = start.s if number == 0 else entry
+        leave = end.s if number == len(groups) - 1 else leave
+        steps += _within(road, lanes, entry, leave)
+    return steps
+
+
+def _chain(
+    model: OpenDrive, first: Stretch, start: Place, end: Place, targets: set[Stretch]
+) -> list[Stretch]:
+    """Return the lanes of the cheapest way, those beside each other where it changes (Dijkstra).
+
+    A change costs the more, the less room there is for it.
+    """
+    sections = {one[:2] for one in targets}
+    come_from: dict[Stretch, Stretch | None] = {}
+    queue: list[tuple[float, int, Stretch, Stretch | None]] = [(0.0, 0, first, None)]
+    count, found = 0, None
+    while queue and found is None:
+        cost, _, stretch, before = heapq.heappop(queue)
+        if stretch in come_from:
+            continue
+        come_from[stretch] = before
+        if stretch in targets:
+            found = stretch
+        entry, leave = _ends(model.road(stretch.road_id), stretch)
+        entry = start.s if stretch[:2] == first[:2] else entry
+        rest = abs(leave - entry)
+        room = abs(end.s - entry) if stretch[:2] in sections else rest
+        onward = [(rest, one) for one in next_stretches(model, stretch)]
+        if room >= SHORTEST:
+            change = _COST * (1.0 + 2.0 * USUAL / room)
+            onward += [(change, one) for one in _beside(model, stretch)]
+        for more, following in onward:
+            if following not in come_from:
+                count += 1
+                heapq.heappush(queue, (cost + more, count, following, stretch))
+    if found is None:
+        raise InputError(f"no lane leads from {start} to {end}, not with lane changes either")
+    chain: list[Stretch] = []
+    at: Stretch | None = found
+    while at is not None:
+        chain.append(at)
+        at = come_from[at]
+    return chain[::-1]
+
+
+def _beside(model: OpenDrive, stretch: Stretch) -> Iterator[Stretch]:
+    """Yield the driving lanes beside one, in its direction."""
+    road = model.road(stretch.road_id)
+    for lane in road.sections[stretch.section].lanes:
+        near = abs(lane.id - stretch.lane_id) == 1 and lane.id * stretch.lane_id > 0
+        if near and lane.drivable:
+            yield stretch._replace(lane_id=lane.id)
+
+
+def _ends(road: Road, stretch: Stretch) -> tuple[float, float]:
+    low, high = road.sections[stretch.section].s, section_end(road, stretch.section)
+    return (low, high) if road.direction(stretch.lane_id) > 0 else (high, low)
+
+
+def _within(road: Road, lanes: list[Stretch], entry: float, leave: float) -> Iterator[Step]:
+    """Yield the steps through a lane section: one change after the other, then straight on."""
+    room = abs(leave - entry) / max(len(lanes) - 1, 1)
+    way = math.copysign(1.0, leave - entry)
+    at = entry
+    ahead = (leave - entry) * road.direction(lanes[0].lane_id) > 0.0
+    if len(lanes) > 1 and not (ahead and room >= SHORTEST):
+        raise InputError(
+            f"a lane change needs {SHORTEST:g} m of road, but there are {room:.3g} m on road "
+            f"{road.id} from s={entry:g} m to s={leave:g} m"
+        )
+    for one, other in pairwise(lanes):
+        until = at + way * min(USUAL, room)
+        yield from _change(road, one, other, at, until)
+        at = until
+    if at != leave or len(lanes) == 1:
+        yield Step(road.id, lanes[-1].lane_id, at, leave)
+
+
+def _change(road: Road, one: Stretch, other: Stretch, s: float, s_end: float) -> Iterator[Step]:
+    """Yield a change from one lane to the next: half of it on either."""
+    low, high = min(s, s_end), max(s, s_end)
+    at_low, at_high = (one, other) if s < s_end else (other, one)
+    a, b = _centre(road, at_low, low, high)
+    c, d = _centre(road, at_high, high, low)
+    span = high - low
+    cubic = (
+        a, b,
+        (3.0 * (c - a) / span - 2.0 * b - d) / span,
+        (2.0 * (a - c) / span + b + d) / span**2,
+    )  # fmt: skip
+    middle = 0.5 * (s + s_end)
+    for stretch, first, last in ((one, s, middle), (other, middle, s_end)):
+        across = shifted(cubic, min(first, last) - low)
+        yield Step(road.id, stretch.lane_id, first, last, across)
+
+
+def _centre(road: Road, stretch: Stretch, s: float, towards: float) -> tuple[float, float]:
+    """Return the t of a lane's centre [m] at one end of a change, and its slope there."""
+    near = s + math.copysign(_SLOPE, towards - s)
+    edges = borders(road, stretch.section, np.array([s, near]))
+    lane = stretch.lane_id
+    t = 0.5 * (edges[lane - (1 if lane > 0 else -1)] + edges[lane])
+    return float(t[0]), float((t[1] - t[0]) / (near - s))

@@ -1,0 +1,204 @@
+"""A scenario as it is at a place of a map that has fewer lanes, or shorter legs, than its own."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from bridgegen.errors import InputError
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.story import Action, Arrival, LaneChange, Participant, Story, Way, Waypoint
+from bridgegen.ontology.site import Leg, Site
+from bridgegen.openx.opendrive.merges import AFTER, MAIN
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.routes import plan_route
+
+END_MARGIN = 1.0
+"""How far before the end of its leg a shortened route ends [m]."""
+
+
+_BOTH_WAYS: tuple[tuple[str, Way], ...] = (("main", "in"), ("main", "out"))
+_CARRIAGEWAY: tuple[tuple[str, Way], ...] = ((MAIN, "in"),)
+
+
+def adapted(
+    scenario: LogicalScenario, model: OpenDrive, site: Site
+) -> tuple[LogicalScenario, list[str]]:
+    """Return a scenario whose lanes and routes are those of a site, and a sentence per change.
+
+    Who drives on a lane that is not there takes the outermost one, if nobody else is on it and
+    nobody changes lane; a route ends on the lane that is reached, and where its leg ends.
+
+    Args:
+        scenario: what shall take place there.
+        model: the road network.
+        site: the place, with its legs named as the scenario's.
+    """
+    notes: list[str] = []
+    lights = sum(one.cls == "TrafficLight" for one in site.facilities)
+    if lights and scenario.roads.signals == "none":
+        notes.append(
+            f"the traffic lights of {site.where} ({lights}) are off: the scenario has none"
+        )
+    if site.kind in (None, "Merge"):
+        scenario = _along(scenario, site, notes)
+    participants = tuple(scenario.story.participants)
+    if not any(isinstance(one, LaneChange) for one in _actions(scenario.story)):
+        participants = tuple(_on_lanes(participants, site, notes))
+    participants = tuple(_routed(one, model, site, notes) for one in participants)
+    participants = tuple(_shortened(one, site, notes) for one in participants)
+    if not notes:
+        return scenario, notes
+    story = replace(scenario.story, participants=participants)
+    return replace(scenario, story=story), notes
+
+
+def _along(scenario: LogicalScenario, site: Site, notes: list[str]) -> LogicalScenario:
+    """Return a scenario of a road on one that has more lanes: they count from the outermost one.
+
+    Who drives on the right does so there, and who stands beside the road stands beside them. At a
+    merge the carriageway's lanes count so, before it and after it.
+    """
+    more: dict[tuple[str, Way], int] = {}
+    for leg, way in _CARRIAGEWAY if site.kind == "Merge" else _BOTH_WAYS:
+        own = scenario.roads.lanes(leg, way)
+        there = len(_leg(site, leg).roads[0].along(way))
+        if not isinstance(own, str) and there > own > 0:
+            more[leg, way] = there - int(own)
+            if site.kind == "Merge":
+                more[AFTER, "out"] = there - int(own)
+            counted = f"there are {there}, not {own:g}"
+            notes.append(f"lanes {way} count from the outermost one: {counted}")
+    if not more:
+        return scenario
+
+    def moved(place: Waypoint) -> Waypoint:
+        if not isinstance(place.lane, int):
+            return place
+        return replace(place, lane=place.lane + more.get((place.leg, place.way), 0))
+
+    return replace(scenario, story=_moved(scenario.story, moved))
+
+
+def _leg(site: Site, name: str) -> Leg:
+    leg = site.leg(name)
+    assert leg is not None  # of a road and of a merge all are there
+    return leg
+
+
+def _moved(story: Story, moved: Callable[[Waypoint], Waypoint]) -> Story:
+    """Return a story whose places are moved."""
+    return replace(
+        story,
+        participants=tuple(
+            replace(
+                one,
+                start=moved(one.start),
+                end=None if one.end is None else moved(one.end),
+                path=tuple(map(moved, one.path)),
+            )
+            for one in story.participants
+        ),
+        jams=tuple(replace(one, tail=moved(one.tail)) for one in story.jams),
+        works=tuple(
+            replace(
+                one,
+                start=moved(one.start),
+                cones=tuple(map(moved, one.cones)),
+                sign=moved(one.sign),
+            )
+            for one in story.works
+        ),
+        events=tuple(
+            replace(
+                event,
+                actions=tuple(
+                    replace(one, at=moved(one.at), place=moved(one.place))
+                    if isinstance(one, Arrival)
+                    else one
+                    for one in event.actions
+                ),
+            )
+            for event in story.events
+        ),
+    )
+
+
+def _actions(story: Story) -> Iterator[Action]:
+    for event in story.events:
+        yield from event.actions
+
+
+def _on_lanes(
+    participants: tuple[Participant, ...], site: Site, notes: list[str]
+) -> Iterator[Participant]:
+    """Yield participants on lanes that are there, as long as each has one of its own."""
+    starts = Counter((one.start.leg, one.start.way, one.start.lane) for one in participants)
+    for one in participants:
+        start, leg = one.start, site.leg(one.start.leg)
+        lanes = len(leg.roads[0].along(start.way)) if leg is not None else 0
+        if isinstance(start.lane, int) and not one.path and start.lane > lanes > 0:
+            outermost = (start.leg, start.way, lanes)
+            if starts[outermost] == 0 and starts[start.leg, start.way, start.lane] == 1:
+                starts[outermost] += 1
+                notes.append(_said(f"{one.name} starts", start, lanes))
+                one = replace(one, start=replace(start, lane=lanes))
+        yield one
+
+
+def _routed(one: Participant, model: OpenDrive, site: Site, notes: list[str]) -> Participant:
+    """Return a participant whose route ends on the lane nearest to its own that it reaches."""
+    start, end = one.start, one.end
+    if end is None or one.path or not isinstance(end.lane, int) or start.leg == end.leg:
+        return one
+    leg, own = site.leg(end.leg), site.leg(start.leg)
+    if leg is None or own is None or not isinstance(start.lane, int):
+        return one
+    if start.lane > len(own.roads[0].along(start.way)):
+        return one
+    wanted = end.lane
+    lanes = range(1, len(leg.roads[0].along(end.way)) + 1)
+    for lane in sorted(lanes, key=lambda lane: (abs(lane - wanted), lane)):
+        there = replace(end, lane=lane)
+        if has_way(model, site, start, there):
+            if lane != wanted:
+                notes.append(_said(f"the route of {one.name} ends", end, lane))
+            return replace(one, end=there)
+    return one
+
+
+def _said(what: str, place: Waypoint, lane: int) -> str:
+    return f"{what} on lane {lane} of leg {place.leg} instead of lane {place.lane}"
+
+
+def has_way(model: OpenDrive, site: Site, start: Waypoint, end: Waypoint) -> bool:
+    """Return whether lanes lead from one place of a site to another."""
+    try:
+        plan_route(model, _on_lane(site, start), (), _on_lane(site, end))
+    except InputError:
+        return False
+    return True
+
+
+def _on_lane(site: Site, place: Waypoint) -> tuple[str, int, float]:
+    """Return a lane of the road that touches the junction, halfway along that road."""
+    leg = site.leg(place.leg)
+    assert leg is not None  # `_missing` says so
+    assert isinstance(place.lane, int)
+    road = leg.roads[0]
+    return road.road_id, road.along(place.way)[place.lane - 1].lane_id, 0.5 * road.length
+
+
+def _shortened(one: Participant, site: Site, notes: list[str]) -> Participant:
+    """Return a participant whose route ends on the leg of a site."""
+    end = one.end
+    leg = site.leg(end.leg) if end is not None else None
+    if end is None or leg is None or isinstance(end.distance, str):
+        return one
+    last = max(leg.length - END_MARGIN, 0.5 * leg.length)
+    if end.distance <= last:
+        return one
+    notes.append(
+        f"the route of {one.name} ends {last:.4g} m along leg {leg.name} instead of "
+        f"{end.distance:g} m: the leg has {leg.length:.4g} m"
+    )
+    return replace(one, end=replace(end, distance=last))

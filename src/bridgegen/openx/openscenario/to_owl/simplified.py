@@ -1,0 +1,333 @@
+"""OpenSCENARIO2OWL, before it: other people's files, said as the ontology says the same.
+
+- Places and speeds relative to an entity at the start become absolute (`starts`).
+- What the ontology does not know as an initial action becomes an event at time 0.
+- An act that starts later hands its conditions on to its events, where these last.
+- Who waits for the only action of an event waits for the event.
+- A lane that is named, or counted from another entity's, is counted from the actor's own, where
+  both keep to their lanes otherwise.
+- Actions on which nothing depends that happens are left out.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.to_owl.build import Lost
+from bridgegen.openx.openscenario.to_owl.differences import DETAILS
+from bridgegen.openx.openscenario.to_owl.starts import Starts
+
+_LEAST = (osc.Rule.GREATER_THAN, osc.Rule.GREATER_OR_EQUAL)
+_BEGUN = ("startTransition", "runningState")
+_ENDED = ("endTransition", "completeState")
+_LATER = (
+    osc.LongitudinalDistanceAction,
+    osc.LaneOffsetAction,
+    osc.LaneChangeAction,
+    osc.SynchronizeAction,
+)
+_ONCE = osc.StoryboardElementType.EVENT
+
+
+def simplified(scenario: osc.OpenScenario, roads: OpenDrive) -> tuple[osc.OpenScenario, list[Lost]]:
+    """Return a scenario of which more can be said in the ontology, and what it lacks then."""
+    made = _Simplified(scenario, roads)
+    return made.scenario, made.lost
+
+
+class _Simplified:
+    def __init__(self, scenario: osc.OpenScenario, roads: OpenDrive) -> None:
+        self.lost: list[Lost] = []
+        storyboard = scenario.storyboard
+        self._read = set(_variables(storyboard))
+        declared = scenario.variable_declarations
+        if declared is not None and not self._read:
+            self.lost.append(Lost(declared.line, "VariableDeclarations", is_detail=True))
+            scenario = replace(scenario, variable_declarations=None)
+        self._starts = Starts(scenario, _placed(storyboard.init.actions), roads)
+        events = list(_events(storyboard))
+        names = Counter(str(action.name) for _, event in events for action in event.actions)
+        self._only = {
+            str(event.actions[0].name): str(event.name)
+            for _, event in events
+            if len(event.actions) == 1
+            and event.maximum_execution_count in (None, 1)
+            and names[str(event.actions[0].name)] == 1
+        }
+        self._changes = Counter(
+            name
+            for group, event in events
+            for wrapped in event.actions
+            if isinstance(_inner(wrapped.action), osc.LaneChangeAction)
+            for name in self._actors(group)
+        )
+        initial = _placed(storyboard.init.actions)
+        begun = [self._begun(one) for one in initial.privates]
+        stories = [self._story(one) for one in storyboard.stories]
+        later = [group for _, groups in begun for group in groups]
+        if later:
+            stories.append(osc.Story(name="initial", acts=(osc.Act("initial", tuple(later)),)))
+        actions = replace(storyboard.init.actions, privates=tuple(private for private, _ in begun))
+        init = replace(storyboard.init, actions=actions)
+        self.scenario = replace(
+            scenario, storyboard=replace(storyboard, init=init, stories=tuple(stories))
+        )
+
+    # -- the start ---------------------------------------------------------------------------------
+
+    def _begun(self, private: osc.Private) -> tuple[osc.Private, list[osc.ManeuverGroup]]:
+        """Return what an entity does at the start, and what it does at once from then on."""
+        kept, later = [], []
+        for wrapped in private.private_actions:
+            inner = _inner(wrapped)
+            if isinstance(inner, _LATER):
+                name = f"{self._starts.text(private.entity_ref)}_{type(inner).__name__}"
+                later.append(_at_once(name, private, wrapped))
+            elif isinstance(inner, DETAILS):
+                what = f"an initial {type(inner).__name__}"
+                self.lost.append(Lost(wrapped.line, what, is_detail=True))
+            else:
+                kept.append(self._starts.absolute(wrapped))
+        return replace(private, private_actions=tuple(kept)), later
+
+    # -- what follows ------------------------------------------------------------------------------
+
+    def _story(self, story: osc.Story) -> osc.Story:
+        return replace(story, acts=tuple(self._act(act) for act in story.acts))
+
+    def _act(self, act: osc.Act) -> osc.Act:
+        stop = act.stop_trigger
+        if stop is not None and stop.condition_groups:  # it says when one looks no further
+            self.lost.append(Lost(stop.line, "StopTrigger of Act", is_detail=True))
+            act = replace(act, stop_trigger=None)
+        begins = _lasting(act.start_trigger)
+        if begins is not None:
+            act = replace(act, start_trigger=None)
+        groups = [
+            replace(
+                group,
+                maneuvers=tuple(self._maneuver(group, one, begins) for one in group.maneuvers),
+            )
+            for group in act.maneuver_groups
+        ]
+        return replace(act, maneuver_groups=tuple(groups))
+
+    def _maneuver(
+        self, group: osc.ManeuverGroup, maneuver: osc.Maneuver, begins: osc.ConditionGroup | None
+    ) -> osc.Maneuver:
+        events = []
+        alike = len({_domain(one) for event in maneuver.events for one in event.actions}) == 1
+        for event in maneuver.events:
+            actions = []
+            for action in event.actions:
+                inner = _inner(action.action)
+                if isinstance(inner, DETAILS) or self._is_unread(action):
+                    self.lost.append(Lost(action.line, type(inner).__name__, is_detail=True))
+                else:
+                    actions.append(replace(action, action=self._counted(group, action.action)))
+            if not actions:
+                continue
+            if alike and event.priority in (osc.Priority.OVERRIDE, osc.Priority.OVERWRITE):
+                # An action of the same kind ends the one before in any case.
+                event = replace(event, priority=osc.Priority.PARALLEL)
+            trigger = self._trigger(event.start_trigger)
+            event = replace(event, actions=tuple(actions), start_trigger=trigger)
+            events.append(event if begins is None else _after(event, begins))
+        return replace(maneuver, events=tuple(events))
+
+    def _is_unread(self, action: osc.Action) -> bool:
+        """Return whether an action sets a variable that no event waits for."""
+        wrapped = action.action
+        one = wrapped.action if isinstance(wrapped, osc.GlobalAction) else None
+        return isinstance(one, osc.VariableAction) and str(one.variable_ref) not in self._read
+
+    def _trigger(self, trigger: osc.Trigger | None) -> osc.Trigger | None:
+        if trigger is None:
+            return None
+        groups = []
+        for group in trigger.condition_groups:
+            alone = len(group.conditions) == 1
+            conditions = tuple(self._condition(one, alone) for one in group.conditions)
+            groups.append(replace(group, conditions=conditions))
+        return replace(trigger, condition_groups=tuple(groups))
+
+    def _condition(self, condition: osc.Condition, alone: bool) -> osc.Condition:
+        """Return a condition on an event where it is one on the event's only action.
+
+        A transition is a moment, a state lasts: one stands for the other where nothing else must
+        be true at that moment.
+        """
+        wrapped = condition.condition
+        if not isinstance(wrapped, osc.ByValueCondition):
+            return condition
+        one = wrapped.condition
+        if not isinstance(one, osc.StoryboardElementStateCondition):
+            return condition
+        name, state = str(one.storyboard_element_ref), str(one.state)
+        if str(one.storyboard_element_type) == "action" and name in self._only:
+            name = self._only[name]
+        elif str(one.storyboard_element_type) != "event":
+            return condition
+        at = osc.StoryboardElementState
+        known = at.COMPLETE_STATE if state in _ENDED else at.START_TRANSITION
+        if state not in (*_ENDED, *_BEGUN) or not (alone or state == _ENDED[-1]):
+            return condition
+        edge = condition.condition_edge
+        if edge is osc.ConditionEdge.RISING and alone:
+            edge = osc.ConditionEdge.NONE
+        changed = replace(
+            one, storyboard_element_ref=name, storyboard_element_type=_ONCE, state=known
+        )
+        return replace(
+            condition,
+            condition=replace(wrapped, condition=changed),
+            condition_edge=edge,
+        )
+
+    # -- lanes -------------------------------------------------------------------------------------
+
+    def _actors(self, group: osc.ManeuverGroup) -> list[str]:
+        return [self._starts.text(one.entity_ref) for one in group.actors.entity_refs]
+
+    def _counted(
+        self,
+        group: osc.ManeuverGroup,
+        wrapped: osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction,
+    ) -> osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction:
+        """Return a lane change whose lanes count from the actor's own, where both are known."""
+        action = _inner(wrapped)
+        actors = self._actors(group)
+        if (
+            not isinstance(action, osc.LaneChangeAction)
+            or not isinstance(wrapped, osc.PrivateAction)
+            or not isinstance(wrapped.action, osc.LateralAction)
+            or len(actors) != 1
+            or self._changes[actors[0]] != 1
+        ):
+            return wrapped
+        (actor,) = actors
+        target = action.lane_change_target.target
+        own, way = self._starts.lane(actor), self._starts.way(actor)
+        if own is None or not way:
+            return wrapped
+        if isinstance(target, osc.AbsoluteTargetLane):
+            try:
+                lane = int(self._starts.text(target.value))
+            except ValueError:
+                return wrapped
+        else:
+            other = self._starts.text(target.entity_ref)
+            there = self._starts.lane(other)
+            if other == actor or self._changes[other] or there is None or there[0] != own[0]:
+                return wrapped
+            lane = there[1] + round(self._starts.number(target.value)) * self._starts.way(other)
+        if lane * own[1] <= 0:
+            return wrapped
+        count = (lane - own[1]) * way
+        if count == 0:
+            return wrapped
+        said = f"{type(target).__name__} (counted from the lane that {actor} starts on)"
+        self.lost.append(Lost(target.line, said, is_detail=True))
+        relative = osc.RelativeTargetLane(actor, count, line=target.line)
+        changed = replace(action, lane_change_target=osc.LaneChangeTarget(relative))
+        return replace(wrapped, action=replace(wrapped.action, action=changed))
+
+
+def _placed(actions: osc.InitActions) -> osc.InitActions:
+    """Return initial actions in which who is added is put there."""
+    kept, added = [], []
+    for one in actions.global_actions:
+        action = one.action
+        if isinstance(action, osc.EntityAction) and isinstance(action.action, osc.AddEntityAction):
+            put = osc.PrivateAction(osc.TeleportAction(action.action.position), line=one.line)
+            added.append(osc.Private(action.entity_ref, (put,), line=one.line))
+        else:
+            kept.append(one)
+    return replace(actions, global_actions=tuple(kept), privates=(*added, *actions.privates))
+
+
+def _events(storyboard: osc.Storyboard) -> Iterator[tuple[osc.ManeuverGroup, osc.Event]]:
+    for story in storyboard.stories:
+        for act in story.acts:
+            for group in act.maneuver_groups:
+                for maneuver in group.maneuvers:
+                    for event in maneuver.events:
+                        yield group, event
+
+
+def _variables(storyboard: osc.Storyboard) -> Iterator[str]:
+    """Yield the names of the variables that acts and events wait for."""
+    acts = [act for story in storyboard.stories for act in story.acts]
+    triggers = [act.start_trigger for act in acts]
+    triggers += [event.start_trigger for _, event in _events(storyboard)]
+    for trigger in triggers:
+        for group in () if trigger is None else trigger.condition_groups:
+            for condition in group.conditions:
+                one = getattr(condition.condition, "condition", None)
+                if isinstance(one, osc.VariableCondition):
+                    yield str(one.variable_ref)
+
+
+def _inner(wrapped: object) -> object:
+    """Return the innermost element that says what is done."""
+    action = getattr(wrapped, "action", wrapped)
+    return getattr(action, "action", action)
+
+
+def _domain(action: osc.Action) -> type[object]:
+    """Return what an action moves: along the lane, across it, or what else it is."""
+    wrapped = action.action
+    return type(wrapped.action) if isinstance(wrapped, osc.PrivateAction) else type(wrapped)
+
+
+def _at_once(name: str, private: osc.Private, wrapped: osc.PrivateAction) -> osc.ManeuverGroup:
+    """Return what does an initial action as an event at time 0."""
+    event = osc.Event(name, osc.Priority.PARALLEL, (osc.Action(name, wrapped),))
+    actors = osc.Actors(False, (osc.EntityRef(private.entity_ref),))
+    return osc.ManeuverGroup(name, 1, actors, (osc.Maneuver(name=name, events=(event,)),))
+
+
+def _lasting(trigger: osc.Trigger | None) -> osc.ConditionGroup | None:
+    """Return the conditions of a trigger if they stay true once they are; None otherwise."""
+    if trigger is None or len(trigger.condition_groups) != 1:
+        return None
+    (group,) = trigger.condition_groups
+    if not group.conditions or not all(map(_lasts, group.conditions)):
+        return None
+    return group
+
+
+def _lasts(condition: osc.Condition) -> bool:
+    wrapped = condition.condition
+    one: object = None
+    if isinstance(wrapped, osc.ByValueCondition):
+        one = wrapped.condition
+    elif isinstance(wrapped, osc.ByEntityCondition):
+        one = wrapped.entity_condition.condition
+    edges = (osc.ConditionEdge.NONE, osc.ConditionEdge.RISING)
+    if condition.condition_edge not in edges or condition.delay != 0.0:
+        return False
+    if isinstance(one, osc.SimulationTimeCondition):
+        return one.rule in _LEAST
+    return isinstance(one, osc.TraveledDistanceCondition)
+
+
+def _after(event: osc.Event, begins: osc.ConditionGroup) -> osc.Event:
+    """Return an event that needs some lasting conditions besides its own."""
+    if all(_is_start(one) for one in begins.conditions):
+        return event
+    none = osc.ConditionEdge.NONE
+    lasting = tuple(replace(one, condition_edge=none) for one in begins.conditions)
+    own = event.start_trigger
+    groups = own.condition_groups if own is not None else ()
+    found = tuple(replace(one, conditions=(*one.conditions, *lasting)) for one in groups)
+    return replace(event, start_trigger=osc.Trigger(found or (osc.ConditionGroup(lasting),)))
+
+
+def _is_start(condition: osc.Condition) -> bool:
+    """Return whether a condition is true from the start."""
+    wrapped = condition.condition
+    one = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
+    return isinstance(one, osc.SimulationTimeCondition) and one.value == 0.0
