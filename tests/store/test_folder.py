@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bridgegen.errors import StorageError
-from bridgegen.store import Recorded, Store
+from bridgegen.store import Recorded, Store, sqlite
 
 HEAD = """
 import os, sys
@@ -203,13 +203,25 @@ def test_a_damaged_file(tmp_path):
 # ---------------------------------------------------------------------- the lock
 
 
-def test_two_writers(tmp_path):
+def test_a_writer_waits_for_one_that_is_about_to_end(tmp_path):
+    code = "import time; create(sys.argv[1]); print(flush=True); time.sleep(0.5); os._exit(9)"
+    words = [sys.executable, "-c", HEAD + code, str(tmp_path / "run")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline()  # it holds the lock
+        with Store.open(tmp_path / "run", write=True) as again:
+            assert len(again) == 0
+
+
+def test_two_writers(tmp_path, monkeypatch):
+    monkeypatch.setattr(sqlite, "LOCK_SECONDS", 0.0)
     with create(tmp_path / "run") as store:
         append(store)
         with pytest.raises(StorageError, match="another process is writing this run"):
             Store.open(tmp_path / "run", write=True)
         said = child(
             """
+            from bridgegen.store import sqlite
+            sqlite.LOCK_SECONDS = 0.0
             try:
                 Store.open(sys.argv[1], write=True)
             except StorageError as error:

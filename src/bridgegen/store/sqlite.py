@@ -9,6 +9,9 @@ from urllib.parse import quote
 
 from bridgegen.errors import StorageError
 
+LOCK_SECONDS = 5.0
+"""How long a writer waits for another: a killed process's workers end moments after it."""
+
 CAUSES = {
     sqlite3.SQLITE_FULL: "the disk is full",
     sqlite3.SQLITE_READONLY: "it is read-only",
@@ -118,12 +121,13 @@ class Lock:
     system and within one process, and end when the process ends, for whatever reason.
 
     Raises:
-        StorageError: another process holds it, or the folder is not writable.
+        StorageError: another process still holds it after `LOCK_SECONDS`, or the folder is not
+            writable.
     """
 
     def __init__(self, path: Path) -> None:
         with storage_errors(path.parent, "written"):
-            connection = sqlite3.connect(path, isolation_level=None, timeout=0.0)
+            connection = sqlite3.connect(path, isolation_level=None, timeout=LOCK_SECONDS)
             try:
                 connection.execute("PRAGMA journal_mode = MEMORY")  # nothing is ever written
                 connection.execute("BEGIN EXCLUSIVE")
