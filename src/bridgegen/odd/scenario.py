@@ -216,7 +216,8 @@ class LogicalScenario(SearchedScenario):
         sirens = [one.name for one in self.participants if one.siren]
         bodies = {one.name: one.own_body for one in self.participants if one.own_body}
         types = {one.name: (one.type_by, one.types) for one in self.participants if one.type_by}
-        parts = (drivers, headings, lifted, sirens, bodies, types)
+        models = {one.name: one.model for one in self.participants if one.model}
+        parts = (drivers, headings, lifted, sirens, bodies, types, models)
         more = "".join(repr(one) for one in parts if one)
         return sha256((content + more).encode()).hexdigest()
 

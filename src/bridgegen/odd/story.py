@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
+from bridgegen.named_models import body_of
 from bridgegen.odd.roads import LETTERS, Quantity
 from bridgegen.participants import PARTICIPANTS, Body, Conduct
 
@@ -63,9 +64,11 @@ class Participant:
         driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
         heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
             drives against the traffic.
-        type_by: the category that gives its type in each evaluation; empty: it is always the same.
-        types: the values of that.
-        own_body: its body, where it is not the type's.
+        type_by: the category that gives its type or model in each evaluation; empty: it is always
+            the same.
+        types: the values of that: types, and names of models.
+        model: one of `bridgegen.named_models.MODELS`; empty: it is as its type usually is.
+        own_body: its body, where it is not the type's or model's.
         siren: whether it is an emergency vehicle on a call, to which all give way.
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
     """
@@ -83,16 +86,17 @@ class Participant:
     own_body: Body | None = field(default=None, repr=False, kw_only=True)
     type_by: str = field(default="", repr=False, kw_only=True)
     types: tuple[str, ...] = field(default=(), repr=False, kw_only=True)
+    model: str = field(default="", repr=False, kw_only=True)
 
     @property
     def body(self) -> Body:
         """How large it is, and what it can do."""
-        return self.own_body or PARTICIPANTS[self.type].body
+        return self.own_body or body_of(self.model or self.type)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
         """All that its body may be."""
-        return tuple(PARTICIPANTS[one].body for one in self.types) or (self.body,)
+        return tuple(body_of(one) for one in self.types) or (self.body,)
 
     @property
     def conduct(self) -> Conduct:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
+from bridgegen.named_models import MODELS
 from bridgegen.odd.shape import (
     Acceleration,
     Angle,
@@ -25,8 +26,10 @@ from bridgegen.participants import QUEUES, TYPE_NAMES, canonical
 if TYPE_CHECKING:
     TypeName: TypeAlias = str
     QueueName: TypeAlias = str
+    ModelName: TypeAlias = str
 else:
     TypeName, QueueName = Literal[TYPE_NAMES], Literal[QUEUES]
+    ModelName = Literal[tuple(MODELS)]
 
 
 class WaypointSection(ShapedSection):
@@ -71,7 +74,9 @@ class ParticipantSection(ShapedSection):
     type: Annotated[TypeName, AfterValidator(canonical)]
     """What it is."""
     type_by: Word | None = None
-    """A category that gives its type instead, in each evaluation; ``type`` is its default."""
+    """A category that gives type or model instead, in each evaluation; its default is said, too."""
+    model: ModelName | None = None
+    """Which one of its type: a test target or a design vehicle, whose body it has."""
     body: BodySection | None = None
     """Its dimensions and what it can do, where they are not the type's."""
     start: WaypointSection | None = None

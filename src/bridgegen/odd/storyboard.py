@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from bridgegen.named_models import MODELS, body_of, type_of
 from bridgegen.odd.others import ATTENTIVE, DRIVERS
 from bridgegen.odd.parameters import Axis, Parameter, nearest
 from bridgegen.odd.places import Places
@@ -149,6 +150,7 @@ class Storyboard:
         return Participant(
             name, given.type, points[0], None, given.speed, points, driver=driver,
             own_body=_body(given), type_by=given.type_by or "", types=self._types(given),
+            model=given.model or "",
         )  # fmt: skip
 
     def _driver(
@@ -188,6 +190,7 @@ class Storyboard:
             name, given.type, start, end, given.speed, driver=given.driver or "",
             heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
             own_body=_body(given), type_by=given.type_by or "", types=self._types(given),
+            model=given.model or "",
         )  # fmt: skip
 
     def _check_types(self, name: str, given: ParticipantSection, path: Path) -> None:
@@ -202,12 +205,16 @@ class Storyboard:
             return
         usual = PARTICIPANTS[given.type]
         for kind in parameter.kind.names:
-            if kind not in TYPES:
+            if kind not in TYPES and kind not in MODELS:
+                hint = nearest(kind, (*TYPES, *MODELS))
                 self._report(
-                    f"the values of {given.type_by} must be types of participants, got '{kind}'",
+                    f"the values of {given.type_by} must be types of participants or names of "
+                    f"models, got '{kind}'{hint}",
                     place,
                 )
-            elif (PARTICIPANTS[kind].seen_as.conduct, PARTICIPANTS[kind].on_rails) != (
+                continue
+            found = PARTICIPANTS[type_of(kind)]
+            if (found.seen_as.conduct, found.on_rails) != (
                 usual.seen_as.conduct,
                 usual.on_rails,
             ):
@@ -218,11 +225,11 @@ class Storyboard:
                 )
         if parameter.axis is Axis.STATIC:
             self._report("the category of a type must not be of the static axis", place)
-        if parameter.kind.names[int(parameter.default)] != given.type:
-            default = parameter.kind.names[int(parameter.default)]
+        default, said = parameter.kind.names[int(parameter.default)], given.model or given.type
+        if default != said:
+            what = "model" if default in MODELS else "type"
             self._report(
-                f"type of {name} must be the default of {given.type_by}, {default}, got "
-                f"{given.type}",
+                f"{what} of {name} must be the default of {given.type_by}, {default}, got {said}",
                 place,
             )
         if given.body is not None:
@@ -235,10 +242,17 @@ class Storyboard:
 
     def _types(self, given: ParticipantSection) -> tuple[str, ...]:
         found = self._types_of(given)
-        return tuple(one for one in found.kind.names if one in TYPES) if found else ()
+        known = (*TYPES, *MODELS)
+        return tuple(one for one in found.kind.names if one in known) if found else ()
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
-        """Check a body of one's own, if there is one: what the type's has none of, it has not."""
+        """Check model and own body, if there are: what the type's has none of, it has not."""
+        if given.model and MODELS[given.model].type != given.type:
+            self._report(
+                f"model of {name} must be a {given.type}, {given.model} is a "
+                f"{MODELS[given.model].type}",
+                (*path, "model"),
+            )
         usual = PARTICIPANTS[given.type].body
         for key, value in given.body.model_dump().items() if given.body else ():
             if value is not None and getattr(usual, key) == 0.0 and key != "mass":
@@ -544,7 +558,7 @@ def _body(given: ParticipantSection) -> Body | None:
     """Return a body of one's own; the reference point and the axles move with the length."""
     if given.body is None:
         return None
-    usual = PARTICIPANTS[given.type].body
+    usual = body_of(given.model or given.type)
     said = {key: value for key, value in given.body.model_dump().items() if value is not None}
     longer = said.get("length", usual.length) / usual.length
     return replace(

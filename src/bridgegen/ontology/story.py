@@ -71,6 +71,8 @@ def add_participant(
     put, name = builder.put, one.name
     node = builder.node(name, PARTICIPANTS[one.type].owl_class)
     put(node, "has_name", name)
+    if one.model:
+        put(node, "has_model", one.model)
     if one.siren:
         put(node, "has_siren", "on")
     if one.exceeds_limit:

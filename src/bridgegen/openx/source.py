@@ -8,8 +8,10 @@ from typing import Protocol
 
 from bridgegen.arrays import Float
 from bridgegen.errors import InputError
+from bridgegen.named_models import MODELS, type_of
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
+from bridgegen.odd.story import Participant
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build, build_static
 from bridgegen.ontology.site import Site
@@ -229,11 +231,16 @@ class OntologySource:
         if not self.variant_names:
             return self._scenario
         chosen = tuple(
-            replace(one, type=one.types[int(values[one.type_by])]) if one.type_by else one
+            _of_kind(one, one.types[int(values[one.type_by])]) if one.type_by else one
             for one in self._scenario.participants
         )
         story = replace(self._scenario.story, participants=chosen)
         return replace(self._scenario, story=story)
+
+
+def _of_kind(one: Participant, name: str) -> Participant:
+    """Return a participant as a type's or a model's name says."""
+    return replace(one, type=type_of(name), model=name if name in MODELS else "")
 
 
 @dataclass(frozen=True)

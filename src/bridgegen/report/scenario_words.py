@@ -27,7 +27,7 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
 
 
 def _participant(one: Participant) -> str:
-    kind = " or ".join(one.types) or one.type
+    kind = " or ".join(one.types) or one.model or one.type
     if one.path:
         way = " to ".join(_place(point) for point in one.path)
         return f"{one.name}, a {kind}, goes from {way} at {in_words(one.speed, 'm/s')}."

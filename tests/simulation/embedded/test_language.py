@@ -1,12 +1,15 @@
 """What scenario files can say, as it moves; by hand-worked numbers, and there and back again."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bridgegen import participants as participant_types
 from bridgegen.conflict.plausibility import plausibility
 from bridgegen.errors import ScenarioError
+from bridgegen.named_models import MODELS
 from bridgegen.odd.reader import load
 from bridgegen.ontology.check import check
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
@@ -387,11 +390,68 @@ def test_types_vary(made, tmp_path, monkeypatch):
     assert len(kinds) > 1
 
 
+def test_models_by_name(made):
+    """A model has its own body, in the files too, and is what a reader finds again."""
+    model = LEAD.replace("type_by: lead_type", "model: ncap_global_vehicle_target")
+    pipeline = made(PARTICIPANTS + model)
+    row = pipeline.space.row({})
+    rollout = pipeline.rollout(row[np.newaxis])
+    assert rollout.box[rollout.names.index("lead")] == pytest.approx([4.023, 1.712, 1.328])
+    written = to_xml(pipeline.concrete(row, "roads.xodr").storyboard)
+    assert b'name="ncap_global_vehicle_target"' in written
+    there_and_back(pipeline)
+    said = " ".join(story_lines(pipeline.scenario))
+    assert "lead, a ncap_global_vehicle_target, starts" in said
+
+
+def test_models_vary(made):
+    names = "[ncap_motorcycle, aashto_su, car]"
+    more = LEAD_TYPE.replace("[car, truck, motorcycle]", names).replace(
+        "default: car", "default: aashto_su"
+    )
+    lead = LEAD.replace("type: car", "type: truck\n    model: aashto_su")
+    pipeline = made(PARTICIPANTS + lead, more=more)
+    pipeline.choose_objective()
+    for k, length in enumerate((2.08, 9.2, 4.6)):
+        row = pipeline.space.row({"lead_type": float(k)})[np.newaxis]
+        ((_, one),) = pipeline.by_variant(row)
+        rollout = one.rollout(row)
+        assert rollout.box[rollout.names.index("lead"), 0] == pytest.approx(length, abs=0.2)
+    there_and_back(pipeline)
+
+
+def test_the_models_are_those_of_their_sources():
+    """The axles lie below the box, and the documentation names each."""
+    documented = (Path(__file__).parents[3] / "docs" / "scenarios.md").read_text("utf-8")
+    for model in MODELS.values():
+        assert f"`{model.name}`" in documented
+        body, usual = model.body, participant_types.PARTICIPANTS[model.type].body
+        assert (body.wheelbase > 0.0) == (usual.wheelbase > 0.0)
+        assert body.wheelbase < body.length
+        if body.wheelbase:
+            rear = 0.5 * body.length - body.center_ahead
+            front = 0.5 * body.length + body.center_ahead - body.wheelbase
+            assert rear > 0.0
+            assert front > 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("type_by: lead_type", "model: aashto_su", "model of lead must be a car, aashto_su is a t"),
+        ("type_by: lead_type", "model: ncap_adlt", "did you mean 'ncap_adult'"),
+    ],
+)
+def test_models_that_cannot_be_are_refused(made, old, new, message):
+    with pytest.raises(ScenarioError, match=message):
+        made((PARTICIPANTS + LEAD).replace(old, new))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ("car, truck, motorcycle", "car, pedestrian", "a pedestrian is not as a car"),
-        ("car, truck, motorcycle", "car, lorry", "must be types of participants, got 'lorry'"),
+        ("car, truck, motorcycle", "car, lorry", "or names of models, got 'lorry'"),
         ("default: car", "default: truck", "must be the default of lead_type, truck, got car"),
         ("type_by: lead_type", "type_by: lead_typ", "must name a category, got 'lead_typ'; did"),
     ],

@@ -96,8 +96,9 @@ def _pedestrian(individuals: Individuals, node: Subject, kind: ParticipantKind) 
     fastest = individuals.optional_number(node, "has_max_speed")
     said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
     name = kind.written.name or kind.written.category
+    model = individuals.optional_text(node, "has_model")
     return osc.Pedestrian(
-        name=name,
+        name=model or name,
         pedestrian_category=osc.PedestrianCategory(kind.written.category),
         mass=individuals.number(node, "has_mass"),
         bounding_box=_box(individuals, node),
@@ -129,7 +130,7 @@ def _box(individuals: Individuals, node: Subject) -> osc.BoundingBox:
 def _vehicle(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Vehicle:
     width, written = individuals.number(node, "has_box_width"), kind.written
     return osc.Vehicle(
-        name=written.name or written.category,
+        name=individuals.optional_text(node, "has_model") or written.name or written.category,
         vehicle_category=osc.VehicleCategory(written.category),
         bounding_box=_box(individuals, node),
         performance=osc.Performance(

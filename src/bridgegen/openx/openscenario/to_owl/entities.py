@@ -2,6 +2,7 @@
 
 import pyoxigraph as ox
 
+from bridgegen.named_models import MODELS
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.from_owl.entities import LIFTED, MAX_SPEED
@@ -120,6 +121,9 @@ def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: st
             values["has_max_speed"] = as_number(builder, fastest, body.properties)
     node = builder.node(name, cls)
     builder.put(node, "has_name", name)
+    model = MODELS.get(builder.text(body.name))
+    if model is not None and PARTICIPANTS[model.type].owl_class == cls:
+        builder.put(node, "has_model", model.name)
     if isinstance(body, osc.Vehicle) and body.properties is not None:
         for key, name in LIFTED.items():
             if (said := body.properties.get(name)) is not None:
