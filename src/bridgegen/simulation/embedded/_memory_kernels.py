@@ -94,7 +94,9 @@ class Plan(NamedTuple):
 class Roads(NamedTuple):
     """The paths on a road network, and what the driver knows of it.
 
-    `Network` and `bridgegen.ego.scene.Scene` document the shapes.
+    `Network` and `bridgegen.ego.scene.Scene` document the shapes. ``slopes`` are ``(K, L, 3)``:
+    of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
+    presses less on the road; L is 0 on a network whose roads are level.
     """
 
     paths: Float
@@ -102,6 +104,7 @@ class Roads(NamedTuple):
     steps: Float
     follows: Int
     spans: Float
+    slopes: Float
     span_counts: Int
     zones: Float
     points: Float

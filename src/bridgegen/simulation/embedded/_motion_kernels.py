@@ -11,24 +11,28 @@ from bridgegen.ego._path_kernels import X, Y, project
 STEP, LINEAR, CUBIC, SINUSOIDAL = 0, 1, 2, 3
 RATE, TIME, DISTANCE = 0, 1, 2
 SAME_SPEED, SAME_TIME = 1e-9, 1e-9  # m/s, s, what is less is rounding
+SLOW = 1.0  # m/s, below which no bend is sharp enough to slide down a bank: the wheels roll
 STANDS = 1e-6  # m/s, below which a body stands
 SEARCH_STEP = 5.0  # m, between the points at which a foot on another path is first looked for
 
 
 @kernel
-def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, dt):
-    """Return (x, y, h, v, a) one step on, and the acceleration that the tyres gave.
+def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, uphill, aside, dt):
+    """Return (x, y, h, v, a) one step on, and the acceleration that engine, brakes, tyres gave.
 
     Kinematic bicycle at the rear axle. ``limits`` are those of speed, acceleration, deceleration,
-    and curvature (full lock). Inside the friction circle the demand is met; outside, both its
-    parts shrink to the circle.
+    and curvature (full lock) on a level road. Gravity acts against the motion by ``uphill`` and to
+    the right by ``aside`` [m/s²]; engine, brakes and tyres act against it. Inside the friction
+    circle the demand is met; outside, both parts of the tyres' force shrink to the circle.
     """
-    a = min(max(demanded, -limits[2]), limits[1])
+    a = min(max(demanded, -limits[2] - uphill), limits[1] - uphill)
     bend = min(max(curvature, -limits[3]), limits[3])
-    total = math.hypot(a, v * v * bend)
+    total = math.hypot(a + uphill, v * v * bend + aside)
     if total > friction_limit:
-        a *= friction_limit / total
-        bend *= friction_limit / total
+        share = friction_limit / total
+        a = share * (a + uphill) - uphill
+        bend = share * bend - (1.0 - share) * aside / max(v * v, SLOW * SLOW)
+        bend = min(max(bend, -limits[3]), limits[3])
     end = min(max(v + a * dt, 0.0), limits[0])
     a = (end - v) / dt
     travelled = 0.5 * (v + end) * dt

@@ -16,6 +16,7 @@ from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY, SETS
 from bridgegen.simulation.embedded.drivers._ego_kernels import move_ego
 from bridgegen.simulation.embedded.motion import move_along_path, stop_follow, stop_longitudinal
 from bridgegen.simulation.embedded.places._place_kernels import end_lateral
+from bridgegen.simulation.embedded.places._slope_kernels import slope
 
 
 @kernel
@@ -60,8 +61,10 @@ def is_steered(plan, state):
 @kernel
 def move_paced(k, demanded, plan, roads, state, record):
     """Move the ego on along the storyboard's way, as fast as its driver asks for."""
-    body, grip, v = plan.bodies[0], state.weather[FRICTION], record.v[0, k]
-    a = min(max(demanded, -min(body[5], grip)), min(body[4], grip))
+    body, v = plan.bodies[0], record.v[0, k]
+    uphill, _, press = slope(0, roads, state)
+    grip = press * state.weather[FRICTION]
+    a = min(max(demanded, -min(body[5], grip) - uphill), min(body[4], grip) - uphill)
     asked, target = state.command[0], state.target[0]
     state.command[0] = min(max(v + a * plan.dt, 0.0), body[3])
     state.mean[0] = math.nan

@@ -8,6 +8,7 @@ from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle, standing
 from bridgegen.simulation.embedded.motion import ENDS, pass_end
+from bridgegen.simulation.embedded.places._slope_kernels import slope
 
 
 @inlined_kernel
@@ -35,9 +36,10 @@ def ego_is_through(plan, roads, state):
 def move_ego(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k; return its new x, y [m] and heading [rad]."""
     v, dt, p = record.v[0, k], plan.dt, state.on[0]
+    uphill, aside, press = slope(0, roads, state)
     x, y, h, after, given = bicycle(
         record.x[0, k], record.y[0, k], record.h[0, k], v, demanded, curvature,
-        plan.bodies[0, 3:7], state.weather[FRICTION], dt,
+        plan.bodies[0, 3:7], press * state.weather[FRICTION], uphill, aside, dt,
     )  # fmt: skip
     step = 0.5 * (v + after) * dt
     record.a[0, k] = given

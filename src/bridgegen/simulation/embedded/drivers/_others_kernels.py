@@ -24,6 +24,7 @@ from bridgegen.simulation.embedded.motion import (
     is_pointless,
     move_along_path,
 )
+from bridgegen.simulation.embedded.places._slope_kernels import slope
 
 
 @kernel
@@ -83,7 +84,8 @@ def move_heeding(e, before, k, plan, roads, state, record):
         most = min(most, COMFORT_ACCELERATION)
     asked = state.command[e]
     if most < math.inf:
-        most = max(most, -min(body[5], state.weather[FRICTION]))
+        uphill, _, press = slope(e, roads, state)
+        most = max(most, -min(body[5], press * state.weather[FRICTION]) - uphill)
         state.command[e] = min(asked, max(v + most * plan.dt, 0.0))
         if state.command[e] < asked:
             state.mean[e] = math.nan

@@ -19,6 +19,7 @@ from bridgegen.openx.opendrive.lanes import borders, lane_at, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import Piece
 from bridgegen.openx.opendrive.routes import Place, Route
+from bridgegen.simulation.embedded.places.slopes import LEVEL, slopes
 from bridgegen.simulation.embedded.program import (
     LaneSpot,
     RoadSpot,
@@ -42,12 +43,14 @@ class Path(NamedTuple):
         step: between two samples [m].
         spans: ``(J, 11)`` float64, which lanes it leads along; see ``_lane_kernels``.
         follows: the node that continues where it ends; -1: the road ends there.
+        slopes: ``(L, 3)`` float64, what gravity does along it, see ``slopes``; or no rows.
     """
 
     table: Float
     step: float
     spans: Float
     follows: int
+    slopes: Float = LEVEL
 
 
 def sampled(route: Route) -> tuple[Float, float]:
@@ -240,7 +243,10 @@ class Lanes:
             made = self.graph.route(chain)
         except InputError:
             return None
-        return Path(*sampled(made), self.spans(made, chain), int(self.graph.straight[chain[-1]]))
+        table, step = sampled(made)
+        spans, follows = self.spans(made, chain), int(self.graph.straight[chain[-1]])
+        rises = slopes(self.graph.model, made, step, len(table))
+        return Path(table, step, spans, follows, rises)
 
     def _joins(self, route: int, node: int) -> list[int] | None:
         way = self.ways[route]

@@ -165,6 +165,7 @@ class Network:
         ways = self._ways
         paths = padded([[path.table for path in each.paths] for each in ways], 6)
         spans = padded([[path.spans for path in each.paths] for each in ways], 11)
+        slopes = padded([[path.slopes for path in each.paths] for each in ways], 3)
         counts = _numbers([[len(path.table) for path in each.paths] for each in ways])
         steps = padded([[np.full((1, 1), path.step) for path in each.paths] for each in ways], 1)
         lanes = [each.lanes for each in ways]
@@ -184,6 +185,7 @@ class Network:
             steps=np.ascontiguousarray(steps[:, :, 0, 0]),
             follows=_numbers([[path.follows for path in each.paths] for each in ways]),
             spans=spans,
+            slopes=slopes,
             span_counts=_numbers([[len(path.spans) for path in each.paths] for each in ways]),
             zones=self._find_zones(paths, counts, steps[:, :, 0, 0]),
             points=self._points,

@@ -22,6 +22,7 @@ from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
 from bridgegen.simulation.embedded.compiler import clothoids
 from bridgegen.simulation.embedded.compiler.trajectories import Corner, polyline, timetable
 from bridgegen.simulation.embedded.places.lanes import Lanes, Path, sampled
+from bridgegen.simulation.embedded.places.slopes import slopes
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
     AlongTrajectory,
@@ -161,7 +162,8 @@ class Ways:
         self.routes.append(route)
         last = _stretch(self._model, route.steps[-1])
         goes_on = next(next_stretches(self._model, last), None) is not None
-        self.paths.append(Path(table, step, _NO_SPANS, ASKS if goes_on else ENDS))
+        rises = slopes(self._model, route, step, len(table))
+        self.paths.append(Path(table, step, _NO_SPANS, ASKS if goes_on else ENDS, rises))
         self.station.append(route.station(*_known(self._program, spec.start)))
         varies = isinstance(spec.start.s, ParameterRef | Expr)
         if varies and number < len(self._program.names) and not route.is_even(spec.start.road):
