@@ -43,9 +43,10 @@ class Scene:
         self.y = start[:, 1:2] + self.v * np.sin(self.h) * t
         self.n_entities = e
         self.present = np.ones(e, dtype=np.bool_)
+        self.lamps = np.zeros(e, dtype=np.int64)
 
     def perceive(self, numbers: np.ndarray, key: int = 1, *, ideal: bool = False):
-        """Return the detections ``(E, T, 8)`` and the tracks of all instants ``(T, E, 12)``."""
+        """Return the detections ``(E, T, 8)`` and the tracks of all instants ``(T, E, 13)``."""
         memory = np.zeros((self.n_entities, MEMORY))
         tracks = np.zeros((self.n_entities, TRACK))
         detections = np.full((self.n_entities, self.n_steps, DETECTION), np.nan)
@@ -53,7 +54,7 @@ class Scene:
         for k in range(self.n_steps):
             perceive(
                 k, self.dt, np.uint64(key), ideal, self.present, self.x, self.y, self.h, self.v,
-                self.bodies, self.kinds, numbers, memory, tracks, detections,
+                self.bodies, self.kinds, self.lamps, numbers, memory, tracks, detections,
             )  # fmt: skip
             history[k] = tracks
         return detections, history

@@ -66,7 +66,7 @@ def test_the_machine_code_answers_as_the_function_does_in_python():
 
     numbers = [one.view(np.float64) for one in (scene, ego)]
     call(driver.address, *numbers, route.view(np.float64).reshape(3, 4),
-         tracks.view(np.float64).reshape(2, 12), memory, answer)  # fmt: skip
+         tracks.view(np.float64).reshape(2, 13), memory, answer)  # fmt: skip
     assert answer.tolist() == [9.0, 2.0, 1.0]
     assert memory.tolist() == [1.0]
     told = scene[0], ego[0], route.view(np.recarray), tracks.view(np.recarray), memory

@@ -67,7 +67,7 @@ def driven(path, m=1):
     one = np.arange(3.0)
     observation = Observation(
         0.0, np.array([True, True, False]), one, one, one, one, one, 2.0 * one + 1.0, one,
-        np.zeros((3, ROUTE_POINTS, 4)), np.full((3, m, 12), 7.0), np.full(3, np.inf),
+        np.zeros((3, ROUTE_POINTS, 4)), np.full((3, m, 13), 7.0), np.full(3, np.inf),
         np.zeros(3, np.int8),
     )  # fmt: skip
     scene = Scene(0.05, 9, ("bv",), np.zeros(m, np.int64), 4.5, 1.8, 1.4, 50.0, 3.0, 8.0, 0.2)

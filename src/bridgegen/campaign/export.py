@@ -27,7 +27,7 @@ from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.recorded import Recording, recorded
 from bridgegen.openx.openscenario.resolve import resolved
 from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_scenario_runner
-from bridgegen.openx.openscenario.versions import VERSIONS, to_version
+from bridgegen.openx.openscenario.versions import VERSIONS, least_version, to_version
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulate import simulate_file
@@ -193,7 +193,8 @@ def _moved(
 
 
 def _resolved(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
-    return to_version(resolved(_keyed(scenario), str(path)), "1.2", str(path))
+    made = resolved(_keyed(scenario), str(path))
+    return to_version(made, least_version(made), str(path))
 
 
 def _keyed(scenario: osc.OpenScenario) -> osc.OpenScenario:

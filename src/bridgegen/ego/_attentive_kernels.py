@@ -6,7 +6,8 @@ exceeds that speed. It goes slower
 - to keep its distance from those ahead of it (`_following_kernels`: the intelligent driver model);
 - to give way where its path meets another one (`_yielding_kernels`), by the map's rules where these
   decide, else in order of arrival; always to pedestrians;
-- to stop at a red light and at a stop sign (`_lights_kernels`).
+- to stop at a red light and at a stop sign (`_lights_kernels`);
+- to let in who indicates a change to its lane, within a comfortable deceleration.
 
 A deceleration up to `EMERGENCY_FROM` is anticipated, and applied at once. A stronger one is an
 emergency: the driver reacts `CAREFUL_REACTION` after it begins, and then brakes as hard as the
@@ -38,6 +39,7 @@ from bridgegen.ego._following_kernels import (
     DRIFT,
     HEAD_ON,
     HEADWAY,
+    LET_IN,
     SAME_WAY,
     SIDE_GAP,
     SIDE_GAP_ON_FOOT,
@@ -45,12 +47,14 @@ from bridgegen.ego._following_kernels import (
     STANDSTILL_GAP,
     STOP_MARGIN,
     follow,
+    let_in,
     stop_for,
 )
 from bridgegen.ego._kind_tables import IS_ON_FOOT, IS_PEDESTRIAN, IS_VEHICLE, NEEDS_ROOM
 from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._path_kernels import COS, SIN, H, X, Y, locate, project
 from bridgegen.ego._yielding_kernels import COMMITTED, HORIZON, give_way
+from bridgegen.ego.lamps import HAZARD
 from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 MIND = 8
@@ -60,10 +64,11 @@ driver gave last [m/s²]; 1 while it brakes for an emergency; the light that it 
 from 1; the station of the stop sign at which it halted last [m]; what its last look asked for;
 up to which station its path is straight [m], and which path that is, counted from 1."""
 
-SEEN = 8
-CX, CY, C, S, W, GAIN, LENGTH, WIDTH = range(SEEN)
+SEEN = 9
+CX, CY, C, S, W, GAIN, LENGTH, WIDTH, LAMPS = range(SEEN)
 """Rows of ``seen``, the bodies as all drivers see them: the centre [m], cosine and sine of the
-heading, the speed [m/s], its rate of change [m/s²], length and width [m]."""
+heading, the speed [m/s], its rate of change [m/s²], length and width [m], and the indicators that
+it shows, see `bridgegen.ego.lamps`."""
 
 LOOK = 0.2  # s, between two looks around; the acceleration of one holds until the next
 CONCERNS = 0.75 * COMFORT_ACCELERATION  # m/s²; a leader that allows more (its gap is twice the
@@ -85,7 +90,7 @@ LEAST_LANE_GAP = STANDSTILL_GAP  # m, to those ahead and behind on the other lan
 
 
 @kernel
-def see(k, dt, x, y, h, speed, bodies, seen):
+def see(k, dt, x, y, h, speed, bodies, lamps, seen):
     """Fill ``seen`` ``(SEEN, E)`` with all bodies at instant k."""
     for o in range(len(speed)):
         cosine, sine = math.cos(h[o, k]), math.sin(h[o, k])
@@ -93,6 +98,7 @@ def see(k, dt, x, y, h, speed, bodies, seen):
         seen[C, o], seen[S, o], seen[W, o] = cosine, sine, speed[o, k]
         seen[GAIN, o] = (speed[o, k] - speed[o, k - 1]) / dt if k > 0 else 0.0
         seen[LENGTH, o], seen[WIDTH, o] = bodies[o, 0], bodies[o, 1]
+        seen[LAMPS, o] = lamps[o] & HAZARD
 
 
 @kernel
@@ -125,7 +131,7 @@ def keep_to_leaders(
     half = 0.5 * bodies[e, 1]
     front = bodies[e, 2] + 0.5 * bodies[e, 0]
     cx, cy, cosines, sines = seen[CX], seen[CY], seen[C], seen[S]
-    speeds, lengths, widths = seen[W], seen[LENGTH], seen[WIDTH]
+    speeds, lengths, widths, lamps = seen[W], seen[LENGTH], seen[WIDTH], seen[LAMPS]
     straight = mind[STRAIGHT_TO] - s
     for o in range(len(far)):  # without a branch, so that it is done for several at a time
         # Ignored are participants farther away than `CONCERNS` allows, those behind, and, where the
@@ -137,6 +143,7 @@ def keep_to_leaders(
         wants = STANDSTILL_GAP + v * max(HEADWAY + closing * (1.0 / CALM), 0.0)
         reach = front + 0.5 * lengths[o] + LEAST_REACH + 2.0 * wants
         wide = half + 0.5 * (widths[o] + lengths[o] * turned) + COMING_IN * speeds[o] * turned
+        wide += LET_IN * min(lamps[o], 1.0)
         beside = max(aside - left, right - aside) - wide - SIDE_GAP_ON_FOOT
         away = beside if along < straight else -1.0
         far[o] = max(max(dx * dx + dy * dy - reach * reach, front - lengths[o] - along), away)
@@ -162,10 +169,14 @@ def keep_to_leaders(
         beside = d - left if d > left else min(d - right, 0.0)
         space = abs(beside) - half_width - half
         nearing = -w * across if beside > 0.0 else w * across
-        if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
-            continue
         half_length = 0.5 * (bodies[o, 0] * abs(parallel) + bodies[o, 1] * abs(across))
         gap = q - half_length - s - front
+        if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
+            if lamps[o] > 0.0 and parallel >= SAME_WAY and not walks:
+                allowed = let_in(lamps[o], beside, space, gap, v, w * parallel, seen[GAIN, o])
+                if allowed < CONCERNS:
+                    asked = min(asked, allowed)
+            continue
         if gap < -half_length:
             continue  # beside: braking would not separate them
         if not walks:

@@ -24,7 +24,8 @@ from bridgegen.ego._surroundings_kernels import (
     HALF_WIDTH,
     NEAR,
 )
-from bridgegen.ego._tracking_kernels import KIND
+from bridgegen.ego._tracking_kernels import KIND, LAMPS
+from bridgegen.ego.lamps import HAZARD, LEFT, RIGHT
 
 COMFORT_ACCELERATION = 1.5  # m/s²
 COMFORT_DECELERATION = 2.0  # m/s²
@@ -42,6 +43,8 @@ DRIFT = 0.3  # m/s; … if that is faster than this, above the noise of tracking
 SAME_WAY = 0.5  # cosine of the heading difference below which an actor goes another way …
 HEAD_ON = -0.9  # … and below which it is oncoming
 STANDS = 0.5  # m/s, below which an actor stands
+LET_IN = 3.0  # m; who is no farther beside and indicates this way is let in, in comfort
+LET_OUT = 5.6  # m/s; for one who stands, it slows to so much; StVO § 20: with special care
 
 
 @kernel
@@ -75,6 +78,22 @@ def follow(gap, v, leader_speed, leader_acceleration):
 
 
 @kernel
+def let_in(lamps, beside, space, gap, v, speed, acceleration):
+    """Return the acceleration [m/s²] by which an actor beside is let in; +inf if it is not.
+
+    The actor shows ``lamps`` (`bridgegen.ego.lamps`) ``beside`` the strip, left positive, at so
+    much ``space``, and its rear end is ahead by a ``gap`` [m]. Whoever indicates has no right of
+    way, so braking stays comfortable.
+    """
+    shown = int(lamps) & HAZARD
+    if shown != (RIGHT if beside > 0.0 else LEFT) or space > LET_IN or gap < 0.0:
+        return math.inf
+    if speed < STANDS and v <= LET_OUT:
+        return math.inf
+    return max(follow(gap, v, speed, acceleration), -COMFORT_DECELERATION)
+
+
+@kernel
 def stop_for(distance, v):
     """Return the acceleration [m/s²] that stops before a point; +inf while that is not urgent."""
     needed = v * v / (2.0 * max(distance - STOP_MARGIN, 0.1))
@@ -101,9 +120,15 @@ def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
         moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
         if moves and HEAD_ON < around[e, COSINE] < SAME_WAY:
             continue  # it crosses: a matter of giving way, not of following
-        if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
-            continue
         gap = rear_end - s - front
+        if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
+            if around[e, COSINE] >= SAME_WAY:
+                allowed = let_in(
+                    tracks[e, LAMPS], beside, space, gap, v, max(around[e, ALONG], 0.0),
+                    around[e, GAINING],
+                )  # fmt: skip
+                asked = min(asked, allowed)
+            continue
         if gap < 0.0 and around[e, AT] < s + front:
             continue  # beside the ego: braking would not separate them
         speed = around[e, ALONG] if moves else 0.0

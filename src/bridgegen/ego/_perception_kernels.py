@@ -94,7 +94,7 @@ def place(k, present, x, y, h, bodies, memory):
 
 
 @kernel
-def know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections):
+def know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections):
     """Ideal perception: copy the truth to the tracks, and to the detections of a frame."""
     frame = frame_at(k, dt) >= 0
     for e in range(1, x.shape[0]):
@@ -110,6 +110,7 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections):
         tracks[e, tracking.LENGTH], tracks[e, tracking.WIDTH] = bodies[e, 0], bodies[e, 1]
         tracks[e, tracking.KIND], tracks[e, tracking.CONFIDENCE] = kinds[e], 1.0
         tracks[e, tracking.UNSEEN], tracks[e, tracking.AGE] = 0.0, k * dt
+        tracks[e, tracking.LAMPS] = lamps[e]
         blank(detections, e, k, NO_FRAME)
         if frame:
             detections[e, k, SEEN_BY] = BOTH
@@ -121,7 +122,9 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections):
 
 
 @kernel
-def look(k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tracks, detections):
+def look(
+    k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, memory, tracks, detections
+):  # fmt: skip
     """Take a sensor frame: fill its detections, and update the tracks."""
     elapsed = max(dt, FRAME)
     renew, keep = 1.0 - math.exp(-elapsed / DROPOUT_TIME), math.exp(-elapsed / ERROR_TIME)
@@ -155,11 +158,13 @@ def look(k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tr
             detections[e, k, CONFIDENCE],
             along * ux * ux + across * uy * uy, along * uy * uy + across * ux * ux,
         )  # fmt: skip
+        tracks[e, tracking.LAMPS] = lamps[e]
 
 
 @kernel
 def perceive(
-    k, dt, key, ideal, present, x, y, h, v, bodies, kinds, weather, memory, tracks, detections
+    k, dt, key, ideal, present, x, y, h, v, bodies, kinds, lamps, weather, memory, tracks,
+    detections,
 ):  # fmt: skip
     """Bring the tracks up to instant k, with a sensor frame if one is due.
 
@@ -178,6 +183,7 @@ def perceive(
         v: ``(E, T)`` [m/s].
         bodies: ``(E, 8)``, see `bridgegen.simulation.embedded.program.Program`.
         kinds: ``(E,)``, see `bridgegen.ego.kinds`.
+        lamps: ``(E,)`` int64, what shows, see `bridgegen.ego.lamps`.
         weather: ``(W,)``, see ``_weather_kernels``.
         memory: ``(E, MEMORY)``, zeros before the first instant.
         tracks: ``(E, TRACK)``, zeros before the first instant; see ``_tracking_kernels``.
@@ -185,7 +191,7 @@ def perceive(
     """
     blank(detections, 0, k, MISSED)
     if ideal:
-        know(k, dt, present, x, y, h, v, bodies, kinds, tracks, detections)
+        know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections)
         return
     if k > 0:
         for e in range(1, x.shape[0]):
@@ -193,8 +199,9 @@ def perceive(
     frame = frame_at(k, dt)
     if frame >= 0:
         look(
-            k, dt, frame, key, present, x, y, h, bodies, kinds, weather, memory, tracks, detections
-        )
+            k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, memory, tracks,
+            detections,
+        )  # fmt: skip
         return
     for e in range(1, x.shape[0]):
         blank(detections, e, k, NO_FRAME)

@@ -146,8 +146,8 @@ def drive(k, plan_, roads, state, record):
     curvature = keep_to_route(k, roads, state, record)
     perceive(
         k, plan_.dt, state.key[0], plan_.ideal_perception, state.visible, record.x, record.y,
-        record.h, record.v, plan_.bodies, plan_.kinds, state.weather, state.sensors, state.tracks,
-        record.detections,
+        record.h, record.v, plan_.bodies, plan_.kinds, state.lamps, state.weather, state.sensors,
+        state.tracks, record.detections,
     )  # fmt: skip
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)

@@ -12,8 +12,8 @@ import math
 
 from bridgegen.compiled import kernel
 
-STATE, X, Y, H, VX, VY, LENGTH, WIDTH, KIND, CONFIDENCE, UNSEEN, AGE = range(12)
-TRACK = 12
+STATE, X, Y, H, VX, VY, LENGTH, WIDTH, KIND, CONFIDENCE, UNSEEN, AGE, LAMPS = range(13)
+TRACK = 13
 NONE, TENTATIVE, CONFIRMED, COASTING = 0, 1, 2, 3
 
 # Further state of a track, in the first columns of ``memory`` ``(E, MEMORY)``: its last

@@ -41,7 +41,8 @@ ROUTE = _record("x", "y", "h", "curvature")
 """A point of the route ahead [m, rad, 1/m]; there are ``ROUTE_POINTS``, every ``ROUTE_STEP``."""
 
 TRACK = _record(
-    "state", "x", "y", "h", "vx", "vy", "length", "width", "kind", "confidence", "unseen", "age"
+    "state", "x", "y", "h", "vx", "vy", "length", "width", "kind", "confidence", "unseen", "age",
+    "lamps",
 )  # fmt: skip
 """One of the M other participants as the sensors track them, see `Observation.tracks`."""
 

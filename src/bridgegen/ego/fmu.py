@@ -28,6 +28,7 @@ from bridgegen.extras import require
 
 TRACK = (
     "state", "x", "y", "h", "vx", "vy", "length", "width", "class", "confidence", "unseen", "age",
+    "lamps",
 )  # fmt: skip
 _PLAIN = ("x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light")
 _ROUTE = ("x", "y", "h", "curvature")

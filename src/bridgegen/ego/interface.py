@@ -74,10 +74,11 @@ class Observation:
         route: ``(N, P, 4)`` float64: x, y [m], heading [rad], curvature [1/m] of the route's points
             ahead, every ``ROUTE_STEP`` metres from the point beside the ego; straight on beyond
             its end.
-        tracks: ``(N, M, 12)`` float64, the other participants as the sensors track them: state (0
+        tracks: ``(N, M, 13)`` float64, the other participants as the sensors track them: state (0
             none or absent, 1 tentative, 2 confirmed, 3 coasting), x, y of the box's
             centre [m], heading [rad], velocity in x and y [m/s], length, width [m], class (see
-            ``bridgegen.ego.kinds``), confidence, seconds since last seen, seconds tracked. With
+            ``bridgegen.ego.kinds``), confidence, seconds since last seen, seconds tracked,
+            indicators and brake lights (see ``bridgegen.ego.lamps``). With
             ``--ideal perception`` they are the truth.
         stop_distance: ``(N,)`` float64 [m], from the front of the ego to the next stop line of a
             light on its route; +inf where there is none.

@@ -227,6 +227,23 @@ class Arrival:
 
 
 @dataclass(frozen=True)
+class Indication:
+    """A vehicle indicates, switches its hazard lights on, or all of these off.
+
+    Attributes:
+        side: which.
+    """
+
+    side: Literal["left", "right", "hazard", "off"]
+
+    def __str__(self) -> str:
+        """Return what the participant does, to be said after its name."""
+        if self.side == "hazard":
+            return "switches its hazard lights on"
+        return "stops indicating" if self.side == "off" else f"indicates to the {self.side}"
+
+
+@dataclass(frozen=True)
 class WeatherChange:
     """The weather becomes that of other parameters.
 
@@ -241,7 +258,7 @@ class WeatherChange:
         return f"becomes that of {self.prefix}…"
 
 
-Action = SpeedChange | LaneChange | LaneOffset | KeepDistance | Arrival | WeatherChange
+Action = SpeedChange | LaneChange | LaneOffset | KeepDistance | Arrival | Indication | WeatherChange
 
 
 @dataclass(frozen=True)

@@ -187,7 +187,9 @@ class ArrivalSection(ShapedSection):
     """Where that one arrives."""
 
 
-ACTIONS = ("speed", "lane_change", "lane_offset", "keep_distance", "arrive", "weather")
+ACTIONS = (
+    "speed", "lane_change", "lane_offset", "keep_distance", "arrive", "indicate", "weather",
+)  # fmt: skip
 """The keys of an event that are actions; it has one of them at least."""
 
 
@@ -214,6 +216,8 @@ class EventSection(ShapedSection):
     """It follows another one."""
     arrive: ArrivalSection | None = None
     """It arrives somewhere as another one does elsewhere."""
+    indicate: Literal["left", "right", "hazard", "off"] | None = None
+    """It indicates, or switches its hazard lights on, or all of these off."""
     weather: Word | None = None
     """The weather becomes that of the parameters with this prefix."""
     when: Annotated[list[ConditionSection], Field(min_length=1)]

@@ -18,6 +18,7 @@ from bridgegen.odd.story import (
     Change,
     ConditionSpec,
     EventSpec,
+    Indication,
     KeepDistance,
     LaneChange,
     LaneOffset,
@@ -410,6 +411,13 @@ class Storyboard:
             yield LaneChange(int(one.lanes), change)
         yield from self._moves_aside(name, given, path)
         yield from self._beside_others(name, given, path)
+        if given.indicate is not None:
+            actor = self._acting.get(str(given.participant))
+            if actor is not None and PARTICIPANTS[actor.type].seen_as.conduct != "vehicle":
+                self._report(
+                    f"{actor.name}, a {actor.type}, has no indicators", (*path, "indicate")
+                )
+            yield Indication(given.indicate)
 
     def _moves_aside(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
         aside, place = given.lane_offset, (*path, "lane_offset")

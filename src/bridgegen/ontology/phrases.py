@@ -215,6 +215,10 @@ def _keeps(speaker: _Speaker, node: Subject) -> str:
     return f"{speaker.value(node, kept)} behind {speaker.link(node, 'has_entity_ref')}"
 
 
+def _lights(speaker: _Speaker, node: Subject) -> str:
+    return f"{speaker.value(node, 'has_light_type')} {speaker.value(node, 'has_light_mode')}"
+
+
 def _arrives(speaker: _Speaker, node: Subject) -> str:
     other = speaker.link(node, "has_entity_ref")
     there = speaker.inner(node, "has_master_position")
@@ -263,6 +267,7 @@ _SAYINGS: dict[str, Saying] = {
     "LaneOffsetAction": _aside,
     "LongitudinalDistanceAction": _keeps,
     "SynchronizeAction": _arrives,
+    "LightStateAction": _lights,
     "TeleportAction": lambda speaker, node: speaker.inner(node, "has_position"),
     "FollowTrajectoryAction": _trajectory,
     "EnvironmentAction": lambda speaker, node: f"weather {speaker.link(node, 'has_weather')}",

@@ -1,6 +1,7 @@
 """Layers 3 to 5 as individuals: participants, what happens, temporary changes, weather."""
 
 from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import pyoxigraph as ox
 
@@ -12,6 +13,7 @@ from bridgegen.odd.story import (
     Change,
     ConditionSpec,
     EventSpec,
+    Indication,
     Jam,
     KeepDistance,
     LaneChange,
@@ -20,6 +22,7 @@ from bridgegen.odd.story import (
     RoadWorks,
     SpeedChange,
     Waypoint,
+    WeatherChange,
 )
 from bridgegen.ontology.builder import Builder
 from bridgegen.ontology.roads import lane_name, road_name
@@ -194,10 +197,14 @@ def add_event(
     put(node, "has_name", event.name)
     if event.participant is not None:
         put(node, "has_who", builder.iri(event.participant))
-    for number, action in enumerate(event.actions, start=1):
-        suffix = "" if number == 1 else f"_{number}"
-        name = f"{event.name}_action{suffix}"
-        put(node, "has_what", _add_action(builder, name, action, declared, site))
+    number = 0
+    for action in event.actions:
+        parts = _SWITCHES[action.side] if isinstance(action, Indication) else (action,)
+        for part in parts:
+            number += 1
+            suffix = "" if number == 1 else f"_{number}"
+            name = f"{event.name}_action{suffix}"
+            put(node, "has_what", _add_action(builder, name, part, declared, site))
     trigger = builder.node(f"{event.name}_trigger", "Trigger")
     for number, conditions in enumerate(event.when, start=1):
         name = f"{event.name}_condition_{number}"
@@ -206,10 +213,36 @@ def add_event(
     return node
 
 
+class _Switch(NamedTuple):
+    """A light of a vehicle, and what it does from then on."""
+
+    light: str
+    mode: str
+
+
+_SWITCHES = {
+    "left": (_Switch("warningLights", "off"), _Switch("indicatorRight", "off"),
+             _Switch("indicatorLeft", "flashing")),
+    "right": (_Switch("warningLights", "off"), _Switch("indicatorLeft", "off"),
+              _Switch("indicatorRight", "flashing")),
+    "hazard": (_Switch("warningLights", "flashing"),),
+    "off": (_Switch("warningLights", "off"), _Switch("indicatorLeft", "off"),
+            _Switch("indicatorRight", "off")),
+}  # fmt: skip
+
+
 def _add_action(
-    builder: Builder, name: str, action: Action, declared: Mapping[str, object], site: Site
+    builder: Builder,
+    name: str,
+    action: Action | _Switch,
+    declared: Mapping[str, object],
+    site: Site,
 ) -> ox.NamedNode:
-    if isinstance(action, SpeedChange):
+    if isinstance(action, _Switch):
+        node = builder.node(name, "LightStateAction")
+        builder.put(node, "has_light_type", action.light)
+        builder.put(node, "has_light_mode", action.mode)
+    elif isinstance(action, SpeedChange):
         node = builder.node(name, "SpeedAction")
         builder.quantity(node, "has_target_speed", action.speed)
         _add_change(builder, node, action.change)
@@ -242,6 +275,7 @@ def _add_action(
         builder.put(node, "has_position", here)
         builder.put(node, "has_master_position", there)
     else:
+        assert isinstance(action, WeatherChange)  # an Indication is several switches
         node = builder.node(name, "EnvironmentAction")
         weather = add_weather(builder, declared, action.prefix)
         if weather is not None:

@@ -216,6 +216,8 @@ class Playback:
         weather: from the start on, and whenever it changes; empty: not known.
         street_lights: ``(n, 2)`` float64 [m].
         conflict: the decisive one; None if there is none, or it was not analysed.
+        shows: ``(E, T)`` int8, indicators and brake lights, see `bridgegen.ego.lamps`; None: not
+            known.
     """
 
     name: str
@@ -244,6 +246,7 @@ class Playback:
     weather: tuple[Weather, ...] = ()
     street_lights: Float | None = None
     conflict: Conflict | None = None
+    shows: npt.NDArray[np.int8] | None = None
 
     def __post_init__(self) -> None:
         place = f"playback '{self.name}'"

@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Float
 from bridgegen.metrics.d_min import first_closest
@@ -79,8 +80,9 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
                 "center_ahead": float(e.center_ahead),
                 "shape": drawing_of(e.type).shape,
                 "headlights": drawing_of(e.type).headlights,
+                "shows": [] if p.shows is None else _shows(p.shows[i, : p.n_steps]),
             }
-            for e in p.entities
+            for i, e in enumerate(p.entities)
         ],
         "lamps": [_lamp(lamp, p.n_steps) for lamp in p.lamps],
         "series": _series(p),
@@ -192,6 +194,12 @@ def _course(c: Course, n_steps: int) -> dict[str, Any]:
             [int(i), *np.round(shift[i], 2).tolist()] for i in np.flatnonzero(moved)
         ],
     }  # fmt: skip
+
+
+def _shows(states: npt.NDArray[np.int8]) -> list[list[int]]:
+    """Return the instants at which what lamps show changes, and to what; nothing shows before."""
+    at = np.flatnonzero(np.diff(states, prepend=np.int8(0)))
+    return [[int(k), int(states[k])] for k in at]
 
 
 def _changes(values: np.ndarray) -> list[list[int]]:

@@ -20,7 +20,7 @@ from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.painter import paint
 from bridgegen.report.playback import Conflict, Course, Playback, Weather
-from bridgegen.report.scenery import Scenery, bodies, lamps
+from bridgegen.report.scenery import Scenery, bodies, lamps, vehicle_lamps
 from bridgegen.report.sensing import sensed
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows
@@ -152,6 +152,7 @@ def _played(
     entities, scenery = bodies(rollout, pipeline.bodies(shown[0].x)), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
     ttc, detections = ttc_over_time(rollout), sensed(rollout)
+    shows = vehicle_lamps(rollout)
     checked = constraints_in_words(pipeline.source.constraints)
     found = []
     for k, one in enumerate(shown):
@@ -188,6 +189,7 @@ def _played(
                 weather=tuple(_weather(step, one) for step, one in replay.weathers[k]),
                 street_lights=road.street_lights,
                 conflict=_conflict(conflicts, k, count),
+                shows=shows[k],
             )
         )  # fmt: skip
     return tuple(found)

@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Float
+from bridgegen.ego._kind_tables import IS_VEHICLE
+from bridgegen.ego.lamps import BRAKE, BRAKE_LIGHTS_FROM
 from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -91,3 +94,15 @@ def lamps(rollout: Rollout, row: int, found: list[Light]) -> tuple[Lamp, ...]:
         for one in found
         if one.id in shown
     )
+
+
+def vehicle_lamps(rollout: Rollout) -> npt.NDArray[np.int8]:
+    """Return what lamps show, ``(N, E, T)``; where it is not recorded, who brakes shows that."""
+    if rollout.lamps.size:
+        return rollout.lamps
+    found = np.zeros(rollout.x.shape, dtype=np.int8)
+    if rollout.kinds.size:
+        brakes = rollout.a[:, :, :-1] <= -BRAKE_LIGHTS_FROM
+        lit = brakes & np.array(IS_VEHICLE)[rollout.kinds][:, np.newaxis]
+        found[:, :, 1:][lit] = BRAKE
+    return found

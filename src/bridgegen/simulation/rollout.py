@@ -88,6 +88,8 @@ class Rollout:
         began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
         present: ``(N, E, T)`` bool, which entity is present at which instant; where one is
             absent, its states are finite but meaningless. ``(0, 0, 0)`` where all always are.
+        lamps: ``(N, E, T)`` int8, indicators and brake lights that show, see `bridgegen.ego.lamps`;
+            ``(0, 0, 0)`` where no scenario switches any.
         kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
             unknown.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
@@ -127,6 +129,7 @@ class Rollout:
     event_names: tuple[str, ...] = ()
     began: Int = field(default_factory=lambda: np.zeros((0, 0), np.int64))
     present: Bool = field(default_factory=lambda: np.zeros((0, 0, 0), np.bool_))
+    lamps: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
     kinds: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
@@ -209,10 +212,10 @@ class Rollout:
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
-    "stop_lines", "present", "claims", "crosswalks", "friction",
+    "stop_lines", "present", "lamps", "claims", "crosswalks", "friction",
 )  # fmt: skip
 
-_BY_INSTANT = ("x", "y", "h", "v", "a", "offset", "lights", "present", "detections")
+_BY_INSTANT = ("x", "y", "h", "v", "a", "offset", "lights", "present", "lamps", "detections")
 
 
 def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:

@@ -142,6 +142,8 @@ ACTIONS: tuple[Thing, ...] = (
                                     "has_max_speed": 20.0}),
     ("TeleportAction", {"has_position": ("LanePosition", {
         "on_lane": "<leg_A_in_1>", "has_distance": 12.5, "has_relative_heading": 90.0})}),
+    ("LightStateAction", {"has_light_type": "indicatorLeft", "has_light_mode": "flashing"}),
+    ("LightStateAction", {"has_light_type": "brakeLights", "has_light_mode": "off"}),
     ("SynchronizeAction", {"has_entity_ref": "<ego>",
                            "has_position": on_lane("leg_C_out_1", 5.0),
                            "has_master_position": on_lane("leg_B_in_1", 1.0)}),

@@ -8,6 +8,7 @@ import pytest
 
 from bridgegen import participants as participant_types
 from bridgegen.conflict.plausibility import plausibility
+from bridgegen.ego import lamps
 from bridgegen.errors import ScenarioError
 from bridgegen.named_models import MODELS
 from bridgegen.odd.reader import load
@@ -491,7 +492,52 @@ EVENTS = {
     r"must be -4 to 4, beyond that it changes lane, got 6": "lane_offset: {offset: 6}",
     r"acceleration \[m/s²\] must be greater than 0": "lane_offset: {offset: 1, acceleration: 0}",
     "must have an action: speed, lane_change, lane_offset": "",
+    "indicate must be 'left', 'right', 'hazard' or 'off', got 'both'": "indicate: both",
 }
+
+
+def test_indicating(made):
+    """It shows from its event on, is in the files, and the ego makes room for a change of lane."""
+    participants = PARTICIPANTS.replace("lane: 1}\n    speed: 20.0", "lane: 1}\n    speed: 15.0")
+    events = """
+  shows:
+    participant: other
+    indicate: right
+    when:
+      - {kind: time, value: 1.0}
+  no_more:
+    participant: other
+    indicate: off
+    when:
+      - {kind: time, value: 5.0}
+"""
+    pipeline, silent = made(participants, events), made(participants)
+    x = pipeline.space.row({})[np.newaxis]
+    rollout = pipeline.rollout(x)
+    shown = rollout.lamps[0, 1] & lamps.HAZARD
+    assert np.flatnonzero(shown).tolist() == list(range(20, 100))
+    assert (shown[20:100] == lamps.RIGHT).all()
+    ego, free = rollout.v[0, 0], silent.rollout(x).v[0, 0]
+    assert np.array_equal(ego[:20], free[:20])
+    assert ego[100] < free[100] - 1.0
+    there_and_back(pipeline)
+    assert str(pipeline.concrete(x[0], "roads.xodr").storyboard.file_header.rev_minor) == "3"
+    said = " ".join(story_lines(pipeline.scenario))
+    assert "other indicates to the right" in said
+    assert "other stops indicating" in said
+
+
+def test_who_has_no_indicators_does_not_indicate(made):
+    event = """
+  shows:
+    participant: other
+    indicate: left
+    when:
+      - {kind: time, value: 1.0}
+"""
+    participants = PARTICIPANTS.replace("other:\n    type: car", "other:\n    type: bicycle")
+    with pytest.raises(ScenarioError, match="other, a bicycle, has no indicators"):
+        made(participants.replace("lane: 1}\n    speed: 20.0", "lane: 1}\n    speed: 5.0"), event)
 
 
 @pytest.mark.parametrize("message", EVENTS)

@@ -72,6 +72,11 @@ def to_version(scenario: osc.OpenScenario, version: str, place: str) -> osc.Open
     return replace(made, file_header=replace(made.file_header, rev_major=1, rev_minor=minor))
 
 
+def least_version(scenario: osc.OpenScenario) -> str:
+    """Return the first of `VERSIONS` in which all of a scenario can be said."""
+    return "1.3" if any(_only_later(element) for element in walk(scenario)) else "1.2"
+
+
 def _only_later(element: Element) -> list[str]:
     """Return what of an element there is from 1.3 on only."""
     found = [

@@ -14,7 +14,21 @@ export function roundBox(c, x, y, width, height, radius) {
   else c.rect(x, y, width, height);
 }
 
-export function drawBody(c, entity, state, colour, scale) {
+const FLASHES = 1.5; // a second; UN R48: 60 to 120 a minute
+
+// Indicators at the corners, as they flash, and brake lights.
+function drawShown(c, { length, width }, shows, time) {
+  const lamp = (x, y) => c.fillRect(x - length * 0.035, y - width * 0.11, length * 0.07, width * 0.22);
+  c.fillStyle = "#ffb000";
+  const lit = (time * FLASHES) % 1 < 0.5;
+  for (const [bit, side] of [[1, 1], [2, -1]]) {
+    if (lit && shows & bit) for (const end of [-1, 1]) lamp(end * length * 0.455, side * width * 0.4);
+  }
+  c.fillStyle = "#ff2d2d";
+  if (shows & 4) for (const side of [-1, 1]) c.fillRect(-length * 0.5, side * width * 0.28 - width * 0.12, length * 0.05, width * 0.24);
+}
+
+export function drawBody(c, entity, state, colour, scale, shows = 0, time = 0) {
   const { length, width } = entity;
   c.save();
   c.translate(...boxCentre(entity, state.x, state.y, state.h));
@@ -42,6 +56,7 @@ export function drawBody(c, entity, state, colour, scale) {
   c.fillRect(-length * 0.36, -width * 0.34, length * 0.08, width * 0.68);
   c.fillStyle = "rgba(255, 255, 255, 0.9)";
   for (const side of [-1, 1]) c.fillRect(length * 0.455, side * width * 0.33 - width * 0.08, length * 0.035, width * 0.16);
+  if (shows) drawShown(c, entity, shows, time);
   c.restore();
 }
 

@@ -12,7 +12,7 @@ import { drawElsewhere } from "./ghosts.js";
 import { Labels, drawScaleBar, labelLamps, pill, pointTo } from "./labels.js";
 import { measured } from "./numbers.js";
 import { detectedBoxes, drawDetections } from "./senses.js";
-import { detectionAt, unpackLine, weatherAt } from "./unpack.js";
+import { detectionAt, showsAt, unpackLine, weatherAt } from "./unpack.js";
 import { View, fitCanvas } from "./view.js";
 import { detectionWords } from "./words.js";
 
@@ -75,7 +75,10 @@ export class Scene {
     for (const e of playersOf(this.kept)) this.drawTrail(c, e, state.index, scale);
     drawDecided(c, this.kept, this.centres, scale);
     this.drawGhosts(c, state, scale);
-    state.entities.forEach((s, e) => { if (isPlaced(s)) drawBody(c, this.kept.entities[e], s, colourOf(this.kept, e), scale); });
+    state.entities.forEach((s, e) => {
+      const entity = this.kept.entities[e];
+      if (isPlaced(s)) drawBody(c, entity, s, colourOf(this.kept, e), scale, showsAt(entity, state.index), state.index * this.kept.time_step);
+    });
     drawZones(c, this.kept, state, scale);
     if (this.layers.elsewhere) drawElsewhere(c, this.kept, state, scale);
     if (this.layers.sensed) drawDetections(c, this.kept, state, scale);

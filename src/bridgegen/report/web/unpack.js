@@ -101,6 +101,11 @@ export function lightAt(lamp, index) {
   return lamp.changes.reduce((now, [k, to]) => (k <= index ? to : now), 0);
 }
 
+// What a vehicle's lamps show: 1 left, 2 right, 4 brake; both indicators are hazard lights.
+export function showsAt(entity, index) {
+  return (entity.shows ?? []).reduce((now, [k, to]) => (k <= index ? to : now), 0);
+}
+
 export function weatherAt(kept, index) {
   return kept.weather.reduce((now, one) => (one.step <= index ? one : now), null);
 }

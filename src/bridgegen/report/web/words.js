@@ -3,7 +3,9 @@
 import { intentionAt } from "./course.js";
 import { isPlaced, playersOf } from "./geometry.js";
 import { elsewhereWords } from "./ghosts.js";
-import { SIGNALS, detectionAt, lightAt, weatherAt } from "./unpack.js";
+import { SIGNALS, detectionAt, lightAt, showsAt, weatherAt } from "./unpack.js";
+
+const INDICATORS = ["", "indicates left", "indicates right", "hazard lights on"];
 
 export function detectionWords(found) {
   if (!found) return "";
@@ -34,8 +36,8 @@ export function stateWords(kept, state) {
   for (const e of playersOf(kept)) {
     const s = state.entities[e];
     if (e === 0 || !isPlaced(s)) continue;
-    const seen = detectionWords(detectionAt(kept, e, state.index));
-    parts.push(`${s.name} ${value(s.v, "m/s", 1)}${seen ? `, ${seen}` : ""}`);
+    const told = [INDICATORS[showsAt(kept.entities[e], state.index) & 3], detectionWords(detectionAt(kept, e, state.index))].filter(Boolean);
+    parts.push([`${s.name} ${value(s.v, "m/s", 1)}`, ...told].join(", "));
   }
   state.entities.forEach((s, e) => {
     const off = elsewhereWords(kept, state, e);

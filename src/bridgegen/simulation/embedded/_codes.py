@@ -21,6 +21,7 @@ WHOM, DOES, SHAPE, DIMENSION, TARGET, LASTS, ROW, SELECTS = range(8)
 STEERS, SETS_SPEED = 2, 3  # of a control: whether the driver does, -1 as before
 TOWED = 3  # of a connection: the trailer
 TO_SENSORS, TO_TRAFFIC = 3, 6  # of showing: whether these see it
+LAMP, IS_LIT = 3, 6  # of switching: what, as bits of `bridgegen.ego.lamps`; whether it is on
 DETAIL = 3  # of a route, its position; of a trajectory, whether its times are relative
 PASSES = 2  # of a date: whether time passes
 # What they do, by groups: of one entity from FIRST_MOTION on, of these along its path by
@@ -28,7 +29,7 @@ PASSES = 2  # of a date: whether time passes
 # controller, a value.
 FIRST_MOTION, FIRST_ALONG, FIRST_ACROSS, FIRST_GLOBAL = 20, 40, 50, 100
 ADD_ENTITY, DELETE_ENTITY, CONTROL = 20, 21, 22
-CONNECT_TRAILER, DISCONNECT_TRAILER, SHOW = 23, 24, 25
+CONNECT_TRAILER, DISCONNECT_TRAILER, SHOW, SWITCH = 23, 24, 25, 26
 TELEPORT, ASSIGN_ROUTE, FOLLOW, ACQUIRE, FOLLOW_LAID = range(30, 35)
 SPEED_CHANGE, RELATIVE_SPEED, SPEED_PROFILE, KEEP_DISTANCE, SYNCHRONIZE = range(40, 45)
 LANE_CHANGE, LANE_OFFSET, KEEP_ASIDE = range(50, 53)

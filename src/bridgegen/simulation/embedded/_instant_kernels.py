@@ -28,6 +28,7 @@ from bridgegen.simulation.embedded.motion import (
     move_along_path,
     move_by_timetable,
     note_presence,
+    show_lamps,
     stay_away,
 )
 from bridgegen.simulation.embedded.places._place_kernels import fail
@@ -46,6 +47,7 @@ def before_driver(k, plan, roads, state, record):
     finish(k, plan, state)
     observe(k, plan, roads, state, record)
     decide(k, plan, roads, state, record)
+    show_lamps(k, plan, state, record)
     if plan.attends:
         run_kernel_at(plan.begins_waiting, (k, plan, roads, state, record))
     if plan.is_driven:  # else its turn comes with the others'
@@ -110,5 +112,7 @@ def _repeat(k, record):
             array[e, k + 1 :] = array[e, k]
     for e in range(record.present.shape[0]):
         record.present[e, k + 1 :] = record.present[e, k]
+    for e in range(record.lamps.shape[0]):
+        record.lamps[e, k + 1 :] = record.lamps[e, k]
     for i in range(record.lights.shape[0]):
         record.lights[i, k + 1 :] = record.lights[i, k]

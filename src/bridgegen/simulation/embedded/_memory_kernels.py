@@ -168,6 +168,8 @@ class State(NamedTuple):
         hidden: ``(E, 2)`` bool, from whom; see ``_codes``,
         visible: ``(E,)`` bool, whether the ego's sensors may see it,
         minded: ``(E,)`` bool, and attentive drivers may,
+        switched: ``(E,)`` int64, its lamps as the storyboard has them; see `bridgegen.ego.lamps`,
+        lamps: ``(E,)`` int64, and what shows,
         tower: ``(E,)`` int64, by which entity it is towed; -1: by none,
         straight: ``(E,)`` bool, it is put straight behind that one, which was teleported.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
@@ -254,6 +256,8 @@ class State(NamedTuple):
     hidden: Annotated[Bool, "entities", 2]
     visible: Annotated[Bool, "entities"]
     minded: Annotated[Bool, "entities"]
+    switched: Annotated[Int, "entities"]
+    lamps: Annotated[Int, "entities"]
     tower: Annotated[Int, "entities"]
     straight: Annotated[Bool, "entities"]
     drives: Annotated[Int, 2]
@@ -319,7 +323,8 @@ class Record(NamedTuple):
     """The outputs: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`.
 
     ``detections`` are ``(E, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing;
-    ``present`` is ``(E, T)``, or ``(0, 0)`` if all entities always are.
+    ``present`` is ``(E, T)``, or ``(0, 0)`` if all entities always are; ``lamps`` ``(E, T)``, or
+    ``(0, 0)`` if the storyboard switches none.
     """
 
     x: Float
@@ -331,6 +336,7 @@ class Record(NamedTuple):
     detections: Float
     lights: npt.NDArray[np.int8]
     present: Bool
+    lamps: npt.NDArray[np.int8]
     began: Int
 
 

@@ -200,7 +200,7 @@ class Batch:
             k: the instant; once each, in order, for the sensors look.
             step: between two points of the route [m].
             route: ``(N, P, 4)`` float64.
-            tracks: ``(N, E − 1, 12)`` float64.
+            tracks: ``(N, E − 1, 13)`` float64.
             stop: ``(N,)`` float64, the distance to the next stop line [m].
             light: ``(N,)`` int8, the state of its light.
         """
@@ -251,6 +251,7 @@ class Batch:
             event_names=program.event_names,
             began=record.began,
             present=NO_PRESENCE if record.present.all() else record.present,
+            lamps=record.lamps if record.lamps.size else NO_LAMPS,
             detections=record.detections if record.detections.size else NO_DETECTIONS,
             stop_lines=roads.stop_lines[self._rows],
             stop_lights=roads.stop_lights,
@@ -272,6 +273,8 @@ ALIGNED = 64  # bytes, a line of the processor's cache
 NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 
 NO_PRESENCE = np.zeros((0, 0, 0), dtype=np.bool_)
+
+NO_LAMPS = np.zeros((0, 0, 0), dtype=np.int8)
 
 
 def noise_keys(
@@ -440,5 +443,6 @@ def _record(program: Program, n: int) -> memory.Record:
         detections=np.zeros(seen),
         lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
         present=np.zeros(there, dtype=np.bool_),
+        lamps=np.zeros(shape if program.switches_lamps else (n, 0, 0), dtype=np.int8),
         began=np.full((n, len(program.event_names)), -1, dtype=np.int64),
     )  # fmt: skip

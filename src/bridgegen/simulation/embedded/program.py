@@ -35,6 +35,7 @@ from bridgegen.simulation.embedded._codes import (
     RELATIVE_ANGLE,
     ROAD_SYSTEM,
     ROW,
+    SWITCH,
     SYSTEM,
     WHOM,
 )
@@ -360,6 +361,11 @@ class Program:
                     if action[DOES] < FIRST_GLOBAL:
                         found[element[EVENT_NUMBER]].add(int(action[WHOM]))
         return [frozenset(one) for one in found]
+
+    @property
+    def switches_lamps(self) -> bool:
+        """Whether an action switches indicators or brake lights."""
+        return bool((self.actions[:, DOES] == SWITCH).any())
 
     @property
     def looks_at_lanes(self) -> bool:

@@ -80,6 +80,7 @@ class Actions:
             "LongitudinalDistanceAction": self._keep_distance,
             "FollowTrajectoryAction": self._follow,
             "AssignRouteAction": self._assign_route,
+            "LightStateAction": self._switch,
         }
         for name, make in kinds.items():
             if ind.is_a(node, name):
@@ -142,6 +143,14 @@ class Actions:
         )
         other = self._cast.name(node, "has_entity_ref")
         return osc.PrivateAction(osc.SynchronizeAction(other, master, there))
+
+    def _switch(self, actor: str, node: Subject) -> osc.PrivateAction:
+        """Return the switching of a vehicle's lights."""
+        del actor
+        light = osc.VehicleLightType(self._individuals.text(node, "has_light_type"))
+        mode = osc.LightMode(self._individuals.text(node, "has_light_mode"))
+        switch = osc.LightStateAction(osc.LightType(osc.VehicleLight(light)), osc.LightState(mode))
+        return osc.PrivateAction(osc.AppearanceAction(switch))
 
     def _keep_distance(self, actor: str, node: Subject) -> osc.PrivateAction:
         """Return the following of another entity, from now on, between the bodies."""

@@ -21,6 +21,7 @@ from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.from_owl.weather import environment
+from bridgegen.openx.openscenario.versions import least_version, to_version
 
 DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""
@@ -78,7 +79,7 @@ class _Converter:
                 self.signals
             )
         )
-        return osc.OpenScenario(
+        made = osc.OpenScenario(
             osc.FileHeader(1, 2, date, name, "BridgeGen", properties=osc.Properties(notes)),
             osc.RoadNetwork(
                 osc.File(road_file),
@@ -93,6 +94,8 @@ class _Converter:
             osc.Storyboard(osc.Init(init), _stories(groups), self._stop(self.participants[EGO])),
             parameter_declarations=osc.ParameterDeclarations((*declarations, *texts)),
         )
+        version = least_version(made)
+        return made if version == "1.2" else to_version(made, version, name)
 
     def _participants(self) -> dict[str, Subject]:
         """Return the participants by name, the ego first, then in alphabetical order."""

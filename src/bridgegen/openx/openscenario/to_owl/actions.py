@@ -6,6 +6,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.signals import LAMPS
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position, same_place
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
 
@@ -56,6 +57,11 @@ def add_action(
         put_place(builder, node, "has_position", f"{name}_place", action.target_position)
         there = action.target_position_master
         put_place(builder, node, "has_master_position", f"{name}_master_place", there)
+    elif isinstance(inner, osc.LightStateAction) and (light := known_light(inner, builder.text)):
+        node = builder.node(name, "LightStateAction")
+        mode = builder.choice(osc.LightMode, inner.light_state.mode)
+        builder.put(node, "has_light_type", light)
+        builder.put(node, "has_light_mode", mode.value)
     elif isinstance(inner, osc.LongitudinalDistanceAction):
         node = _keep_distance(builder, name, inner)
     elif isinstance(inner, osc.SpeedAction):

@@ -17,6 +17,7 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.to_owl.build import Lost
 from bridgegen.openx.openscenario.to_owl.differences import DETAILS
+from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.starts import Starts
 
 _LEAST = (osc.Rule.GREATER_THAN, osc.Rule.GREATER_OR_EQUAL)
@@ -82,8 +83,9 @@ class _Simplified:
         kept, later = [], []
         for wrapped in private.private_actions:
             inner = _inner(wrapped)
-            if isinstance(inner, _LATER):
-                name = f"{self._starts.text(private.entity_ref)}_{type(inner).__name__}"
+            light = known_light(inner, self._starts.text)
+            if light or isinstance(inner, _LATER):
+                name = f"{self._starts.text(private.entity_ref)}_{light or type(inner).__name__}"
                 later.append(_at_once(name, private, wrapped))
             elif isinstance(inner, DETAILS):
                 what = f"an initial {type(inner).__name__}"
@@ -123,7 +125,10 @@ class _Simplified:
             actions = []
             for action in event.actions:
                 inner = _inner(action.action)
-                if isinstance(inner, DETAILS) or self._is_unread(action):
+                is_detail = isinstance(inner, DETAILS)
+                if known_light(inner, self._starts.text):
+                    is_detail = False
+                if is_detail or self._is_unread(action):
                     self.lost.append(Lost(action.line, type(inner).__name__, is_detail=True))
                 else:
                     actions.append(replace(action, action=self._counted(group, action.action)))

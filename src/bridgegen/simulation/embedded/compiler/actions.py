@@ -1,8 +1,10 @@
 """The actions of a storyboard, at the start and in events, as rows of integers."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
+from bridgegen.ego import lamps
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded._codes import (
@@ -18,6 +20,7 @@ from bridgegen.simulation.embedded._codes import (
     LANE_OFFSET,
     LATERALLY,
     SHOW,
+    SWITCH,
     TELEPORT,
 )
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
@@ -36,6 +39,16 @@ from bridgegen.simulation.embedded.program import (
 )
 
 _BY_TIME = 1
+
+LAMPS: Mapping[str, int] = MappingProxyType(
+    {
+        osc.VehicleLightType.INDICATOR_LEFT: lamps.LEFT,
+        osc.VehicleLightType.INDICATOR_RIGHT: lamps.RIGHT,
+        osc.VehicleLightType.WARNING_LIGHTS: lamps.HAZARD,
+        osc.VehicleLightType.BRAKE_LIGHTS: lamps.BRAKE,
+    }
+)
+"""The lights of a vehicle that drivers here see."""
 
 CONTROLLING = osc.ActivateControllerAction | osc.ControllerAction
 """The actions on who drives."""
@@ -149,16 +162,29 @@ class Actions:
             shown = (int(self._tables.truth(one)) for one in (action.sensors, action.traffic))
             slot, (sensors, traffic) = self._tables.slot(0.0), shown
             self.rows.append((entity, SHOW, 0, sensors, slot, slot, traffic))
+        elif isinstance(inner, osc.LightStateAction) and (switched := self.lamps(inner)):
+            mode = self._tables.choice(osc.LightMode, inner.light_state.mode)
+            is_lit, slot = int(mode != osc.LightMode.OFF), self._tables.slot(0.0)
+            self.rows.append((entity, SWITCH, 0, switched, slot, slot, is_lit))
         elif isinstance(action, CONTROLLING):
             if (row := self._controllers.row(action, entity)) is not None:
                 self.rows.append(row)
         elif not self.is_unseen(inner, entity):
             self._tables.unsupported(action, f"{type(inner).__name__} in an Event")
 
+    def lamps(self, action: Element) -> int:
+        """Return which lamps that drivers here see an action switches, as bits; 0: none."""
+        if not isinstance(action, osc.LightStateAction):
+            return 0
+        light = action.light_type.light
+        if not isinstance(light, osc.VehicleLight):
+            return 0
+        return LAMPS.get(self._tables.text(light.vehicle_light_type), 0)
+
     def is_unseen(self, action: Element, entity: int) -> bool:
         """Return whether an action changes only what no driver here sees; note it then."""
         if isinstance(action, osc.LightStateAction | osc.AnimationAction):
-            what = "lights" if isinstance(action, osc.LightStateAction) else "animations"
+            what = "other lights" if isinstance(action, osc.LightStateAction) else "animations"
             who = self._tables.names[entity]
             self._tables.note(action, f"no driver here sees the {what} of '{who}'")
             return True

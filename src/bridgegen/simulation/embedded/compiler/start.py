@@ -101,7 +101,9 @@ class Start:
                         first.append((wrapped, self._tables.entity(name)))
                     else:
                         init[name] = self._tables.slot(speed)
-                elif isinstance(action, osc.LateralAction | osc.VisibilityAction):
+                elif isinstance(
+                    action, osc.LateralAction | osc.VisibilityAction
+                ) or self._actions.lamps(inner):
                     first.append((wrapped, self._tables.entity(name)))
                 elif isinstance(inner, osc.FollowTrajectoryAction) and (
                     is_laid(inner)  # a driver needs a path, by the declared numbers

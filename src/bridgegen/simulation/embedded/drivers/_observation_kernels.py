@@ -15,15 +15,15 @@ from bridgegen.simulation.embedded._memory_kernels import (
 
 @kernel
 def observe(k, plan, roads, state, record, step, route, tracks):
-    """Let the sensors look, and fill the route ahead ``(P, 4)`` and the tracks ``(M, 12)``.
+    """Let the sensors look, and fill the route ahead ``(P, 4)`` and the tracks ``(M, 13)``.
 
     Returns:
         the distance to the next stop line of a light [m], +inf if there is none; and its state.
     """
     perceive(
         k, plan.dt, state.key[0], plan.ideal_perception, state.visible, record.x, record.y,
-        record.h, record.v, plan.bodies, plan.kinds, state.weather, state.sensors, state.tracks,
-        record.detections,
+        record.h, record.v, plan.bodies, plan.kinds, state.lamps, state.weather, state.sensors,
+        state.tracks, record.detections,
     )  # fmt: skip
     for e in range(tracks.shape[0]):
         for i in range(tracks.shape[1]):
@@ -52,7 +52,7 @@ def observe(k, plan, roads, state, record, step, route, tracks):
 def observe_rows(k, plan, networks, rows, states, records, step, route, tracks, stop, light):
     """Fill what `Observation` has of rows that run.
 
-    ``route (N, P, 4)``, ``tracks (N, M, 12)``, ``stop (N,)`` and ``light (N,)`` int8.
+    ``route (N, P, 4)``, ``tracks (N, M, 13)``, ``stop (N,)`` and ``light (N,)`` int8.
     """
     plan = bundled(plan)
     for i in range(len(rows)):

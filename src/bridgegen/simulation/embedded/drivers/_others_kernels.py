@@ -32,7 +32,9 @@ def heed(k, plan, roads, state, record):
     """Set ``allowed``: the acceleration [m/s²] that each driver allows from instant k on."""
     every = max(round(LOOK / plan.dt), 1)
     if k % every == 0:
-        see(k, plan.dt, record.x, record.y, record.h, record.v, plan.bodies, state.seen)
+        see(
+            k, plan.dt, record.x, record.y, record.h, record.v, plan.bodies, state.lamps, state.seen
+        )
     for e in range(1, record.x.shape[0]):
         state.allowed[e] = math.inf
         if plan.others[e] != ATTENTIVE:

@@ -13,6 +13,7 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     move_by_timetable,
     stop_follow,
 )
+from bridgegen.simulation.embedded.motion._lamp_kernels import show_lamps
 from bridgegen.simulation.embedded.motion._laying_kernels import move_laid, pose_along
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     is_pointless,
@@ -56,6 +57,7 @@ __all__ = [
     "note_presence",
     "pass_end",
     "pose_along",
+    "show_lamps",
     "start_at_distance",
     "start_at_speed",
     "start_towed",

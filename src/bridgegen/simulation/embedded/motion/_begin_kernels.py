@@ -31,6 +31,7 @@ from bridgegen.simulation.embedded._codes import (
     SHOW,
     SPEED_CHANGE,
     SPEED_PROFILE,
+    SWITCH,
     SYNCHRONIZE,
     TELEPORT,
 )
@@ -47,6 +48,7 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
     stop_follow,
     stop_route,
 )
+from bridgegen.simulation.embedded.motion._lamp_kernels import begin_switch
 from bridgegen.simulation.embedded.motion._laying_kernels import begin_laid
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     begin_add,
@@ -72,6 +74,7 @@ BEGINS: dict[int, Callable[..., Any]] = {
     CONNECT_TRAILER: begin_connect,
     DISCONNECT_TRAILER: begin_disconnect,
     SHOW: begin_show,
+    SWITCH: begin_switch,
     TELEPORT: begin_teleport,
     **dict.fromkeys((ASSIGN_ROUTE, ACQUIRE), begin_route),
     FOLLOW: begin_follow,
