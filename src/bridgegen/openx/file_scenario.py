@@ -20,6 +20,7 @@ from bridgegen.odd.scenario import SearchedScenario, content_of
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.site import Site
+from bridgegen.openx.geo import on_plane
 from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
@@ -136,6 +137,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     ranges = ranges_of(storyboard, definition, str(distribution))
     known: dict[Path, RoadFile] = {}
     roads = _roads_of(path, storyboard, known)
+    storyboard = on_plane(storyboard, roads.model, str(path))
     variants = {}
     for combination in ranges.combinations:
         codes = zip(ranges.variants, combination, strict=True)
@@ -232,7 +234,8 @@ def _variant(
     """
     try:
         storyboard = read(path, texts=texts)
-        return Variant(storyboard, _roads_of(path, storyboard, known))
+        roads = _roads_of(path, storyboard, known)
+        return Variant(on_plane(storyboard, roads.model, str(path)), roads)
     except InputError as error:
         said = ", ".join(f"{name} = '{text}'" for name, text in chosen.items())
         raise type(error)(*(f"{problem} [with {said}]" for problem in error.problems)) from None

@@ -205,7 +205,7 @@ POSITIONS = {
     "RelativeLanePosition": '<RelativeLanePosition entityRef="ego" dLane="0" ds="8"/>',
     "RoutePosition": f"""<RoutePosition><RouteRef>{_ROUTE}</RouteRef><InRoutePosition>
 <FromLaneCoordinates pathS="5" laneId="1"/></InRoutePosition></RoutePosition>""",
-    "GeoPosition": '<GeoPosition latitudeDeg="1" longitudeDeg="2"/>',
+    "GeoPosition": '<GeoPosition latitudeDeg="49.0001" longitudeDeg="8.0001"/>',
     "TrajectoryPosition": f"""<TrajectoryPosition s="5"><TrajectoryRef>{_trajectory(_LINE)}
 </TrajectoryRef></TrajectoryPosition>""",
 }

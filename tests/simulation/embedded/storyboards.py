@@ -5,7 +5,8 @@ import numpy as np
 from bridgegen.ego import DRIVERS
 from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.geo import on_plane
+from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
@@ -16,6 +17,8 @@ STATIC = {
     "arm_length": 100.0,
     "intersection_size": 26.0,
 }
+
+GLOBE = Header(1, 7, geo_reference="+proj=tmerc +lat_0=49 +lon_0=8 +datum=WGS84")
 
 
 def crossroads(**static: float) -> OpenDrive:
@@ -159,7 +162,7 @@ def simulator(
     text: str, ego: str | None = "route-follower", others: str | None = None
 ) -> EmbeddedSimulator:
     driver = DRIVERS[ego] if ego else None
-    file = read(text.encode(), "test.xosc")
+    file = on_plane(read(text.encode(), "test.xosc"), OpenDrive(GLOBE), "test.xosc")
     return EmbeddedSimulator(file, "test.xosc", driver=driver, others=others)
 
 
