@@ -85,6 +85,7 @@ KNOBS: Mapping[Template, Mapping[str, Knob]] = MappingProxyType(
             "lanes": Knob("count", 2, 1, 6, "In the direction of the road."),
             "lanes_against": Knob("count", 0, 0, 6, "In the other direction."),
             "length": Knob("m", 400.0, 20.0, 10000.0, "Where no segments say so."),
+            "grade": Knob("1", 0.0, -0.2, 0.2, "Rise by length, along the road; RAL: 0.08."),
         },
     }
 )

@@ -13,6 +13,7 @@ from bridgegen.odd.shape import (
     Number,
     Percent,
     QuantityField,
+    Ratio,
     ShapedSection,
     Speed,
 )
@@ -80,6 +81,7 @@ class RoadsSection(ShapedSection):
     lanes: QuantityField | None = None
     lanes_against: QuantityField | None = None
     length: Length | None = None
+    grade: Ratio | None = None
     merge_length: Length | None = None
     taper_length: Length | None = None
     after_length: Length | None = None

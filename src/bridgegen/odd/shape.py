@@ -115,6 +115,7 @@ Speed = Annotated[float | str, _quantity_in("m/s"), _QUANTITY]
 Acceleration = Annotated[float | str, _quantity_in("m/s²"), _QUANTITY]
 Angle = Annotated[float | str, _quantity_in("deg"), _QUANTITY]
 Curvature = Annotated[float | str, _quantity_in("1/m"), _QUANTITY]
+Ratio = Annotated[float | str, _quantity_in("1"), _QUANTITY]
 Percent = Annotated[float | str, _quantity_in("%"), _QUANTITY]
 LaneField = Annotated[
     int | str,

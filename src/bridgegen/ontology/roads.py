@@ -74,6 +74,8 @@ def _add_road(builder: Builder, leg: Leg, index: int, road: ArmRoad) -> ox.Named
         quantity(node, "has_speed_limit", road.speed_limit)
     if road.road_type is not None:
         put(node, "has_road_type", road.road_type)
+    if road.grade != 0.0 or isinstance(road.grade, Searched):
+        quantity(node, "has_grade", road.grade)
     for name, limit in road.closes.items():
         quantity(node, f"closes_above_{name}", limit)
     for number, segment in enumerate(road.segments, start=1):

@@ -74,6 +74,7 @@ class ArmRoad:
         road_type: town, rural or motorway, where known.
         segments: of its reference line; empty: straight.
         counts: number of lanes in and out, where a parameter gives it.
+        grade: its rise along the reference line by its length [1].
         closes: weather parameters beyond which it is closed, with the limits [%].
         station: where on the reference line distances begin [m], if not at the road's end.
         bends: of a map: absolute curvature of its reference line [1/m] at even steps from its
@@ -87,6 +88,7 @@ class ArmRoad:
     speed_limit: float | None = None
     road_type: str | None = None
     segments: tuple[SiteSegment, ...] = ()
+    grade: float = 0.0
     counts: Mapping[Direction, float] = field(default_factory=lambda: MappingProxyType({}))
     closes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     station: float | None = None

@@ -157,6 +157,7 @@ class _Template:
             speed_limit=self.knobs["speed_limit"],
             road_type=self.roads.road_type,
             segments=segments,
+            grade=self.knobs.get("grade", 0.0),
             counts=said,
             closes={name: self.measure(limit) for name, limit in self.roads.closes.items()},
         )

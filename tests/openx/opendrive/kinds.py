@@ -41,6 +41,7 @@ KINDS: dict[str, RoadsSpec] = {
     "five": town("crossroads", {n: LegSpec(72.0 * k) for k, n in enumerate("ABCDE")}),
     "straight": usual("road", lanes=3, lanes_against=1, shoulder_width=1.5, sidewalk_width=2.0),
     "one-way": usual("road", lanes=2, length=1000.0, speed_limit=33.3),
+    "downhill": usual("road", lanes=2, lanes_against=1, grade=-0.06),
     "curved": replace(
         usual("road", lanes=2, lanes_against=2),
         segments=(

@@ -154,7 +154,7 @@ def networks(pick: st.DrawFn) -> RoadsSpec:
         ("lane_width", 3.0, 3.6), ("speed_limit", 5.0, 35.0), ("sidewalk_width", 0.5, 2.0),
         ("arm_length", 50.0, 80.0), ("after_length", 290.0, 400.0),
         ("intersection_size", 60.0, 90.0), ("green_time", 5.0, 60.0),
-        ("closing_fog_density", 10.0, 99.0),
+        ("closing_fog_density", 10.0, 99.0), ("grade", -0.1, 0.1),
         ("merge_length", 60.0, 150.0), ("radius", 20.0, 40.0), ("taper_length", 20.0, 80.0),
     ):  # fmt: skip
         if knob in knobs:

@@ -4,8 +4,8 @@ import numpy as np
 
 from bridgegen.ego import DRIVERS
 from bridgegen.ontology.individuals import build_static
-from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.geo import on_plane
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator

@@ -16,6 +16,7 @@ from bridgegen.ontology.check import check
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.physics import GRAVITY, GRIP
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.scenario_words import story_lines
 
@@ -494,6 +495,26 @@ EVENTS = {
     "must have an action: speed, lane_change, lane_offset": "",
     "indicate must be 'left', 'right', 'hazard' or 'off', got 'both'": "indicate: both",
 }
+
+
+def test_downhill_the_ego_brakes_less(made, monkeypatch):
+    """At 25 m/s towards a car that stands 35 m ahead: with all that the road gives."""
+    stands = PARTICIPANTS.replace("lane: 1}\n    speed: 20.0", "lane: 2}\n    speed: 0.0")
+    stands = stands.replace("speed: 20.0", "speed: 25.0")
+    hardest, plain = {}, HEAD
+    for grade, rise in (("0 %", 0.0), ("-6 %", -0.06), ("0.06", 0.06)):
+        head = plain.replace("motorway}", f"motorway, grade: {grade}}}")
+        monkeypatch.setitem(globals(), "HEAD", head)
+        pipeline = made(stands)
+        rollout = pipeline.rollout(pipeline.space.row({"other_at": 90.0})[np.newaxis])
+        hardest[grade] = -rollout.a[0, 0].min()
+        there_and_back(pipeline)
+        concrete = pipeline.concrete(pipeline.space.row({}), "roads.xodr")
+        assert concrete.roads.roads[0].elevations[0].b == rise
+    angle = np.arctan(0.06)
+    assert hardest["0 %"] == pytest.approx(GRIP)
+    assert hardest["-6 %"] == pytest.approx(GRIP * np.cos(angle) - GRAVITY * np.sin(angle))
+    assert hardest["0.06"] == pytest.approx(GRIP)  # uphill more would do, but it asks for no more
 
 
 def test_indicating(made):

@@ -51,6 +51,7 @@ class Arm:
         strips_out: beside the lanes away from it.
         turns: where each inbound lane leads, innermost first; empty: by rule.
         road_type: OpenDRIVE's.
+        grade: its rise along the reference line, by its length.
         objects: what lies on it.
         signals: what stands beside it.
         user_data: its further values.
@@ -68,6 +69,7 @@ class Arm:
     strips_out: Strips = ()
     turns: tuple[frozenset[str], ...] = ()
     road_type: str = "town"
+    grade: float = 0.0
     objects: tuple[Object, ...] = field(default=())
     signals: tuple[Signal, ...] = field(default=())
     user_data: tuple[UserData, ...] = ()
@@ -149,7 +151,7 @@ def road_of(
         successor=link if arm.junction_end == "end" else None,
         types=types_of(arm.speed_limit, arm.road_type),
         plan_view=plan_view,
-        elevations=LEVEL,
+        elevations=(Cubic(0.0, 0.0, arm.grade, 0.0, 0.0),) if arm.grade else LEVEL,
         lane_offsets=LEVEL,
         sections=sections or _with_turns(arm, arm_sections(*arm.sides())),
         objects=arm.objects,

@@ -58,6 +58,9 @@ def read_arm(
     )
     if bent:
         problems.append(f"{what}: a generated leg must be straight, got a bend (has_segment)")
+    grade = individuals.optional_number(leg, "has_grade") or 0.0
+    if grade and junction_end != "none":
+        problems.append(f"{what}: a generated leg must be level, got has_grade {grade:g}")
     lanes = _Lanes(individuals, leg, junction_end, problems, widens)
     arm = Arm(
         name=individuals.text(leg, "has_name"),
@@ -72,6 +75,7 @@ def read_arm(
         strips_out=lanes.strips("out"),
         turns=lanes.turns(),
         road_type=individuals.optional_text(leg, "has_road_type") or "town",
+        grade=grade,
         objects=tuple(objects_on(individuals, leg, lanes.reach, length, problems)),
         signals=tuple(signals_on(individuals, leg, lanes.reach, junction_end, problems)),
         user_data=tuple(_about(individuals, leg, heading, junction_end)),

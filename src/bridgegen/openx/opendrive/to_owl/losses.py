@@ -12,9 +12,9 @@ from bridgegen.openx.opendrive.to_owl.furniture import class_of
 def losses(model: OpenDrive) -> Iterator[str]:
     """Yield a sentence for each kind of content of a map that its individuals lack in part.
 
-    Left out of every import, and not reported here: elevations and lateral profiles, lane offsets,
-    widths but at the start and the middle of a lane section, where along a lane its lines begin,
-    the shapes and heights of objects, and lane speed limits.
+    Left out of every import, and not reported here: elevations but an even grade, lateral profiles,
+    lane offsets, widths but at the start and the middle of a lane section, where along a lane its
+    lines begin, the shapes and heights of objects, and lane speed limits.
 
     Args:
         model: the road network.

@@ -110,6 +110,10 @@ class _Map(Builder):
             above = number(road.user_data, name)
             if above is not None:
                 self.put(node, name, above)
+        if len(road.elevations) == 1 and not (road.elevations[0].c or road.elevations[0].d):
+            rise = road.elevations[0].b
+            if rise:
+                self.put(node, "has_grade", float(rise))
         self.join(node, "has_predecessor", road.predecessor)
         self.join(node, "has_successor", road.successor)
         if end in ("start", "end"):
