@@ -93,6 +93,9 @@ def test_equal_results_are_rewarded_by_their_sign():
     reward = Reward()
     assert reward(np.zeros(3), np.ones(3, bool)).tolist() == [0.0] * 3
     assert reward(np.array([-1e-9, 1e-9]), np.ones(2, bool)).tolist() == [5.0, -5.0]
+    reward = Reward()
+    reward(np.array([-0.0, 0.0, -0.0, -0.0]), np.ones(4, bool))
+    assert reward(np.array([-1e-9, 1e-9]), np.ones(2, bool)).tolist() == [5.0, -5.0]
 
 
 @given(

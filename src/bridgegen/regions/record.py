@@ -69,7 +69,7 @@ def _number(*values: Any) -> None:
 
 
 def _reason(error: Exception) -> str:
-    return f"lacks {error}" if isinstance(error, KeyError) else f"is not: {error}"
+    return f"lacks {str(error)[:60]}" if isinstance(error, KeyError) else f"is not: {error}"
 
 
 def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:

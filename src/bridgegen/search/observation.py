@@ -81,7 +81,7 @@ class Reward:
         if not self.scale[0] and good.any():
             low, centre, high = np.quantile(F[good], (0.25, 0.5, 0.75), method="lower")
             with np.errstate(over="ignore"):
-                self.scale[:] = 1.0, centre, high - low
+                self.scale[:] = 1.0, centre, abs(high - low)  # −0 − 0 is −0
         _, centre, spread = self.scale
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             # Where all were equal, better is LIMIT, worse is −LIMIT, and equal (0/0) is 0.
