@@ -59,13 +59,30 @@ def run(tmp_path_factory) -> bg.Run:
     )
 
 
-every = pytest.mark.parametrize(
-    "name", [f"{one}{more}" for one in names() for more in ("", "-random")]
+EVERY = [f"{one}{more}" for one in names() for more in ("", "-random")]
+every = pytest.mark.parametrize("name", EVERY)
+
+
+INDICATES = ("bus-pulls-out", "bus-pulls-out-random")
+
+
+@pytest.mark.parametrize("name", INDICATES)
+def test_lights_are_said_from_1_3_on(catalogue, tmp_path, name):
+    with pytest.raises(UnsupportedError, match=r"AppearanceAction cannot be said in version 1\.2"):
+        export(catalogue[name], "1.2", out=tmp_path)
+    path, _ = export(catalogue[name], "resolved", out=tmp_path)
+    assert read(path).file_header.rev_minor == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "flavour"),
+    [
+        (name, flavour)
+        for name in EVERY
+        for flavour in ("1.2", "1.3", "resolved")
+        if name not in INDICATES or flavour != "1.2"
+    ],
 )
-
-
-@every
-@pytest.mark.parametrize("flavour", ["1.2", "1.3", "resolved"])
 def test_the_same_motion_bit_for_bit(catalogue, tmp_path, name, flavour):
     path, _ = export(catalogue[name], flavour, out=tmp_path)
     assert validate_file(path) == []
