@@ -421,6 +421,18 @@ def moves_as(file: Path, owl: Path, folder: Path) -> None:
 BESIDE = '<LanePosition roadId="2" laneId="1" s="12.25" offset="0"/>'
 FIRST = '<LanePosition roadId="1" laneId="1" s="30" offset="0"/>'
 SPEED = '<AbsoluteTargetSpeed value="4"/>'
+TELEPORT = f"""<PrivateAction><TeleportAction><Position>
+          {BESIDE}
+        </Position></TeleportAction></PrivateAction>"""
+NEAR = FILE[FILE.index("<RelativeDistanceCondition") : FILE.index("</EntityCondition>")]
+
+
+def follows(*places: str) -> str:
+    vertices = "".join(f'<Vertex time="0"><Position>{one}</Position></Vertex>' for one in places)
+    return f"""<PrivateAction><RoutingAction><FollowTrajectoryAction><Trajectory name="t"
+      closed="false"><ParameterDeclarations/><Shape><Polyline>{vertices}</Polyline></Shape>
+      </Trajectory><TimeReference><None/></TimeReference><TrajectoryFollowingMode
+      followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>"""
 
 
 @pytest.mark.parametrize(
@@ -446,6 +458,11 @@ SPEED = '<AbsoluteTargetSpeed value="4"/>'
         ("<StartTrigger>" + over_time("0"), "<StartTrigger>" + over_time("3")),
         ('"near" delay="0" conditionEdge="none"', '"near" delay="1.5" conditionEdge="none"'),
         ('"near" delay="0" conditionEdge="none"', '"near" delay="0" conditionEdge="rising"'),
+        (TELEPORT, follows(BESIDE, '<LanePosition roadId="2" laneId="1" s="2"/>')),
+        (TELEPORT, follows('<RoadPosition roadId="2" s="12.25" t="-11"/>',
+                           '<RoadPosition roadId="2" s="30" t="-12"/>')),
+        (NEAR, '<ReachPositionCondition tolerance="2"><Position><RoadPosition roadId="1" s="20" '
+         't="1.75"/></Position></ReachPositionCondition>'),
     ],
 )  # fmt: skip
 def test_what_is_said_otherwise_is_the_same(plain, folder, old, new):

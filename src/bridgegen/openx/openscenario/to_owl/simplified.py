@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element, rewritten
 from bridgegen.openx.openscenario.to_owl.build import Lost
 from bridgegen.openx.openscenario.to_owl.differences import DETAILS
 from bridgegen.openx.openscenario.to_owl.lights import known_light
@@ -29,6 +30,8 @@ _LATER = (
     osc.LaneChangeAction,
     osc.SynchronizeAction,
 )
+_ON_MAP = osc.RoutePosition | osc.RoadPosition | osc.LanePosition
+Wrapped = osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction
 _ONCE = osc.StoryboardElementType.EVENT
 
 
@@ -72,9 +75,29 @@ class _Simplified:
             stories.append(osc.Story(name="initial", acts=(osc.Act("initial", tuple(later)),)))
         actions = replace(storyboard.init.actions, privates=tuple(private for private, _ in begun))
         init = replace(storyboard.init, actions=actions)
-        self.scenario = replace(
-            scenario, storyboard=replace(storyboard, init=init, stories=tuple(stories))
-        )
+        told = replace(storyboard, init=init, stories=tuple(stories))
+        self.scenario = replace(scenario, storyboard=rewritten(told, self._on_map))
+
+    def _on_map(self, element: Element) -> Element:
+        """Return a place along a route, or by a road's coordinates, as one the ontology knows.
+
+        And a trajectory without the times that do not count.
+        """
+        if isinstance(element, osc.FollowTrajectoryAction) and not isinstance(
+            element.time_reference.reference, osc.Timing
+        ):
+            return replace(element, trajectory_ref=rewritten(element.trajectory_ref, _untimed))
+        if not isinstance(element, osc.Position) or not isinstance(element.position, _ON_MAP):
+            return element
+        found = self._starts.place(element)
+        if found is None:
+            return element
+        where = found.position
+        if element.position.orientation is None and isinstance(where, osc.LanePosition):
+            return replace(found, position=replace(where, orientation=None))
+        if element.position.orientation is None and isinstance(where, osc.WorldPosition):
+            return replace(found, position=replace(where, h=None))
+        return found
 
     # -- the start ---------------------------------------------------------------------------------
 
@@ -125,13 +148,13 @@ class _Simplified:
             actions = []
             for action in event.actions:
                 inner = _inner(action.action)
-                is_detail = isinstance(inner, DETAILS)
-                if known_light(inner, self._starts.text):
-                    is_detail = False
-                if is_detail or self._is_unread(action):
+                is_lit = known_light(inner, self._starts.text) is not None
+                if (isinstance(inner, DETAILS) and not is_lit) or self._is_unread(action):
                     self.lost.append(Lost(action.line, type(inner).__name__, is_detail=True))
                 else:
-                    actions.append(replace(action, action=self._counted(group, action.action)))
+                    actions.append(
+                        replace(action, action=self._counted(group, self._put(action.action)))
+                    )
             if not actions:
                 continue
             if alike and event.priority in (osc.Priority.OVERRIDE, osc.Priority.OVERWRITE):
@@ -141,6 +164,16 @@ class _Simplified:
             event = replace(event, actions=tuple(actions), start_trigger=trigger)
             events.append(event if begins is None else _after(event, begins))
         return replace(maneuver, events=tuple(events))
+
+    def _put(self, wrapped: Wrapped) -> Wrapped:
+        """Return an action that teleports to a place with the heading there."""
+        if (
+            isinstance(wrapped, osc.PrivateAction)
+            and isinstance(wrapped.action, osc.TeleportAction)
+            and isinstance(wrapped.action.position.position, _ON_MAP)
+        ):
+            return self._starts.absolute(wrapped)
+        return wrapped
 
     def _is_unread(self, action: osc.Action) -> bool:
         """Return whether an action sets a variable that no event waits for."""
@@ -199,8 +232,8 @@ class _Simplified:
     def _counted(
         self,
         group: osc.ManeuverGroup,
-        wrapped: osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction,
-    ) -> osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction:
+        wrapped: Wrapped,
+    ) -> Wrapped:
         """Return a lane change whose lanes count from the actor's own, where both are known."""
         action = _inner(wrapped)
         actors = self._actors(group)
@@ -250,7 +283,30 @@ def _placed(actions: osc.InitActions) -> osc.InitActions:
             added.append(osc.Private(action.entity_ref, (put,), line=one.line))
         else:
             kept.append(one)
-    return replace(actions, global_actions=tuple(kept), privates=(*added, *actions.privates))
+    privates = tuple(map(_at_its_trajectory, actions.privates))
+    return replace(actions, global_actions=tuple(kept), privates=(*added, *privates))
+
+
+def _untimed(element: Element) -> Element:
+    return replace(element, time=None) if isinstance(element, osc.Vertex) else element
+
+
+def _at_its_trajectory(private: osc.Private) -> osc.Private:
+    """Return the start of an entity that follows a trajectory, and so is at its first vertex."""
+    first: osc.Position | None = None
+    for wrapped in private.private_actions:
+        inner = _inner(wrapped)
+        if isinstance(wrapped.action, osc.TeleportAction):
+            return private
+        if isinstance(inner, osc.FollowTrajectoryAction):
+            trajectory = inner.trajectory_ref.trajectory
+            shape = None if trajectory is None else trajectory.shape.shape
+            if isinstance(shape, osc.Polyline) and shape.vertices:
+                first = shape.vertices[0].position
+    if first is None:
+        return private
+    put = osc.PrivateAction(osc.TeleportAction(first), line=private.line)
+    return replace(private, private_actions=(put, *private.private_actions))
 
 
 def _events(storyboard: osc.Storyboard) -> Iterator[tuple[osc.ManeuverGroup, osc.Event]]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from bridgegen.errors import InputError
+from bridgegen.openx.opendrive.geometry import reference_line
 from bridgegen.openx.opendrive.lanes import borders, lane_at, lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.routes import plan_route
@@ -52,7 +53,9 @@ class Starts:
         """Return an initial action whose place is on a lane, and whose speed is a number."""
         action = wrapped.action
         if isinstance(action, osc.TeleportAction):
-            place = self._on_lane(action.position, 0) or self._in_world(action.position)
+            place = self.place(action.position)
+            if place is None:
+                place = self._in_world(action.position)
             if place is not None and place is not action.position:
                 return replace(wrapped, action=replace(action, position=place))
         elif isinstance(action, osc.LongitudinalAction) and isinstance(
@@ -64,6 +67,36 @@ class Starts:
                 changed = replace(action.action, speed_action_target=target)
                 return replace(wrapped, action=replace(action, action=changed))
         return wrapped
+
+    def place(self, position: osc.Position) -> osc.Position | None:
+        """Return a place of the map as one on a lane, or of the world; None where it is neither."""
+        found = self._on_lane(position, 0)
+        where = position.position if found is None else found.position
+        try:
+            if isinstance(where, osc.LanePosition):
+                return self._turned(position if found is None else found, where)
+            if isinstance(where, osc.RoadPosition):
+                return replace(position, position=self._beside_lanes(where))
+        except (InputError, ValueError):
+            return None
+        return found
+
+    def _beside_lanes(self, where: osc.RoadPosition) -> osc.WorldPosition:
+        """Return a place beside all lanes of a road as a point of the world.
+
+        Raises:
+            InputError: there is no such road.
+        """
+        road, t = self._roads.road(self.text(where.road_id)), self.number(where.t)
+        line = reference_line(road, np.array([self.number(where.s)]))
+        x, y, h = (float(one[0]) for one in (line.x, line.y, line.h))
+        turned, facing = where.orientation, h
+        if turned is not None and turned.h is not None:
+            own = self.number(turned.h)
+            facing = own if self._is_absolute(turned) else h + own
+        facing = math.remainder(facing, math.tau)
+        at = x - t * math.sin(h), y + t * math.cos(h)
+        return osc.WorldPosition(*at, None, facing, None, None, line=where.line)
 
     def lane(self, entity: str) -> tuple[str, int] | None:
         """Return the road and the lane that an entity starts on; None where it is on none."""
