@@ -14,13 +14,13 @@ from bridgegen import metrics as measures
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import Conflicts, analyse
 from bridgegen.errors import FileFormatError, UnknownNameError
-from bridgegen.openx.geo import on_plane
 from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.openx.prepared import prepared
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
@@ -112,7 +112,7 @@ def simulate_file(
     scenario = read_scenario(path, skipped=skipped, warnings=warnings)
     scenario = read_empty_triggers(scenario, empty_trigger)
     roads = roads_of(scenario, path)
-    scenario = on_plane(scenario, roads, str(path))
+    scenario = prepared(scenario, roads, str(path))
     problems = openscenario_validate.problems(scenario, roads)
     if problems:
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))

@@ -10,7 +10,6 @@ from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
 from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.geo import on_plane
 from bridgegen.openx.logic_file import logic_path, roads_of
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import write as opendrive_write
@@ -24,6 +23,7 @@ from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
+from bridgegen.openx.prepared import prepared
 from bridgegen.openx.xml import read_bytes
 
 
@@ -126,7 +126,7 @@ def _import_storyboard(
     if ego is not None:
         scenario = rename_entity(scenario, ego, EGO)
     roads = roads_of(scenario, file)
-    scenario = on_plane(scenario, roads, str(file))
+    scenario = prepared(scenario, roads, str(file))
     road_map = logic_path(scenario, file)
     individuals, lost = individuals_from_openscenario(
         scenario,

@@ -20,7 +20,6 @@ from bridgegen.odd.scenario import SearchedScenario, content_of
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.site import Site
-from bridgegen.openx.geo import on_plane
 from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
@@ -38,6 +37,7 @@ from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.values import Kind, format_double
+from bridgegen.openx.prepared import prepared
 from bridgegen.openx.xml import read_bytes
 
 MAX_SEED = 2**32 - 1
@@ -137,7 +137,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     ranges = ranges_of(storyboard, definition, str(distribution))
     known: dict[Path, RoadFile] = {}
     roads = _roads_of(path, storyboard, known)
-    storyboard = on_plane(storyboard, roads.model, str(path))
+    storyboard = prepared(storyboard, roads.model, str(path))
     variants = {}
     for combination in ranges.combinations:
         codes = zip(ranges.variants, combination, strict=True)
@@ -235,7 +235,7 @@ def _variant(
     try:
         storyboard = read(path, texts=texts)
         roads = _roads_of(path, storyboard, known)
-        return Variant(on_plane(storyboard, roads.model, str(path)), roads)
+        return Variant(prepared(storyboard, roads.model, str(path)), roads)
     except InputError as error:
         said = ", ".join(f"{name} = '{text}'" for name, text in chosen.items())
         raise type(error)(*(f"{problem} [with {said}]" for problem in error.problems)) from None

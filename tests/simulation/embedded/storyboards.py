@@ -1,13 +1,16 @@
 """Small scenarios for tests, written as OpenSCENARIO text on the generated crossroads."""
 
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 
 from bridgegen.ego import DRIVERS
 from bridgegen.ontology.individuals import build_static
-from bridgegen.openx.geo import on_plane
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.prepared import prepared
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
 
@@ -23,6 +26,11 @@ GLOBE = Header(1, 7, geo_reference="+proj=tmerc +lat_0=49 +lon_0=8 +datum=WGS84"
 
 def crossroads(**static: float) -> OpenDrive:
     return opendrive_from_owl(build_static(STATIC | static))
+
+
+@cache
+def _on_the_globe() -> OpenDrive:
+    return replace(crossroads(), header=GLOBE)
 
 
 WALKER = """<ScenarioObject name="{name}"><Pedestrian name="p" pedestrianCategory="pedestrian"
@@ -162,7 +170,7 @@ def simulator(
     text: str, ego: str | None = "route-follower", others: str | None = None
 ) -> EmbeddedSimulator:
     driver = DRIVERS[ego] if ego else None
-    file = on_plane(read(text.encode(), "test.xosc"), OpenDrive(GLOBE), "test.xosc")
+    file = prepared(read(text.encode(), "test.xosc"), _on_the_globe(), "test.xosc")
     return EmbeddedSimulator(file, "test.xosc", driver=driver, others=others)
 
 
