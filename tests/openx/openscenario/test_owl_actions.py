@@ -120,7 +120,7 @@ def test_they_are_valid_by_the_schema_and_by_the_checkers(checkers, individuals,
     path = tmp_path / "all.xosc"
     path.write_bytes(to_xml(openscenario_from_owl(stage.individuals(), "road.xodr")))
     (tmp_path / "road.xodr").write_bytes(_road(source))
-    schema = checkers.schema("qc_openscenario", "1.2.0/OpenSCENARIO.xsd")
+    schema = checkers.schema("qc_openscenario", "1.3.0/OpenSCENARIO.xsd")  # for lights
     assert schema.validate(etree.parse(path)), schema.error_log
     (report,) = checkers.qc_openscenario(path)
     assert report.clean, report

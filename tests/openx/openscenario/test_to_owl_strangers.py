@@ -476,6 +476,23 @@ def test_what_is_said_otherwise_is_the_same(plain, folder, old, new):
     moves_as(plain, owl, folder)
 
 
+def pressing(active: str) -> str:
+    return f"""<PrivateAction><ControllerAction><OverrideControllerValueAction>
+      <Throttle active="{active}" value="0.5"/></OverrideControllerValueAction>
+      </ControllerAction></PrivateAction><PrivateAction><LongitudinalAction>"""
+
+
+def test_a_pedal_that_is_held_matters_and_one_that_is_let_go_of_does_not(plain, folder):
+    whole, before = plain.read_text(), "<PrivateAction><LongitudinalAction>"
+    plain.write_text(whole.replace(before, pressing("true"), 1))
+    with pytest.raises(UnsupportedError, match=r"ControllerAction .*in the ontology"):
+        import_file(plain, ego="Hero")
+    plain.write_text(whole.replace(before, pressing("false"), 1))
+    owl, (note,) = import_file(plain, ego="Hero")
+    assert "ControllerAction" in note
+    moves_as(plain, owl, folder)
+
+
 def test_an_initial_action_that_is_none_of_ours_is_an_event_at_once(plain, folder):
     text = plain.read_text()
     offset = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">

@@ -24,12 +24,16 @@ from bridgegen.simulation.embedded.drivers import (
 )
 from bridgegen.simulation.embedded.motion import (
     arrive,
+    command_by_pedals,
     command_speed,
     move_along_path,
     move_by_timetable,
+    move_pedals,
     note_presence,
+    pressed,
     show_lamps,
     stay_away,
+    steered,
 )
 from bridgegen.simulation.embedded.places._place_kernels import fail
 from bridgegen.simulation.embedded.storyboard import decide, finish
@@ -64,6 +68,13 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move all entities to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
+    if plan.has_pedals:
+        move_pedals(plan, state)
+        if state.holds[0] and plan.is_driven:
+            if state.drives[LONGITUDINALLY] == 0:
+                demanded = (state.command[0] - record.v[0, k]) / plan.dt
+            demanded = pressed(0, demanded, plan, state)
+            curvature = steered(curvature, state)
     if plan.attends:
         run_kernel_at(plan.heeds, (k, plan, roads, state, record))
     if is_steered(plan, state):
@@ -88,6 +99,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         before = state.command[e]
         if e > 0 or not plan.is_driven:
             command_speed(e, k, plan, roads, state, record)
+        if plan.has_pedals and state.holds[e]:
+            command_by_pedals(e, k, plan, roads, state, record)
         if plan.moves_laid and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
         elif plan.attends and plan.others[e] == ATTENTIVE:

@@ -83,6 +83,7 @@ class Plan(NamedTuple):
     heeds: int
     begins_waiting: int
     is_driven: int
+    has_pedals: int
     driver_code: int
     own_code: int
     ideal_perception: int
@@ -170,6 +171,8 @@ class State(NamedTuple):
         minded: ``(E,)`` bool, and attentive drivers may,
         switched: ``(E,)`` int64, its lamps as the storyboard has them; see `bridgegen.ego.lamps`,
         lamps: ``(E,)`` int64, and what shows,
+        holds: ``(E,)`` int64, which pedals are held, as bits; see ``_pedal_kernels``,
+        pedals: ``(E, 5, 4)`` where they are,
         tower: ``(E,)`` int64, by which entity it is towed; -1: by none,
         straight: ``(E,)`` bool, it is put straight behind that one, which was teleported.
         drives: ``(2,)`` int64, whether the driver steers, and sets the speed; see ``_codes``.
@@ -258,6 +261,8 @@ class State(NamedTuple):
     minded: Annotated[Bool, "entities"]
     switched: Annotated[Int, "entities"]
     lamps: Annotated[Int, "entities"]
+    holds: Annotated[Int, "entities"]
+    pedals: Annotated[Float, "entities", 5, 4]
     tower: Annotated[Int, "entities"]
     straight: Annotated[Bool, "entities"]
     drives: Annotated[Int, 2]

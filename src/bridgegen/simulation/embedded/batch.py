@@ -24,7 +24,13 @@ from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
 from bridgegen.simulation.embedded import drivers
-from bridgegen.simulation.embedded._codes import CLOSELY, COURSE_MEMORY, DELAY
+from bridgegen.simulation.embedded._codes import (
+    CLOSELY,
+    COURSE_MEMORY,
+    DELAY,
+    DOES,
+    PRESS,
+)
 from bridgegen.simulation.embedded.addresses import addressed
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
@@ -322,6 +328,7 @@ def _plan(program: Program) -> memory.Plan:
         "heeds": 0,
         "begins_waiting": 0,
         "is_driven": int(program.driver != STORYBOARD),
+        "has_pedals": int((program.actions[:, DOES] == PRESS).any()),
         "driver_code": 0,
         "own_code": 0,
         "dt": program.time_step,

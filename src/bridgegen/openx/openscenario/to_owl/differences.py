@@ -7,7 +7,7 @@ besides; a value that the standard takes where none is written is that value.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Attribute, Element, children_of, declaration
@@ -83,6 +83,24 @@ _OLD_NAMES: dict[Any, Any] = {
 }
 
 
+def is_detail(element: object) -> bool:
+    """Return whether nothing that happens depends on an element."""
+    return isinstance(element, DETAILS) and not _holds_pedals(element)
+
+
+def _controls(element: object) -> TypeGuard[osc.ControllerAction]:
+    return isinstance(element, osc.ControllerAction)
+
+
+def _holds_pedals(element: object) -> bool:
+    """Return whether an action holds a pedal, the wheel or the gear, or may do so."""
+    part = element.override_controller_value_action if _controls(element) else None
+    pedals = () if part is None else (
+        part.throttle, part.brake, part.clutch, part.parking_brake, part.steering_wheel, part.gear
+    )  # fmt: skip
+    return any(one is not None and one.active is not False for one in pedals)
+
+
 @dataclass(frozen=True)
 class Differences:
     """Compares elements of two files.
@@ -100,7 +118,7 @@ class Differences:
         tag = type(one).__name__
         if other is None or type(other) is not type(one):
             if not _is_nothing(one):
-                yield Lost(one.line, _called(one), isinstance(one, DETAILS))
+                yield Lost(one.line, _called(one), is_detail(one))
             return
         step = isinstance(one, osc.TransitionDynamics) and (
             one.dynamics_shape == osc.DynamicsShape.STEP == getattr(other, "dynamics_shape", None)
@@ -119,7 +137,7 @@ class Differences:
             shown = str(said).lower() if isinstance(said, bool) else said
             becomes = "" if again is None else f" (it would become {_text(again, self.there)})"
             detail = (
-                isinstance(one, DETAILS)
+                is_detail(one)
                 or (type(one), attribute.field) in _DETAIL_FIELDS
                 or self._is_size(one, other)
             )
@@ -130,7 +148,7 @@ class Differences:
             )
         text = declaration(type(one)).text
         if text is not None and getattr(one, text) != getattr(other, text):
-            yield Lost(one.line, f"the text of {tag}", isinstance(one, DETAILS))
+            yield Lost(one.line, f"the text of {tag}", is_detail(one))
         yield from self._below(one, other)
 
     def _below(self, one: Element, other: Element) -> Iterator[Lost]:

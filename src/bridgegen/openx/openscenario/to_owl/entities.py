@@ -13,7 +13,7 @@ from bridgegen.openx.openscenario.to_owl.actions import (
     put_speed,
 )
 from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, UnsayableError
-from bridgegen.openx.openscenario.to_owl.differences import DETAILS
+from bridgegen.openx.openscenario.to_owl.differences import is_detail
 from bridgegen.openx.openscenario.to_owl.places import add_position
 from bridgegen.participants import PARTICIPANTS
 
@@ -200,5 +200,5 @@ def _add_init(
     elif isinstance(action, osc.AssignRouteAction):
         builder.put(node, "has_route", add_route(builder, name, action.route, start))
     else:
-        is_detail = issubclass(kind, DETAILS)
-        raise UnsayableError(wrapped, f"an initial {kind.__name__}", is_detail=is_detail)
+        what = f"an initial {kind.__name__}"
+        raise UnsayableError(wrapped, what, is_detail=is_detail(action))

@@ -17,7 +17,7 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, rewritten
 from bridgegen.openx.openscenario.to_owl.build import Lost
-from bridgegen.openx.openscenario.to_owl.differences import DETAILS
+from bridgegen.openx.openscenario.to_owl.differences import is_detail
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.starts import Starts
 
@@ -110,7 +110,7 @@ class _Simplified:
             if light or isinstance(inner, _LATER):
                 name = f"{self._starts.text(private.entity_ref)}_{light or type(inner).__name__}"
                 later.append(_at_once(name, private, wrapped))
-            elif isinstance(inner, DETAILS):
+            elif is_detail(inner):
                 what = f"an initial {type(inner).__name__}"
                 self.lost.append(Lost(wrapped.line, what, is_detail=True))
             else:
@@ -149,7 +149,7 @@ class _Simplified:
             for action in event.actions:
                 inner = _inner(action.action)
                 is_lit = known_light(inner, self._starts.text) is not None
-                if (isinstance(inner, DETAILS) and not is_lit) or self._is_unread(action):
+                if (is_detail(inner) and not is_lit) or self._is_unread(action):
                     self.lost.append(Lost(action.line, type(inner).__name__, is_detail=True))
                 else:
                     actions.append(

@@ -23,10 +23,11 @@ from bridgegen.simulation.embedded._codes import (
     SWITCH,
     TELEPORT,
 )
-from bridgegen.simulation.embedded.compiler.controllers import Controllers
+from bridgegen.simulation.embedded.compiler.controllers import Controllers, parts
 from bridgegen.simulation.embedded.compiler.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
 from bridgegen.simulation.embedded.compiler.layouts import Layouts, is_laid
+from bridgegen.simulation.embedded.compiler.pedals import Pedals
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.towing import Towing
@@ -86,6 +87,7 @@ class Actions:
         self.laterals: list[tuple[int, ...]] = []
         self.lane_checks: list[LaneCheck] = []
         self.courses = Courses(tables, positions)
+        self._pedals = Pedals(tables)
         self.layouts = Layouts(tables, positions)
         self.rows: list[tuple[int, ...]] = []
         self.initial: list[int] = []
@@ -99,6 +101,20 @@ class Actions:
         for i in range(first, len(self.rows)):
             self.rows[i] = (*self.rows[i], 0)
             self.initial.append(i)
+
+    def begin_pedals(self, action: Element, entity: int) -> None:
+        """Add the pedals that one entity holds from the start on."""
+        first = len(self.rows)
+        self._press(action, entity)
+        for i in range(first, len(self.rows)):
+            self.rows[i] = (*self.rows[i], 0)
+            self.initial.append(i)
+
+    def _press(self, action: Element, entity: int) -> None:
+        steers = entity == 0 and self._controllers.has_driver
+        for part in parts(action):
+            if isinstance(part, osc.OverrideControllerValueAction):
+                self.rows += self._pedals.rows(part, entity, steers=steers)
 
     def begin_with_all(self, action: Element) -> None:
         """Add what concerns all from the start on."""
@@ -169,6 +185,7 @@ class Actions:
         elif isinstance(action, CONTROLLING):
             if (row := self._controllers.row(action, entity)) is not None:
                 self.rows.append(row)
+            self._press(action, entity)
         elif not self.is_unseen(inner, entity):
             self._tables.unsupported(action, f"{type(inner).__name__} in an Event")
 

@@ -68,7 +68,7 @@ class Controllers:
             yield one.controller
         for private in self._scenario.storyboard.init.actions.privates:
             for wrapped in private.private_actions if private.entity_ref == owner.name else ():
-                for part in _parts(wrapped.action):
+                for part in parts(wrapped.action):
                     if isinstance(part, osc.AssignControllerAction):
                         yield _controller(part)
 
@@ -80,7 +80,7 @@ class Controllers:
 
     def row(self, action: Element, entity: int) -> tuple[int, ...] | None:
         """Return the row of an action of an event, None if it changes nothing."""
-        for part in _parts(action):
+        for part in parts(action):
             if isinstance(part, osc.AssignControllerAction) and _names_driver(_controller(part)):
                 self._tables.unsupported(part, "another driver than at the start")
         switched = self._switched(action, entity)
@@ -95,10 +95,9 @@ class Controllers:
     def _switched(self, action: Element, entity: int) -> dict[int, int]:
         """Return what an action switches on (1) and off (0) of what the driver does."""
         found = {LATERALLY: UNSAID, LONGITUDINALLY: UNSAID}
-        for part in _parts(action):
+        for part in parts(action):
             if isinstance(part, osc.OverrideControllerValueAction):
-                self._refuse_override(part)
-                continue
+                continue  # see ``pedals``
             is_drivers = entity == 0 and self.has_driver and self._is_drivers(part)
             for which, name in _SWITCHES.items():
                 prefix = "activate_" if isinstance(part, osc.AssignControllerAction) else ""
@@ -154,22 +153,8 @@ class Controllers:
             sentence = f"the storyboard moves '{name}': its controller is not known here{hint}"
             self._tables.note(part, sentence)
 
-    def _refuse_override(self, part: osc.OverrideControllerValueAction) -> None:
-        """Refuse to hold pedals, wheel and gear, which nobody has here; to let go of them is fine.
 
-        The vehicles are moved by speeds, accelerations and curvatures.
-        """
-        pedals = (
-            part.throttle, part.brake, part.clutch, part.parking_brake, part.steering_wheel,
-            part.gear,
-        )  # fmt: skip
-        for pedal in pedals:
-            if pedal is not None and self._tables.truth(pedal.active):
-                name = type(pedal).__name__
-                self._tables.unsupported(part, f"{name} in an OverrideControllerValueAction")
-
-
-def _parts(action: Element) -> Iterator[Part]:
+def parts(action: Element) -> Iterator[Part]:
     """Yield what an action does to controllers; nothing if it is on something else."""
     if isinstance(action, osc.ActivateControllerAction):
         yield action

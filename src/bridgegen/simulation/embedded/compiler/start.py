@@ -93,6 +93,7 @@ class Start:
                     continue
                 if isinstance(action, CONTROLLING):
                     self._controllers.begin(action, self._tables.entity(name))
+                    self._actions.begin_pedals(action, self._tables.entity(name))
                     continue
                 inner = getattr(action, "action", action)
                 if isinstance(inner, LONGITUDINAL):

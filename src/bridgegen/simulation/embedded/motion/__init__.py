@@ -15,6 +15,12 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
 )
 from bridgegen.simulation.embedded.motion._lamp_kernels import show_lamps
 from bridgegen.simulation.embedded.motion._laying_kernels import move_laid, pose_along
+from bridgegen.simulation.embedded.motion._pedal_kernels import (
+    command_by_pedals,
+    move_pedals,
+    pressed,
+    steered,
+)
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     is_pointless,
     leave_out_absent,
@@ -45,6 +51,7 @@ __all__ = [
     "at_time",
     "begin_lane_change",
     "begin_motion",
+    "command_by_pedals",
     "command_speed",
     "follow_course",
     "is_pointless",
@@ -53,16 +60,19 @@ __all__ = [
     "move_along_path",
     "move_by_timetable",
     "move_laid",
+    "move_pedals",
     "note",
     "note_presence",
     "pass_end",
     "pose_along",
+    "pressed",
     "show_lamps",
     "start_at_distance",
     "start_at_speed",
     "start_towed",
     "stay_away",
     "steer",
+    "steered",
     "steers",
     "stop_follow",
     "stop_longitudinal",

@@ -27,6 +27,7 @@ from bridgegen.simulation.embedded._codes import (
     KEEP_DISTANCE,
     LANE_CHANGE,
     LANE_OFFSET,
+    PRESS,
     RELATIVE_SPEED,
     SHOW,
     SPEED_CHANGE,
@@ -50,6 +51,7 @@ from bridgegen.simulation.embedded.motion._follow_kernels import (
 )
 from bridgegen.simulation.embedded.motion._lamp_kernels import begin_switch
 from bridgegen.simulation.embedded.motion._laying_kernels import begin_laid
+from bridgegen.simulation.embedded.motion._pedal_kernels import begin_press
 from bridgegen.simulation.embedded.motion._presence_kernels import (
     begin_add,
     begin_delete,
@@ -75,6 +77,7 @@ BEGINS: dict[int, Callable[..., Any]] = {
     DISCONNECT_TRAILER: begin_disconnect,
     SHOW: begin_show,
     SWITCH: begin_switch,
+    PRESS: begin_press,
     TELEPORT: begin_teleport,
     **dict.fromkeys((ASSIGN_ROUTE, ACQUIRE), begin_route),
     FOLLOW: begin_follow,
