@@ -152,6 +152,9 @@ frictionScaleFactor="0.5"/></Environment></EnvironmentAction>""",
     ),
 }
 
+AT_THE_START = ("TrafficSourceAction", "TrafficSinkAction", "TrafficSwarmAction")
+"""They run there alone."""
+
 ENTITY_CONDITIONS = {
     "EndOfRoadCondition": '<EndOfRoadCondition duration="1"/>',
     "CollisionCondition": '<CollisionCondition><EntityRef entityRef="ego"/></CollisionCondition>',
@@ -260,6 +263,9 @@ entityRef="bv"/></TriggeringEntities><EntityCondition>{x}</EntityCondition></ByE
     for name, x in SHAPES.items():
         found[name] = _event(f"<PrivateAction>{_follow(x)}</PrivateAction>", soon)
     whole = {name: _whole(event) for name, event in found.items()}
+    for name in AT_THE_START:
+        first = f"<Init><Actions><GlobalAction>{GLOBAL_ACTIONS[name]}</GlobalAction>"
+        whole[name] = _whole(_event(slower, soon)).replace("<Init><Actions>", first)
     return whole | {
         "ConnectTrailerAction": _with_a_trailer(whole["ConnectTrailerAction"]),
     }

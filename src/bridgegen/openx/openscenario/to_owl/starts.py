@@ -81,6 +81,19 @@ class Starts:
             return None
         return found
 
+    def pose(self, position: osc.Position) -> tuple[float, float, float] | None:
+        """Return where a place is: x, y [m], heading [rad]; None where it is not known."""
+        found = self.place(position)
+        where = position.position if found is None else found.position
+        if isinstance(where, osc.WorldPosition):
+            return self.number(where.x), self.number(where.y), self.number(where.h or 0.0)
+        if not isinstance(where, osc.LanePosition):
+            return None
+        try:
+            return self._pose(where)
+        except (InputError, ValueError):
+            return None
+
     def _beside_lanes(self, where: osc.RoadPosition) -> osc.WorldPosition:
         """Return a place beside all lanes of a road as a point of the world.
 
