@@ -32,6 +32,8 @@ APART = 15.0
 """[m] Between the reference points of two vehicles at the start; ours."""
 LASTS = 60.0
 """[s] How long a source gives vehicles where the scenario does not end by time."""
+FASTEST = 100.0
+"""[m/s]"""
 NAMED = "traffic"
 
 _CATEGORIES = {
@@ -139,6 +141,7 @@ class _Populated:
         rate, radius = (self._starts.number(one) for one in (action.rate, action.radius))
         said = action.speed if action.speed is not None else action.velocity
         speed = 0.0 if said is None else self._starts.number(said)
+        _check_speed(speed)
         at = self._starts.pose(action.position)
         if at is None:
             raise InputError("a TrafficSourceAction needs a position on the map")
@@ -172,20 +175,25 @@ class _Populated:
         dx, dy = self._places.x - x, self._places.y - y
         along, aside = dx * c + dy * s - number(action.offset), dy * c - dx * s
         major, minor = number(action.semi_major_axis), number(action.semi_minor_axis)
-        inside = (along / max(major, 1e-9)) ** 2 + (aside / max(minor, 1e-9)) ** 2 <= 1.0
+        with np.errstate(over="ignore"):
+            inside = np.hypot(along / max(major, 1e-9), aside / max(minor, 1e-9)) <= 1.0
         inside &= np.hypot(along, aside) >= number(action.inner_radius)
-        same, opposite = 1.0, 1.0
+        ways = [1.0, 1.0]
         if action.direction_of_travel_distribution is not None:
             said = action.direction_of_travel_distribution
-            same, opposite = number(said.same), number(said.opposite)
-        weight = np.where(np.cos(self._places.h - h) >= 0.0, same, opposite) * inside
+            ways = _shares([number(said.same), number(said.opposite)])
+        weight = np.where(np.cos(self._places.h - h) >= 0.0, *ways) * inside
         if not weight.any():
             raise InputError(f"no lane is where the swarm around '{whom}' is")
         low = high = 0.0 if action.velocity is None else number(action.velocity)
         if action.initial_speed_range is not None:
             ends = action.initial_speed_range
             low, high = number(ends.lower_limit), number(ends.upper_limit)
-        wanted, made = int(number(action.number_of_vehicles)), 0
+        for one in (low, high):
+            _check_speed(one)
+        wanted, made = number(action.number_of_vehicles), 0
+        if wanted > MOST:
+            raise InputError(f"a swarm may have {MOST} vehicles, got {wanted:g}")
         order = random.choice(
             len(weight), int((weight > 0.0).sum()), replace=False, p=weight / weight.sum()
         )
@@ -240,14 +248,29 @@ class _Populated:
             yield _event(f"{name}_leaves_{sink.line}", leaves, condition)
 
 
+def _check_speed(speed: float) -> None:
+    if not 0.0 <= speed <= FASTEST:
+        raise InputError(f"speeds of traffic [m/s] must be 0 to {FASTEST:g}, got {speed:g}")
+
+
+def _shares(weights: Sequence[float]) -> list[float]:
+    """Return weights whose sum is 1.
+
+    Raises:
+        InputError: there is none greater than 0, or one that is no weight.
+    """
+    most = max(weights)
+    if not 0.0 < most < math.inf:
+        raise InputError("the weights of a distribution of traffic must not all be 0")
+    scaled = [one / most for one in weights]
+    return [one / sum(scaled) for one in scaled]
+
+
 class _Kinds:
     """What vehicles are drawn from, by weights."""
 
     def __init__(self, bodies: Sequence[osc.Vehicle], weights: Sequence[float]) -> None:
-        self._bodies, total = bodies, sum(weights)
-        if not total > 0.0:
-            raise InputError("the weights of a distribution of traffic must not all be 0")
-        self._weights = [one / total for one in weights]
+        self._bodies, self._weights = bodies, _shares(weights)
 
     def draw(self, random: np.random.Generator) -> osc.Vehicle:
         return self._bodies[int(random.choice(len(self._bodies), p=self._weights))]

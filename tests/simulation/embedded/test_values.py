@@ -4,7 +4,7 @@ import pytest
 
 from bridgegen.errors import UnsupportedError
 
-from .storyboards import after, lane, run, scenario, speeding, start
+from .storyboards import after, lane, run, scenario, simulator, speeding, start
 
 EGO = start("ego", lane(1, 1, 90.0), 0.0)
 MOVE = f"<PrivateAction>{speeding(3.0, 'step time 0')}</PrivateAction>"
@@ -264,3 +264,9 @@ def test_a_light_changes_after_an_entity_is_deleted_that_has_its_number():
     )  # fmt: skip
     assert at == {"gone": 20, "set": 30}
     assert rollout.lights[0, 0, [29, 30, 39]].tolist() == [1, 4, 4]
+
+
+def test_an_end_beyond_all_numbers_is_refused():
+    text = scenario(("ego",), start("ego", lane(1, 1, 60.0), 5.0))
+    with pytest.raises(UnsupportedError, match="the stop trigger's simulation time must take 1 to"):
+        simulator(text.replace('value="10.0" rule', 'value="1e308" rule'))

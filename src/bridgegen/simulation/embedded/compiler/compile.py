@@ -162,7 +162,7 @@ class _Compiler:
             trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
         ]
         others_drivers = self._others(objects, others)
-        n_steps = round(duration / step) + 1
+        n_steps = round(min(duration / step, MAX_STEPS)) + 1
         if not 2 <= n_steps <= MAX_STEPS:
             self.tables.problems.append(
                 f"{self.place}: the stop trigger's simulation time must take 1 to {MAX_STEPS} "
