@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridgegen.campaign.export import export
 from bridgegen.errors import FileFormatError
 from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -163,6 +164,20 @@ def test_a_sink_takes_them_away(tmp_path):
     gap = math.hypot(found.x[0, 1, left] - 160.0, found.y[0, 1, left] + 1.5 * LANE)
     assert 9.0 < gap <= 9.0 + 12.0 * 0.05 + 1e-6  # its last instant; at the next it is near
     assert found.present[0, 0].all()  # the ego stays
+
+
+@pytest.mark.parametrize("flavour", ["1.3", "resolved", "recorded"])
+def test_it_is_exported_vehicle_by_vehicle(tmp_path, flavour):
+    before = rollout(tmp_path, file(swarm(6), source(0.5), sink(300), ends=6.0))
+    path, _ = export(tmp_path / "s.xosc", flavour, out=tmp_path / "export")
+    assert b"TrafficAction" not in path.read_bytes()
+    after = simulate_file(path).rollout
+    assert after.names == before.names
+    n = int(before.n_steps[0])
+    there = before.present[0, :, :n]
+    for field in ("x", "y", "h"):
+        one, other = (getattr(run, field)[0, :, :n] for run in (before, after))
+        assert np.array_equal(np.where(there, one, 0.0), np.where(there, other, 0.0))
 
 
 def test_what_it_is_made_of():

@@ -20,6 +20,7 @@ from bridgegen.errors import (
     UnsupportedError,
 )
 from bridgegen.openx.logic_file import logic_path, roads_of
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
 from bridgegen.openx.openscenario.parameters import numbers
@@ -29,6 +30,7 @@ from bridgegen.openx.openscenario.resolve import resolved
 from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_scenario_runner
 from bridgegen.openx.openscenario.versions import VERSIONS, least_version, to_version
 from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.openx.prepared import prepared
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulate import simulate_file
 from bridgegen.simulation.embedded.compiler import compile_storyboard
@@ -99,7 +101,8 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
     """Return what a flavour cannot say of who drives the participants other than the ego."""
     if flavour == RECORDED:  # their motion is in the file
         return []
-    program = compile_storyboard(read(path), str(path))
+    scenario, _ = _read(path)
+    program = compile_storyboard(scenario, str(path))
     names = ", ".join(f"'{program.names[e]}'" for e in program.attends.tolist())
     if not names:
         return []
@@ -143,9 +146,15 @@ def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
     return [path for name, path in kept.items() if not name.startswith(MINIMAL)]
 
 
-def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> list[Path]:
+def _read(path: Path) -> tuple[osc.OpenScenario, OpenDrive]:
+    """Return a scenario file with its map, as it is simulated."""
     scenario = read(path)
     roads = roads_of(scenario, path)
+    return prepared(scenario, roads, str(path)), roads
+
+
+def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> list[Path]:
+    scenario, roads = _read(path)
     if problems := validate.problems(scenario, roads):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     made, maps = flavour(scenario, path), []
