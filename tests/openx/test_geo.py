@@ -117,6 +117,15 @@ def test_what_cannot_be_projected_is_refused_by_its_line(tmp_path, place, geo, m
         simulate_file(files(tmp_path, place, geo))
 
 
+def test_an_orientation_without_a_type_is_relative_from_1_3_on(tmp_path):
+    place = PLACE.replace("/>", '><Orientation h="0.5"/></GeoPosition>')
+    path = files(tmp_path, place)
+    assert where(path)[2] == 0.5
+    path.write_text(path.read_text().replace('revMinor="2"', 'revMinor="3"'))
+    with pytest.raises(FileFormatError, match="relative to nothing"):
+        simulate_file(path)
+
+
 def test_without_the_extra_one_is_told_its_name(tmp_path, monkeypatch):
     monkeypatch.setattr("bridgegen.extras.is_installed", lambda extra: extra != "geo")
     with pytest.raises(InputError, match=r"a GeoPosition needs the extra 'geo'"):

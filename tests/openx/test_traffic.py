@@ -208,6 +208,19 @@ def test_what_cannot_be_is_refused_by_its_line(traffic, message):
         populated(read(file(traffic), "s"), ROADS, "s")
 
 
+def test_numbers_that_rows_could_not_vary_are_refused():
+    """They are drawn once: a searched rate would change nothing."""
+    data = file(source(0.5)).replace(b'rate="0.5"', b'rate="$r"').replace(
+        b"<CatalogLocations/>",
+        b'<ParameterDeclarations><ParameterDeclaration name="r" parameterType="double" value="0.5"/>'
+        b"</ParameterDeclarations><CatalogLocations/>",
+    )  # fmt: skip
+    with pytest.raises(
+        FileFormatError, match=r"must have numbers, got parameter r: .*\(line \d+\)"
+    ):
+        populated(read(data, "s"), ROADS, "s")
+
+
 def test_all_traffic_together_is_bounded():
     with pytest.raises(FileFormatError, match=rf"all traffic may have {MOST} vehicles, got"):
         populated(read(file(source(6.0), source(6.0, s=300.0)), "s"), ROADS, "s")

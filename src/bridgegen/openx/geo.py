@@ -31,12 +31,13 @@ def on_plane(scenario: osc.OpenScenario, roads: OpenDrive, place: str) -> osc.Op
     if not any(isinstance(one, osc.GeoPosition) for one in walk(scenario)):
         return scenario
     project = projection(roads.header, place)
+    is_new = scenario.file_header.rev_minor not in (0, 1, 2)
     problems: list[str] = []
 
     def change(element: Element) -> Element:
         if isinstance(element, osc.Position) and isinstance(element.position, osc.GeoPosition):
             try:
-                where = _projected(element.position, project, roads.header)
+                where = _projected(element.position, project, roads.header, is_new=is_new)
             except FileFormatError as error:
                 line = element.position.line
                 problems.extend(f"{place}: {one} (line {line})" for one in error.problems)
@@ -90,14 +91,18 @@ def projection(header: Header, place: str) -> Project:
     return project
 
 
-def _projected(where: osc.GeoPosition, project: Project, header: Header) -> osc.WorldPosition:
+def _projected(
+    where: osc.GeoPosition, project: Project, header: Header, *, is_new: bool
+) -> osc.WorldPosition:
+    """Return a position of the world; ``is_new``: without a type, an orientation is relative."""
     latitude = _degrees("latitude", where.latitude_deg, where.latitude)
     longitude = _degrees("longitude", where.longitude_deg, where.longitude)
     x, y = project(longitude, latitude)
     height = where.height if where.altitude is None else where.altitude
     turn = header.offset.hdg if header.offset else 0.0
     said = where.orientation or osc.Orientation()
-    if said.type is osc.ReferenceContext.RELATIVE:
+    unsaid = is_new and said.type is None and (said.h, said.p, said.r) != (None, None, None)
+    if unsaid or said.type is osc.ReferenceContext.RELATIVE:
         raise FileFormatError("a relative Orientation of a GeoPosition is relative to nothing")
     h = said.h
     if turn and h is not None:

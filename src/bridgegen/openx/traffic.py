@@ -21,6 +21,7 @@ from bridgegen.openx.opendrive.lanes import borders, section_end
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER
+from bridgegen.openx.openscenario.element import Element, references
 from bridgegen.openx.openscenario.to_owl.starts import Starts
 from bridgegen.participants import PARTICIPANTS, Body
 
@@ -70,10 +71,16 @@ def populated(scenario: osc.OpenScenario, roads: OpenDrive, place: str) -> osc.O
         FileFormatError: what cannot be populated, by line.
     """
     actions = scenario.storyboard.init.actions
-    asked = [one for one in actions.global_actions if isinstance(one.action, osc.TrafficAction)]
-    if not any(isinstance(one.action.action, Source | osc.TrafficSinkAction) for one in asked):  # type: ignore[union-attr]
+    if not any(
+        isinstance(_asked(one), Source | osc.TrafficSinkAction) for one in actions.global_actions
+    ):
         return scenario
     return _Populated(scenario, roads, place).scenario
+
+
+def _asked(one: osc.GlobalAction) -> Element | None:
+    """Return what traffic an action asks for; None if it is about something else."""
+    return one.action.action if isinstance(one.action, osc.TrafficAction) else None
 
 
 class _Populated:
@@ -92,12 +99,13 @@ class _Populated:
         made: list[Made] = []
         sinks: list[osc.TrafficSinkAction] = []
         for number, one in enumerate(actions.global_actions):
-            action = one.action.action if isinstance(one.action, osc.TrafficAction) else None
+            action = _asked(one)
             if isinstance(action, osc.TrafficSinkAction):
                 sinks.append(action)
             elif isinstance(one.action, osc.TrafficAction) and isinstance(action, Source):
                 name = self._starts.text(one.action.traffic_name or f"{NAMED}_{number + 1}")
                 try:
+                    _check_constant(action)
                     made += self._vehicles(name, action, actions)
                 except (InputError, ValueError) as error:
                     self._problems.append(f"{place}: {error} (line {action.line})")
@@ -248,6 +256,15 @@ class _Populated:
             yield _event(f"{name}_leaves_{sink.line}", leaves, condition)
 
 
+def _check_constant(action: Source) -> None:
+    """Refuse parameters: vehicles are drawn once, so rows could not vary them."""
+    if names := sorted(references(action)):
+        raise InputError(
+            f"a {type(action).__name__} must have numbers, got parameter {names[0]}: its vehicles "
+            "are drawn beforehand, the same in every row"
+        )
+
+
 def _check_speed(speed: float) -> None:
     if not 0.0 <= speed <= FASTEST:
         raise InputError(f"speeds of traffic [m/s] must be 0 to {FASTEST:g}, got {speed:g}")
@@ -257,7 +274,7 @@ def _shares(weights: Sequence[float]) -> list[float]:
     """Return weights whose sum is 1.
 
     Raises:
-        InputError: there is none greater than 0, or one that is no weight.
+        InputError: none is greater than 0, or one is infinite.
     """
     most = max(weights)
     if not 0.0 < most < math.inf:

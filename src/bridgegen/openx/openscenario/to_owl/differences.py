@@ -7,7 +7,7 @@ besides; a value that the standard takes where none is written is that value.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import Any
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Attribute, Element, children_of, declaration
@@ -88,13 +88,11 @@ def is_detail(element: object) -> bool:
     return isinstance(element, DETAILS) and not _holds_pedals(element)
 
 
-def _controls(element: object) -> TypeGuard[osc.ControllerAction]:
-    return isinstance(element, osc.ControllerAction)
-
-
 def _holds_pedals(element: object) -> bool:
     """Return whether an action holds a pedal, the wheel or the gear, or may do so."""
-    part = element.override_controller_value_action if _controls(element) else None
+    if not isinstance(element, osc.ControllerAction):
+        return False
+    part = element.override_controller_value_action
     pedals = () if part is None else (
         part.throttle, part.brake, part.clutch, part.parking_brake, part.steering_wheel, part.gear
     )  # fmt: skip
