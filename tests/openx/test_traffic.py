@@ -210,11 +210,10 @@ def test_what_cannot_be_is_refused_by_its_line(traffic, message):
 
 def test_numbers_that_rows_could_not_vary_are_refused():
     """They are drawn once: a searched rate would change nothing."""
-    data = file(source(0.5)).replace(b'rate="0.5"', b'rate="$r"').replace(
-        b"<CatalogLocations/>",
-        b'<ParameterDeclarations><ParameterDeclaration name="r" parameterType="double" value="0.5"/>'
-        b"</ParameterDeclarations><CatalogLocations/>",
-    )  # fmt: skip
+    declared = """<ParameterDeclarations><ParameterDeclaration name="r" parameterType="double"
+value="0.5"/></ParameterDeclarations><CatalogLocations/>"""
+    data = file(source(0.5)).replace(b'rate="0.5"', b'rate="$r"')
+    data = data.replace(b"<CatalogLocations/>", declared.encode())
     with pytest.raises(
         FileFormatError, match=r"must have numbers, got parameter r: .*\(line \d+\)"
     ):

@@ -240,7 +240,12 @@ class _Populated:
 
     def _departures(self, sink: osc.TrafficSinkAction, names: Sequence[str]) -> Iterator[osc.Event]:
         """Yield an event for each vehicle: it leaves when it is near the sink."""
-        if sink.rate is not None and self._starts.number(sink.rate) < 1.0:
+        if isinstance(sink.rate, osc.ParameterRef | osc.Expr):
+            self._problems.append(
+                f"{self._place}: the rate of a sink must be a number, got {sink.rate} "
+                f"(line {sink.line})"
+            )
+        elif sink.rate is not None and self._starts.number(sink.rate) < 1.0:
             self._problems.append(
                 f"{self._place}: a sink takes all who come; rate [1/s] must be 1 at least, got "
                 f"{self._starts.number(sink.rate):g} (line {sink.line})"
