@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
+from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, OFF_ROAD, ONCOMING, SIREN
 from bridgegen.ego.right_of_way import (
     NO_RULE,
     THEY_WAIT,
@@ -179,6 +179,13 @@ def test_all_give_way_to_a_siren_wherever_they_are(tmp_path: Path) -> None:
     ]  # fmt: skip
     both = claims(model, [own, None, other], [0, 1, 1])
     assert both[1, 2] == both[2, 1] == 0
+
+
+def test_who_comes_from_off_the_road_gives_way_to_all_on_it(tmp_path: Path) -> None:
+    model, (own, other) = routes(crossing(tmp_path, "B", "D"))
+    assert claims(model, [own, None, other], [0, -1, 1]).tolist() == [
+        [0, OFF_ROAD, -SIREN], [-OFF_ROAD, 0, -SIREN], [SIREN, SIREN, 0]
+    ]  # fmt: skip
 
 
 def test_a_priority_of_the_map_overrules_the_rule_of_the_right(tmp_path: Path) -> None:

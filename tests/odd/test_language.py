@@ -114,11 +114,6 @@ def test_a_jam_moves_as_one(own):
             "leg main has no sidewalk: sidewalk_width must be greater than 0 m",
         ),
         (
-            [("    type: car\n    start: {lane: 1, distance: other_at}\n    speed: other_speed",
-              "    type: bicycle\n    path: [{lane: 1, distance: other_at}, {distance: 300}]")],
-            "the places of a path are constants, one path serves every row; other has 'other_at'",
-        ),
-        (
             [("start: {lane: 2, distance: 50.0}", "start: {lane: 2, distance: 50.0, offset: gap}")],
             "the ego's offset is a constant, its driver keeps to one path; got 'gap'",
         ),

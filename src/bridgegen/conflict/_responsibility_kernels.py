@@ -34,6 +34,7 @@ from bridgegen.conflict._codes import (
     EGO,
     EGO_STANDING,
     EMERGENCY_VEHICLE,
+    FROM_OFF_ROAD,
     HEAD_ON,
     INTO_THE_SIDE,
     JUNCTION_OCCUPIED,
@@ -157,7 +158,9 @@ def decide(
 @kernel
 def rule_of(claim):
     """Return the rule of a claim that is not 0."""
-    return EMERGENCY_VEHICLE if abs(claim) == SIREN else MAP_PRIORITY + abs(claim) - 1
+    if abs(claim) >= SIREN:
+        return EMERGENCY_VEHICLE if abs(claim) == SIREN else FROM_OFF_ROAD
+    return MAP_PRIORITY + abs(claim) - 1
 
 
 @kernel

@@ -129,6 +129,7 @@ class Rule(IntEnum):
     UNSAFE_START = _codes.UNSAFE_START
     BRAKED_HARD_AHEAD = _codes.BRAKED_HARD_AHEAD
     EMERGENCY_VEHICLE = _codes.EMERGENCY_VEHICLE
+    FROM_OFF_ROAD = _codes.FROM_OFF_ROAD
 
     @property
     def label(self) -> str:
@@ -221,6 +222,10 @@ RULES = {
     Rule.EMERGENCY_VEHICLE: (
         "did not give way to an emergency vehicle with blue light and siren",
         "Vienna Convention, Art. 34 (1); StVO § 38 (1)",
+    ),
+    Rule.FROM_OFF_ROAD: (
+        "came onto the road from beside it and did not give way to traffic on it",
+        "Vienna Convention, Art. 18 (3); StVO § 10",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",

@@ -1,8 +1,8 @@
 """Right of way where two routes cross: by signs and the map, else priority to the right.
 
 Sources: StVO § 8 (right of way: signs, else priority to the right), § 9 (a left turn waits for
-oncoming traffic), § 10, § 38 (blue light and siren; Vienna Convention, Art. 34); sign numbers of
-the VzKat, which our own maps use, too.
+oncoming traffic), § 10 (who comes from off the road), § 38 (blue light and siren; Vienna
+Convention, Art. 34); sign numbers of the VzKat, which our own maps use, too.
 """
 
 import math
@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.arrays import Int
-from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
+from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, OFF_ROAD, ONCOMING, SIREN
 from bridgegen.openx.opendrive.furniture import Signal
-from bridgegen.openx.opendrive.lanes import lane_pose
+from bridgegen.openx.opendrive.lanes import borders, lane_pose, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
-from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.opendrive.model import DRIVABLE, OpenDrive, Road
 from bridgegen.openx.opendrive.routes import Route, Step
 
 STOP_SIGN = "206"
@@ -26,6 +26,9 @@ PRIORITY = ("301", "306")
 """Signs: right of way at this junction, priority road."""
 
 THEY_WAIT, NO_RULE, WE_WAIT = 1, 0, -1
+
+OF_THE_ROAD = DRIVABLE | {"shoulder", "stop", "parking", "border", "biking", "median", "bus"}
+"""Types of lanes from which one does not come onto the road, for one is on it."""
 
 AT_JUNCTION = 40.0
 """A sign within this distance before a junction [m] is for that junction."""
@@ -90,7 +93,7 @@ def claim(model: OpenDrive, own: Route, other: Route, lights: Collection[str] | 
 def claims(
     model: OpenDrive,
     routes: Sequence[Route | None],
-    sirens: Sequence[int] | Int,
+    ranks: Sequence[int] | Int,
     lights: Collection[str] | None = None,
 ) -> Int:
     """Return the `claim` of each of E routes against each other, ``(E, E)`` int64.
@@ -98,18 +101,48 @@ def claims(
     Args:
         model: the road network.
         routes: of the participants; None off the lanes, which claims nothing.
-        sirens: ``(E,)``: 1 of emergency vehicles on a call: all others give way to them, wherever.
+        ranks: ``(E,)``: 1 of emergency vehicles on a call, -1 of who comes from off the road, else
+            0; who has the lower one gives way, wherever.
         lights: as for `right_of_way`.
     """
     found = np.zeros((len(routes), len(routes)), dtype=np.int64)
     for a, own in enumerate(routes):
         for b, other in enumerate(routes[:a]):
-            if sirens[a] != sirens[b]:
-                found[a, b] = SIREN if sirens[a] else -SIREN
+            if ranks[a] != ranks[b]:
+                reason = SIREN if max(ranks[a], ranks[b]) > 0 else OFF_ROAD
+                found[a, b] = reason if ranks[a] > ranks[b] else -reason
             elif own is not None and other is not None:
                 found[a, b] = claim(model, own, other, lights)
             found[b, a] = -found[a, b]
     return found
+
+
+def is_off_road(road: Road, lane_id: int, s: float, aside: float) -> bool:
+    """Return whether a place is beside the road: on a sidewalk or verge, say, or beyond them.
+
+    Args:
+        road: the road.
+        lane_id: the lane from whose centre it counts.
+        s: along the road [m].
+        aside: left of that centre, seen along the road [m].
+    """
+    index = section_index(road, s)
+    section = road.sections[index]
+    outer = {lane: float(t[0]) for lane, t in borders(road, index, np.array([s])).items()}
+    if lane_id == 0 or lane_id not in outer:
+        return False
+    t = 0.5 * (outer[lane_id] + outer[_inner(lane_id)]) + aside
+    edges = [
+        sorted((outer[lane.id], outer[_inner(lane.id)]))
+        for lane in (*section.left, *section.right)
+        if lane.type in OF_THE_ROAD
+    ]
+    return not any(low <= t <= high for low, high in edges)
+
+
+def _inner(lane_id: int) -> int:
+    """Return the lane that is next to one towards the road's centre."""
+    return lane_id - (1 if lane_id > 0 else -1)
 
 
 def crossings(model: OpenDrive, route: Route) -> Iterator[Crossing]:

@@ -89,7 +89,7 @@ def survey(
     lights: Sequence[str],
     starts: Sequence[Sequence[tuple[Stretch, float]]],
     bodies: Float,
-    sirens: Int,
+    ranks: Int,
 ) -> Scene:
     """Return what the driver knows of one road network, P = 1.
 
@@ -101,7 +101,7 @@ def survey(
         lights: ids of the traffic lights that change.
         starts: per entity the lanes that it starts or changes to, and where [m along the road].
         bodies: ``(E, ≥2)``: length and width [m].
-        sirens: ``(E,)``: 1 of those to which all give way.
+        ranks: ``(E,)``, see `right_of_way.claims`: above 0 all give way to it.
     """
     from bridgegen.ego._yielding_kernels import ZONE, find_zone  # numba is slow to import
 
@@ -116,7 +116,7 @@ def survey(
     tables: list[Float] = []
     steps: list[float] = []
     zones: list[Float] = []
-    ranks: list[int] = []
+    lane_ranks: list[int] = []
     first = [0]
     for e, lanes in enumerate(starts):
         for way in [way for stretch, s in lanes for way in ways_from(model, stretch, s)]:
@@ -132,7 +132,7 @@ def survey(
             )  # fmt: skip
             zones.append(zone)
             rank = right_of_way(model, route, way, lights) if route is not None else NO_RULE
-            ranks.append(WE_WAIT if sirens[e] else rank)
+            lane_ranks.append(WE_WAIT if ranks[e] > 0 else rank)
         first.append(len(tables))
     ways = np.zeros((len(tables), max(map(len, tables), default=0), 6))
     for i, table in enumerate(tables):
@@ -146,13 +146,13 @@ def survey(
         np.array([[len(table) for table in tables]], dtype=np.int64),
         np.array([steps], dtype=np.float64),
         np.array(zones, dtype=np.float64).reshape(1, len(zones), ZONE),
-        np.array([ranks], dtype=np.int64),
+        np.array([lane_ranks], dtype=np.int64),
         np.array([first], dtype=np.int64),
         np.array(
             [
                 [
                     WE_WAIT
-                    if sirens[e]
+                    if ranks[e] > 0
                     else NO_RULE
                     if one is None or route is None
                     else right_of_way(model, route, one, lights)
@@ -160,7 +160,7 @@ def survey(
                 ]
             ]
         ),
-        claims(model, routes, sirens, lights)[None],
+        claims(model, routes, ranks, lights)[None],
     )
 
 

@@ -84,7 +84,8 @@ class ParticipantSection(ShapedSection):
     end: WaypointSection | None = None
     """Where its route ends; the ego's must."""
     path: list[WaypointSection] = []
-    """Instead of start and end: straight lines through places; not of a vehicle or an obstacle."""
+    """Instead of start and end: straight lines through places; of a vehicle a smooth curve from the
+    first to the last, which the others bend."""
     speed: Speed = 0.0
     """At time 0 [m/s]; of the ego also its target; a vehicle reverses below 0."""
     heading: Angle = 0.0

@@ -46,10 +46,10 @@ FASTEST_REVERSE = -5.0
 
 _OF_EVENTS = ("after", "began")
 
-_WALKERS = tuple(
+_OFF_LANES = tuple(
     name
     for name in TYPES
-    if PARTICIPANTS[name].seen_as.conduct in ("pedestrian", "animal", "bicycle")
+    if PARTICIPANTS[name].seen_as.conduct != "obstacle" and not PARTICIPANTS[name].on_rails
 )
 """Types that may have a path of their own."""
 
@@ -119,13 +119,13 @@ class Storyboard:
                 )
             self._check_driver(name, given, path)
             if given.path:
-                yield self._walker(name, given, path)
+                yield self._off_lanes(name, given, path)
             elif given.start is None:
                 self._report(f"{name} must have a start or a path", path)
             else:
                 yield self._driver(name, given, given.start, path)
 
-    def _walker(self, name: str, given: ParticipantSection, path: Path) -> Participant:
+    def _off_lanes(self, name: str, given: ParticipantSection, path: Path) -> Participant:
         """Return a participant with a path of its own."""
         points = tuple(
             self._places.waypoint(one, (*path, "path", number))
@@ -133,25 +133,24 @@ class Storyboard:
         )
         if given.start is not None or given.end is not None:
             self._report(f"{name} must have a path, or a start and an end, not both", path)
-        varied = [q for one in points for q in (one.distance, one.offset) if isinstance(q, str)]
-        if varied:
-            self._report(
-                f"the places of a path are constants, one path serves every row; {name} has "
-                f"'{varied[0]}'",
-                path,
-            )
         if len(points) < 2:
             self._report(f"a path leads through two points at least, {name} has one", path)
-        if given.type not in _WALKERS:
-            kinds = ", ".join(_WALKERS)
-            self._report(f"a {given.type} keeps to lanes; a path is for {kinds}", path)
+        if name == EGO:
+            self._report("the ego has a route, no path: its driver is under test", path)
+        elif given.type not in _OFF_LANES:
+            kinds = ", ".join(_OFF_LANES)
+            self._report(f"a path is for {kinds}; {name} is of type {given.type}", path)
+        elif given.driver == ATTENTIVE and PARTICIPANTS[given.type].seen_as.conduct == "vehicle":
+            self._report(
+                f"an attentive driver keeps to lanes, {name} has a path: it is scripted", path
+            )
         if given.type == "pedestrian":
             self._places.check_crossing(name, points, path)
         driver = given.driver or ""
         return Participant(
             name, given.type, points[0], None, given.speed, points, driver=driver,
-            own_body=_body(given), type_by=given.type_by or "", types=self._types(given),
-            model=given.model or "",
+            exceeds_limit=given.exceeds_limit or "", siren=given.siren, own_body=_body(given),
+            type_by=given.type_by or "", types=self._types(given), model=given.model or "",
         )  # fmt: skip
 
     def _driver(

@@ -105,13 +105,17 @@ def _vehicles() -> Iterator[Rule]:
         "FILTER(?at_once > 0) }"
     )
     moves = f"?value {_DOES}/bg:has_target_speed ?speed . FILTER(?speed > 0)"
+    own_way = (
+        "FILTER NOT EXISTS { ?value bg:has_init_action/bg:has_trajectory ?own . "
+        "?own bg:has_spline_order ?order ; bg:has_vertex/bg:has_position ?place }"
+    )
     yield about(
         "on-drivable-lane", "Scenario", "on_lane",
         "must be a lane to drive on (or a shoulder to stand on, or to pull out from), got {?got}",
         "Vehicles keep to the lanes that are made for them; a shoulder is for stopping.", source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) WHERE {{ {vehicle} "
-        f"?value {_PLACES}/bg:on_lane ?lane . "
-        f"FILTER NOT EXISTS {{ {is_a('?lane', 'Lane')} }} "
+        f"?value {_PLACES} ?place . ?place bg:on_lane ?lane . "
+        f"FILTER NOT EXISTS {{ {is_a('?lane', 'Lane')} }} {own_way} "
         f"OPTIONAL {{ {moves} }} OPTIONAL {{ {leaves} }} "
         "FILTER((BOUND(?speed) && !BOUND(?change)) || "
         f"NOT EXISTS {{ {is_a('?lane', 'Shoulder')} }}) }}",
@@ -124,7 +128,7 @@ def _vehicles() -> Iterator[Rule]:
         f"SELECT DISTINCT $this ?value ({called('?on')} AS ?lane) ({shown('?aside')} AS ?got) "
         f"({shown('0.5e0 * ?width')} AS ?half) WHERE {{ {vehicle} ?value {_PLACES} ?place . "
         "?place bg:has_lateral_offset ?aside ; bg:on_lane ?on . ?on bg:has_width ?width . "
-        f"FILTER(ABS(?aside) > 0.5e0 * ?width + {_SLACK}) }}",
+        f"FILTER(ABS(?aside) > 0.5e0 * ?width + {_SLACK}) {own_way} }}",
         ("Vehicle", "has_lateral_offset"),
     )  # fmt: skip
     yield about(

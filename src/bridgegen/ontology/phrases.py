@@ -172,7 +172,10 @@ def _trajectory(speaker: _Speaker, node: Subject) -> str:
     places = [speaker.inner(one, "has_position") for one in sorted(vertices, key=index)]
     if len(places) > _MOST_PLACES:
         places = [places[0], f"{len(places) - 2} points between", places[-1]]
-    return f"along {' → '.join(places) or '?'}"
+    smooth = any(
+        speaker.has(one, "has_spline_order") for one in speaker.links(node, "has_trajectory")
+    )
+    return f"along {'a smooth curve by ' * smooth}{' → '.join(places) or '?'}"
 
 
 def _lane_position(speaker: _Speaker, node: Subject) -> str:

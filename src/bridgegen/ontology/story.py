@@ -53,6 +53,9 @@ CONDITIONS = {
 """The class of each kind of condition."""
 
 EGO = "ego"
+
+SMOOTH = 4
+"""Order of the spline along which a vehicle leaves the lanes: its curvature is continuous."""
 """The name of the participant under test."""
 
 
@@ -137,6 +140,8 @@ def _add_trajectory(
     trajectory = builder.node(f"{name}_path", "Trajectory")
     put(action, "has_trajectory", trajectory)
     put(trajectory, "has_name", f"{name}_path")
+    if one.conduct == "vehicle":
+        put(trajectory, "has_spline_order", min(SMOOTH, len(one.path)))
     for number, point in enumerate(one.path, start=1):
         vertex = builder.node(f"{name}_vertex_{number}", "Vertex")
         put(trajectory, "has_vertex", vertex)

@@ -30,7 +30,8 @@ def _participant(one: Participant) -> str:
     kind = " or ".join(one.types) or one.model or one.type
     if one.path:
         way = " to ".join(_place(point) for point in one.path)
-        return f"{one.name}, a {kind}, goes from {way} at {in_words(one.speed, 'm/s')}."
+        goes = "drives on a smooth curve" if one.conduct == "vehicle" else "goes"
+        return f"{one.name}, a {kind}, {goes} from {way} at {in_words(one.speed, 'm/s')}."
     turned = ""
     if one.heading in (180.0, -180.0):
         turned = ", against the traffic"

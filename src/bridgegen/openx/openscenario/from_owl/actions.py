@@ -11,6 +11,7 @@ from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.signals import lamp_states
 from bridgegen.openx.openscenario.from_owl.weather import environment
+from bridgegen.openx.openscenario.splines import uniform_knots
 
 
 class Actions:
@@ -221,20 +222,31 @@ class Actions:
             raise OntologyError(
                 f"{ind.describe(trajectory)} must have two vertices or more, got {len(vertices)}"
             )
-        polyline = osc.Polyline(
-            tuple(
-                osc.Vertex(
-                    self._places.position(ind.link(one, "has_position"), oriented=False), time
-                )
-                for one, time in zip(vertices, times, strict=True)
-            )
-        )
         del actor
+        points = [
+            (self._places.position(ind.link(one, "has_position"), oriented=False), time)
+            for one, time in zip(vertices, times, strict=True)
+        ]
+        line: osc.Polyline | osc.Nurbs
+        order = ind.optional_integer(trajectory, "has_spline_order")
+        if order is not None:
+            if not 2 <= order <= len(points):
+                raise OntologyError(
+                    f"has_spline_order of {ind.describe(trajectory)} must be 2 to its number of "
+                    f"vertices, {len(points)}, got {order}"
+                )
+            line = osc.Nurbs(
+                order,
+                tuple(osc.ControlPoint(place, time) for place, time in points),
+                tuple(osc.Knot(value) for value in uniform_knots(order, len(points))),
+            )
+        else:
+            line = osc.Polyline(tuple(osc.Vertex(place, time) for place, time in points))
         reference: osc.NoTime | osc.Timing = osc.NoTime()
         if timed:
             reference = osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)
         name = plain_text(ind, trajectory, "has_name")
-        made = osc.Trajectory(name, closed=False, shape=osc.Shape(polyline))
+        made = osc.Trajectory(name, closed=False, shape=osc.Shape(line))
         action = osc.FollowTrajectoryAction(
             osc.TimeReference(reference),
             osc.TrajectoryFollowingMode(osc.FollowingMode.POSITION),

@@ -1,10 +1,13 @@
 """OpenSCENARIO2OWL, its actions: what participants, the weather and the lights are made to do."""
 
+from collections.abc import Sequence
+
 import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.signals import LAMPS
+from bridgegen.openx.openscenario.splines import is_uniform
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position, same_place
@@ -211,9 +214,7 @@ def add_trajectory(
     builder.put(node, "has_trajectory", trajectory)
     builder.put(trajectory, "has_name", builder.text(one.name))
     timed = isinstance(action.time_reference.reference, osc.Timing)
-    if not isinstance(one.shape.shape, osc.Polyline):
-        raise UnsayableError(one.shape.shape, type(one.shape.shape).__name__)
-    vertices = one.shape.shape.vertices
+    vertices = _vertices(builder, trajectory, one.shape.shape)
     for k, (number, vertex) in enumerate(zip(numbered(len(vertices)), vertices, strict=True)):
         point = builder.node(f"{name}_vertex_{number}", "Vertex")
         builder.put(trajectory, "has_vertex", point)
@@ -227,6 +228,27 @@ def add_trajectory(
         else:
             place = add_position(builder, f"{name}_point_{number}", vertex.position)
             builder.put(point, "has_position", place)
+
+
+def _vertices(
+    builder: StoryBuilder,
+    trajectory: ox.NamedNode,
+    line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs,
+) -> Sequence[osc.Vertex | osc.ControlPoint]:
+    """Return the points of a line; of a spline its control points, and its order is put."""
+    if isinstance(line, osc.Polyline):
+        return line.vertices
+    if not isinstance(line, osc.Nurbs):
+        raise UnsayableError(line, type(line).__name__)
+    points, order = line.control_points, round(builder.now(line.order, line))
+    weights = [builder.now(one.weight, one) for one in points if one.weight is not None]
+    knots = [builder.now(one.value, one) for one in line.knots]
+    if any(weight != weights[0] for weight in weights) or 0 < len(weights) < len(points):
+        raise UnsayableError(line, "a Nurbs whose weights differ")
+    if len(knots) != len(points) + order or order > len(points) or not is_uniform(knots, order):
+        raise UnsayableError(line, "a Nurbs whose knots are not uniform between its ends")
+    builder.put(trajectory, "has_spline_order", order)
+    return points
 
 
 def add_route(

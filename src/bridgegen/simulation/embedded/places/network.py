@@ -300,10 +300,10 @@ def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
                 for lane in beside(road, section, step.lane_id)
             ]
     path = ways.paths[0]
-    sirens = np.zeros(len(ways.routes), np.int64)  # others than entities have none
-    sirens[: len(program.sirens)] = program.sirens
+    ranks = np.zeros(len(ways.routes), np.int64)  # others than entities have none
+    ranks[: len(program.sirens)] = program.sirens - ways.off_road
     return survey(
-        model, ways.routes, path.table, path.step, program.lights, starts, program.bodies, sirens
+        model, ways.routes, path.table, path.step, program.lights, starts, program.bodies, ranks
     )
 
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.ego._kind_tables import IS_CYCLE, IS_VEHICLE
+from bridgegen.ego.right_of_way import is_off_road
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.lane_changes import plan_with_changes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
@@ -53,6 +55,7 @@ class Ways:
             varied; with the road.
         sides: per entity 1 where its path leads along its first road, -1 against it; 0 on a
             trajectory.
+        off_road: ``(E,)``: 1 of who drives and is beside the road at the start.
         timetables: per trajectory ``trajectories.timetable``, without rows if it has no times.
         spots: ``(C, 5)`` per position of the file: number of its road, lane, s, left of its centre,
             the way from which headings count; see `Lanes.locate`.
@@ -72,6 +75,7 @@ class Ways:
         self.uneven: dict[int, str] = {}
         self.sides: list[int] = []
         self.timetables: list[Float] = []
+        self.off_road: Int = np.array([*map(self._comes_from_off_road, range(len(program.names)))])
         self.lanes: Lanes | None = None
         self.has_ground = False
         self.numbers: Int = np.empty((len(program.waypoints) + 1, 0), dtype=np.int64)
@@ -106,6 +110,15 @@ class Ways:
             self.numbers[route, node] = NONE if path is None else len(self.paths)
             if path is not None:
                 self.paths.append(path)
+
+    def _comes_from_off_road(self, entity: int) -> bool:
+        spec, kind = self._program.paths[entity], self._program.kinds[entity]
+        if not isinstance(spec, AlongLanes) or not (IS_VEHICLE[kind] or IS_CYCLE[kind]):
+            return False
+        road_id, s = _known(self._program, spec.start)
+        road = self._model.road(road_id)
+        aside = _declared(self._program, spec.aside)
+        return is_off_road(road, spec.start.lane, min(max(s, 0.0), road.length), aside)
 
     def is_in_junction(self, road_id: str) -> bool:
         """Return whether a road of the network is part of a junction."""
