@@ -112,7 +112,7 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
 
 
 def _can_be_driven(one: Participant, story: Story) -> bool:
-    on_lanes = one.conduct in ("vehicle", "bicycle") and not one.path
+    on_lanes = one.conduct in ("vehicle", "bicycle") and not one.path and not one.ways
     on_lanes = on_lanes and not PARTICIPANTS[one.type].on_rails
     return on_lanes and one.name != "ego" and any(speed != 0.0 for speed in speeds_of(one, story))
 

@@ -1,7 +1,7 @@
 """What a logical scenario must have as a whole: what it needs, nothing idle, all of it feasible."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
@@ -130,14 +130,44 @@ def try_out(scenario: LogicalScenario) -> None:
         raise ScenarioError(*(f"{problem}, {where}" for problem in error.problems)) from None
     X = whole.decode(probes(whole.n_var))
     columns = {name: X[:, whole.index(name)] for name in whole.names}
-    problems = [*_places(scenario, columns), *_fast(scenario, columns)]
+    problems = [
+        problem
+        for participants, rows in _placed(scenario, columns)
+        for problem in _places(scenario, participants, rows)
+    ]
+    problems += _fast(scenario, columns)
     if problems:
-        raise ScenarioError(*problems)
+        raise ScenarioError(*dict.fromkeys(problems))
 
 
-def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[str]:
+def _placed(
+    scenario: LogicalScenario, columns: Mapping[str, Float]
+) -> Iterator[tuple[tuple[Participant, ...], Mapping[str, Float]]]:
+    """Yield the participants at the places that categories choose, and the rows of that choice."""
+    names = list(dict.fromkeys(one.place_by for one in scenario.participants if one.place_by))
+    if not names:
+        yield scenario.participants, columns
+        return
+    chosen = np.stack([columns[name] for name in names], axis=1)
+    for key in np.unique(chosen, axis=0):
+        at = dict(zip(names, key.astype(int).tolist(), strict=True))
+        rows = np.flatnonzero((chosen == key).all(axis=1))
+        yield (
+            tuple(
+                one.at_each_place[at[one.place_by]] if one.place_by else one
+                for one in scenario.participants
+            ),
+            {name: column[rows] for name, column in columns.items()},
+        )
+
+
+def _places(
+    scenario: LogicalScenario,
+    participants: Sequence[Participant],
+    columns: Mapping[str, Float],
+) -> Iterator[str]:
     """Yield participants that may leave a leg's end, or start inside another."""
-    for one in scenario.participants:
+    for one in participants:
         ends = [(one.start, 0.0), *((point, 0.0) for point in one.path[1:])]
         for end, least in [*ends, *([(one.end, 0.0)] if one.end else [])]:
             length = scenario.roads.length(end.leg)
@@ -157,7 +187,7 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
                     f"{one.name} must stay on leg {end.leg}: distance <= {limit} [m], "
                     f"'{end.distance}' can lie {beyond.max():.3g} m beyond ({scenario.place})"
                 )
-    for one in scenario.participants:
+    for one in participants:
         if one.end is None or (one.start.leg, one.start.way) != (one.end.leg, one.end.way):
             continue
         behind = _metres(one.start.distance, columns) - _metres(one.end.distance, columns)
@@ -169,7 +199,7 @@ def _places(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator
                 f"direction (one that drives against it has heading 180 and no end) "
                 f"({scenario.place})"
             )
-    on_lanes = [one for one in scenario.participants if not one.path]
+    on_lanes = [one for one in participants if not one.path]
     for one, other in combinations(on_lanes, 2):
         a, b = one.start, other.start
         if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):

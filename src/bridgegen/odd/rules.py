@@ -53,7 +53,8 @@ def bounds_between_layers(
     for one in story.participants:
         if one.conduct != "vehicle" or one.name == "ego":
             continue  # the ego's driver is under test: what it dares is its own affair
-        if (radius := bend(roads, one)) is not None:
+        radii = [bend(roads, at) for at in one.at_each_place]
+        for radius in dict.fromkeys(one for one in radii if one is not None):
             yield from bend_bounds(radius, one, story, parameters, prefixes, place)
     for name, limit in roads.closes.items():
         for prefix in weathers:

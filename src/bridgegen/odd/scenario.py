@@ -216,8 +216,9 @@ class LogicalScenario(SearchedScenario):
         sirens = [one.name for one in self.participants if one.siren]
         bodies = {one.name: one.own_body for one in self.participants if one.own_body}
         types = {one.name: (one.type_by, one.types) for one in self.participants if one.type_by}
+        ways = {one.name: (one.place_by, one.ways) for one in self.participants if one.ways}
         models = {one.name: one.model for one in self.participants if one.model}
-        parts = (drivers, headings, lifted, sirens, bodies, types, models)
+        parts = (drivers, headings, lifted, sirens, bodies, types, models, ways)
         more = "".join(repr(one) for one in parts if one)
         return sha256((content + more).encode()).hexdigest()
 

@@ -1,7 +1,7 @@
 """Participants and events of a logical scenario: layers 3 and 4."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -67,6 +67,9 @@ class Participant:
         type_by: the category that gives its type or model in each evaluation; empty: it is always
             the same.
         types: the values of that: types, and names of models.
+        place_by: the category that gives its start and end in each evaluation; empty: they are
+            always the same.
+        ways: the starts and ends that it chooses from, in the order of its values.
         model: one of `bridgegen.named_models.MODELS`; empty: it is as its type usually is.
         own_body: its body, where it is not the type's or model's.
         siren: whether it is an emergency vehicle on a call, to which all give way.
@@ -86,6 +89,8 @@ class Participant:
     own_body: Body | None = field(default=None, repr=False, kw_only=True)
     type_by: str = field(default="", repr=False, kw_only=True)
     types: tuple[str, ...] = field(default=(), repr=False, kw_only=True)
+    place_by: str = field(default="", repr=False, kw_only=True)
+    ways: tuple[tuple[Waypoint, Waypoint | None], ...] = field(default=(), repr=False, kw_only=True)
     model: str = field(default="", repr=False, kw_only=True)
 
     @property
@@ -97,6 +102,13 @@ class Participant:
     def bodies(self) -> tuple[Body, ...]:
         """All that its body may be."""
         return tuple(body_of(one) for one in self.types) or (self.body,)
+
+    @property
+    def at_each_place(self) -> "tuple[Participant, ...]":
+        """It at each place that its category chooses from; itself where there is none."""
+        return tuple(
+            replace(self, start=start, end=end, place_by="", ways=()) for start, end in self.ways
+        ) or (self,)
 
     @property
     def conduct(self) -> Conduct:

@@ -68,6 +68,15 @@ class BodySection(ShapedSection):
     """[m/s²]"""
 
 
+class PlaceSection(ShapedSection):
+    """Where a participant starts and goes, where a category chooses one of several."""
+
+    start: WaypointSection
+    """Where it stands at time 0."""
+    end: WaypointSection | None = None
+    """Where its route ends; the ego's must."""
+
+
 class ParticipantSection(ShapedSection):
     """One road user; the one that is called ``ego`` is under test."""
 
@@ -83,6 +92,10 @@ class ParticipantSection(ShapedSection):
     """Where it stands at time 0."""
     end: WaypointSection | None = None
     """Where its route ends; the ego's must."""
+    place_by: Word | None = None
+    """A category that chooses one of ``places`` in each evaluation."""
+    places: dict[Word, PlaceSection] = {}
+    """Instead of start and end: several, by the category's values."""
     path: list[WaypointSection] = []
     """Instead of start and end: straight lines through places; of a vehicle a smooth curve from the
     first to the last, which the others bend."""

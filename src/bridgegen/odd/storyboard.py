@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from bridgegen.named_models import MODELS, body_of, type_of
+from bridgegen.named_models import MODELS, body_of
+from bridgegen.odd.choices import Choices
 from bridgegen.odd.others import ATTENTIVE, DRIVERS
-from bridgegen.odd.parameters import Axis, Parameter, nearest
+from bridgegen.odd.parameters import nearest
 from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
 from bridgegen.odd.quantities import Quantities
@@ -77,7 +78,7 @@ class Storyboard:
         more: tuple[str, ...] = (),
     ) -> None:
         self._quantities, self._roads, self._prefixes = quantities, roads, prefixes
-        self._places = Places(quantities, roads)
+        self._places, self._choices = Places(quantities, roads), Choices(quantities)
         self._report, self._check = quantities.report, quantities.check
         document = quantities.document
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
@@ -105,7 +106,8 @@ class Storyboard:
             self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
             self._check_heading(name, given, path)
             self._check_body(name, given, path)
-            self._check_types(name, given, path)
+            self._choices.check_types(name, given, path)
+            self._choices.check_places(name, given, path)
             if given.siren and (given.type != "emergency" or name == EGO):
                 self._report(
                     f"a siren is for emergency vehicles other than the ego, {name} is a "
@@ -118,12 +120,26 @@ class Storyboard:
                     (*path, "exceeds_limit"),
                 )
             self._check_driver(name, given, path)
-            if given.path:
+            if given.places:
+                yield self._at_places(name, given, path)
+            elif given.path:
                 yield self._off_lanes(name, given, path)
             elif given.start is None:
                 self._report(f"{name} must have a start or a path", path)
             else:
                 yield self._driver(name, given, given.start, path)
+
+    def _at_places(self, name: str, given: ParticipantSection, path: Path) -> Participant:
+        """Return a participant whose start and end a category chooses."""
+        usual, found = self._choices.default_place(given), {}
+        for key, one in given.places.items():
+            at = given.model_copy(update={"start": one.start, "end": one.end})
+            place = (*path, "places", key)
+            found[key] = self._driver(name, at, one.start, place)
+            self._check_heading(name, at, place)
+        chosen = found[usual or next(iter(found))]
+        ways = tuple((found[key].start, found[key].end) for key in self._choices.places(given))
+        return replace(chosen, place_by=given.place_by or "", ways=ways)
 
     def _off_lanes(self, name: str, given: ParticipantSection, path: Path) -> Participant:
         """Return a participant with a path of its own."""
@@ -150,7 +166,7 @@ class Storyboard:
         return Participant(
             name, given.type, points[0], None, given.speed, points, driver=driver,
             exceeds_limit=given.exceeds_limit or "", siren=given.siren, own_body=_body(given),
-            type_by=given.type_by or "", types=self._types(given), model=given.model or "",
+            type_by=given.type_by or "", types=self._choices.types(given), model=given.model or "",
         )  # fmt: skip
 
     def _driver(
@@ -189,61 +205,9 @@ class Storyboard:
         return Participant(
             name, given.type, start, end, given.speed, driver=given.driver or "",
             heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
-            own_body=_body(given), type_by=given.type_by or "", types=self._types(given),
+            own_body=_body(given), type_by=given.type_by or "", types=self._choices.types(given),
             model=given.model or "",
         )  # fmt: skip
-
-    def _check_types(self, name: str, given: ParticipantSection, path: Path) -> None:
-        """Check the category that gives a participant's type, if there is one."""
-        if given.type_by is None:
-            return
-        place, parameter = (*path, "type_by"), self._types_of(given)
-        self._quantities.used.add(given.type_by)
-        if parameter is None:
-            hint = nearest(given.type_by, self._quantities.parameters)
-            self._report(f"type_by must name a category, got '{given.type_by}'{hint}", place)
-            return
-        usual = PARTICIPANTS[given.type]
-        for kind in parameter.kind.names:
-            if kind not in TYPES and kind not in MODELS:
-                hint = nearest(kind, (*TYPES, *MODELS))
-                self._report(
-                    f"the values of {given.type_by} must be types of participants or names of "
-                    f"models, got '{kind}'{hint}",
-                    place,
-                )
-                continue
-            found = PARTICIPANTS[type_of(kind)]
-            if (found.seen_as.conduct, found.on_rails) != (
-                usual.seen_as.conduct,
-                usual.on_rails,
-            ):
-                self._report(
-                    f"the types of {name} must be moved by the same rules, a {kind} is not as a "
-                    f"{given.type}",
-                    place,
-                )
-        if parameter.axis is Axis.STATIC:
-            self._report("the category of a type must not be of the static axis", place)
-        default, said = parameter.kind.names[int(parameter.default)], given.model or given.type
-        if default != said:
-            what = "model" if default in MODELS else "type"
-            self._report(
-                f"{what} of {name} must be the default of {given.type_by}, {default}, got {said}",
-                place,
-            )
-        if given.body is not None:
-            self._report(f"{name} has a body of its own, or types that vary, not both", place)
-
-    def _types_of(self, given: ParticipantSection) -> Parameter | None:
-        """Return the category that gives a type; None if there is none of that name."""
-        found = self._quantities.parameters.get(given.type_by or "")
-        return found if found is not None and found.kind.names else None
-
-    def _types(self, given: ParticipantSection) -> tuple[str, ...]:
-        found = self._types_of(given)
-        known = (*TYPES, *MODELS)
-        return tuple(one for one in found.kind.names if one in known) if found else ()
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check model and own body, if there are: what the type's has none of, it has not."""

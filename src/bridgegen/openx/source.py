@@ -148,7 +148,8 @@ class OntologySource:
         self.static_names = () if road_map else static
         self.unused_names = static if road_map and not road_map.sites else ()
         types = {one.type_by: one.types for one in scenario.participants if one.type_by}
-        choices: dict[str, Sequence[object]] = dict(types)
+        ways = {one.place_by: one.ways for one in scenario.participants if one.place_by}
+        choices: dict[str, Sequence[object]] = {**types, **ways}
         if road_map and road_map.sites:
             choices = {PLACE: road_map.sites} | choices
         self.variant_names = tuple(choices)
@@ -182,7 +183,7 @@ class OntologySource:
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
-        types = {one.name: str(one.type) for one in self._typed(values).participants}
+        types = {one.name: str(one.type) for one in self._settled(values).participants}
         for works in self._scenario.story.works:
             types |= {f"{works.name}_cone_{k}": "cone" for k in range(1, len(works.cones) + 1)}
             types[f"{works.name}_sign"] = "sign"
@@ -211,7 +212,7 @@ class OntologySource:
             road_file: what its OpenDRIVE file will be called.
             courses: see `bridgegen.ontology.individuals.build`.
         """
-        site, scenario = self.place(values), self._typed(values)
+        site, scenario = self.place(values), self._settled(values)
         if site and self._map and self._map.sites:
             scenario = at_site(scenario, self._map.model, site, int(values[PLACE]))
         if site and road_file:
@@ -226,21 +227,21 @@ class OntologySource:
         )
         return _OfOntology(individuals, road_file or f"{self._scenario.name}.xodr", self._map)
 
-    def _typed(self, values: Mapping[str, float]) -> LogicalScenario:
-        """Return the scenario with the types that a row gives its participants."""
+    def _settled(self, values: Mapping[str, float]) -> LogicalScenario:
+        """Return the scenario with the types and places that a row gives its participants."""
         if not self.variant_names:
             return self._scenario
-        chosen = tuple(
-            _of_kind(one, one.types[int(values[one.type_by])]) if one.type_by else one
-            for one in self._scenario.participants
-        )
+        chosen = tuple(_chosen(one, values) for one in self._scenario.participants)
         story = replace(self._scenario.story, participants=chosen)
         return replace(self._scenario, story=story)
 
 
-def _of_kind(one: Participant, name: str) -> Participant:
-    """Return a participant as a type's or a model's name says."""
-    return replace(one, type=type_of(name), model=name if name in MODELS else "")
+def _chosen(one: Participant, values: Mapping[str, float]) -> Participant:
+    """Return a participant with the type or model, and at the place, that a row chooses."""
+    if one.type_by:
+        name = one.types[int(values[one.type_by])]
+        one = replace(one, type=type_of(name), model=name if name in MODELS else "")
+    return one.at_each_place[int(values[one.place_by])] if one.place_by else one
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,10 @@ def _participant(one: Participant) -> str:
         way = " to ".join(_place(point) for point in one.path)
         goes = "drives on a smooth curve" if one.conduct == "vehicle" else "goes"
         return f"{one.name}, a {kind}, {goes} from {way} at {in_words(one.speed, 'm/s')}."
+    if one.ways:
+        at = [f"from {_place(start)}{f' to {_place(end)}' if end else ''}"
+              for start, end in one.ways]  # fmt: skip
+        return f"{one.name}, a {kind}, goes {' or '.join(at)} at {in_words(one.speed, 'm/s')}."
     turned = ""
     if one.heading in (180.0, -180.0):
         turned = ", against the traffic"
