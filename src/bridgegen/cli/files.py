@@ -119,11 +119,14 @@ def import_(
             "--strict", help="Refuse an .xosc of which any detail would be lost, or computed."
         ),
     ] = False,
+    empty_trigger: options.EmptyTrigger = None,
 ) -> None:
     """Convert a map, or a scenario file, to individuals."""
     from bridgegen.openx.convert import import_file
 
-    written, notes = import_file(file, out, partial=partial, ego=ego, strict=strict)
+    written, notes = import_file(
+        file, out, partial=partial, ego=ego, strict=strict, empty_trigger=empty_trigger or "never"
+    )
     print(written)
     for note in notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)

@@ -20,6 +20,7 @@ from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.to_owl.losses import losses
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import write as openscenario_write
+from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
@@ -74,12 +75,14 @@ def import_file(
     partial: bool = False,
     ego: str | None = None,
     strict: bool = False,
+    empty_trigger: str = NEVER,
 ) -> tuple[Path, list[str]]:
     """Write a whole OpenDRIVE map, or a scenario file on its map, as an ontology.
 
     Of other people's scenario files, details are left out on which nothing depends that happens
     (names of models, wheels, controllers that are not known here, …), and an expression is stated
-    by the value that it has. What else the ontology cannot express is refused.
+    by the value that it has. What else it has no words for is kept in OpenSCENARIO's own; what can
+    be kept in neither is refused.
 
     Args:
         file: the map (``.xodr``, or by CARLA's name), or the scenario (``.xosc``), which
@@ -88,6 +91,7 @@ def import_file(
         partial: leave out contents that the ontology cannot express, instead of refusing the file.
         ego: of a scenario, the entity under test, if it is not called so.
         strict: take every detail of a scenario for one that must not be lost.
+        empty_trigger: when acts and events start whose StartTrigger is empty: "never", or "now".
 
     Returns:
         The file written, and a sentence for each content that it lacks, or has in part.
@@ -102,10 +106,11 @@ def import_file(
     out = out or (file if file == named else Path(named.name)).with_suffix(".owl")
     notes: list[str] = []
     if file.suffix.lower() == ".xosc":
-        individuals, notes = _import_storyboard(file, out, partial, ego, strict)
-    elif partial or strict or ego is not None:
+        individuals, notes = _import_storyboard(file, out, partial, ego, strict, empty_trigger)
+    elif partial or strict or ego is not None or empty_trigger != NEVER:
         raise InputError(
-            f"{file}: only a scenario (.xosc) can be imported in part or strictly, or has an ego"
+            f"{file}: only a scenario (.xosc) can be imported in part or strictly, or has an ego "
+            "or triggers"
         )
     else:
         data = read_bytes(file)
@@ -119,12 +124,13 @@ def import_file(
 
 
 def _import_storyboard(
-    file: Path, out: Path, partial: bool, ego: str | None, strict: bool
+    file: Path, out: Path, partial: bool, ego: str | None, strict: bool, empty_trigger: str
 ) -> tuple[Individuals, list[str]]:
     skipped: list[str] = []
     scenario = openscenario_read.read(file, skipped=skipped if partial else None)
     if ego is not None:
         scenario = rename_entity(scenario, ego, EGO)
+    scenario = read_empty_triggers(scenario, empty_trigger)
     roads = roads_of(scenario, file)
     scenario = prepared(scenario, roads, str(file))
     road_map = logic_path(scenario, file)

@@ -14,7 +14,7 @@ from bridgegen.openx.openscenario.element import Element, declaration, walk
 from bridgegen.openx.openscenario.read import read, verbatim
 from bridgegen.openx.openscenario.reader import Reader
 from bridgegen.openx.openscenario.values import Kind
-from bridgegen.openx.openscenario.write import _fill, to_xml
+from bridgegen.openx.openscenario.write import fill, to_xml
 
 _TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn")), max_size=8)
 _ODD = st.sampled_from(["\n", "\t x", " ", "<&>\"'", "ä∑🚗", "$", "$ a", "${a}"])
@@ -165,13 +165,13 @@ def test_reading_what_was_written_gives_the_same_element(cls):
     @given(st.integers(0, 2).flatmap(lambda more: elements(cls, _height(cls) + more)))
     def check(element):
         node = etree.Element("Any")
-        _fill(node, "Any", element, bare=False)
+        fill(node, "Any", element, bare=False)
         text = etree.tostring(node)
         reader = Reader()
         again = reader.element(cls, etree.fromstring(text))
         assert again == element, (reader.malformed, reader.unsupported)
         node = etree.Element("Any")
-        _fill(node, "Any", again, bare=False)
+        fill(node, "Any", again, bare=False)
         assert etree.tostring(node) == text
 
     check()
@@ -239,4 +239,4 @@ def test_a_class_that_declares_nonsense_is_a_programming_error():
 )
 def test_what_no_file_can_hold_is_not_written(bad, text):
     with pytest.raises(ValueError, match=text):
-        _fill(etree.Element("Any"), type(bad).__name__, bad, bare=False)
+        fill(etree.Element("Any"), type(bad).__name__, bad, bare=False)

@@ -77,6 +77,11 @@ def numbers(scenario: OpenScenario) -> dict[str, float]:
     return {name: float(value) for name, value in values(scenario).items() if kinds[name].is_number}
 
 
+def text_of(known: Mapping[str, Literal], value: ParameterRef | str) -> str:
+    """Return a text, at the values of the parameters."""
+    return str(known[value.name] if isinstance(value, ParameterRef) else value)
+
+
 def problems(scenario: OpenScenario) -> list[str]:
     """Return what is wrong with the parameters, one sentence each, with the line."""
     found: list[tuple[int, str]] = []

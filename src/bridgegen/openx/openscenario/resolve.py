@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from bridgegen.errors import FileFormatError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Attribute, Element, rewritten, values_of
-from bridgegen.openx.openscenario.values import Kind, Literal
+from bridgegen.openx.openscenario.values import Kind, Literal, format_double
+
+E = TypeVar("E", bound=Element)
 
 
 def resolved(scenario: osc.OpenScenario, place: str) -> osc.OpenScenario:
@@ -23,6 +25,20 @@ def resolved(scenario: osc.OpenScenario, place: str) -> osc.OpenScenario:
     Raises:
         FileFormatError: an expression that has no finite value, or no whole one where one is
             needed; all of them at once.
+    """
+    return part_resolved(replace(scenario, parameter_declarations=None), scenario, place)
+
+
+def part_resolved(part: E, scenario: osc.OpenScenario, place: str) -> E:
+    """Return a part of a scenario in which literals stand for all parameters.
+
+    Args:
+        part: an element.
+        scenario: that declares the parameters.
+        place: as of `resolved`.
+
+    Raises:
+        FileFormatError: as of `resolved`.
     """
     declared = scenario.parameter_declarations
     texts = {one.name: one.value for one in declared.parameters} if declared else {}
@@ -44,10 +60,13 @@ def resolved(scenario: osc.OpenScenario, place: str) -> osc.OpenScenario:
                     found.append(f"{place}: {tag} must be {what}, got {value} = {number:g} "
                                  f"(line {element.line})")  # fmt: skip
                     continue
-                changes[attribute.field] = _typed(attribute.kind, number)
+                is_text = attribute.kind is Kind.STRING  # a value of any type
+                changes[attribute.field] = (
+                    format_double(number) if is_text else _typed(attribute.kind, number)
+                )
         return replace(element, **changes) if changes else element
 
-    made = rewritten(replace(scenario, parameter_declarations=None), change)
+    made = rewritten(part, change)
     if found:
         raise FileFormatError(*found)
     return made

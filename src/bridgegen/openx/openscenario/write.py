@@ -28,7 +28,7 @@ def to_xml(scenario: OpenScenario) -> bytes:
         ValueError: NaN, a text that XML or the standard cannot hold, or too few children.
     """
     root = etree.Element("OpenSCENARIO")
-    _fill(root, "OpenSCENARIO", scenario, bare=scenario.file_header.rev_minor == 0)
+    fill(root, "OpenSCENARIO", scenario, bare=scenario.file_header.rev_minor == 0)
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
 
@@ -43,7 +43,19 @@ def _text(attribute: Attribute, value: Any) -> str:
     return text
 
 
-def _fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> None:
+def fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> None:
+    """Give a node what an element has.
+
+    Args:
+        node: an empty one.
+        tag: its own, for messages.
+        element: what it shall be.
+        bare: as of version 1.0, without what later versions wrap.
+
+    Raises:
+        TypeError: as of `to_xml`.
+        ValueError: likewise.
+    """
     declared = declaration(type(element))
     try:
         for attribute, value in values_of(element):
@@ -59,4 +71,4 @@ def _fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> No
     for name, below in children_of(element):
         wrapped = bare and is_wrapper(element, below)
         for each, one in children_of(below) if wrapped else ((name, below),):
-            _fill(etree.SubElement(node, each), each, one, bare=bare)
+            fill(etree.SubElement(node, each), each, one, bare=bare)

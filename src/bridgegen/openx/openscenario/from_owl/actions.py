@@ -9,6 +9,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
+from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import lamp_states
 from bridgegen.openx.openscenario.from_owl.weather import environment
 from bridgegen.openx.openscenario.splines import uniform_knots
@@ -49,6 +50,8 @@ class Actions:
             UnsupportedError: an action of a class that cannot be written.
         """
         ind = self._individuals
+        if ind.is_a(node, "OpenScenarioAction"):
+            return self._quoted(node)
         if ind.is_a(node, "EnvironmentAction"):
             weather = ind.link(node, "has_weather")
             made, texts = environment(ind, weather, self._quantities, name=event)
@@ -72,6 +75,11 @@ class Actions:
             UnsupportedError: an action of a class that cannot be written.
         """
         ind = self._individuals
+        if ind.is_a(node, "OpenScenarioAction"):
+            made = self._quoted(node)
+            if not isinstance(made, osc.PrivateAction):
+                raise OntologyError(f"{ind.describe(node)} must be a PrivateAction")
+            return made
         kinds: dict[str, Callable[[str, Subject], osc.PrivateAction]] = {
             "SpeedAction": self._speed,
             "LaneChangeAction": self._lane_change,
@@ -90,6 +98,23 @@ class Actions:
             f"{ind.describe(node)} must be one of {', '.join(kinds)}, EnvironmentAction, "
             "TrafficSignalStateAction, AddEntityAction or DeleteEntityAction to be written"
         )
+
+    def scenario_wide(self, node: Subject) -> osc.GlobalAction:
+        """Return an action of nobody.
+
+        Raises:
+            OntologyError: it is another one, or malformed.
+        """
+        made = self._quoted(node)
+        if not isinstance(made, osc.GlobalAction):
+            raise OntologyError(f"{self._individuals.describe(node)} must be a GlobalAction")
+        return made
+
+    def _quoted(self, node: Subject) -> osc.PrivateAction | osc.GlobalAction:
+        options = {"PrivateAction": osc.PrivateAction, "GlobalAction": osc.GlobalAction}
+        made = quoted_element(self._individuals, node, options)
+        assert isinstance(made, osc.PrivateAction | osc.GlobalAction)
+        return made
 
     def _teleport(self, actor: str, node: Subject) -> osc.PrivateAction:
         del actor

@@ -7,6 +7,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
+from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import lamp_states
 
 AnyCondition = osc.ByEntityCondition | osc.ByValueCondition
@@ -90,6 +91,14 @@ class Conditions:
     ) -> tuple[AnyCondition, float | osc.ParameterRef]:
         """Return a condition and its delay [s]."""
         ind = self._individuals
+        if ind.is_a(node, "OpenScenarioCondition"):
+            options = {
+                "ByEntityCondition": osc.ByEntityCondition,
+                "ByValueCondition": osc.ByValueCondition,
+            }
+            made = quoted_element(ind, node, options)
+            assert isinstance(made, osc.ByEntityCondition | osc.ByValueCondition)
+            return made, 0.0
         if ind.is_a(node, "StoryboardElementStateCondition"):
             event = plain_text(ind, ind.link(node, "has_event_ref"), "has_name")
             said = ind.optional_text(node, "has_event_state")

@@ -12,6 +12,7 @@ from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
+from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
 
 RADIANS = repr(math.pi / 180.0)
@@ -91,6 +92,10 @@ class Places:
                 beyond the leg's end.
         """
         individuals = self._individuals
+        if individuals.is_a(node, "OpenScenarioPosition"):
+            made = quoted_element(individuals, node, {"Position": osc.Position})
+            assert isinstance(made, osc.Position)
+            return made
         if individuals.is_a(node, "WorldPosition"):
             x, y = (self._quantities.get(node, f"has_world_{one}") for one in ("x", "y"))
             turned = [

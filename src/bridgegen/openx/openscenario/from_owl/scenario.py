@@ -8,6 +8,8 @@ What other tools need (found by reading and running esmini): orientations always
 ``override`` as of 1.2; routes by lane positions; inline vehicles; a stop trigger.
 """
 
+from itertools import count
+
 from bridgegen.errors import OntologyError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
@@ -19,6 +21,7 @@ from bridgegen.openx.openscenario.from_owl.events import Events
 from bridgegen.openx.openscenario.from_owl.notes import Notes
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
+from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.from_owl.weather import environment
 from bridgegen.openx.openscenario.versions import least_version, to_version
@@ -66,7 +69,8 @@ class _Converter:
     def scenario(self, road_file: str, date: str) -> osc.OpenScenario:
         elements = self._elements()
         init, texts = self._init(elements)
-        groups = (*self.events.maneuver_groups(self.node), *self.signals.maneuver_groups())
+        groups, acts = self.events.acts(self.node)
+        groups += tuple(self.signals.maneuver_groups())
         texts += self.actions.texts
         declarations = self.quantities.declarations()
         for text in texts:
@@ -91,8 +95,11 @@ class _Converter:
                     for name, node in (self.participants | elements).items()
                 )
             ),
-            osc.Storyboard(osc.Init(init), _stories(groups), self._stop(self.participants[EGO])),
+            osc.Storyboard(
+                osc.Init(init), _stories(groups, acts), self._stop(self.participants[EGO])
+            ),
             parameter_declarations=osc.ParameterDeclarations((*declarations, *texts)),
+            variable_declarations=self._variables(),
         )
         version = least_version(made)
         return made if version == "1.2" else to_version(made, version, name)
@@ -123,6 +130,14 @@ class _Converter:
                     found[name] = node
         return {name: found[name] for name in sorted(found)}
 
+    def _variables(self) -> osc.VariableDeclarations | None:
+        found = [
+            quoted_element(self.individuals, node, {"VariableDeclaration": osc.VariableDeclaration})
+            for node in self.individuals.links(self.node, "has_variable")
+        ]
+        known = tuple(one for one in found if isinstance(one, osc.VariableDeclaration))
+        return osc.VariableDeclarations(known) if known else None
+
     # -- start and end -------------------------------------------------------------------------
 
     def _init(
@@ -134,6 +149,8 @@ class _Converter:
         if weather is not None:
             result, texts = environment(self.individuals, weather, self.quantities)
             globals_.append(osc.GlobalAction(osc.EnvironmentAction(result)))
+        for action in self.individuals.links(self.node, "has_global_action"):
+            globals_.append(self.actions.scenario_wide(action))
         privates = [
             osc.Private(name, self._start(name, node)) for name, node in self.participants.items()
         ]
@@ -145,12 +162,12 @@ class _Converter:
         return osc.InitActions((*globals_, *self.signals.start), tuple(privates)), texts
 
     def _start(self, name: str, node: Subject) -> tuple[osc.PrivateAction, ...]:
-        """Return place, speed and way of a participant, in this order."""
+        """Return place, speed and way of a participant, in this order, and what else it does."""
         ind = self.individuals
-        kinds = ("TeleportAction", "SpeedAction", "FollowTrajectoryAction")
+        kinds = ("TeleportAction", "SpeedAction", "FollowTrajectoryAction", "")
         found: dict[str, list[osc.PrivateAction]] = {kind: [] for kind in kinds}
         for action in ind.links(node, "has_init_action"):
-            kind = next((one for one in kinds if ind.is_a(action, one)), kinds[1])
+            kind = next((one for one in kinds[:3] if ind.is_a(action, one)), kinds[3])
             found[kind].append(self.actions.private(name, action))
         counts = [len(found[kind]) for kind in kinds]
         if counts[0] != 1 or counts[1] > 1 or counts[2] > 1:
@@ -159,19 +176,20 @@ class _Converter:
                 f"and one FollowTrajectoryAction as has_init_action, got {counts[0]}, {counts[1]} "
                 f"and {counts[2]}"
             )
-        actions = [action for kind in kinds for action in found[kind]]
+        others = found.pop(kinds[3])
+        actions = [action for each in found.values() for action in each]
         route = ind.optional_link(node, "has_route")
         if route is not None:
             actions.append(self.actions.route(f"{name}_route", route))
-        return tuple(actions)
+        return (*actions, *others)
 
     def _stop(self, ego: Subject) -> osc.Trigger:
-        """Return the end: the duration has passed, or the ego has arrived."""
+        """Return the end: the duration has passed, the ego has arrived, or what else ends it."""
         duration = self.quantities.get(self.node, "has_duration")
         passed = osc.SimulationTimeCondition(duration, osc.Rule.GREATER_OR_EQUAL)
         groups = [_alternative("duration", osc.ByValueCondition(passed))]
         route = self.individuals.optional_link(ego, "has_route")
-        if route is not None:
+        if route is not None and self.individuals.optional_text(self.node, "has_arrival") is None:
             destination = self.individuals.link(route, "has_destination")
             position = self.places.position(destination, oriented=False)
             arrived = osc.ByEntityCondition(
@@ -179,15 +197,23 @@ class _Converter:
                 osc.EntityCondition(osc.ReachPositionCondition(ARRIVAL, position)),
             )
             groups.append(_alternative("ego_arrives", arrived))
+        stop = self.individuals.optional_link(self.node, "has_stop")
+        if stop is not None:
+            groups += self.events.groups("stop", (), stop)
         return osc.Trigger(tuple(groups))
 
 
-def _stories(groups: tuple[osc.ManeuverGroup, ...]) -> tuple[osc.Story, ...]:
-    if not groups:
+def _stories(
+    groups: tuple[osc.ManeuverGroup, ...], later: tuple[osc.Act, ...]
+) -> tuple[osc.Story, ...]:
+    if not groups and not later:
         return ()
     begun = osc.SimulationTimeCondition(0.0, osc.Rule.GREATER_OR_EQUAL)
     start = osc.Trigger((_alternative("start", osc.ByValueCondition(begun)),))
-    return (osc.Story("story", (osc.Act("act", groups, start),)),)
+    taken = {one.name for one in later}
+    name = next(one for k in count(1) if (one := f"act_{k}" if k > 1 else "act") not in taken)
+    first = (osc.Act(name, groups, start),) if groups else ()
+    return (osc.Story("story", (*first, *later)),)
 
 
 def _alternative(

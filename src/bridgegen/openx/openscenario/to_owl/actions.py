@@ -8,9 +8,15 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.signals import LAMPS
 from bridgegen.openx.openscenario.splines import is_uniform
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.build import (
+    StoryBuilder,
+    UnsayableError,
+    numbered,
+    plain_name,
+)
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position, same_place
+from bridgegen.openx.openscenario.to_owl.quoted import ACTION, node_of
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
 
 Start = tuple[ox.NamedNode, osc.Position]
@@ -40,8 +46,21 @@ def add_action(
         wrapped: the action.
 
     Raises:
-        UnsayableError: an action that the ontology has no class for, or no property.
+        UnsayableError: an action that the ontology has no class for, or no property, and that
+            cannot be quoted.
     """
+    return node_of(
+        builder, name, ACTION, wrapped, lambda: _action(builder, event, name, actors, wrapped)
+    )
+
+
+def _action(
+    builder: StoryBuilder,
+    event: str,
+    name: str,
+    actors: tuple[str, ...],
+    wrapped: osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction,
+) -> ox.NamedNode:
     if isinstance(wrapped, osc.GlobalAction):
         return _global(builder, event, name, wrapped)
     if isinstance(wrapped, osc.UserDefinedAction):
@@ -212,7 +231,8 @@ def add_trajectory(
     one = action.trajectory_ref.trajectory
     trajectory = builder.node(f"{name}_path", "Trajectory")
     builder.put(node, "has_trajectory", trajectory)
-    builder.put(trajectory, "has_name", builder.text(one.name))
+    called = builder.text(one.name)
+    builder.put(trajectory, "has_name", plain_name(called) if builder.in_substance else called)
     timed = isinstance(action.time_reference.reference, osc.Timing)
     vertices = _vertices(builder, trajectory, one.shape.shape)
     for k, (number, vertex) in enumerate(zip(numbered(len(vertices)), vertices, strict=True)):

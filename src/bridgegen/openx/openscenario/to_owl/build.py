@@ -21,6 +21,7 @@ from bridgegen.openx.openscenario.to_owl.legs import Stretch
 
 E = TypeVar("E", bound=StrEnum)
 
+_NO_REFERENCE = str.maketrans("", "", "${}")
 _JUST_A_NAME = re.compile(r"\$\{[\s(]*\$([A-Za-z_][A-Za-z0-9_]*)[\s)]*\}")
 
 
@@ -59,28 +60,47 @@ class StoryBuilder(Builder):
         scenario_file: the file's model.
         roads: its map.
         legs: how distances count on roads that lead to the scenario's intersection, by their ids.
+        variables: names of those that are stated.
+        starts: where participants start, by name.
         cast: entities that have been stated, by name.
         events: events that are, or will be, stated, by name.
         referred: events whose end the event that is being stated waits for.
         problems: what cannot be expressed.
-        in_substance: whether an expression may be stated by the value that it has.
+        in_substance: whether an expression may be stated by the value that it has, and an element
+            in OpenSCENARIO's own words (`quoted`).
+        quoted_lines: of the elements that the ontology's words do not say in full.
+        entities: names of all entities of the file.
+        element_names: what the storyboard's elements that are stated will be called, by kind and
+            name; empty where several have that name.
+        acts: acts that begin later than the scenario, by name.
         bindings: nodes, their properties, and the parameters that give these.
         free: nodes and those of their properties that have numbers of their own.
         parameters: the individuals of the file's numeric parameters, by name.
     """
 
     def __init__(
-        self, name: str, scenario: osc.OpenScenario, roads: OpenDrive, *, in_substance: bool = False
+        self,
+        name: str,
+        scenario: osc.OpenScenario,
+        roads: OpenDrive,
+        *,
+        in_substance: bool = False,
+        quoted_lines: frozenset[int] = frozenset(),
     ) -> None:
         self.scenario_file, self.roads = scenario, roads
-        self.in_substance = in_substance
+        self.in_substance, self.quoted_lines = in_substance, quoted_lines
         self.legs: dict[str, Stretch] = {}
         self.numbers = parameters.numbers(scenario)
         self._constants = parameters.values(scenario)
         super().__init__(name, self.numbers)
         self.named.add("road_network")
         self._names: list[str] = []
+        self.variables: set[str] = set()
+        self.starts: dict[str, ox.NamedNode] = {}
         self.cast: dict[str, ox.NamedNode] = {}
+        self.entities = {self.text(one.name) for one in scenario.entities.scenario_objects}
+        self.acts: dict[str, ox.NamedNode] = {}
+        self.element_names: dict[tuple[str, str], str] = {}
         self.events: dict[str, ox.NamedNode] = {}
         self.referred: set[str] = set()
         self.problems: list[Lost] = []
@@ -120,20 +140,28 @@ class StoryBuilder(Builder):
     @contextmanager
     def attempt(self) -> Iterator[None]:
         """Take back what is stated within, and note the problem, where it proves unsayable."""
-        lengths = len(self.quads), len(self._names), len(self.bindings), len(self.free)
+        mark = self.mark()
         try:
             yield
         except UnsayableError as error:
             self.problems.append(error.lost)
-            self.named.difference_update(self._names[lengths[1] :])
-            del self.quads[lengths[0] :], self._names[lengths[1] :]
-            del self.bindings[lengths[2] :], self.free[lengths[3] :]
+            self.take_back(mark)
+
+    def mark(self) -> tuple[int, int, int, int]:
+        """Return how much has been stated by now."""
+        return len(self.quads), len(self._names), len(self.bindings), len(self.free)
+
+    def take_back(self, mark: tuple[int, int, int, int]) -> None:
+        """Take back what has been stated since a mark."""
+        self.named.difference_update(self._names[mark[1] :])
+        del self.quads[mark[0] :], self._names[mark[1] :]
+        del self.bindings[mark[2] :], self.free[mark[3] :]
 
     # -- values ------------------------------------------------------------------------------------
 
     def text(self, value: osc.ParameterRef | str) -> str:
         """Return a text, at the parameters' values."""
-        return str(self._constants[value.name] if isinstance(value, osc.ParameterRef) else value)
+        return parameters.text_of(self._constants, value)
 
     def choice(self, cls: type[E], value: Any) -> E:
         """Return a member of an enumeration, at the parameters' values."""
@@ -214,6 +242,11 @@ class StoryBuilder(Builder):
             what = type(element).__name__
             raise UnsayableError(element, f"{what} of {name}, a traffic light that the map lacks")
         return found
+
+
+def plain_name(name: str) -> str:
+    """Return a name without what would make it a reference."""
+    return name.translate(_NO_REFERENCE)
 
 
 def simplest(value: Any) -> Any:

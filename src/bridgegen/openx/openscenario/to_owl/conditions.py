@@ -7,6 +7,7 @@ from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.conditions import USUAL_RULES
 from bridgegen.openx.openscenario.to_owl.actions import put_place, signal_state
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.quoted import CONDITION, said_or_quoted
 
 Relative = osc.RelativeDistanceCondition | osc.TimeHeadwayCondition | osc.TimeToCollisionCondition
 
@@ -60,7 +61,14 @@ def _add_group(
 def _add_condition(
     builder: StoryBuilder, name: str, actors: tuple[str, ...], wrapped: osc.Condition
 ) -> ox.NamedNode:
-    node = _stated(builder, name, actors, wrapped)
+    node, is_quoted = said_or_quoted(
+        builder,
+        name,
+        CONDITION,
+        wrapped.condition,
+        lambda: (_stated(builder, name, actors, wrapped), False),
+        lambda node: (node, True),
+    )
     edge = builder.choice(osc.ConditionEdge, wrapped.condition_edge)
     if edge is not osc.ConditionEdge.NONE:
         builder.put(node, "has_condition_edge", edge.value)
@@ -68,7 +76,7 @@ def _add_condition(
     by_state = isinstance(wrapped.condition, osc.ByValueCondition) and isinstance(
         wrapped.condition.condition, osc.StoryboardElementStateCondition
     )
-    if delayed and not by_state:  # of an event's state it is the condition's value
+    if delayed and (is_quoted or not by_state):  # of an event's state it is the condition's value
         builder.number(node, "has_delay", wrapped.delay, wrapped)
     return node
 
@@ -89,8 +97,9 @@ def _stated(
     elif not isinstance(one, osc.StoryboardElementStateCondition):
         raise UnsayableError(one, type(one).__name__)
     else:
-        event = builder.text(one.storyboard_element_ref)
         kind = builder.text(one.storyboard_element_type)
+        event = builder.text(one.storyboard_element_ref)
+        event = builder.element_names.get((kind, event), event)
         state = builder.text(one.state)
         known = ("completeState", "startTransition")
         if kind != "event" or state not in known or event not in builder.events:

@@ -59,6 +59,7 @@ DETAILS = (
     | osc.LightStateAction
     | osc.TrailerHitch
     | osc.ParameterDeclaration
+    | osc.File
     | osc.TimeOfDay
 )
 """Elements on which nothing depends that happens.
@@ -138,6 +139,7 @@ class Differences:
                 is_detail(one)
                 or (type(one), attribute.field) in _DETAIL_FIELDS
                 or self._is_size(one, other)
+                or self._is_called_out(one, other)
             )
             yield Lost(
                 one.line,
@@ -193,6 +195,16 @@ class Differences:
         sizes = abs(_number(one.value, self.here)), abs(_number(other.value, self.there))
         return one.dynamics_dimension == other.dynamics_dimension == rate and math.isclose(*sizes)
 
+    def _is_called_out(self, one: Element, other: Element) -> bool:
+        """Return whether both are emergency vehicles, whichever: all are of one class."""
+        roles = (osc.Role.AMBULANCE, osc.Role.FIRE, osc.Role.POLICE)
+        return (
+            isinstance(one, osc.Vehicle)
+            and isinstance(other, osc.Vehicle)
+            and one.role in roles
+            and other.role in roles
+        )
+
     def _is_clear(self, one: Element, other: Element) -> bool:
         """Return whether two fogs are none that a driver would notice."""
         if not (isinstance(one, osc.Fog) and isinstance(other, osc.Fog)):
@@ -202,7 +214,8 @@ class Differences:
 
     def _is_equal(self, attribute: Attribute, one: Any, other: Any) -> bool:
         """Return whether two numbers are equal at the parameters' values."""
-        if attribute.kind is Kind.STRING or attribute.kind is Kind.DATE_TIME or other is None:
+        is_text = attribute.kind is Kind.STRING and not attribute.takes_expressions
+        if is_text or attribute.kind is Kind.DATE_TIME or other is None:
             return False
         try:
             a, b = _number(one, self.here), _number(other, self.there)

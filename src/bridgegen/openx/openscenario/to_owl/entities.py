@@ -1,5 +1,7 @@
 """OpenSCENARIO2OWL, its entities: bodies, drivers, and starts."""
 
+from functools import partial
+
 import pyoxigraph as ox
 
 from bridgegen.named_models import MODELS
@@ -8,15 +10,29 @@ from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.from_owl.entities import LIFTED, MAX_SPEED
 from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.to_owl.actions import (
+    add_action,
     add_route,
     add_trajectory,
     put_speed,
 )
-from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, UnsayableError
+from bridgegen.openx.openscenario.to_owl.build import (
+    Lost,
+    StoryBuilder,
+    UnsayableError,
+    numbered,
+)
 from bridgegen.openx.openscenario.to_owl.differences import is_detail
+from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position
+from bridgegen.openx.openscenario.to_owl.quoted import ACTION, said_or_quoted
 from bridgegen.participants import PARTICIPANTS
 
+_AS_IN_EVENTS = (
+    osc.LongitudinalDistanceAction
+    | osc.LaneOffsetAction
+    | osc.LaneChangeAction
+    | osc.SynchronizeAction
+)
 _ROAD_WORKS = {one.written.name: one for one in PARTICIPANTS.values() if not one.takes_part}
 _FURNITURE = {osc.MiscObjectCategory.POLE: PARTICIPANTS["sign"]}
 
@@ -42,13 +58,35 @@ def add_participant(
     start = add_position(builder, f"{name}_start", first.position)
     teleport = builder.node(f"{name}_teleport", "TeleportAction")
     builder.put(teleport, "has_position", start)
+    builder.starts[name] = start
     builder.put(node, "has_init_action", teleport)
-    begun: set[type[object]] = {osc.TeleportAction}
-    for wrapped in actions:
-        if wrapped.action is not first:
-            with builder.attempt():
-                _add_init(builder, node, name, wrapped, begun, (start, first.position))
     return node
+
+
+def add_begun(
+    builder: StoryBuilder, one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+) -> None:
+    """Add what a participant does from the start on; all of them have been stated.
+
+    Args:
+        builder: where to.
+        one: the entity.
+        actions: its own of the storyboard's Init.
+    """
+    name = builder.text(one.name)
+    node, first = builder.cast[name], _teleport(one, actions)
+    begun: set[type[object]] = {osc.TeleportAction}
+    left = [wrapped for wrapped in actions if wrapped.action is not first]
+    start = builder.starts[name], first.position
+    for number, wrapped in zip(numbered(len(left)), left, strict=True):
+        with builder.attempt():
+            done = f"{name}_init_{number}"
+            link, found = said_or_quoted(
+                builder, done, ACTION, wrapped,
+                partial(_init, builder, name, done, wrapped, begun, start),
+                lambda what: ("has_init_action", what),
+            )  # fmt: skip
+            builder.put(node, link, found)
 
 
 def add_element(
@@ -174,31 +212,32 @@ def _teleport(
     raise UnsayableError(one, f"the entity {one.name} without an initial TeleportAction")
 
 
-def _add_init(
+def _init(
     builder: StoryBuilder,
-    node: ox.NamedNode,
     name: str,
+    done: str,
     wrapped: osc.PrivateAction,
     begun: set[type[object]],
     start: tuple[ox.NamedNode, osc.Position],
-) -> None:
+) -> tuple[str, ox.NamedNode]:
+    """Return what an entity does at the start, and the property that links it."""
     action = wrapped.action
     if isinstance(action, osc.LongitudinalAction | osc.LateralAction | osc.RoutingAction):
         action = action.action  # type: ignore[assignment]
     kind = type(action)
+    if isinstance(action, _AS_IN_EVENTS) or known_light(action, builder.text):
+        return "has_init_action", add_action(builder, name, done, (name,), wrapped)
     if kind in begun:
         raise UnsayableError(wrapped, f"a second initial {kind.__name__} of {name}")
     begun.add(kind)
     if isinstance(action, osc.SpeedAction):
         speed = builder.node(f"{name}_init_speed", "SpeedAction")
         put_speed(builder, speed, action)
-        builder.put(node, "has_init_action", speed)
-    elif isinstance(action, osc.FollowTrajectoryAction):
+        return "has_init_action", speed
+    if isinstance(action, osc.FollowTrajectoryAction):
         follow = builder.node(f"{name}_follow", "FollowTrajectoryAction")
         add_trajectory(builder, name, follow, action, start)
-        builder.put(node, "has_init_action", follow)
-    elif isinstance(action, osc.AssignRouteAction):
-        builder.put(node, "has_route", add_route(builder, name, action.route, start))
-    else:
-        what = f"an initial {kind.__name__}"
-        raise UnsayableError(wrapped, what, is_detail=is_detail(action))
+        return "has_init_action", follow
+    if isinstance(action, osc.AssignRouteAction):
+        return "has_route", add_route(builder, name, action.route, start)
+    raise UnsayableError(wrapped, f"an initial {kind.__name__}", is_detail=is_detail(action))

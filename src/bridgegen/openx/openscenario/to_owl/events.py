@@ -1,12 +1,13 @@
 """OpenSCENARIO2OWL, its events: actors, actions and conditions; and the temporary changes.
 
 A storyboard's stories, acts, groups and maneuvers are levels without a meaning of their own where
-they begin with the scenario and happen once: their names are not kept. An event of a maneuver with
-others, which ends these when it starts, is not like one that stands alone.
+they begin with the scenario and happen once: their names are not kept. An act is stated where it
+begins later, a maneuver where its events end one another, and both where a condition names them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import count
 from urllib.parse import unquote
 
 import pyoxigraph as ox
@@ -15,9 +16,16 @@ from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_at, section_index
 from bridgegen.openx.opendrive.map_names import lane_name, road_name
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.from_owl.notes import CHANGES
 from bridgegen.openx.openscenario.to_owl.actions import add_action
-from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, UnsayableError, numbered
+from bridgegen.openx.openscenario.to_owl.build import (
+    Lost,
+    StoryBuilder,
+    UnsayableError,
+    numbered,
+    plain_name,
+)
 from bridgegen.openx.openscenario.to_owl.conditions import add_trigger
 from bridgegen.openx.openscenario.to_owl.entities import as_number
 from bridgegen.openx.openscenario.to_owl.parameters import Facts
@@ -33,36 +41,95 @@ class Happening:
     Attributes:
         name: its own.
         group: of the event, as if it stood alone in it.
-        event: with the priority that it has by itself.
+        event: with the priority that it has by itself, or in the maneuver that is stated.
+        act: its act, if that is stated.
+        maneuver: the name of its maneuver, if that is stated.
     """
 
     name: str
     group: osc.ManeuverGroup
     event: osc.Event
+    act: osc.Act | None = None
+    maneuver: str | None = None
 
 
 def happenings(builder: StoryBuilder) -> Iterator[Happening]:
     """Yield the events of a storyboard, each once; problems are noted."""
     seen: set[str] = set()
-    for act in (one for story in builder.scenario_file.storyboard.stories for one in story.acts):
-        if not _begins_at_once(builder, act.start_trigger):
-            builder.problems.append(Lost(act.line, f"the Act {act.name}, which starts later,"))
-            continue
+    storyboard, names = builder.scenario_file.storyboard, builder.element_names
+    named = named_elements(storyboard, builder.text)
+    if len(storyboard.stories) == 1:
+        names["story", builder.text(storyboard.stories[0].name)] = "story"
+    for act in (one for story in storyboard.stories for one in story.acts):
+        name, stated = builder.text(act.name), None
+        if not _begins_at_once(builder, act.start_trigger) or ("act", name) in named:
+            if not builder.in_substance or ("act", name) in names:
+                builder.problems.append(Lost(act.line, f"the Act {act.name}, which starts later,"))
+                continue
+            stated, names["act", name] = act, name
         if act.stop_trigger is not None and act.stop_trigger.condition_groups:
             builder.problems.append(Lost(act.stop_trigger.line, "StopTrigger of Act"))
         for group in act.maneuver_groups:
             for maneuver in group.maneuvers:
+                together = _together(builder, group, maneuver, named)
                 for event in maneuver.events:
                     name = builder.text(event.name)
-                    if name in seen:
+                    if name in seen and (not builder.in_substance or ("event", name) in named):
                         text = f"a second Event of the name {name}"
                         builder.problems.append(Lost(event.line, text))
                         continue
+                    wanted, name = name, plain_name(name) if builder.in_substance else name
+                    if name in seen:
+                        name = next(n for k in count(2) if (n := f"{name}_{k}") not in seen)
+                    if name != wanted:
+                        event = replace(event, name=name)
                     seen.add(name)
-                    if len(maneuver.events) > 1 and event.priority in _ENDING:
+                    for number, action in enumerate(event.actions, start=1):
+                        key = "action", builder.text(action.name)
+                        names[key] = f"{name}_action_{number}" if key not in names else ""
+                    names["event", wanted] = name
+                    if len(maneuver.events) > 1 and event.priority in _ENDING and not together:
                         text = f'priority="{event.priority}" of Event {name} among others'
                         builder.problems.append(Lost(event.line, text))
-                    yield Happening(name, group, _by_itself(event))
+                    own = event if together else _by_itself(event)
+                    yield Happening(name, group, own, stated, together)
+
+
+def named_elements(
+    storyboard: osc.Storyboard, text: Callable[[osc.ParameterRef | str], str]
+) -> set[tuple[str, str]]:
+    """Return the kinds and names of the storyboard's elements whose state a condition looks at."""
+    return {
+        (text(one.storyboard_element_type), text(one.storyboard_element_ref))
+        for one in walk(storyboard)
+        if isinstance(one, osc.StoryboardElementStateCondition)
+    }
+
+
+def _together(
+    builder: StoryBuilder,
+    group: osc.ManeuverGroup,
+    maneuver: osc.Maneuver,
+    named: set[tuple[str, str]],
+) -> str | None:
+    """Return the name under which a maneuver is stated; None if it is not."""
+    name, of_group = builder.text(maneuver.name), builder.text(group.name)
+    several = len(maneuver.events) > 1
+    ends = several and any(event.priority in _ENDING for event in maneuver.events)
+    is_named = ("maneuver", name) in named or (
+        ("maneuverGroup", of_group) in named and len(group.maneuvers) == 1
+    )
+    names = builder.element_names
+    if not (ends or is_named) or not builder.in_substance:
+        return None
+    wanted = next(n for k in count(1) if ("maneuver", n := f"{name}_{k}" if k > 1 else name)
+                  not in names)  # fmt: skip
+    if wanted != name and is_named:
+        return None  # two of one name, and one of them is meant
+    names["maneuver", wanted] = wanted
+    if len(group.maneuvers) == 1:
+        names["maneuverGroup", of_group] = f"{wanted}_group"
+    return wanted
 
 
 def _by_itself(event: osc.Event) -> osc.Event:
@@ -96,10 +163,14 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
     for one in all_:
         builder.events[one.name] = builder.reserve(one.name)
     waits: dict[str, set[str]] = {}
+    awaited = {
+        name: _add_act(builder, act)
+        for name, act in {builder.text(one.act.name): one.act for one in all_ if one.act}.items()
+    }
     lines = {one.name: one.event.line for one in all_}
     start = len(builder.problems)
     kept = len(builder.quads), len(builder.bindings), len(builder.free)
-    done = {one.name for one in all_ if _attempt(builder, scenario, one, waits)}
+    done = {one.name for one in all_ if _attempt(builder, scenario, one, waits, awaited)}
     lost = [name for name in lines if name not in done]
     if not lost:
         return done
@@ -118,20 +189,38 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
     del builder.quads[kept[0] :], builder.bindings[kept[1] :], builder.free[kept[2] :]
     for one in all_:
         if one.name in done:
-            _attempt(builder, scenario, one, waits)
+            _attempt(builder, scenario, one, waits, awaited)
     builder.problems[start:] = problems[start:]
     return done
 
 
+def _add_act(builder: StoryBuilder, act: osc.Act) -> set[str]:
+    """Add an act with when it begins; return the events that it waits for."""
+    name = builder.text(act.name)
+    builder.referred = set()
+    with builder.attempt():
+        node = builder.node(f"{name}_act", "Act")
+        builder.put(node, "has_name", name)
+        trigger = add_trigger(builder, f"{name}_act", (), act.start_trigger)
+        builder.put(node, "begins_when", trigger)
+        builder.acts[name] = node
+    return builder.referred
+
+
 def _attempt(
-    builder: StoryBuilder, scenario: ox.NamedNode, one: Happening, waits: dict[str, set[str]]
+    builder: StoryBuilder,
+    scenario: ox.NamedNode,
+    one: Happening,
+    waits: dict[str, set[str]],
+    awaited: Mapping[str, set[str]],
 ) -> bool:
     builder.referred = set()
     before = len(builder.problems)
     with builder.attempt():
         _add_event(builder, one)
         builder.put(scenario, "has_event", builder.events[one.name])
-    waits[one.name] = builder.referred
+    act = set() if one.act is None else awaited[builder.text(one.act.name)]
+    waits[one.name] = builder.referred | act
     return len(builder.problems) == before
 
 
@@ -161,6 +250,18 @@ def _add_event(builder: StoryBuilder, one: Happening) -> None:
     usual = "SignalChangeEvent" if all(signals) else "EnvironmentChangeEvent"
     node = builder.state(builder.events[one.name], "StoryboardEvent" if nodes else usual)
     builder.put(node, "has_name", one.name)
+    if one.act is not None:
+        if (act := builder.acts.get(builder.text(one.act.name))) is None:
+            raise UnsayableError(one.act, f"the Act {one.act.name}, which starts later,")
+        builder.put(node, "in_act", act)
+    if one.maneuver is not None:
+        priority = builder.choice(osc.Priority, one.event.priority)
+        usual = osc.Priority.OVERRIDE if priority is osc.Priority.OVERWRITE else priority
+        builder.put(node, "in_maneuver", one.maneuver)
+        builder.put(node, "has_priority", usual.value)
+    most = one.event.maximum_execution_count
+    if builder.in_substance and most is not None and builder.now(most, one.event) != 1.0:
+        builder.put(node, "has_execution_count", round(builder.now(most, one.event)))
     for actor in nodes.values():
         builder.put(node, "has_who", actor)
     names = tuple(sorted(nodes))

@@ -1,10 +1,12 @@
 """OpenSCENARIO2OWL, its check: contents of a file that its individuals, written again, lack."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
-from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.element import Element, rewritten
 from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder
 from bridgegen.openx.openscenario.to_owl.differences import Differences
 from bridgegen.openx.openscenario.to_owl.events import Happening
@@ -39,7 +41,7 @@ def losses(
         yield from compare(declaration, declared.get(declaration.name))
     if here.road_network.scene_graph_file is not None:
         yield Lost(here.road_network.scene_graph_file.line, "SceneGraphFile", is_detail=True)
-    for element in _unsaid(here):
+    for element in _unsaid(builder, here):
         yield from compare(element, None)
     others = {str(one.name): one for one in _controllers(again)}
     for controller in _controllers(here):
@@ -50,16 +52,17 @@ def losses(
         if (name := builder.text(entity.name)) in builder.cast:
             yield from compare(entity, entities.get(name))
     yield from _in_init(builder, compare, again.storyboard.init.actions)
-    yield from _in_events(compare, again, stated)
+    yield from _in_events(builder, compare, again, stated)
     stop = here.storyboard.stop_trigger
     if stop is not None:  # it says when one looks no further
         for lost in compare(stop, again.storyboard.stop_trigger):
             yield lost._replace(is_detail=True)
 
 
-def _unsaid(here: osc.OpenScenario) -> Iterator[Element]:
+def _unsaid(builder: StoryBuilder, here: osc.OpenScenario) -> Iterator[Element]:
     """Yield the parts of a file that no individual stands for."""
-    parts = (here.variable_declarations, here.monitor_declarations, here.road_network.used_area)
+    variables = None if builder.variables else here.variable_declarations
+    parts = (variables, here.monitor_declarations, here.road_network.used_area)
     yield from (one for one in parts if one is not None)
     yield from here.entities.entity_selections
     yield from here.storyboard.init.actions.user_defined_actions
@@ -69,7 +72,7 @@ def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) ->
     here = builder.scenario_file.storyboard.init.actions
     left = list(there.global_actions)
     for one in here.global_actions:
-        fitting = [other for other in left if other == one] or [
+        fitting = [other for other in left if not any(compare(one, other))] or [
             other
             for other in left
             if isinstance(other.action, osc.EnvironmentAction)
@@ -90,7 +93,7 @@ def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) ->
 
 
 def _in_events(
-    compare: Compare, again: osc.OpenScenario, stated: list[Happening]
+    builder: StoryBuilder, compare: Compare, again: osc.OpenScenario, stated: list[Happening]
 ) -> Iterator[Lost]:
     events = {
         str(event.name): event
@@ -105,7 +108,16 @@ def _in_events(
         if count != 1:
             yield Lost(one.group.line, f'maximumExecutionCount="{count}" of ManeuverGroup')
         if (event := events.get(one.name)) is not None:
-            yield from compare(one.event, event)
+            yield from compare(rewritten(one.event, partial(_called, builder)), event)
+
+
+def _called(builder: StoryBuilder, element: Element) -> Element:
+    """Return a condition that calls the storyboard's element as it is called once it is stated."""
+    if not isinstance(element, osc.StoryboardElementStateCondition):
+        return element
+    kind, name = element.storyboard_element_type, element.storyboard_element_ref
+    found = builder.element_names.get((builder.text(kind), builder.text(name)))
+    return replace(element, storyboard_element_ref=found) if found else element
 
 
 def _kind(action: osc.PrivateAction) -> str:

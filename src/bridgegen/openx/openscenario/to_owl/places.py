@@ -25,6 +25,7 @@ from bridgegen.openx.openscenario.to_owl.build import (
     simplest,
 )
 from bridgegen.openx.openscenario.to_owl.legs import Stretch
+from bridgegen.openx.openscenario.to_owl.quoted import POSITION, node_of
 
 _LENGTH_SLACK = 1e-6  # [m]
 _NAME = r"\(?\s*\$(?P<name>[A-Za-z_][A-Za-z0-9_]*)\s*\)?"
@@ -43,9 +44,25 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
         position: on a lane of the map, or a point of the world.
 
     Raises:
-        UnsayableError: it is off the map, given by an expression that is no distance, or of
-            another kind.
+        UnsayableError: it is off the map, or given by an expression that is no distance.
     """
+    where = position.position
+    if isinstance(where, osc.LanePosition) and _is_off(builder, where):
+        return _position(builder, name, position)
+    return node_of(builder, name, POSITION, position, lambda: _position(builder, name, position))
+
+
+def _is_off(builder: StoryBuilder, where: osc.LanePosition) -> bool:
+    """Return whether a place on a lane is off the map, in whatever words."""
+    try:
+        road, lane_id = _lane_of(builder, where)
+        lane_at(road, lane_id, builder.now(where.s, where))
+    except (InputError, UnsayableError):
+        return True
+    return False
+
+
+def _position(builder: StoryBuilder, name: str, position: osc.Position) -> ox.NamedNode:
     where = position.position
     if isinstance(where, osc.WorldPosition):
         return _world_position(builder, name, where)

@@ -24,26 +24,37 @@ import pyoxigraph as ox
 
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
+from bridgegen.ontology.vocabulary import bg
 from bridgegen.openx.opendrive.map_names import road_name
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
+from bridgegen.openx.openscenario.fragments import fragment_of
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
-from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl.scenario import ARRIVAL, EGO, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
-from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder
-from bridgegen.openx.openscenario.to_owl.entities import add_element, add_participant, as_number
+from bridgegen.openx.openscenario.resolve import part_resolved
+from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, numbered
+from bridgegen.openx.openscenario.to_owl.conditions import add_trigger
+from bridgegen.openx.openscenario.to_owl.entities import (
+    add_begun,
+    add_element,
+    add_participant,
+    as_number,
+)
 from bridgegen.openx.openscenario.to_owl.events import (
     Happening,
     add_changes,
     add_events,
     happenings,
 )
+from bridgegen.openx.openscenario.to_owl.foregone import without_foregone
 from bridgegen.openx.openscenario.to_owl.legs import stretches, with_legs
 from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
+from bridgegen.openx.openscenario.to_owl.quoted import ACTION, quoted
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
 from bridgegen.openx.openscenario.to_owl.simplified import simplified
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
@@ -84,10 +95,19 @@ def individuals_from_openscenario(
     """
     lost: list[Lost] = []
     if in_substance:
+        scenario, foregone = without_foregone(scenario)
         scenario, lost = simplified(scenario, roads)
+        lost += foregone
     importer = _Importer(scenario, roads, map_file, in_substance)
     individuals = importer.build()
-    found = dict.fromkeys((*lost, *importer.problems(individuals)))
+    missing = list(importer.problems(individuals))
+    if in_substance and (lines := frozenset(one.line for one in missing if not one.is_detail)):
+        again = _Importer(scenario, roads, map_file, in_substance, lines - {0})
+        quoted = again.build()
+        still = list(again.problems(quoted))
+        if _count(still) + len(again.refused) < _count(missing) + len(importer.refused):
+            importer, individuals, missing = again, quoted, still
+    found = dict.fromkeys((*lost, *missing))
     problems = sorted(found, key=lambda one: one.line)
     details = [one for one in problems if one.is_detail and in_substance]
     sentences = [
@@ -108,6 +128,11 @@ def individuals_from_openscenario(
     return individuals, [*sentences, *_of_details(place, details)]
 
 
+def _count(lost: list[Lost]) -> int:
+    """Return how many of the things that are lost are no details."""
+    return sum(not one.is_detail for one in lost)
+
+
 def _of_details(place: str, details: list[Lost]) -> Iterator[str]:
     """Yield a sentence on details, if there are any: the first ones, and how many more."""
     if details:
@@ -120,15 +145,22 @@ class _Importer:
     """States the parts of a file in their order, then compares."""
 
     def __init__(
-        self, scenario: osc.OpenScenario, roads: OpenDrive, map_file: str, in_substance: bool
+        self,
+        scenario: osc.OpenScenario,
+        roads: OpenDrive,
+        map_file: str,
+        in_substance: bool,
+        quoted_lines: frozenset[int] = frozenset(),
     ) -> None:
         self.scenario, self.map_file = scenario, map_file
         header = scenario.file_header
-        constants = parameters.values(scenario)
-        said = header.description
-        self.name = str(constants[said.name] if isinstance(said, osc.ParameterRef) else said)
+        self.name = parameters.text_of(parameters.values(scenario), header.description)
         self.builder = StoryBuilder(
-            self.name or PurePath(map_file).stem, scenario, roads, in_substance=in_substance
+            self.name or PurePath(map_file).stem,
+            scenario,
+            roads,
+            in_substance=in_substance,
+            quoted_lines=quoted_lines,
         )
         self.builder.legs = stretches(roads, self._ends_of_way())
         signals = scenario.road_network.traffic_signals
@@ -170,6 +202,7 @@ class _Importer:
         network = builder.iri("road_network")
         put(node, "has_road_network", network)
         elements = self._elements(notes)
+        self._add_variables(node)
         self._add_entities(node, elements)
         self.controllers = add_controllers(builder, network, notes.of[SIGNALS])
         lights = self._lights(duration)
@@ -183,8 +216,9 @@ class _Importer:
             if self.derived.get(happening.name) != happening.event:
                 self.happenings.append(happening)
         self.stated = add_events(builder, node, self.happenings)
+        self._put_stop(node)
         add_changes(builder, node, notes.of[EVENT], elements)
-        self._add_weather(node)
+        self._add_globals(node)
         add_parameters(builder, node, notes)
         return Individuals([*self.static, *builder.quads])
 
@@ -219,6 +253,60 @@ class _Importer:
         builder.put(node, "has_duration", DURATION)
         return DURATION
 
+    def _add_variables(self, node: ox.NamedNode) -> None:
+        builder, declared = self.builder, self.scenario.variable_declarations
+        if declared is None or not builder.in_substance:
+            return
+        for one in part_resolved(declared, self.scenario, "document").variables:
+            variable = builder.node(f"v_{one.name}", "Variable")
+            builder.put(variable, "has_name", one.name)
+            builder.put(variable, "has_openscenario", fragment_of(one))
+            builder.put(node, "has_variable", variable)
+            builder.variables.add(one.name)
+
+    def _put_stop(self, node: ox.NamedNode) -> None:
+        """State what else than the time ends the scenario; the ego's arrival follows from its way.
+
+        What cannot be said is a detail: it says when one looks no further.
+        """
+        builder, stop = self.builder, self.scenario.storyboard.stop_trigger
+        if stop is None or not builder.in_substance:
+            return
+        arrives = any(map(self._is_arrival, stop.condition_groups))
+        if not arrives and self._has_way():
+            builder.put(node, "has_arrival", "goes-on")
+        groups = tuple(
+            one
+            for one in stop.condition_groups
+            if _time_alone(one) is None and not (arrives and self._is_arrival(one))
+        )
+        before = len(builder.problems)
+        with builder.attempt():
+            if groups:
+                trigger = add_trigger(builder, "stop", (), osc.Trigger(groups))
+                builder.put(node, "has_stop", trigger)
+        builder.problems[before:] = [
+            one._replace(is_detail=True) for one in builder.problems[before:]
+        ]
+
+    def _is_arrival(self, group: osc.ConditionGroup) -> bool:
+        """Return whether the ego's arrival ends the scenario, as that of its route does."""
+        (one, *others) = (each.condition for each in group.conditions)
+        return (
+            not others
+            and isinstance(one, osc.ByEntityCondition)
+            and isinstance(one.entity_condition.condition, osc.ReachPositionCondition)
+            and one.entity_condition.condition.tolerance == ARRIVAL
+            and [self.builder.text(each.entity_ref) for each in one.triggering_entities.entity_refs]
+            == [EGO]
+            and self._has_way()
+        )
+
+    def _has_way(self) -> bool:
+        """Return whether the ego has a route that is stated."""
+        ego, route = self.builder.cast.get(EGO), bg("has_route")
+        return any((one.subject, one.predicate) == (ego, route) for one in self.builder.quads)
+
     def _elements(self, notes: Notes) -> dict[str, str]:
         """Return the things at road works, each with whose they are."""
         builder = self.builder
@@ -235,6 +323,7 @@ class _Importer:
         for private in self.scenario.storyboard.init.actions.privates:
             name = builder.text(private.entity_ref)
             starts.setdefault(name, []).extend(private.private_actions)
+        stated: list[osc.ScenarioObject] = []
         for one in self.scenario.entities.scenario_objects:
             name = builder.text(one.name)
             if name in builder.cast:
@@ -246,21 +335,32 @@ class _Importer:
                 if name not in elements:
                     builder.put(node, "has_participant", entity)
                 builder.cast[name] = entity
+                stated.append(one)
+        for one in stated:
+            name = builder.text(one.name)
+            if name not in elements:
+                add_begun(builder, one, tuple(starts[name]))
 
     def _lights(self, duration: float) -> Signals:
         """Return what the controllers that are stated make of the lights."""
         quads = [*self.static, *self.builder.quads]
         return Signals(Individuals(quads), duration)
 
-    def _add_weather(self, node: ox.NamedNode) -> None:
-        builder = self.builder
-        for one in self.scenario.storyboard.init.actions.global_actions:
-            if isinstance(one.action, osc.EnvironmentAction):
+    def _add_globals(self, node: ox.NamedNode) -> None:
+        """State the weather at the start, and quote what else the scenario begins with."""
+        builder, begun = self.builder, False
+        globals_ = self.scenario.storyboard.init.actions.global_actions
+        for number, one in zip(numbered(len(globals_)), globals_, strict=True):
+            if isinstance(one.action, osc.EnvironmentAction) and not begun:
+                begun = True
                 with builder.attempt():
                     weather = add_weather(builder, one.action.environment)
                     if weather is not None:
                         builder.put(node, "has_weather", weather)
-                return
+            elif one.line in builder.quoted_lines:
+                with builder.attempt():
+                    name = f"{self.name or 'scenario'}_global_{number}"
+                    builder.put(node, "has_global_action", quoted(builder, name, ACTION, one))
 
     # -- losses ------------------------------------------------------------------------------------
 
@@ -288,6 +388,11 @@ def _time_alone(group: osc.ConditionGroup) -> osc.SimulationTimeCondition | None
     """Return the one condition of a group if it is on the time."""
     if len(group.conditions) != 1:
         return None
-    wrapped = group.conditions[0].condition
+    condition = group.conditions[0]
+    if condition.condition_edge is osc.ConditionEdge.FALLING or condition.delay != 0.0:
+        return None
+    wrapped = condition.condition
     one = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
-    return one if isinstance(one, osc.SimulationTimeCondition) else None
+    if not isinstance(one, osc.SimulationTimeCondition):
+        return None
+    return one if one.rule in (osc.Rule.GREATER_OR_EQUAL, osc.Rule.GREATER_THAN) else None

@@ -1,7 +1,6 @@
 """OpenSCENARIO2OWL, before it: other people's files, said as the ontology says the same.
 
 - Places and speeds relative to an entity at the start become absolute (`starts`).
-- What the ontology does not know as an initial action becomes an event at time 0.
 - An act that starts later hands its conditions on to its events, where these last.
 - Who waits for the only action of an event waits for the event.
 - A lane that is named, or counted from another entity's, is counted from the actor's own, where
@@ -12,24 +11,21 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Element, rewritten
 from bridgegen.openx.openscenario.to_owl.build import Lost
 from bridgegen.openx.openscenario.to_owl.differences import is_detail
+from bridgegen.openx.openscenario.to_owl.events import named_elements
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.starts import Starts
 
 _LEAST = (osc.Rule.GREATER_THAN, osc.Rule.GREATER_OR_EQUAL)
 _BEGUN = ("startTransition", "runningState")
 _ENDED = ("endTransition", "completeState")
-_LATER = (
-    osc.LongitudinalDistanceAction,
-    osc.LaneOffsetAction,
-    osc.LaneChangeAction,
-    osc.SynchronizeAction,
-)
 _ON_MAP = osc.RoutePosition | osc.RoadPosition | osc.LanePosition
 Wrapped = osc.PrivateAction | osc.GlobalAction | osc.UserDefinedAction
 _ONCE = osc.StoryboardElementType.EVENT
@@ -50,6 +46,12 @@ class _Simplified:
         if declared is not None and not self._read:
             self.lost.append(Lost(declared.line, "VariableDeclarations", is_detail=True))
             scenario = replace(scenario, variable_declarations=None)
+        elif declared is not None:
+            kept = tuple(one for one in declared.variables if one.name in self._read)
+            scenario = replace(scenario, variable_declarations=replace(declared, variables=kept))
+        self._named = named_elements(
+            storyboard, partial(parameters.text_of, parameters.values(scenario))
+        )
         self._starts = Starts(scenario, _placed(storyboard.init.actions), roads)
         events = list(_events(storyboard))
         names = Counter(str(action.name) for _, event in events for action in event.actions)
@@ -68,12 +70,9 @@ class _Simplified:
             for name in self._actors(group)
         )
         initial = _placed(storyboard.init.actions)
-        begun = [self._begun(one) for one in initial.privates]
+        privates = tuple(self._begun(one) for one in initial.privates)
         stories = [self._story(one) for one in storyboard.stories]
-        later = [group for _, groups in begun for group in groups]
-        if later:
-            stories.append(osc.Story(name="initial", acts=(osc.Act("initial", tuple(later)),)))
-        actions = replace(storyboard.init.actions, privates=tuple(private for private, _ in begun))
+        actions = replace(storyboard.init.actions, privates=privates)
         init = replace(storyboard.init, actions=actions)
         told = replace(storyboard, init=init, stories=tuple(stories))
         self.scenario = replace(scenario, storyboard=rewritten(told, self._on_map))
@@ -101,21 +100,18 @@ class _Simplified:
 
     # -- the start ---------------------------------------------------------------------------------
 
-    def _begun(self, private: osc.Private) -> tuple[osc.Private, list[osc.ManeuverGroup]]:
-        """Return what an entity does at the start, and what it does at once from then on."""
-        kept, later = [], []
+    def _begun(self, private: osc.Private) -> osc.Private:
+        """Return what an entity does at the start."""
+        kept = []
         for wrapped in private.private_actions:
             inner = _inner(wrapped)
-            light = known_light(inner, self._starts.text)
-            if light or isinstance(inner, _LATER):
-                name = f"{self._starts.text(private.entity_ref)}_{light or type(inner).__name__}"
-                later.append(_at_once(name, private, wrapped))
-            elif is_detail(inner):
+            is_lit = known_light(inner, self._starts.text) is not None
+            if is_detail(inner) and not is_lit:
                 what = f"an initial {type(inner).__name__}"
                 self.lost.append(Lost(wrapped.line, what, is_detail=True))
             else:
                 kept.append(self._starts.absolute(wrapped))
-        return replace(private, private_actions=tuple(kept)), later
+        return replace(private, private_actions=tuple(kept))
 
     # -- what follows ------------------------------------------------------------------------------
 
@@ -128,6 +124,8 @@ class _Simplified:
             self.lost.append(Lost(stop.line, "StopTrigger of Act", is_detail=True))
             act = replace(act, stop_trigger=None)
         begins = _lasting(act.start_trigger)
+        if ("act", self._starts.text(act.name)) in self._named:
+            begins = None
         if begins is not None:
             act = replace(act, start_trigger=None)
         groups = [
@@ -299,14 +297,22 @@ def _at_its_trajectory(private: osc.Private) -> osc.Private:
         if isinstance(wrapped.action, osc.TeleportAction):
             return private
         if isinstance(inner, osc.FollowTrajectoryAction):
-            trajectory = inner.trajectory_ref.trajectory
-            shape = None if trajectory is None else trajectory.shape.shape
-            if isinstance(shape, osc.Polyline) and shape.vertices:
-                first = shape.vertices[0].position
+            first = _first(inner.trajectory_ref.trajectory.shape.shape)
     if first is None:
         return private
     put = osc.PrivateAction(osc.TeleportAction(first), line=private.line)
     return replace(private, private_actions=(put, *private.private_actions))
+
+
+def _first(
+    line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs,
+) -> osc.Position | None:
+    """Return where a line begins, if it says so."""
+    if isinstance(line, osc.Polyline):
+        return line.vertices[0].position
+    if isinstance(line, osc.Nurbs):
+        return line.control_points[0].position
+    return line.position if isinstance(line, osc.Clothoid) else line.segments[0].position_start
 
 
 def _events(storyboard: osc.Storyboard) -> Iterator[tuple[osc.ManeuverGroup, osc.Event]]:
@@ -319,9 +325,9 @@ def _events(storyboard: osc.Storyboard) -> Iterator[tuple[osc.ManeuverGroup, osc
 
 
 def _variables(storyboard: osc.Storyboard) -> Iterator[str]:
-    """Yield the names of the variables that acts and events wait for."""
+    """Yield the names of the variables that acts, events and the end wait for."""
     acts = [act for story in storyboard.stories for act in story.acts]
-    triggers = [act.start_trigger for act in acts]
+    triggers = [storyboard.stop_trigger, *(act.start_trigger for act in acts)]
     triggers += [event.start_trigger for _, event in _events(storyboard)]
     for trigger in triggers:
         for group in () if trigger is None else trigger.condition_groups:
@@ -341,13 +347,6 @@ def _domain(action: osc.Action) -> type[object]:
     """Return what an action moves: along the lane, across it, or what else it is."""
     wrapped = action.action
     return type(wrapped.action) if isinstance(wrapped, osc.PrivateAction) else type(wrapped)
-
-
-def _at_once(name: str, private: osc.Private, wrapped: osc.PrivateAction) -> osc.ManeuverGroup:
-    """Return what does an initial action as an event at time 0."""
-    event = osc.Event(name, osc.Priority.PARALLEL, (osc.Action(name, wrapped),))
-    actors = osc.Actors(False, (osc.EntityRef(private.entity_ref),))
-    return osc.ManeuverGroup(name, 1, actors, (osc.Maneuver(name=name, events=(event,)),))
 
 
 def _lasting(trigger: osc.Trigger | None) -> osc.ConditionGroup | None:
@@ -377,7 +376,7 @@ def _lasts(condition: osc.Condition) -> bool:
 
 def _after(event: osc.Event, begins: osc.ConditionGroup) -> osc.Event:
     """Return an event that needs some lasting conditions besides its own."""
-    if all(_is_start(one) for one in begins.conditions):
+    if all(map(_is_start, begins.conditions)) and (event.start_trigger or _at_zero(begins)):
         return event
     none = osc.ConditionEdge.NONE
     lasting = tuple(replace(one, condition_edge=none) for one in begins.conditions)
@@ -385,6 +384,16 @@ def _after(event: osc.Event, begins: osc.ConditionGroup) -> osc.Event:
     groups = own.condition_groups if own is not None else ()
     found = tuple(replace(one, conditions=(*one.conditions, *lasting)) for one in groups)
     return replace(event, start_trigger=osc.Trigger(found or (osc.ConditionGroup(lasting),)))
+
+
+def _at_zero(begins: osc.ConditionGroup) -> bool:
+    """Return whether times are true at 0, and not just after it."""
+    return all(
+        isinstance(one.condition, osc.ByValueCondition)
+        and isinstance(one.condition.condition, osc.SimulationTimeCondition)
+        and one.condition.condition.rule is osc.Rule.GREATER_OR_EQUAL
+        for one in begins.conditions
+    )
 
 
 def _is_start(condition: osc.Condition) -> bool:
