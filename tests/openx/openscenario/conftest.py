@@ -1,15 +1,22 @@
 """Scenarios to read, write and break; helpers are handed out as fixtures."""
 
+import math
+from pathlib import Path
+
 import numpy as np
 import pyoxigraph as ox
 import pytest
+from tests.openx.openscenario.strangers import FILE, changed
 
 from bridgegen.odd.reader import load
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.individuals import build
 from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.ontology.vocabulary import TYPE, bg
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.write import to_xml as roads_to_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl.weather import time_of_day
 from bridgegen.openx.openscenario.write import to_xml
 
 _SCENARIOS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
@@ -111,3 +118,19 @@ def _retyped(source: Individuals, subject: str, cls: str) -> Individuals:
             quad = ox.Quad(quad.subject, TYPE, bg(cls))
         quads.append(quad)
     return Individuals(quads)
+
+
+@pytest.fixture
+def folder(individuals, tmp_path) -> Path:
+    (tmp_path / "map.xodr").write_bytes(roads_to_xml(opendrive_from_owl(individuals())))
+    (tmp_path / "their.xosc").write_text(FILE)
+    return tmp_path
+
+
+@pytest.fixture
+def plain(folder) -> Path:
+    """The same without what the ontology has no words for."""
+    return changed(
+        folder, ('cloudState="free"', 'fractionalCloudCover="twoOktas"'),
+        (' intensity="0.8"', ""), ("2025-03-20T10:00:00", time_of_day(math.degrees(0.5))),
+    )  # fmt: skip

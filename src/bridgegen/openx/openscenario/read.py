@@ -60,7 +60,7 @@ def read(
             f"{place}: is no scenario but says how the parameters of one vary; to search that: "
             f"bridgegen search {its_own} --distribution {place}"
         )
-    file = _with_texts(verbatim(root, place, skipped), texts or {})
+    file = _with_texts(verbatim(root, place, skipped, warnings), texts or {})
     folder = path.parent if isinstance(path, Path) else None
     scenario = expanded(file, folder, place, skipped, warnings)
     while skipped is not None and (astray := strays(scenario)):
@@ -86,7 +86,10 @@ def _with_texts(scenario: OpenScenario, texts: dict[str, str]) -> OpenScenario:
 
 
 def verbatim(
-    root: etree._Element, place: str = "document", skipped: list[str] | None = None
+    root: etree._Element,
+    place: str = "document",
+    skipped: list[str] | None = None,
+    warnings: list[str] | None = None,
 ) -> OpenScenario:
     """Return a file's model as it stands there; parameters are not checked.
 
@@ -94,6 +97,7 @@ def verbatim(
         root: of the document.
         place: what to call it in messages.
         skipped: as of `read`.
+        warnings: likewise.
 
     Raises:
         FileFormatError: as of `read`.
@@ -105,7 +109,7 @@ def verbatim(
         )
     if root.find("Catalog") is not None:
         raise FileFormatError(f"{place}: is a catalogue, and no scenario")
-    scenario = element_of(OpenScenario, root, place, skipped)
+    scenario = element_of(OpenScenario, root, place, skipped, warnings)
     header = scenario.file_header
     version = f"{header.rev_major}.{header.rev_minor}"
     if version not in VERSIONS:

@@ -18,13 +18,19 @@ from bridgegen.openx.openscenario.values import Expr, ParameterRef, parse_value
 
 MAX_PROBLEMS = 50
 _ENOUGH = 1000  # problems; a file with more is not worth reading on
+_LABELLED = ("Story", "Act", "ManeuverGroup", "Maneuver", "Action", "Condition")
+"""Elements whose names are for people; a file may be without."""
 _HINT = "{http://www.w3.org/2001/XMLSchema-instance}"  # where to find an XSD: no content
 
 E = TypeVar("E", bound=Element)
 
 
 def element_of(
-    cls: type[E], node: etree._Element, place: str, skipped: list[str] | None = None
+    cls: type[E],
+    node: etree._Element,
+    place: str,
+    skipped: list[str] | None = None,
+    warnings: list[str] | None = None,
 ) -> E:
     """Return a node and all below it as the model's.
 
@@ -33,6 +39,7 @@ def element_of(
         node: its XML; what is not supported is cut out of it if ``skipped`` is given.
         place: what to call the document in messages.
         skipped: as of `bridgegen.openx.openscenario.read.read`.
+        warnings: likewise.
 
     Raises:
         FileFormatError: malformed, all of it at once (at most 50 problems).
@@ -49,6 +56,8 @@ def element_of(
         for culprit, name in reader.culprits:
             prune(culprit, name)
     reader.raise_problems(place)
+    if warnings is not None:
+        warnings += [f"{place}: {text} (line {line})" for line, text in reader.odd]
     return cast(E, element)
 
 
@@ -72,6 +81,7 @@ class Reader:
     malformed: list[tuple[int, str]] = field(default_factory=list)
     unsupported: list[tuple[int, str]] = field(default_factory=list)
     culprits: list[tuple[etree._Element, str | None]] = field(default_factory=list)
+    odd: list[tuple[int, str]] = field(default_factory=list)
 
     def raise_problems(self, place: str) -> None:
         """Raise one error with all problems in the order of the file, if there are any."""
@@ -134,7 +144,12 @@ class Reader:
                         what = f"a reference as {name} of {_tag(node)}"
                         self.unknown(node, f"{what} is not supported, got {value}", name)
         for attribute in declared.attributes.values():
-            if attribute.required and attribute.name not in node.attrib:
+            if not attribute.required or attribute.name in node.attrib:
+                continue
+            if attribute.name == "name" and _tag(node) in _LABELLED:
+                values[attribute.field] = _tag(node)
+                self.odd.append((node.sourceline or 0, f"{_tag(node)} should have a name"))
+            else:
                 self.wrong(node, f"{_tag(node)} must have the attribute {attribute.name}")
         return values
 

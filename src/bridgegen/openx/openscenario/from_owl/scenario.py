@@ -170,7 +170,8 @@ class _Converter:
             kind = next((one for one in kinds[:3] if ind.is_a(action, one)), kinds[3])
             found[kind].append(self.actions.private(name, action))
         counts = [len(found[kind]) for kind in kinds]
-        if counts[0] != 1 or counts[1] > 1 or counts[2] > 1:
+        comes_later = counts[0] == 0 and node in self._added()
+        if (counts[0] != 1 and not comes_later) or counts[1] > 1 or counts[2] > 1:
             raise OntologyError(
                 f"{ind.describe(node)} must have one TeleportAction and at most one SpeedAction "
                 f"and one FollowTrajectoryAction as has_init_action, got {counts[0]}, {counts[1]} "
@@ -182,6 +183,14 @@ class _Converter:
         if route is not None:
             actions.append(self.actions.route(f"{name}_route", route))
         return (*actions, *others)
+
+    def _added(self) -> set[Subject]:
+        """Return the participants that an action adds; they need no place at the start."""
+        return {
+            who
+            for action in self.individuals.of_class("AddEntityAction")
+            for who in self.individuals.links(action, "has_entity_ref")
+        }
 
     def _stop(self, ego: Subject) -> osc.Trigger:
         """Return the end: the duration has passed, the ego has arrived, or what else ends it."""

@@ -16,7 +16,7 @@ from bridgegen.openx.opendrive.map_names import part_name
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
-from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.openx.openscenario.to_owl.legs import Stretch
 
 E = TypeVar("E", bound=StrEnum)
@@ -61,6 +61,7 @@ class StoryBuilder(Builder):
         roads: its map.
         legs: how distances count on roads that lead to the scenario's intersection, by their ids.
         variables: names of those that are stated.
+        added: names of entities that the storyboard adds.
         starts: where participants start, by name.
         cast: entities that have been stated, by name.
         events: events that are, or will be, stated, by name.
@@ -99,6 +100,12 @@ class StoryBuilder(Builder):
         self.starts: dict[str, ox.NamedNode] = {}
         self.cast: dict[str, ox.NamedNode] = {}
         self.entities = {self.text(one.name) for one in scenario.entities.scenario_objects}
+        self.added = {
+            self.text(one.entity_ref)
+            for story in scenario.storyboard.stories
+            for one in walk(story)
+            if isinstance(one, osc.EntityAction) and isinstance(one.action, osc.AddEntityAction)
+        }
         self.acts: dict[str, ox.NamedNode] = {}
         self.element_names: dict[tuple[str, str], str] = {}
         self.events: dict[str, ox.NamedNode] = {}

@@ -73,6 +73,7 @@ _DETAIL_FIELDS: frozenset[tuple[type[Element], str]] = frozenset(
         *((cls, "model3d") for cls in (osc.Vehicle, osc.Pedestrian, osc.MiscObject)),
         (osc.Pedestrian, "model"),
         (osc.Center, "z"),
+        (osc.Precipitation, "intensity"),
         (osc.Sun, "intensity"),
         (osc.Sun, "illuminance"),
         (osc.Weather, "cloud_state"),

@@ -54,6 +54,13 @@ def add_participant(
     node = _add_body(builder, one, name, _class_of(builder, one.entity_object))
     if len(one.object_controllers) == 1:
         _add_controller(builder, node, name, one.object_controllers[0].controller)
+    if name in builder.added and not any(
+        isinstance(wrapped.action, osc.TeleportAction) for wrapped in actions
+    ):
+        standing = builder.node(f"{name}_init_speed", "SpeedAction")
+        builder.put(standing, "has_target_speed", 0.0)
+        builder.put(node, "has_init_action", standing)
+        return node
     first = _teleport(one, actions)
     start = add_position(builder, f"{name}_start", first.position)
     teleport = builder.node(f"{name}_teleport", "TeleportAction")
@@ -74,7 +81,13 @@ def add_begun(
         actions: its own of the storyboard's Init.
     """
     name = builder.text(one.name)
-    node, first = builder.cast[name], _teleport(one, actions)
+    node = builder.cast[name]
+    if name not in builder.starts:  # it comes later
+        for wrapped in actions:
+            text = f"an initial action of {name}, which comes later,"
+            builder.problems.append(Lost(wrapped.line, text))
+        return
+    first = _teleport(one, actions)
     begun: set[type[object]] = {osc.TeleportAction}
     left = [wrapped for wrapped in actions if wrapped.action is not first]
     start = builder.starts[name], first.position

@@ -339,7 +339,7 @@ class _Importer:
         for one in stated:
             name = builder.text(one.name)
             if name not in elements:
-                add_begun(builder, one, tuple(starts[name]))
+                add_begun(builder, one, tuple(starts.get(name, ())))
 
     def _lights(self, duration: float) -> Signals:
         """Return what the controllers that are stated make of the lights."""

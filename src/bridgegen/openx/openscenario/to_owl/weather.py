@@ -11,6 +11,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
+from bridgegen.odd.expression import parse
 from bridgegen.openx.openscenario import cloudiness
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, shortest
@@ -135,9 +136,14 @@ def _solved(builder: StoryBuilder, environment: osc.Environment) -> dict[str, di
 
 
 def _falling(builder: StoryBuilder, one: osc.Precipitation | None) -> dict[str, dict[str, Any]]:
-    if one is None or one.precipitation_intensity is None:
+    if one is None or (one.precipitation_intensity is None and one.intensity is None):
         return {}
     kind = builder.choice(osc.PrecipitationType, one.precipitation_type)
+    if one.precipitation_intensity is None:  # 1.0's share of the most: as a percentage is to us
+        percent = min(100.0 * builder.now(one.intensity, one), _MOST)
+        formula = PARAMETERS["precipitation"].law.formula
+        falls = osc.Precipitation(kind, float(parse(formula).evaluate({"x": percent})))
+        return _falling(builder, falls)
     if kind is osc.PrecipitationType.SNOW:
         return {"has_snow": {"has_snowfall": one.precipitation_intensity}}
     rate = builder.now(one.precipitation_intensity, one)
