@@ -169,7 +169,7 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
     }
     lines = {one.name: one.event.line for one in all_}
     start = len(builder.problems)
-    kept = len(builder.quads), len(builder.bindings), len(builder.free)
+    kept = builder.mark()
     done = {one.name for one in all_ if _attempt(builder, scenario, one, waits, awaited)}
     lost = [name for name in lines if name not in done]
     if not lost:
@@ -186,7 +186,7 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
                 text = f"the Event {name}, which waits for {gone},"
                 builder.problems.append(Lost(lines[name], text))
     problems = builder.problems[:]
-    del builder.quads[kept[0] :], builder.bindings[kept[1] :], builder.free[kept[2] :]
+    builder.take_back(kept)
     for one in all_:
         if one.name in done:
             _attempt(builder, scenario, one, waits, awaited)

@@ -357,10 +357,15 @@ class _Importer:
                     weather = add_weather(builder, one.action.environment)
                     if weather is not None:
                         builder.put(node, "has_weather", weather)
+                    elif builder.in_substance:
+                        self._quote_global(node, number, one)
             elif one.line in builder.quoted_lines:
                 with builder.attempt():
-                    name = f"{self.name or 'scenario'}_global_{number}"
-                    builder.put(node, "has_global_action", quoted(builder, name, ACTION, one))
+                    self._quote_global(node, number, one)
+
+    def _quote_global(self, node: ox.NamedNode, number: str, one: osc.GlobalAction) -> None:
+        what = quoted(self.builder, f"global_action_{number}", ACTION, one)
+        self.builder.put(node, "has_global_action", what)
 
     # -- losses ------------------------------------------------------------------------------------
 

@@ -153,8 +153,9 @@ class _Simplified:
                     actions.append(
                         replace(action, action=self._counted(group, self._put(action.action)))
                     )
-            if not actions:
+            if not actions and ("event", self._starts.text(event.name)) not in self._named:
                 continue
+            actions = actions or list(event.actions)  # somebody waits for them
             if alike and event.priority in (osc.Priority.OVERRIDE, osc.Priority.OVERWRITE):
                 # An action of the same kind ends the one before in any case.
                 event = replace(event, priority=osc.Priority.PARALLEL)
