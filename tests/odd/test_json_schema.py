@@ -201,6 +201,9 @@ def test_a_damaged_fragment_is_invalid_to_both(path, value):
         (("events", "bv_sets_off", "when", 0), {"kind": "distance", "value": 3.0}),
         (("events", "bv_sets_off", "when", 0), {"kind": "time", "to": "ego"}),
         (("events", "bv_sets_off", "when", 0), {"kind": "after", "value": 3.0}),
+        (("events", "bv_sets_off", "when", 0), {"kind": "began", "value": 3.0}),
+        (("participants", "bv", "places"), {"a": {"start": {"point": "P3", "distance": 9.0}}}),
+        (("participants", "bv", "place_by"), "side"),
     ],
 )
 def test_rules_between_keys_are_the_schema_s_too(path, value):
@@ -208,6 +211,26 @@ def test_rules_between_keys_are_the_schema_s_too(path, value):
     change(data, path, value)
     assert refused(data)
     assert not validator("scenario").is_valid(data)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (
+            ("participants", "bv"),
+            {
+                "type": "car",
+                "place_by": "side",
+                "places": {"a": {"start": {"point": "P3", "distance": 9.0}}},
+            },
+        ),
+        (("events", "bv_sets_off", "when", 0), {"kind": "began", "event": "other", "value": 3.0}),
+    ],
+)
+def test_alternatives_are_the_schema_s_too(path, value):
+    data = copy.deepcopy(catalogue("crossroads-s4"))
+    change(data, path, value)
+    assert problems("scenario", data) == []
 
 
 def test_it_is_written_and_nobody_s_file_is_lost(tmp_path):

@@ -145,7 +145,13 @@ def _between_keys(sections: dict[str, Any]) -> None:
     sections["WaypointSection"]["allOf"] = [
         _if_there("point", {"leg": _NULL, "way": _NULL}),
     ]
-    sections["ParticipantSection"]["anyOf"] = [{"required": ["start"]}, {"required": ["path"]}]
+    sections["ParticipantSection"] |= {
+        "anyOf": [{"required": [key]} for key in ("start", "path", "place_by")],
+        "allOf": [
+            _if_there("place_by", {"start": _NULL, "end": _NULL, "path": {"maxItems": 0}}),
+        ],
+        "dependencies": {"place_by": ["places"], "places": ["place_by"]},
+    }
     sections["LaneChangeSection"]["anyOf"] = [{"required": ["time"]}, {"required": ["distance"]}]
     sections["LaneChangeSection"]["properties"]["lanes"]["not"] = {"const": 0}
     sections["EventSection"] |= {
@@ -181,7 +187,7 @@ def _if_there(key: str, then: Mapping[str, Any]) -> dict[str, Any]:
 
 def _condition(kind: str) -> dict[str, Any]:
     """Return what a kind of condition needs, and what it does not have."""
-    pair, after = CONDITIONS[kind].pair, kind == "after"
+    pair, after = CONDITIONS[kind].pair, kind in ("after", "began")
     needs = ["to"] * pair + ["event"] * after
     others = {"to": pair, "event": after}
     without = {key: _NULL for key, has in others.items() if not has}
