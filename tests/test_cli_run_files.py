@@ -34,6 +34,22 @@ VALUES = {
     "ideal": st.lists(NAMES, max_size=3),
     "metrics": st.lists(NAMES, max_size=3),
     "algorithm": NAMES,
+    "criteria": st.lists(
+        st.builds(
+            lambda name, more: {"id": name, "formula": "always(ego.v > 2 m/s)"} | more,
+            NAMES.filter(lambda one: one[0] != "_"),
+            st.fixed_dictionaries(
+                {},
+                optional={
+                    "text": TEXTS.map(lambda text: f"x{text}".strip()),
+                    "severity": st.sampled_from(["minor", "critical"]),
+                    "tags": st.lists(st.sampled_from(["a", "b-1"]), min_size=1, max_size=2),
+                },
+            ),
+        ),
+        max_size=3,
+        unique_by=lambda one: one["id"],
+    ),
 }
 OTHERS = st.none() | NAMES | TEXTS.map(lambda text: f"x{text}".strip())
 OPTIONS = st.builds(

@@ -8,22 +8,25 @@ default of all scenarios but the paper's is ``harm`` (`bridgegen.conflict.harm`)
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from math import isfinite
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, as_float
 from bridgegen.conflict.harm import NEAR_MISS, Count
-from bridgegen.conflict.quantities import HARM, HARM_ANY, get
+from bridgegen.conflict.quantities import HARM, HARM_ANY
+from bridgegen.criteria import quantity
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.thresholds import Thresholds
 
 Weights = Literal["fixed", "entropy"]
 Scale = Literal["raw", "standardised"]
 Objectives = Literal["one", "many"]
-Rule = Literal["harm", "thresholds"]
-"""What makes a scenario critical: its harm, or the paper's thresholds."""
+Rule = Literal["harm", "thresholds", "criteria"]
+"""What makes a scenario critical: its harm, the paper's thresholds, or a violated criterion."""
+
+RULES: tuple[Rule, ...] = get_args(Rule)
 
 CLASSIFYING = ("n_collision", "d_min", "v_d")
 """The metrics that the paper's thresholds read."""
@@ -54,12 +57,14 @@ class Objective:
         objectives: "one" or "many".
         thresholds: when a scenario is critical by the rule "thresholds".
         rule: what makes a scenario critical: "harm", a collision or near miss of the ego's (see
-            `bridgegen.conflict.harm`), or "thresholds". With "harm", implausible scenarios are
-            neither critical nor fit.
+            `bridgegen.conflict.harm`), "thresholds", or "criteria", a violation of one of
+            ``criteria``. Implausible scenarios are neither critical nor fit, but by "thresholds".
         count: whose conflicts count as harm: "ego", those that the ego is responsible for or could
             have prevented; or "any".
         low: the sample's least x' per term; empty on the raw scale.
         span: the sample's range of x' per term, > 0; empty on the raw scale.
+        criteria: the names of the margins that make a scenario critical below 0 by the rule
+            "criteria"; else empty.
     """
 
     names: tuple[str, ...]
@@ -71,17 +76,20 @@ class Objective:
     span: tuple[float, ...] = ()
     rule: Rule = "thresholds"
     count: Count = "ego"
+    criteria: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.names:
-            get(name)
+            quantity(name)
         _choice("scale", self.scale, ("raw", "standardised"))
         _choice("number of objectives", self.objectives, ("one", "many"))
-        _choice("rule of what is critical", self.rule, ("harm", "thresholds"))
+        _choice("rule of what is critical", self.rule, RULES)
         _choice("conflicts that count", self.count, ("ego", "any"))
         n = len(self.names)
         n_scale = n if self.scale == "standardised" else 0
         problems = []
+        if (self.rule == "criteria") != bool(self.criteria):
+            problems.append(f"rule {self.rule} with criteria {list(self.criteria)}")
         if not n or len(set(self.names)) < n:
             problems.append(f"an objective needs metrics, each once, got {list(self.names)}")
         if len(self.weights) != n or not all(isfinite(w) and w >= 0.0 for w in self.weights):
@@ -106,6 +114,7 @@ class Objective:
         thresholds: Thresholds | None = None,
         rule: Rule = "thresholds",
         count: Count = "ego",
+        criteria: Sequence[str] = (),
         sample: tuple[npt.ArrayLike, Sequence[str]] | None = None,
     ) -> Self:
         """Return the objective, its weights and scale taken from a random sample where asked to.
@@ -117,7 +126,8 @@ class Objective:
             scale: "raw" or "standardised" by the sample.
             objectives: "one" weighted sum, or "many", one per term (weights are then not used).
             thresholds: when a scenario is critical; the paper's by default.
-            rule: "harm" or "thresholds".
+            rule: "harm", "thresholds" or "criteria".
+            criteria: the margins that count by the rule "criteria".
             count: whose conflicts count as harm: "ego" or "any". With "any", the term ``harm``
                 means ``harm_any``.
             sample: metrics ``(m, M)`` of m random scenarios and the M columns' names; failed rows
@@ -133,7 +143,7 @@ class Objective:
             terms = [(HARM_ANY if name == HARM else name, weight) for name, weight in terms]
         names = tuple(name for name, _ in terms)
         for name in names:
-            get(name)
+            quantity(name)
         _choice("way of weighting", weights, ("fixed", "entropy"))
         wrong = [n for n, w in terms if (w is None) == (weights == "fixed")]
         if wrong and objectives == "one":
@@ -155,7 +165,9 @@ class Objective:
             if weights == "entropy" and objectives == "one":
                 resolved = tuple(entropy_weights((x - least) / extent).tolist())
         given = thresholds or Thresholds()
-        return cls(names, resolved, scale, objectives, given, low, span, rule, count)
+        return cls(
+            names, resolved, scale, objectives, given, low, span, rule, count, tuple(criteria)
+        )
 
     @property
     def n_obj(self) -> int:
@@ -170,7 +182,14 @@ class Objective:
     @property
     def classifying(self) -> tuple[str, ...]:
         """The quantities that the rule reads."""
+        if self.rule == "criteria":
+            return self.criteria
         return (self.harm,) if self.rule == "harm" else CLASSIFYING
+
+    @property
+    def gated(self) -> bool:
+        """Whether implausible scenarios are no results."""
+        return self.rule != "thresholds"
 
     @property
     def needed_metrics(self) -> tuple[str, ...]:
@@ -197,7 +216,7 @@ class Objective:
         """
         x = self._scaled(positivised(metrics, names, self.names))
         ok: Bool = np.logical_not(np.isnan(x).any(axis=1)) & np.asarray(fit, dtype=np.bool_)
-        caps = np.array([[get(name).cap for name in self.names]])
+        caps = np.array([[quantity(name).cap for name in self.names]])
         x[~ok] = self._scaled(positivised(caps, self.names, self.names))
         if self.objectives == "many":
             return 0.0 - x, ok
@@ -217,6 +236,10 @@ class Objective:
         if self.rule == "harm":
             harmful: Bool = values[:, _column(names, self.harm)] >= NEAR_MISS
             return harmful
+        if self.rule == "criteria":
+            columns = [_column(names, name) for name in self.criteria]
+            violated: Bool = np.any(values[:, columns] < 0.0, axis=1)
+            return violated
         n_collision, d_min, v_d = (values[:, _column(names, name)] for name in CLASSIFYING)
         limit = self.thresholds
         close = (d_min < limit.d_min_below) & (v_d >= limit.v_d_at_least)
@@ -239,7 +262,8 @@ class Objective:
         """
         if not isinstance(data, Mapping):
             raise InputError(f"not an objective: {data!r}")
-        data = {"rule": "thresholds", "count": "ego", **data}  # earlier versions had no others
+        # Earlier versions had no others.
+        data = {"rule": "thresholds", "count": "ego", "criteria": [], **data}
         if odd := set(data) ^ {field.name for field in fields(cls)}:
             raise InputError(f"unknown or missing keys of an objective: {sorted(odd)}")
         try:
@@ -270,7 +294,7 @@ def positivised(metrics: npt.ArrayLike, names: Sequence[str], wanted: Sequence[s
     values = as_float("metrics", metrics, (None, len(names)), finite=False)
     x = np.empty((len(values), len(wanted)))
     for j, name in enumerate(wanted):
-        metric = get(name)
+        metric = quantity(name)
         column = metric.sign * values[:, _column(names, name)]
         x[:, j] = np.maximum(column, metric.sign * metric.cap)
     return x

@@ -23,16 +23,20 @@ from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import Count
 from bridgegen.conflict.plausibility import Implausible, plausibility
-from bridgegen.errors import InputError
+from bridgegen.criteria import Monitor, quantity
+from bridgegen.criteria import evaluate as measure
+from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.evaluation import Evaluation, Replay, Replays, Trials
 from bridgegen.objective import CLASSIFYING, Objective, Objectives, needs_sample
+from bridgegen.odd.criteria import PREFIX, joined, read_criterion
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.options import PipelineOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.simulation.rollout import NO_SCENARIO, WORKER_ENDED, Rollout, joined
+from bridgegen.simulation.rollout import NO_SCENARIO, WORKER_ENDED, Rollout
+from bridgegen.simulation.rollout import joined as joined_rollouts
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.variants import Variants, nominal_of
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
@@ -64,7 +68,8 @@ class Pipeline:
         source: makes its concrete scenarios.
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded: those requested, and those that the
-            objective and the thresholds need.
+            objective and the thresholds need; then the margins of criteria.
+        monitor: the pass criteria, of the scenario and of the options.
         simulator: runs the scenario's storyboard; the embedded one if only the workers' machines
             have the chosen one.
         cause: the only one that makes a scenario count as critical, if one was requested.
@@ -127,13 +132,20 @@ class Pipeline:
             self.source = _source(scenario, self.driver, road_map, space)
         if self.cause is not None:
             require(self.cause, self.driver)
-        sees = simulator.detects
-        if recorded is None:
-            recorded = metrics_of(scenario, self.driver, options.metrics, detects=sees)
+        sees, embedded = simulator.detects, self.simulator.embedded
         held = measures.held_by(self.driver, detects=sees)
-        self.metrics = quantities.require(recorded, held, f"the driver '{self.driver.name}'")
+        named = f"the driver '{self.driver.name}'"
+        self.monitor = Monitor(
+            joined(scenario.criteria, [read_criterion(one) for one in options.criteria]),
+            embedded.program.names, held, embedded.duration, named,
+        )  # fmt: skip
+        if recorded is None:
+            also = (*options.metrics, *self.monitor.metrics)
+            recorded = metrics_of(scenario, self.driver, also, detects=sees)
+        margins = [name for name in recorded if name.startswith(PREFIX)]
+        known = quantities.require([one for one in recorded if one not in margins], held, named)
+        self.metrics = (*known, *(margins or self.monitor.names))
         self._roads: Any = self._static_roads(nominal)
-        embedded = self.simulator.embedded
         self._variants = Variants.of(scenario, space, self.source, embedded, driver)
         self._variant = lru_cache(maxsize=KEPT_VARIANTS)(self._make_variant)
 
@@ -217,6 +229,12 @@ class Pipeline:
         return Recipe.of(make, carried, options, recorded=self.metrics, **self._made_with)
 
     @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of each recorded quantity."""
+        margins = dict(zip(self.monitor.names, self.monitor.units, strict=True))
+        return {name: margins.get(name) or quantity(name).unit for name in self.metrics}
+
+    @property
     def rows_at_once(self) -> int:
         """The number of rows of a chunk that is fastest; see `Simulator`."""
         return FAR_ROWS if self._is_far else self.simulator.rows_at_once
@@ -264,6 +282,8 @@ class Pipeline:
         """
         if objective is None:
             spec = self.scenario.objective
+            if margins := [one.metric for one in spec.terms if one.metric.startswith(PREFIX)]:
+                self._violated(margins)
             sample = None
             if needs_sample(spec.weights, spec.scale, objectives):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
@@ -280,10 +300,29 @@ class Pipeline:
                 thresholds=spec.critical,
                 rule=spec.rule,
                 count=spec.count,
+                criteria=self._violated(spec.criteria) if spec.rule == "criteria" else (),
                 sample=sample,
             )
         self.objective = objective
         return objective
+
+    def _violated(self, asked: Sequence[str]) -> tuple[str, ...]:
+        """Return the margins that make a scenario critical: those asked for, or all.
+
+        Raises:
+            InputError: there are no criteria.
+            UnknownNameError: no such criterion.
+        """
+        known = self.monitor.names
+        if not known:
+            raise InputError(
+                f"{self.scenario.place}: criteria make a scenario critical, and there are none; "
+                "state some with --criterion, or in the scenario file"
+            )
+        for name in asked:
+            if name not in known:
+                raise UnknownNameError("criterion", name, known)
+        return tuple(asked) or known
 
     def warm_up(self) -> None:
         """Roll out the nominal row once, so that the kernels are compiled before time is measured.
@@ -303,8 +342,8 @@ class Pipeline:
         batch = self._nominal_batch()
         batch.compile_start()
         standing = batch.standing()
-        names = [one for one in self.metrics if one not in quantities.MEASURED]
-        quantities.evaluate(standing, names)
+        apart = (*quantities.MEASURED, *self.monitor.names)
+        quantities.evaluate(standing, [one for one in self.metrics if one not in apart])
         plausibility(standing)
         for fix in self.fixes:
             self._nominal_batch(driver=fix.driver, dry=fix.dry).take_addresses()
@@ -345,21 +384,28 @@ class Pipeline:
         """Evaluate N rows of one storyboard."""
         roads, rows = self._roads_of(X)
         rollout = self._run(roads, rows, X)
-        metrics = quantities.evaluate(rollout, self.metrics)
+        metrics = self.measure(rollout)
         gate = plausibility(rollout)
         findings = Findings.of(analyse(rollout), gate.labels, objective.count)
-        fit = gate.code == Implausible.NONE if objective.rule == "harm" else True
+        fit = gate.code == Implausible.NONE if objective.gated else True
         F, ok = objective.F(metrics, self.metrics, fit)
         critical = objective.critical(metrics, self.metrics) & ok
         if not self.seeks_causes:
             return Evaluation(metrics, F, critical, rollout.status, findings, rollout.messages)
 
         def harmless(at: Int, replay: Counterfactual) -> Bool:
-            return _harmless(self._run(roads, rows[at], X[at], replay), objective)
+            return self._harmless(self._run(roads, rows[at], X[at], replay), objective)
 
         cause = causes(self.driver, critical, harmless)
         counts = critical if self.cause is None else cause == self.cause
         return Evaluation(metrics, F, counts, rollout.status, findings, rollout.messages, cause)
+
+    def _harmless(self, rollout: Rollout, objective: Objective) -> Bool:
+        """Return which rows succeed and are not critical."""
+        names = objective.classifying
+        metrics = measure(rollout, names, self.monitor)
+        harmless: Bool = (rollout.status == 0) & ~objective.critical(metrics, names)
+        return harmless
 
     @property
     def tries(self) -> bool:
@@ -439,7 +485,9 @@ class Pipeline:
 
     def rollout_again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
         """Roll out N rows in the embedded simulator with the random numbers of some keys."""
-        return joined([(at, one._again(X[at], noise[at])) for at, one in self.by_variant(X)])
+        return joined_rollouts(
+            [(at, one._again(X[at], noise[at])) for at, one in self.by_variant(X)]
+        )
 
     def _again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
         """Roll out N rows of one storyboard; see ``rollout_again``."""
@@ -471,7 +519,7 @@ class Pipeline:
     def rollout(self, X: Float) -> Rollout:
         """Roll out N rows as ``evaluate`` does, and keep the motion."""
         if not self._is_far:
-            return joined(
+            return joined_rollouts(
                 [(at, one._run(*one._roads_of(X[at]), X[at])) for at, one in self.by_variant(X)]
             )
         parts, start = [], 0
@@ -482,7 +530,7 @@ class Pipeline:
                 status = np.full(part.rows, WORKER_ENDED, np.int8)
                 rollout = replace(lost, status=status, messages={0: rollout.reason})
             parts.append((rows, rollout))
-        return joined(parts)
+        return joined_rollouts(parts)
 
     def rollouts(self, X: Float) -> list[Rollout | Lost]:
         """Roll out N rows in the workers; return the rollouts of consecutive parts of them."""
@@ -554,7 +602,11 @@ class Pipeline:
 
     def measure_rows(self, X: Float) -> Float:
         """Return the metrics of N rows, ``(N, M)``, in this thread."""
-        return quantities.evaluate(self.rollout(X), self.metrics)
+        return self.measure(self.rollout(X))
+
+    def measure(self, rollout: Rollout) -> Float:
+        """Return all recorded quantities of a rollout, ``(N, len(metrics))``."""
+        return measure(rollout, self.metrics, self.monitor)
 
     def _map(
         self, work: Callable[[Self, Float, *Args], Result], X: Float, *args: *Args
@@ -612,14 +664,6 @@ def _compile_ahead(ego: CarriedDriver | None, options: PipelineOptions, **made_w
     Pipeline(options=options, **made_with, workers=Threads(1)).compile_ahead()
 
 
-def _harmless(rollout: Rollout, objective: Objective) -> Bool:
-    """Return which rows succeed and are not critical."""
-    names = objective.classifying
-    metrics = quantities.evaluate(rollout, names)
-    harmless: Bool = (rollout.status == 0) & ~objective.critical(metrics, names)
-    return harmless
-
-
 def _source(
     scenario: SearchedScenario,
     driver: egos.Driver | None,
@@ -655,6 +699,10 @@ def metrics_of(
         InputError: a metric does not exist with this driver.
     """
     terms = (term.metric for term in scenario.objective.terms)
-    asked = [name for name in (*terms, *CLASSIFYING, *also) if name not in quantities.MEASURED]
+    asked = [
+        name
+        for name in (*terms, *CLASSIFYING, *also)
+        if name not in quantities.MEASURED and not name.startswith(PREFIX)
+    ]
     recorded = measures.to_record(driver, asked, detects=detects)
     return (*recorded, *quantities.MEASURED)

@@ -13,13 +13,16 @@ from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import Conflicts, analyse
+from bridgegen.criteria import CriterionResult, Monitor
 from bridgegen.errors import FileFormatError, UnknownNameError
+from bridgegen.odd.criteria import Criterion, joined
 from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.prepared import prepared
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
@@ -37,6 +40,7 @@ class FileResult:
         parameters: the file's numeric parameters.
         metrics: by name, in the metric's unit; the quantities of the conflict analysis too.
         rollout: the motion, N = 1.
+        criteria: the pass criteria, those that the file states among them, with their margins.
         conflicts: the conflict analysis, N = 1; `bridgegen.conflict.summary.summarise` gives the
             decisive conflict.
         cause: of its harm, by the search that exported the file, as its header states; None where
@@ -51,6 +55,7 @@ class FileResult:
     metrics: Mapping[str, float]
     rollout: Rollout
     conflicts: Conflicts
+    criteria: tuple[CriterionResult, ...] = ()
     cause: str | None = None
     notes: tuple[str, ...] = ()
 
@@ -73,6 +78,7 @@ def simulate_file(
     time_step: float | None = None,
     skipped: list[str] | None = None,
     simulator: SimulatorChoice = EMBEDDED,
+    criteria: Sequence[Criterion] = (),
 ) -> FileResult:
     """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
 
@@ -91,6 +97,7 @@ def simulate_file(
         skipped: takes a sentence for each thing that is not supported, which is left out then
             instead of refused, with the event, action, entity or condition group around it.
         simulator: which one runs it.
+        criteria: pass criteria, besides those that the file states.
 
     Raises:
         InputError: a time step out of range, a stage that the driver has not, or a simulator that
@@ -130,6 +137,11 @@ def simulate_file(
     names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
     names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
+    stated, unknown = stated_criteria(scenario)
+    monitor = Monitor(
+        joined(stated, criteria), embedded.program.names, held, embedded.duration,
+        f"the driver '{embedded.driver}'",
+    )  # fmt: skip
     rollout = runs.run(runs.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = quantities.evaluate(rollout, names)[0]
     return FileResult(
@@ -140,8 +152,9 @@ def simulate_file(
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
         conflicts=analyse(rollout),
+        criteria=monitor.results(rollout, 0),
         cause=_stated_cause(scenario) if ego is None and ideal is None and others is None else None,
-        notes=(*warnings, *embedded.program.notes),
+        notes=(*warnings, *(f"{path}: {one}" for one in unknown), *embedded.program.notes),
     )
 
 

@@ -169,6 +169,7 @@ def run_search(given: SearchArguments) -> Run:
             junction=_junction(given, roads),
             adversary=driven,
             optimised=chosen.to_dict(),
+            criteria=[one.to_dict() for one in pipeline.monitor],
         )
         searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
         with Store.create(
@@ -293,8 +294,8 @@ def _finish(
         )
         record, best = triaged.record, np.array(triaged.exports, dtype=np.int64)
         write_record(store.folder, record)
-    if pipeline.objective.rule == "thresholds" and len(best) < settings.keep:
-        # Fill up with what the paper calls critical, in the paper's order.
+    if pipeline.objective.rule != "harm" and len(best) < settings.keep:
+        # Fill up with what the rule calls critical, in the objective's order.
         at = np.flatnonzero(rows.critical)
         more = at[most_critical(rows.U[at], rows.F[at], rows.critical[at], settings.keep)]
         best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]

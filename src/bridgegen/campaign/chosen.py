@@ -6,10 +6,12 @@ from typing import Any, cast, get_args
 from bridgegen.conflict.harm import Count
 from bridgegen.conflict.quantities import HARM
 from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.objective import Objectives
+from bridgegen.objective import RULES, Objectives
+from bridgegen.odd.criteria import PREFIX
 from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, SearchedScenario, Term
 from bridgegen.options import CommonOptions
+from bridgegen.options.forms import read_names
 from bridgegen.search import Algorithm
 
 PAPER = "paper"
@@ -46,13 +48,30 @@ def counted(count: str | None) -> Count | None:
 def as_judged(scenario: SearchedScenario, rule: str | None) -> SearchedScenario:
     """Return a scenario adapted to the criticality rule.
 
-    Vehicles that stop dead at the end of a road are implausible and would not count as harm: with
-    the rule "harm" they drive on and leave there, whatever the scenario says for the paper's
+    Vehicles that stop dead at the end of a road are implausible and would not count: with the rules
+    "harm" and "criteria" they drive on and leave there, whatever the scenario says for the paper's
     evaluation. A scenario file stays as it is.
     """
-    if rule == "harm" and isinstance(scenario, LogicalScenario):
+    if rule in ("harm", "criteria") and isinstance(scenario, LogicalScenario):
         return replace(scenario, road_end="leave")
     return scenario
+
+
+def _judged_by(spec: ObjectiveSpec, critical: str | None) -> ObjectiveSpec:
+    """Return an objective with the user's choice of what makes a scenario critical.
+
+    Raises:
+        UnknownNameError: no such choice.
+    """
+    if critical is None:
+        return spec
+    names = tuple(read_names(critical))
+    if names and all(name.startswith(PREFIX) for name in names):
+        return replace(spec, rule="criteria", criteria=names)
+    for known in RULES:
+        if critical == known:
+            return replace(spec, rule=known, criteria=())
+    raise UnknownNameError("choice of what is critical", critical, (*RULES, f"{PREFIX}ID"))
 
 
 def chosen_objective(
@@ -80,6 +99,11 @@ def chosen_objective(
         spec = replace(spec, rule="harm", weights="fixed")
         if len(metrics) == 1:
             metrics = {HARM: 1.0 if columns == "one" and weights != "entropy" else None}
+    if metrics and all(name.startswith(PREFIX) for name in metrics):
+        spec = replace(spec, rule="criteria", criteria=tuple(metrics), weights="fixed")
+        if len(metrics) == 1 and columns == "one" and weights != "entropy":
+            metrics = {name: weight or 1.0 for name, weight in metrics.items()}
+    spec = _judged_by(spec, options.critical)
     if columns == "many":
         given = [f"{name}={w:g}" for name, w in (metrics or {}).items() if w is not None]
         given += [f"--weights {weights}"] if weights else []

@@ -12,10 +12,8 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.campaign.exported import FOLDER, NOT_EXPORTED, Exported, Refused
 from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.cause import Cause
-from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.harm import Count
-from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.conflict.summary import ConflictSummary, summarise
 from bridgegen.errors import OntologyError, StorageError
 from bridgegen.evaluation import Replays
@@ -163,7 +161,7 @@ def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Pat
     X = np.array([minimal.x])
     rollout = pipeline.rollout_again(X, np.array([minimal.noise_key], dtype=np.uint64))
     conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
-    metrics = quantities.evaluate(rollout, pipeline.metrics)
+    metrics = pipeline.measure(rollout)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
     noise = minimal.noise_key if pipeline.driver.stages else None  # others have no noise
     write_scenario(
@@ -184,7 +182,7 @@ def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Pat
         "parameters": _parameters(pipeline, X[0]),
         "metrics": _named(
             dict(zip(pipeline.metrics, metrics[0].tolist(), strict=True)),
-            {name: QUANTITIES[name].unit for name in pipeline.metrics},
+            pipeline.units,
         ),
         "F": pipeline.objective.F(metrics, pipeline.metrics)[0][0].tolist(),
     }
@@ -208,7 +206,7 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, objec
         "parameters": _parameters(pipeline, rows.X[i]),
         "metrics": _named(
             dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),
-            {name: QUANTITIES[name].unit for name in pipeline.metrics},
+            pipeline.units,
         ),
         "F": rows.F[i].tolist(),
     }

@@ -11,7 +11,6 @@ from bridgegen.confirmation.compare import compare, first_contact, tracks
 from bridgegen.confirmation.record import digest_of
 from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Scenario, number
 from bridgegen.confirmation.words import explanation
-from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import Count
@@ -98,7 +97,7 @@ def _elsewhere(there: Pipeline, X: Float, count: Count) -> Iterator[_Ran | str]:
         if isinstance(one, Lost):
             yield f"{STATUS_MESSAGES[WORKER_ENDED]}: {one.reason}"
             continue
-        metrics = quantities.evaluate(one, there.metrics)
+        metrics = there.measure(one)
         findings = _findings(one, count)
         for row in range(one.shape[0]):
             yield _Ran(one, row, metrics[row], findings)

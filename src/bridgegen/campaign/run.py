@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from bridgegen.campaign.criteria import CriterionSummary, summarise_criteria
 from bridgegen.campaign.exported import (
     FOLDER,
     MINIMAL,
@@ -17,6 +18,7 @@ from bridgegen.campaign.exported import (
     not_exported,
 )
 from bridgegen.campaign.settings import Settings
+from bridgegen.odd.criteria import read_criterion
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows, Store
 from bridgegen.store.summary import Summary, summarise
@@ -125,6 +127,16 @@ class Run:
             return None
         with Store.open(self.folder) as store:
             return read_record(path, Recorded(store).digest())
+
+    @cached_property
+    def criteria(self) -> tuple[CriterionSummary, ...]:
+        """How its evaluations meet its pass criteria, in their order."""
+        criteria = [read_criterion(one) for one in self.settings.criteria]
+        if not criteria:
+            return ()
+        with Store.open(self.folder) as store:
+            rows = Recorded(store, whole=tuple(one.quantity for one in criteria))
+            return summarise_criteria(criteria, rows.metrics, store.metrics)
 
     @property
     def modes(self) -> tuple[Mode, ...]:

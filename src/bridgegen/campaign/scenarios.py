@@ -5,11 +5,13 @@ from typing import NoReturn
 
 from bridgegen.errors import InputError
 from bridgegen.odd import reader
+from bridgegen.odd.criteria import joined, read_criterion
 from bridgegen.odd.others import ATTENTIVE, require, with_others
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with_triggers
 from bridgegen.openx.file_scenario import with_others as drive_file_by
 from bridgegen.openx.openscenario.parameters import values
+from bridgegen.options import CommonOptions
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
@@ -51,6 +53,17 @@ def load(
             f"{scenario}"
         )
     return reader.load(scenario)
+
+
+def margins_of(scenario: str | Path, options: CommonOptions) -> tuple[str, ...]:
+    """Return the names of the margins that a search measures: of all pass criteria.
+
+    Raises:
+        InputError: as the readers say, or two criteria have one id.
+    """
+    found = load(scenario, options.distribution, options.empty_trigger)
+    given = [read_criterion(one) for one in options.criteria]
+    return tuple(one.quantity for one in joined(found.criteria, given))
 
 
 def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenario:

@@ -77,6 +77,12 @@ def _objectives(ctx: typer.Context) -> Iterable[str]:
     return ["harm", "paper", *_metrics(ctx)]
 
 
+def _critical(_: typer.Context) -> Iterable[str]:
+    from bridgegen.objective import RULES
+
+    return RULES
+
+
 def _parameters(ctx: typer.Context) -> Iterable[str]:
     """Return the parameters of the scenario that the command line names."""
     from bridgegen.odd.reader import load
@@ -123,6 +129,7 @@ NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "stage": _stages,
     "metric": _metrics,
     "objective": _objectives,
+    "critical": _critical,
     "parameter": _parameters,
     "axis": _axes,
     "simulator": _simulators,

@@ -111,7 +111,9 @@ def import_(
     ] = False,
     ego: Annotated[
         str | None,
-        typer.Option(help="The entity under test in an .xosc, if it is not called ego."),
+        typer.Option(
+            help="The entity under test in an .xosc; by default the one called ego, else the first."
+        ),
     ] = None,
     strict: Annotated[
         bool,

@@ -10,7 +10,7 @@ from bridgegen.cli.connection import Connection
 from bridgegen.cli.declared import declaration
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_settings, read_value
-from bridgegen.options.option import DRIVER, OUTPUT, SEARCH, SIMULATOR
+from bridgegen.options.option import DRIVER, OBJECTIVE, OUTPUT, SEARCH, SIMULATOR
 from bridgegen.simulation.choice import SimulatorChoice, Value
 
 Json = Annotated[
@@ -79,6 +79,15 @@ FailIf = Annotated[
         help="End with exit status 3 if this holds, e.g. 'r_critic > 0.1'; may be repeated.",
         show_default=False,
         rich_help_panel=OUTPUT,
+    ),
+]
+Criterion = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Pass criterion: 'ID: FORMULA', or a YAML file with a list of criteria; the exit "
+        "status is 3 if it is violated. May be repeated.",
+        show_default="those that the file states",
+        rich_help_panel=OBJECTIVE,
     ),
 ]
 FileFailIf = Annotated[

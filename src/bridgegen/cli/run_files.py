@@ -38,6 +38,9 @@ _FORMS: Mapping[Any, FileForm] = {
     Path: file_forms.TEXT,
     list[str]: file_forms.TEXTS,
 }
+_CRITERIA = "criteria"
+_YAML = (".yaml", ".yml")
+
 _CODE = {"ego", "detector"}
 """Options whose value is a path in front of a colon, or a path if it ends in ``.fmu``."""
 
@@ -200,6 +203,8 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     """Return a value with its path, if it holds one, moved to or from the file's folder."""
     if key.is_path:
         return Path(str(move(str(value))))
+    if key.name == _CRITERIA:
+        return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
     if not isinstance(value, str):
         return value
     if key.name in _CODE:
@@ -207,7 +212,7 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
         if path.endswith(".py"):
             return f"{move(path)}{colon}{what}"
         return str(move(value)) if value.endswith(".fmu") else value
-    is_file = Path(value).suffix.lower() in (".yaml", ".yml", ".xosc")
+    is_file = value.lower().endswith((*_YAML, ".xosc"))
     return str(move(value)) if key.name == SCENARIO and is_file else value
 
 

@@ -30,7 +30,7 @@ from bridgegen.options.option import DRIVER, OUTPUT, WHAT
 from bridgegen.simulation.choice import EMBEDDED
 
 if TYPE_CHECKING:
-    from bridgegen.verdict.criteria import Outcome
+    from bridgegen.verdict.fail_if import Outcome
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -74,11 +74,15 @@ def search(
     those of the command line override the file's.
     """
     from bridgegen import campaign
+    from bridgegen.campaign.scenarios import margins_of
     from bridgegen.screen.search import SearchScreen, print_summary
     from bridgegen.verdict.of_run import PassFailCriteria
 
     assert save is None  # written by the run file's reader, which knows what was given
-    criteria = PassFailCriteria.read(fail_if or (), junit, causes=options.causes)
+    criteria = PassFailCriteria.read(
+        fail_if or (), junit, causes=options.causes,
+        criteria=margins_of(scenario, options) if fail_if else (),
+    )  # fmt: skip
     chosen = common.read_simulator(simulator, simulator_set, connection)
     options = replace(options, simulator=chosen or EMBEDDED)
     with SearchScreen(options.budget) as screen:
@@ -248,6 +252,7 @@ def simulate(
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what is not supported, with a warning.")
     ] = False,
+    criterion: common.Criterion = None,
     fail_if: common.FileFailIf = None,
     junit: common.Junit = None,
     as_json: common.Json = False,
@@ -256,12 +261,12 @@ def simulate(
 
     Also prints its decisive conflict.
     """
-    from bridgegen.screen.files import conflict_facts, print_file_result
+    from bridgegen.screen.files import conflict_facts, criteria_facts, print_file_result
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
     from bridgegen.verdict.of_file import FileCriteria
 
-    criteria = FileCriteria.read(fail_if or (), junit)
+    criteria = FileCriteria.read(fail_if or (), junit, criterion or ())
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
     result = simulate_file(
@@ -276,6 +281,7 @@ def simulate(
         time_step=dt,
         skipped=skipped,
         simulator=common.read_simulator(simulator, simulator_set, connection) or EMBEDDED,
+        criteria=criteria.criteria,
     )
     for one in skipped or ():
         print(f"bridgegen: warning: left out: {one}", file=sys.stderr)
@@ -290,6 +296,7 @@ def simulate(
             "status": result.status,
         }
         values = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
+        facts |= {"criteria": criteria_facts(result.criteria)}
         facts |= {"cause": result.cause, "parameters": result.parameters, "metrics": values}
         facts |= conflict_facts(result.conflicts)
         if result.incidents:

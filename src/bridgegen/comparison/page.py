@@ -16,7 +16,7 @@ from bridgegen.comparison.plan import RUNS, Cell
 from bridgegen.comparison.record import points
 from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.table import Line
-from bridgegen.conflict.quantities import QUANTITIES
+from bridgegen.criteria import quantity
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
 
@@ -233,7 +233,7 @@ def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
     k = waited_for(plan.budget)
     boxes = "; ".join(
         f"{name}: " + ", ".join(
-            f"{term} {abs(worst):.4g} to {abs(best):.4g} {QUANTITIES[term].unit}".removesuffix(" 1")
+            f"{term} {abs(worst):.4g} to {abs(best):.4g} {quantity(term).unit}".removesuffix(" 1")
             for term, worst, best in zip(
                 next(r for c, r in comparison.records.items() if c.scenario == name).terms,
                 one.scale.worst, one.scale.best, strict=True,

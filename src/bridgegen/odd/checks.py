@@ -19,8 +19,8 @@ from bridgegen.odd.rules import cap, speeds_of
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.space import probes
 from bridgegen.odd.story import Participant
-from bridgegen.odd.units import has_unit, in_unit
 from bridgegen.participants import Body
+from bridgegen.units import has_unit, in_unit
 from bridgegen.weather import PARAMETERS
 
 MAX_STEPS = 100_000

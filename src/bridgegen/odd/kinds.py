@@ -28,7 +28,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.odd.expression import RESERVED
-from bridgegen.odd.units import PATTERN
+from bridgegen.units import PATTERN
 
 # Every check of a bound or a derived value allows TOLERANCE·(1 + |limit|): values that passed
 # through a file rounded to four decimals still keep their bounds, and no physical quantity here

@@ -38,12 +38,13 @@ def read_objective(given: ObjectiveSection, report: Callable[[str, Path], None])
                 f"fixed weights need one greater than 0 for {term.metric}, got {term.weight}",
                 path,
             )
-    by_harm = given.critical == "harm"
     limits = {} if isinstance(given.critical, str) else given.critical.model_dump()
     for key, value in list(limits.items()):
         if not 0.0 <= value < math.inf:
             report(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
             del limits[key]
     terms = tuple(Term(one.metric, one.weight) for one in given.terms)
-    rule: Literal["harm", "thresholds"] = "harm" if by_harm else "thresholds"
+    rule: Literal["harm", "thresholds", "criteria"] = "thresholds"
+    if isinstance(given.critical, str):
+        rule = given.critical
     return ObjectiveSpec(terms, given.weights, given.scale, Thresholds(**limits), rule)

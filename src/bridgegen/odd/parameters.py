@@ -12,7 +12,7 @@ from bridgegen.arrays import Float
 from bridgegen.errors import ScenarioError, UnknownNameError
 from bridgegen.odd.expression import RESERVED, Expression
 from bridgegen.odd.kinds import FLOAT, Kind
-from bridgegen.odd.units import has_unit, in_unit
+from bridgegen.units import has_unit, in_unit
 
 UNITS = {
     "m": "length",

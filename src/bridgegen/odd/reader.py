@@ -12,6 +12,7 @@ from bridgegen.errors import FileFormatError, InputError, ScenarioError, Unknown
 from bridgegen.odd.changes import TemporaryChanges, jam_members
 from bridgegen.odd.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.odd.constraints import problems_of
+from bridgegen.odd.criteria import read_criteria_in, unknown_entities
 from bridgegen.odd.expression import Expression, parse
 from bridgegen.odd.kinds import KEYS, KINDS
 from bridgegen.odd.objectives import HARM, read_objective
@@ -325,6 +326,8 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     participants = driven((*board.participants, *changes.participants), board.events, others)
     story = Story(participants, board.events, changes.jams, changes.works)
     objective = _objective(document.data.get("objective", "harm"), quantities)
+    criteria, wrong = read_criteria_in(document)
+    problems += wrong + unknown_entities(criteria, [one.name for one in story.participants])
     declarations.derived += changes.derived
     derived |= {one.name: one for one in changes.derived}
     between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
@@ -361,6 +364,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         bounds=tuple(declarations.bounds),
         derived=tuple(declarations.derived),
         objective=objective,
+        criteria=criteria,
     )
     try_out(scenario)
     return scenario

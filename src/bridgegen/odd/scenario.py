@@ -9,6 +9,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.odd.constraints import Constraints
+from bridgegen.odd.criteria import Criterion
 from bridgegen.odd.kinds import slack
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at
 from bridgegen.odd.roads import RoadsSpec
@@ -40,17 +41,20 @@ class ObjectiveSpec:
             Eqs. 4 to 7).
         scale: "raw": metrics as they are; "standardised": by the same sample.
         critical: the thresholds of what counts as critical by the rule "thresholds".
-        rule: "harm": critical is what the conflict analysis finds harmful; or "thresholds".
+        rule: "harm": critical is what the conflict analysis finds harmful; "thresholds"; or
+            "criteria": what violates a criterion.
         count: whose conflicts are harm: "ego", those that the ego is responsible for or could have
             prevented; or "any".
+        criteria: the margins that count by the rule "criteria"; empty: all.
     """
 
     terms: tuple[Term, ...]
     weights: Literal["fixed", "entropy"]
     scale: Literal["raw", "standardised"]
     critical: Thresholds = field(default_factory=Thresholds)
-    rule: Literal["harm", "thresholds"] = "thresholds"
+    rule: Literal["harm", "thresholds", "criteria"] = "thresholds"
     count: Literal["ego", "any"] = "ego"
+    criteria: tuple[str, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ class SearchedScenario:
         checks: limits that a row may break, for they leave some combinations no value, or do not
             shape how a value is drawn: it is no scenario then.
         notes: what is searched otherwise than its files may lead one to expect.
+        criteria: pass criteria, which a search measures besides.
     """
 
     name: str
@@ -109,6 +114,7 @@ class SearchedScenario:
     seed: int = field(default=0, kw_only=True)
     checks: tuple[Bound, ...] = field(default=(), kw_only=True, compare=False, repr=False)
     notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
+    criteria: tuple[Criterion, ...] = field(default=(), kw_only=True, repr=False)
 
     @property
     def fingerprint(self) -> str:
@@ -218,7 +224,7 @@ class LogicalScenario(SearchedScenario):
         types = {one.name: (one.type_by, one.types) for one in self.participants if one.type_by}
         ways = {one.name: (one.place_by, one.ways) for one in self.participants if one.ways}
         models = {one.name: one.model for one in self.participants if one.model}
-        parts = (drivers, headings, lifted, sirens, bodies, types, models, ways)
+        parts = (drivers, headings, lifted, sirens, bodies, types, models, ways, self.criteria)
         more = "".join(repr(one) for one in parts if one)
         return sha256((content + more).encode()).hexdigest()
 

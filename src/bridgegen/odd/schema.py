@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from bridgegen.odd.criteria import CriterionSection
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.shape import (
     AxisName,
@@ -19,6 +20,7 @@ from bridgegen.odd.shape import (
     Number,
     NumberOrName,
     OrWord,
+    QuantityName,
     Seconds,
     ShapedSection,
     Text,
@@ -118,8 +120,8 @@ class EffectSection(ShapedSection):
 class TermSection(ShapedSection):
     """One metric of the objective."""
 
-    metric: Word
-    """See 'bridgegen list metrics'."""
+    metric: QuantityName
+    """See 'bridgegen list metrics'; or the margin of a criterion, criterion:ID."""
     weight: Number | None = None
     """With ``weights: fixed``."""
 
@@ -144,10 +146,10 @@ class ObjectiveSection(ShapedSection):
     """Of the terms, or by the entropy of a random sample."""
     scale: Literal["raw", "standardised"]
     """In the units of the metrics, or standardised by a random sample."""
-    critical: Annotated[CriticalSection | Literal["harm"], OrWord(CriticalSection, "harm")] = (
-        CriticalSection()
-    )
-    """What makes a scenario critical: thresholds, or harm."""
+    critical: Annotated[
+        CriticalSection | Literal["harm", "criteria"], OrWord(CriticalSection, "harm", "criteria")
+    ] = CriticalSection()
+    """What makes a scenario critical: thresholds, harm, or criteria: one that is violated."""
 
 
 class ScenarioFile(ShapedSection):
@@ -197,6 +199,8 @@ class ScenarioFile(ShapedSection):
     """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}
     """By name: what follows from parameters."""
+    criteria: list[CriterionSection] = []
+    """Pass criteria: formulas that a scenario must keep, each with an id."""
     objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
         "harm"
     )

@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_sc
 from bridgegen.odd.parameters import nearest
 from bridgegen.odd.plain_yaml import Document, Path
 from bridgegen.odd.story import STRIPS
-from bridgegen.odd.units import PATTERN, has_unit, in_unit
+from bridgegen.units import PATTERN, has_unit, in_unit
 
 _PARAMETER = "[A-Za-z][A-Za-z0-9_]{0,63}"
 
@@ -87,6 +87,13 @@ Text = Annotated[
     WithJsonSchema({"type": "string", "pattern": r"\S"}),
 ]
 Word = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
+QuantityName = Annotated[
+    str,
+    Field(
+        strict=True,
+        pattern=r"^([A-Za-z][A-Za-z0-9_-]{0,63}|criterion:[A-Za-z0-9][A-Za-z0-9_.-]{0,63})$",
+    ),
+]
 _SCHEMA_WITH_UNIT = {"type": "string", "pattern": PATTERN}
 _MEASURED = WithJsonSchema({"anyOf": [{"type": "number"}, _SCHEMA_WITH_UNIT]})
 _QUANTITY = WithJsonSchema(
@@ -150,19 +157,19 @@ Section = TypeVar("Section", bound=ShapedSection)
 
 
 class OrWord:
-    """A section of a file in whose place one word may stand: ``Annotated[S | Literal[word], …]``.
+    """A section of a file in whose place a word may stand: ``Annotated[S | Literal[word], …]``.
 
     Unlike a plain union, it reports which parts of an invalid section are wrong.
     """
 
-    def __init__(self, model: type[ShapedSection], word: str) -> None:
-        self._model, self._word = model, word
+    def __init__(self, model: type[ShapedSection], *words: str) -> None:
+        self._model, self._words = model, words
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         def read(value: Any, section: core_schema.ValidatorFunctionWrapHandler) -> Any:
-            return value if isinstance(value, str) and value == self._word else section(value)
+            return value if isinstance(value, str) and value in self._words else section(value)
 
         return core_schema.no_info_wrap_validator_function(
             read, handler.generate_schema(self._model)
@@ -171,7 +178,7 @@ class OrWord:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {"anyOf": [{"const": self._word}, handler(schema)]}
+        return {"anyOf": [*({"const": word} for word in self._words), handler(schema)]}
 
 
 _MESSAGES = {

@@ -21,8 +21,8 @@ from bridgegen.openx.opendrive.to_owl.losses import losses
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
-from bridgegen.openx.openscenario.from_owl.scenario import EGO, openscenario_from_owl
-from bridgegen.openx.openscenario.renaming import rename_entity
+from bridgegen.openx.openscenario.from_owl.scenario import openscenario_from_owl
+from bridgegen.openx.openscenario.renaming import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.prepared import prepared
 from bridgegen.openx.xml import read_bytes
@@ -89,7 +89,7 @@ def import_file(
             references its map.
         out: the file to write, new; beside the first by default.
         partial: leave out contents that the ontology cannot express, instead of refusing the file.
-        ego: of a scenario, the entity under test, if it is not called so.
+        ego: of a scenario, the entity under test; the one called so by default, else the first.
         strict: take every detail of a scenario for one that must not be lost.
         empty_trigger: when acts and events start whose StartTrigger is empty: "never", or "now".
 
@@ -128,6 +128,11 @@ def _import_storyboard(
 ) -> tuple[Individuals, list[str]]:
     skipped: list[str] = []
     scenario = openscenario_read.read(file, skipped=skipped if partial else None)
+    notes: list[str] = []
+    if ego is None and scenario.entities.scenario_objects:
+        ego = ego_of(scenario)
+        if ego.lower() != EGO:
+            notes.append(f"{file}: {ego}, the first entity, is the ego; --ego chooses another")
     if ego is not None:
         scenario = rename_entity(scenario, ego, EGO)
     scenario = read_empty_triggers(scenario, empty_trigger)
@@ -142,7 +147,7 @@ def _import_storyboard(
         partial=partial,
         in_substance=not strict,
     )
-    return individuals, [f"left out: {sentence}" for sentence in (*skipped, *lost)]
+    return individuals, notes + [f"left out: {sentence}" for sentence in (*skipped, *lost)]
 
 
 def _seen_from(out: Path, file: Path) -> str:

@@ -30,11 +30,11 @@ from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.empty_triggers import read_empty_triggers
 from bridgegen.openx.openscenario.fixed_texts import fixed_texts
-from bridgegen.openx.openscenario.from_owl.scenario import EGO
 from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.ranges import FileParameter, Ranges, ranges_of
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.openscenario.renaming import rename_entity
+from bridgegen.openx.openscenario.renaming import EGO, ego_of, rename_entity
+from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.values import Kind, format_double
 from bridgegen.openx.prepared import prepared
@@ -146,6 +146,7 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     bounds, checks = _kept(ranges)
     varied = {one.axis for one in ranges.parameters.values() if one.low < one.high}
     description = str(storyboard.file_header.description).strip()
+    criteria, unknown = stated_criteria(storyboard)
     return FileScenario(
         name=path.stem,
         title=description or path.stem,
@@ -159,12 +160,14 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         objective=HARM,
         driver=None,
         **_of_draws(definition, str(distribution)),
+        criteria=criteria,
         storyboard=storyboard,
         roads=roads,
         definition=definition,
         texts=ranges.texts,
         notes=(
             *ranges.notes,
+            *(f"{path}: {one}" for one in unknown),
             *(f"{path}: {one}, or an evaluation fails ({one.place})" for one in checks),
         ),
         variant_names=ranges.variants,
@@ -343,12 +346,6 @@ class ConcreteFile:
             return individuals_from_openscenario(renamed, self.roads, self.road_file, "")[0]
         except InputError:
             return None
-
-
-def ego_of(storyboard: osc.OpenScenario) -> str:
-    """Return the name of the entity under test: the one called so, else the first."""
-    names = [str(one.name) for one in storyboard.entities.scenario_objects]
-    return next((name for name in names if name.lower() == EGO), names[0])
 
 
 def with_values(

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from bridgegen.odd.plain_yaml import read_plain_yaml
+
 
 @dataclass(frozen=True)
 class FileForm:
@@ -77,6 +79,21 @@ def _split(pairs: list[str], value: Callable[[str], Any]) -> dict[str, Any]:
     return {name: value(text) for name, _, text in parts}
 
 
+def _criteria(value: Any) -> list[str]:
+    """Return criteria as texts; mappings become JSON, which is YAML in braces."""
+    given = value if isinstance(value, list) else [value]
+    if not all(isinstance(one, str | dict) for one in given):
+        raise ValueError("must be a list of criteria: mappings, or texts ID: FORMULA")
+    return [one if isinstance(one, str) else json.dumps(one, ensure_ascii=False) for one in given]
+
+
+def _plain_criteria(texts: list[str]) -> list[Any]:
+    return [
+        read_plain_yaml(one.encode(), "--criterion").data if one.startswith("{") else one
+        for one in texts
+    ]
+
+
 def _terms(value: Any) -> str:
     if isinstance(value, dict):
         weights = {_word(name): w if w is None else _number(w) for name, w in value.items()}
@@ -106,6 +123,10 @@ NAMES = FileForm(
     _TEXTS,
     lambda value: ",".join(_words(value)),
     lambda text: [name for part in text.split(",") if (name := part.strip())],
+)
+_CRITERION = {"anyOf": [{"type": "string"}, {"type": "object"}]}
+CRITERIA = FileForm(
+    {"anyOf": [_CRITERION, {"type": "array", "items": _CRITERION}]}, _criteria, _plain_criteria
 )
 FIXED = FileForm(
     _PAIRS,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bridgegen.errors import InputError
+from bridgegen.odd.criteria import Criterion, in_words, joined, read_criteria, read_criterion
 from bridgegen.options import file_forms
 from bridgegen.options.file_forms import FileForm
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
@@ -135,6 +136,19 @@ def _term_texts(terms: Mapping[str, float | None]) -> list[str]:
     return [",".join(m if w is None else f"{m}={w!r}" for m, w in terms.items())] if terms else []
 
 
+def _kept_criteria(
+    given: Iterable[str | Criterion | Mapping[str, Any]],
+) -> tuple[dict[str, Any], ...]:
+    """Return criteria as plain data, of texts, plain data or themselves."""
+    found: list[Criterion] = []
+    for one in given:
+        if isinstance(one, str):
+            found += read_criteria([one])
+        else:
+            found.append(one if isinstance(one, Criterion) else read_criterion(one))
+    return tuple(one.to_dict() for one in joined(found))
+
+
 def _flag_words(spelling: str, value: bool) -> list[str]:
     return [spelling if value else f"--no-{spelling.removeprefix('--')}"]
 
@@ -189,6 +203,15 @@ TERMS = Form(
     file_forms.TERMS,
 )
 """``metric=weight,metric``."""
+
+CRITERIA = Form(
+    list[str],
+    lambda texts, _: _kept_criteria(texts),
+    _repeated(lambda given: [in_words(read_criterion(one)) for one in given]),
+    lambda given: _kept_criteria(given or ()),
+    file_forms.CRITERIA,
+)
+"""``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
 
 SIMULATOR = Form(None, words=_simulator_words, keep=lambda choice: choice or EMBEDDED)
 """Its name and its settings. Where it is on this machine belongs to no run's command."""

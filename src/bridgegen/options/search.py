@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from bridgegen.options.forms import (
+    CRITERIA,
     FIXED,
     FLAG,
     NAMES,
@@ -83,6 +84,19 @@ class PipelineOptions:
             before=(),
             group=OUTPUT,
             names="metric",
+        ),
+    )
+    criteria: Sequence[Mapping[str, str | Sequence[str]]] = field(
+        default=(),
+        metadata=option(
+            CRITERIA,
+            "Pass criterion to measure in every scenario: 'ID: FORMULA', or a YAML file with a "
+            "list of criteria.",
+            spelling="--criterion",
+            hint="E.g. 'R-12: min(gap to any) > 1 m'; may be repeated.",
+            shown="the scenario's",
+            before=(),
+            group=OBJECTIVE,
         ),
     )
     causes: bool = field(default=False, metadata=_CAUSES)
@@ -232,6 +246,18 @@ class CommonOptions(PipelineOptions):
             before=None,
             group=OBJECTIVE,
             names="count",
+        ),
+    )
+    critical: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "What makes a scenario critical: harm, thresholds (the paper's), criteria (any that is "
+            "violated), or some of them: criterion:ID, separated by commas.",
+            shown="the scenario's, or what the objective says",
+            before=None,
+            group=OBJECTIVE,
+            names="critical",
         ),
     )
     adversary: str | None = field(

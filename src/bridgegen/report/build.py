@@ -10,12 +10,13 @@ import numpy as np
 from bridgegen.arrays import Taken
 from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
-from bridgegen.conflict import quantities
 from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.criteria import quantity
 from bridgegen.errors import ScenarioError
 from bridgegen.evaluation import Replays
 from bridgegen.objective import Objective
 from bridgegen.odd.coverage import CoverageMap, coverage_map
+from bridgegen.odd.criteria import PREFIX
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
     WHOLE,
@@ -96,7 +97,7 @@ def build_report(
         minimal_files: of the minimal scenarios, by their paths relative to the page.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
-    terms, by_harm = pipeline.objective.names, pipeline.objective.rule == "harm"
+    terms, rule = pipeline.objective.names, pipeline.objective.rule
     if pipeline.objective.objectives == "one":
         weighted = zip(terms, pipeline.objective.weights, strict=True)
         wanted = {"weights of the objective": ", ".join(f"{n} {w:.4g}" for n, w in weighted)}
@@ -115,7 +116,7 @@ def build_report(
         n_critical=summary.critical,
         r_critic=summary.r_critic,
         critical_rule=rule_in_words(pipeline.objective, pipeline.cause),
-        critical_distance=None if by_harm else limits.d_min_below,
+        critical_distance=limits.d_min_below if rule == "thresholds" else None,
         first_critical=summary.first,
         fiftieth_critical=summary.fiftieth,
         d_min_best=summary.d_min_best,
@@ -128,7 +129,7 @@ def build_report(
         command=command,
         view=view,
         independent=algorithm == INDEPENDENT,
-        harm=pipeline.objective.harm if by_harm else "",
+        harm=pipeline.objective.harm if rule != "thresholds" else "",
         hashes=hashes,
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
@@ -166,7 +167,10 @@ def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
         cause: the only one that counts, if one was chosen.
     """
     limits, many = objective.thresholds, objective.thresholds.n_collision_above
-    if objective.rule == "harm" and objective.count == "any":
+    if objective.rule == "criteria":
+        names = ", ".join(name.removeprefix(PREFIX) for name in objective.criteria)
+        rule = f"a violation of {'criterion' if len(objective.criteria) == 1 else 'one of'} {names}"
+    elif objective.rule == "harm" and objective.count == "any":
         rule = f"a collision or a near miss, whoever is responsible, harm_any ≥ {NEAR_MISS:g}"
     elif objective.rule == "harm":
         rule = (
@@ -203,9 +207,9 @@ def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
     metrics = tuple(
         Column(
             name,
-            quantities.get(name).unit,
+            pipeline.units[name],
             rows.metrics[:, j] if name in WHOLE else Deferred(measured, j),
-            quantities.get(name).description,
+            quantity(name).description,
         )
         for j, name in enumerate(pipeline.metrics)
     )

@@ -7,7 +7,6 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.cause import Cause
-from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import Conflicts, analyse
 from bridgegen.conflict.harm import Count
 from bridgegen.conflict.outcomes import with_outcomes
@@ -102,7 +101,7 @@ def minimal_playbacks(
     replays = pipeline.replays(X, plans=False, noise=noise)
     metrics = np.empty((len(X), len(pipeline.metrics)))
     for at, replay in replays.parts:
-        metrics[at] = quantities.evaluate(replay.rollout, pipeline.metrics)
+        metrics[at] = pipeline.measure(replay.rollout)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
     shown = [
         Shown(name, evaluation, files, X[k], metrics[k], bool(critical[k]), "")
@@ -125,7 +124,7 @@ def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
     if rollout.status[0] != 0:
         words = [STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]
         raise FileFormatError(f"{pipeline.scenario.place}: {': '.join(words)}")
-    metrics = quantities.evaluate(rollout, pipeline.metrics)
+    metrics = pipeline.measure(rollout)
     shown = Shown(name, 0, (), X[0], metrics[0], critical=False, cause="")
     return _played(pipeline, [shown], replay, brief=True)[0]
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from bridgegen.campaign.driver_contract import Check
     from bridgegen.conflict.analysis import Conflicts
     from bridgegen.conflict.recorded import Measured
+    from bridgegen.criteria import CriterionResult
     from bridgegen.simulate import FileResult
 
 
@@ -24,7 +25,25 @@ def print_file_result(file: Path, result: "FileResult") -> None:
     for one in result.incidents:
         print(f"at {one.step * result.rollout.time_step:.2f} s: {one.kind}: {one.what}")
     _print_conflict(result.conflicts)
+    for each in result.criteria:
+        unit = "" if each.unit == "1" else f" {each.unit}"
+        text = each.criterion.text or each.criterion.states
+        verdict = f"{each.verdict} (margin {each.margin:.4g}{unit})"
+        print(f"criterion {each.criterion.id} {verdict}: {text}")
     _print_metrics(result.metrics)
+
+
+def criteria_facts(results: "Iterable[CriterionResult]") -> list[dict[str, Any]]:
+    """Return how a file meets criteria as JSON's types."""
+    return [
+        one.criterion.to_dict()
+        | {
+            "verdict": one.verdict,
+            "margin": one.margin if isfinite(one.margin) else None,
+            "unit": one.unit,
+        }
+        for one in results
+    ]
 
 
 def conflict_facts(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> dict[str, Any]:

@@ -97,6 +97,7 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("50th critical after", _count(s.fiftieth)),
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
+        *((f"criterion {one.criterion.id}", one.sentence) for one in run.criteria),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
         ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}{_minimal(run)}"),
     ]
@@ -126,6 +127,15 @@ def conclusion(run: "Run") -> list[tuple[str, str]]:
     else:
         failed = f"; {s.failed} of {s.evaluations} evaluations failed" if s.failed else ""
         rows = [("verdict", (headline(found) if found is not None else critical) + failed)]
+    violated = [one for one in run.criteria if one.violated]
+    if violated:
+        names = "; ".join(
+            f"{one.criterion.id} in {one.violated} of {one.met + one.violated}" for one in violated
+        )
+        rows = [
+            ("verdict", f"{run.settings.ego} violates {names} evaluations"),
+            ("harm", rows[0][1]),
+        ]
     if found is not None and found.modes:
         worst = max(found.modes, key=lambda one: (one.severity, one.harm))
         rows.append(("worst", shortly(worst)))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bridgegen.verdict.criteria import Outcome
+    from bridgegen.verdict.fail_if import Outcome
 
 _WORDS = {"passed": "passed", "failed": "FAILED", "unknown": "FAILED, cannot be judged"}
 

@@ -15,7 +15,7 @@ from lxml import etree
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
-from bridgegen.verdict.criteria import Outcome
+from bridgegen.verdict.fail_if import Outcome
 
 Problem = Literal["failure", "error"]
 

@@ -7,7 +7,7 @@ from typing import Self
 
 from bridgegen.campaign.confirm import RunConfirmation
 from bridgegen.confirmation.schema import Scenario
-from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
+from bridgegen.verdict.fail_if import FailCondition, Outcome, read_conditions
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
 
 FIGURES = {
@@ -31,11 +31,11 @@ class ConfirmationCriteria:
     """The criteria for a confirmation, checked before it starts.
 
     Attributes:
-        criteria: each fails the confirmation if it holds.
+        conditions: each fails the confirmation if it holds.
         junit: path of the JUnit XML, or None.
     """
 
-    criteria: tuple[Criterion, ...]
+    conditions: tuple[FailCondition, ...]
     junit: Path | None
 
     @classmethod
@@ -43,14 +43,14 @@ class ConfirmationCriteria:
         """Read the criteria.
 
         Args:
-            texts: see `read_criteria`; their figures are FIGURES.
+            texts: see `read_conditions`; their figures are FIGURES.
             junit: a new file, or an earlier JUnit XML.
 
         Raises:
-            InputError: a text is not a criterion, or a figure is unknown.
+            InputError: a text is not a condition, or a figure is unknown.
             StorageError: the JUnit XML cannot be written.
         """
-        criteria = cls(read_criteria(texts, FIGURES), junit)
+        criteria = cls(read_conditions(texts, FIGURES), junit)
         if junit is not None:
             refuse_junit(junit)
         return criteria
@@ -61,7 +61,7 @@ class ConfirmationCriteria:
         Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
         whether any scenario ran.
         """
-        if not self.criteria and self.junit is None:
+        if not self.conditions and self.junit is None:
             return ()
         s = found.summary
         ran = Outcome(
@@ -70,7 +70,7 @@ class ConfirmationCriteria:
             f"{s.confirmed} confirmed, {s.lost} not, {s.not_run} not run",
         )
         figures = figures_of(found)
-        outcomes = (ran, *(one.judge(figures) for one in self.criteria))
+        outcomes = (ran, *(one.judge(figures) for one in self.conditions))
         if self.junit is not None:
             write_junit(self.junit, _suites(found, outcomes))
         return outcomes

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Self
 
 from bridgegen.conflict.quantities import QUANTITIES
+from bridgegen.odd.criteria import Criterion, read_criteria
 from bridgegen.simulate import FileResult
-from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
+from bridgegen.verdict.fail_if import FailCondition, Outcome, outcome_of, read_conditions
 from bridgegen.verdict.junit import Suite, case_of, refuse_junit, write_junit
 
 
@@ -16,49 +17,56 @@ class FileCriteria:
     """The criteria for a scenario file, checked before the simulation.
 
     Attributes:
-        criteria: each fails the file if it holds.
+        conditions: each fails the file if it holds.
         junit: path of the JUnit XML, or None.
+        criteria: pass criteria that were asked for.
     """
 
-    criteria: tuple[Criterion, ...]
+    conditions: tuple[FailCondition, ...]
     junit: Path | None
+    criteria: tuple[Criterion, ...] = ()
 
     @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None) -> Self:
+    def read(cls, texts: Sequence[str], junit: Path | None, criteria: Sequence[str] = ()) -> Self:
         """Read the criteria.
 
         Args:
-            texts: see `read_criteria`; their figures are metrics.
+            texts: see `read_conditions`; their figures are metrics.
             junit: a new file, or an earlier JUnit XML.
+            criteria: see `bridgegen.odd.criteria.read_criteria`.
 
         Raises:
-            InputError: a text is not a criterion, or a metric is unknown.
+            InputError: a text is not a condition, or a metric is unknown.
             StorageError: the JUnit XML cannot be written.
         """
-        criteria = cls(read_criteria(texts, QUANTITIES), junit)
+        found = cls(read_conditions(texts, QUANTITIES), junit, read_criteria(criteria))
         if junit is not None:
             refuse_junit(junit)
-        return criteria
+        return found
 
     @property
     def metrics(self) -> tuple[str, ...]:
         """The metrics that must be measured."""
-        return tuple(dict.fromkeys(name for one in self.criteria for name in one.figures))
+        return tuple(dict.fromkeys(name for one in self.conditions for name in one.figures))
 
     def judge(self, file: Path, result: FileResult) -> tuple[Outcome, ...]:
         """Apply the criteria to a result, and write the JUnit XML if requested.
 
-        Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
-        whether the simulation succeeded.
+        Without conditions, criteria and JUnit XML there are no outcomes. Otherwise the first is
+        whether the simulation succeeded; the file's own criteria are among the others.
         """
-        if not self.criteria and self.junit is None:
+        if not self.conditions and not self.criteria and self.junit is None:
             return ()
         ran = Outcome(
             "the simulation succeeds",
             "passed" if result.status == "ok" else "unknown",
             f"{result.status}, {result.seconds:g} s simulated",
         )
-        outcomes = (ran, *(one.judge(result.metrics) for one in self.criteria))
+        outcomes = (
+            ran,
+            *(one.judge(result.metrics) for one in self.conditions),
+            *(outcome_of(one) for one in result.criteria),
+        )
         if self.junit is not None:
             units = {name: QUANTITIES[name].unit for name in result.metrics}
             metrics = {

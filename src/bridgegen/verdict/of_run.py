@@ -8,13 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
+from bridgegen.campaign.criteria import CriterionSummary
 from bridgegen.campaign.exported import Facts, ParameterValue, Quantity, read_facts
 from bridgegen.campaign.run import Run
 from bridgegen.cause import CAUSES
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, StorageError
+from bridgegen.odd.criteria import PREFIX, read_criterion
 from bridgegen.triage.words import mode_in_words
-from bridgegen.verdict.criteria import Criterion, Outcome, read_criteria
+from bridgegen.verdict.fail_if import (
+    FailCondition,
+    Outcome,
+    Verdict,
+    read_conditions,
+    words_of,
+)
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
 
 _CAUSES = {one.label: "critical scenarios of this cause (quick: one replay)" for one in CAUSES}
@@ -52,47 +60,58 @@ class PassFailCriteria:
     """The criteria for a run, checked before it starts.
 
     Attributes:
-        criteria: each fails the run if it holds.
+        conditions: each fails the run if it holds.
         junit: path of the JUnit XML, or None.
     """
 
-    criteria: tuple[Criterion, ...]
+    conditions: tuple[FailCondition, ...]
     junit: Path | None
 
     @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None, *, causes: bool = True) -> Self:
+    def read(
+        cls,
+        texts: Sequence[str],
+        junit: Path | None,
+        *,
+        causes: bool = True,
+        criteria: Sequence[str] = (),
+    ) -> Self:
         """Read the criteria.
 
         Args:
-            texts: see `read_criteria`; their figures are FIGURES.
+            texts: see `read_conditions`; their figures are FIGURES.
             junit: a new file, or an earlier JUnit XML.
             causes: whether the run determines causes.
+            criteria: the names of the margins of its pass criteria, figures too: each is the
+                number of evaluations that violate it.
 
         Raises:
-            InputError: a text is not a criterion; a figure is unknown, or is a cause although the
+            InputError: a text is not a condition; a figure is unknown, or is a cause although the
                 run determines none.
             StorageError: the JUnit XML cannot be written.
         """
-        criteria = cls(read_criteria(texts, FIGURES), junit)
-        if not causes and (named := sorted(criteria.figures & _CAUSES.keys())):
+        found = cls(read_conditions(texts, (*FIGURES, *criteria)), junit)
+        if not causes and (named := sorted(found.figures & _CAUSES.keys())):
             raise InputError(
                 f"--fail-if names {', '.join(named)}, but this run does not determine causes"
             )
         if junit is not None:
             refuse_junit(junit)
-        return criteria
+        return found
 
     @classmethod
     def of_run(cls, texts: Sequence[str], junit: Path | None, folder: Path) -> Self:
         """Read the criteria for an existing run; see ``read``."""
         if not texts and junit is None:
             return cls((), None)
-        return cls.read(texts, junit, causes=Run(folder).settings.causes)
+        settings = Run(folder).settings
+        names = [read_criterion(one).quantity for one in settings.criteria]
+        return cls.read(texts, junit, causes=settings.causes, criteria=names)
 
     @property
     def figures(self) -> set[str]:
         """The names of all figures in the criteria."""
-        return {name for one in self.criteria for name in one.figures}
+        return {name for one in self.conditions for name in one.figures}
 
     def judge(self, run: Run) -> tuple[Outcome, ...]:
         """Apply the criteria to a run, and write the JUnit XML if requested.
@@ -100,10 +119,14 @@ class PassFailCriteria:
         Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
         whether the search has results.
         """
-        if not self.criteria and self.junit is None:
+        if not self.conditions and self.junit is None:
             return ()
         figures = figures_of(run)
-        outcomes = (_searched(run), *(one.judge(figures) for one in self.criteria))
+        outcomes = (
+            _searched(run),
+            *(one.judge(figures) for one in self.conditions),
+            *(_outcome_of(one) for one in run.criteria),
+        )
         if self.junit is not None:
             write_junit(self.junit, _suites(run, outcomes))
         return outcomes
@@ -125,9 +148,18 @@ def figures_of(run: Run) -> dict[str, float]:
         **{name: s.causes.get(name, 0) if sought else nan for name in _CAUSES},
         **_of_triage(run),
     }
+    figures |= {one.criterion.quantity: one.violated for one in run.criteria}
     if s.failed == s.evaluations:
         figures = dict.fromkeys(figures, nan)
     return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
+
+
+def _outcome_of(one: CriterionSummary) -> Outcome:
+    """Return whether all evaluations of a run meet a pass criterion, as an outcome."""
+    known = one.met + one.violated
+    verdict: Verdict = "unknown" if not known else "failed" if one.violated else "passed"
+    figures = (one.criterion.quantity,)
+    return Outcome(words_of(one.criterion), verdict, one.sentence, figures)
 
 
 def _of_triage(run: Run) -> dict[str, float]:
@@ -214,7 +246,14 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
 def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
     """Return whether a critical scenario contributes to a failed criterion, by its quick cause."""
     cause = facts.quick_cause if "quick_cause" in facts.model_fields_set else facts.cause
-    return any(name == cause if name in _CAUSES else name not in _OF_THE_RUN for name in figures)
+    for name in figures:
+        if name.startswith(PREFIX):
+            margin = facts.metrics[name].value if name in facts.metrics else None
+            if margin is not None and margin < 0.0:
+                return True
+        elif name == cause if name in _CAUSES else name not in _OF_THE_RUN:
+            return True
+    return False
 
 
 def _text_of(one: ParameterValue | Quantity) -> str:

@@ -83,10 +83,14 @@ def test_in_part_the_rest_comes_in(folder):
     assert convert_file(owl, folder / "again")
 
 
-def test_somebody_must_be_the_ego(plain):
-    for partial in (False, True):
-        with pytest.raises(UnsupportedError, match="must have the name ego, got Hero, the other"):
-            import_file(plain, partial=partial)
+def test_the_first_entity_is_the_ego_where_none_is_called_so(plain, tmp_path):
+    owl, notes = import_file(plain, tmp_path / "first.owl")
+    assert f"{plain}: Hero, the first entity, is the ego; --ego chooses another" in notes
+    named, _ = import_file(plain, tmp_path / "named.owl", ego="Hero")
+    assert named.read_text("utf-8") == owl.read_text("utf-8")
+
+
+def test_the_ego_is_an_entity_of_the_file(plain):
     with pytest.raises(InputError, match="no entity has the name 'Nobody'; there are Hero"):
         import_file(plain, ego="Nobody")
     scenario = read(plain)

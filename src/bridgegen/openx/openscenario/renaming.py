@@ -10,6 +10,16 @@ from bridgegen.openx.openscenario.element import Element, declaration
 T = TypeVar("T", bound=Element)
 
 
+EGO = "ego"
+"""The name of the entity under test in files of BridgeGen."""
+
+
+def ego_of(storyboard: osc.OpenScenario) -> str:
+    """Return the name of the entity under test: the one called so, else the first."""
+    names = [str(one.name) for one in storyboard.entities.scenario_objects]
+    return next((name for name in names if name.lower() == EGO), names[0])
+
+
 def rename_entity(scenario: osc.OpenScenario, old: str, new: str) -> osc.OpenScenario:
     """Return a scenario in which an entity has another name.
 

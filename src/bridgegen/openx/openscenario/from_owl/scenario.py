@@ -24,12 +24,12 @@ from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.from_owl.weather import environment
+from bridgegen.openx.openscenario.renaming import EGO
 from bridgegen.openx.openscenario.versions import least_version, to_version
 
 DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""
 
-EGO = "ego"
 ARRIVAL = 2.0
 """The ego has arrived within this distance of its destination [m]."""
 

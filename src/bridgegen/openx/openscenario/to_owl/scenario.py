@@ -33,8 +33,9 @@ from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
 from bridgegen.openx.openscenario.fragments import fragment_of
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
-from bridgegen.openx.openscenario.from_owl.scenario import ARRIVAL, EGO, openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl.scenario import ARRIVAL, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
+from bridgegen.openx.openscenario.renaming import EGO
 from bridgegen.openx.openscenario.resolve import part_resolved
 from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, numbered
 from bridgegen.openx.openscenario.to_owl.conditions import add_trigger

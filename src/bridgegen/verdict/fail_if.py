@@ -1,4 +1,4 @@
-"""Fail criteria: comparisons of figures with numbers, applied to a result.
+"""Fail conditions: comparisons of figures with numbers, applied to a result.
 
     r_critic > 0.1
     d_min < 2 and v_d >= 1
@@ -11,9 +11,13 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite, isnan
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from bridgegen.criteria import CriterionResult
 from bridgegen.errors import BridgeGenError, InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from bridgegen.odd.criteria import Criterion
 
 _OPERATORS: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -24,7 +28,7 @@ _OPERATORS: Mapping[str, Callable[[float, float], bool]] = {
     "!=": operator.ne,
 }
 _COMPARISON = re.compile(
-    r"\s*([A-Za-z][A-Za-z0-9_.-]*)\s*(<=|>=|==|!=|<|>)\s*"
+    r"\s*([A-Za-z][A-Za-z0-9_.:-]*)\s*(<=|>=|==|!=|<|>)\s*"
     r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,4})?)\s*",
     re.ASCII,
 )
@@ -70,8 +74,8 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Criterion:
-    """A fail criterion: it is met if all of its comparisons hold.
+class FailCondition:
+    """What fails a result: all of its comparisons hold.
 
     Attributes:
         text: the user's text with single spaces.
@@ -96,19 +100,34 @@ class Criterion:
         return Outcome(f"not {self.text}", verdict, details, self.figures)
 
 
+def outcome_of(one: CriterionResult) -> Outcome:
+    """Return whether a scenario meets a pass criterion, as an outcome."""
+    verdict: Verdict = "unknown"
+    if one.verdict != "unknown":
+        verdict = "passed" if one.verdict == "met" else "failed"
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    margin = "unknown" if isnan(one.margin) else f"{one.margin:.6g}{unit}"
+    return Outcome(words_of(one.criterion), verdict, f"margin {margin}, {one.criterion.states}")
+
+
+def words_of(one: "Criterion") -> str:
+    """Return a pass criterion's id and requirement, as the name of a test."""
+    return f"{one.id}: {one.text or one.states}"
+
+
 def _value_text(value: float) -> str:
     return "= n/a (NaN)" if isnan(value) else f"= {value:.6g}" if isfinite(value) else "= inf"
 
 
-def read_criteria(texts: Iterable[str], known: Collection[str]) -> tuple[Criterion, ...]:
-    """Read criteria.
+def read_conditions(texts: Iterable[str], known: Collection[str]) -> tuple[FailCondition, ...]:
+    """Read conditions.
 
     Args:
         texts: ``FIGURE < NUMBER`` (or <=, >, >=, ==, !=), several joined by ``and``.
         known: the names of all figures.
 
     Raises:
-        InputError: a text is not a criterion, or a figure is unknown; all problems at once.
+        InputError: a text is not a condition, or a figure is unknown; all problems at once.
     """
     found, problems = [], list[str]()
     for text in texts:
@@ -121,7 +140,7 @@ def read_criteria(texts: Iterable[str], known: Collection[str]) -> tuple[Criteri
     return tuple(found)
 
 
-def _read(text: str, known: Collection[str]) -> Criterion:
+def _read(text: str, known: Collection[str]) -> FailCondition:
     comparisons = []
     for part in _AND.split(text):
         match = _COMPARISON.fullmatch(part)
@@ -134,4 +153,4 @@ def _read(text: str, known: Collection[str]) -> Criterion:
         if match[1] not in known:
             raise UnknownNameError("figure of --fail-if", match[1], known)
         comparisons.append(Comparison(match[1], match[2], number))
-    return Criterion(" ".join(text.split()), tuple(comparisons))
+    return FailCondition(" ".join(text.split()), tuple(comparisons))

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.errors import InputError
-from bridgegen.verdict.criteria import Comparison, read_criteria
+from bridgegen.verdict.fail_if import Comparison, read_conditions
 
 KNOWN = ("r_critic", "d_min", "v_d", "map", "and_x")
 SIGNS = {
@@ -18,7 +18,7 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def one(text: str):
-    (criterion,) = read_criteria([text], KNOWN)
+    (criterion,) = read_conditions([text], KNOWN)
     return criterion
 
 
@@ -70,7 +70,7 @@ def test_refusals(text, message):
 
 def test_all_that_is_wrong_is_told_at_once():
     with pytest.raises(InputError) as error:
-        read_criteria(["dmin < 2", "d_min < 2", "v_d"], KNOWN)
+        read_conditions(["dmin < 2", "d_min < 2", "v_d"], KNOWN)
     assert len(error.value.problems) == 2
 
 

@@ -14,7 +14,7 @@ from bridgegen.errors import ScenarioError
 from bridgegen.odd.json_schema import schema
 from bridgegen.odd.parameters import UNITS
 from bridgegen.odd.reader import load
-from bridgegen.odd.units import WRITTEN, has_unit, in_unit
+from bridgegen.units import WRITTEN, has_unit, in_unit
 
 
 @pytest.mark.parametrize(
