@@ -54,7 +54,7 @@ def test_a_pedestrian_steps_out(track, meeting):
 def test_what_stands_far_ahead_is_no_risk_for_so_long(track, meeting):
     text = of(meeting(track(v=10.0, t=9.0), track(x=84.0, t=9.0)))
     assert text.endswith(
-        "; it was in plain sight for 8.0 s before, and a careful driver (UN R157, "
+        "; no other participant hid it for the last 8.0 s, and a careful driver (UN R157, "
         "Annex 3) would have avoided it."
     )
     near = of(meeting(track(v=10.0), track(x=34.0)))

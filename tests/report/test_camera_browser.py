@@ -95,6 +95,32 @@ def test_labels_are_smaller_than_cars_and_leave_the_collision_free(show, report)
     opened.page.close()
 
 
+def test_who_is_half_out_of_the_picture_is_named_once(show, report):
+    """A bus drives out of the picture while the ego stands in its middle."""
+    p = report.kept[0]
+    away = np.arange(401) * 0.25
+    rows = {
+        "x": np.stack([np.zeros(401), away]), "y": np.zeros((2, 401)), "h": np.zeros((2, 401)),
+        "v": np.stack([np.zeros(401), np.full(401, 5.0)]),
+    }  # fmt: skip
+    bus = replace(p.entities[1], name="bus", length=12.0, width=2.5)
+    kept = replace(p, entities=(p.entities[0], bus), distance=away + 1.0, **rows)
+    opened = show(replace(report, kept=(kept,)))
+    page = opened.page
+    page.evaluate("bridgegen.select(0)")
+    page.click("#follow")
+    width, half = page.evaluate("document.getElementById('scene').clientWidth"), 0
+    for k in range(0, 401, 4):
+        page.evaluate("k => bridgegen.seek(k)", k)
+        state = opened.state()
+        x = state["screen"][1][0]
+        is_partly_seen = width < x < width + 6.0 * state["scale"]
+        half += is_partly_seen
+        assert len(state["labels"]) == (2 if x < width else 1)
+    assert half > 2
+    page.close()
+
+
 def test_the_legend_names_the_ego_and_all_that_move(show, report):
     p = report.kept[0]
     more = tuple(Entity(f"car_{n}", 4.8, 2.0, 1.4, "car") for n in range(4))

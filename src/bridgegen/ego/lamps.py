@@ -10,6 +10,9 @@ LEFT, RIGHT, BRAKE = 1, 2, 4
 SWITCHED = 8
 """Besides ``BRAKE``: brake lights are as the storyboard has switched them."""
 
+BLUE = 16
+"""The blue lights of an emergency vehicle on a call; drivers know of them by its siren."""
+
 HAZARD = LEFT | RIGHT
 
 BRAKE_LIGHTS_FROM = 1.3

@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from bridgegen.arrays import Float
+from bridgegen.ego.lamps import BLUE, BRAKE, LEFT, RIGHT
 from bridgegen.metrics.d_min import first_closest
 from bridgegen.participants import drawing_of
 from bridgegen.report.playback import AREA_KINDS, Playback
@@ -34,6 +35,8 @@ _LINES = {  # colour, width [m], dash [m]
     "route": ("#0b5fa5", 0.12, 1.0),
 }  # fmt: skip
 _LIT = {1: (2.2,), 2: (2.2, 0.0), 3: (0.0,), 4: (-2.2,)}  # places of the lit lamps by state
+_FLASHES = 1.5  # a second; UN R48: 60 to 120 a minute
+_RIM = "#10161d"  # tells a lamp from a body of its own colour
 _MOVES = 0.05  # m/s
 _SCALE = (18.0, 30.0)  # pixels per metre of a picture 960 pixels wide; below, the camera follows
 _MARGIN = 7.0  # m around the paths
@@ -245,6 +248,37 @@ class Film:
         if shape == "vehicle":
             for ends in ((0.24, 0.54), (-0.72, -0.56)):
                 draw.polygon(camera.of(self._corners(e, k, ends, 0.72)), fill=INK)
+            self._draw_shown(draw, camera, e, k)
+
+    def _draw_shown(self, draw: Draw, camera: _Camera, e: int, k: int) -> None:
+        """Draw the indicators as they flash, brake lights, and blue lights; as bodies.js does."""
+        p = self.playback
+        shows = 0 if p.shows is None else int(p.shows[e, k])
+        if not shows:
+            return
+        body, h = p.entities[e], float(p.h[e, k])
+        turn = np.array([[math.cos(h), math.sin(h)], [-math.sin(h), math.cos(h)]])
+        r = max(0.3, 4 * self._unit / camera.scale)
+        line = max(round(1.2 * self._unit), round(0.08 * camera.scale))
+        lit = k * p.time_step * _FLASHES % 1.0 < 0.5
+
+        def lamp(along: float, side: float, colour: str) -> None:
+            at = np.array([along * body.length, side * body.width]) @ turn + self.centres[e, k]
+            ((u, v),) = camera.of(at[np.newaxis])
+            draw.circle((u, v), r * camera.scale, fill=colour, outline=_RIM, width=line)
+
+        for side in (-1.0, 1.0):
+            if shows & BRAKE:
+                half = 0.6 * r / body.length
+                box = [(-0.5 + a * half, side * 0.25 + b * 0.14)
+                       for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]  # fmt: skip
+                corners = np.array(box) * (body.length, body.width) @ turn + self.centres[e, k]
+                draw.polygon(camera.of(corners), fill="#ff2d2d", outline=_RIM, width=line)
+            if shows & (LEFT if side > 0 else RIGHT):
+                for end in (-0.5, 0.5):
+                    lamp(end, 0.5 * side, "#ffb000" if lit else "#7a5200")
+            if shows & BLUE:
+                lamp(-0.08, 0.2 * side, "#2f8cff" if lit == (side > 0) else "#123a75")
 
     def _draw_contact(self, draw: Draw, camera: _Camera, k: int) -> list[Box]:
         where = self._contact

@@ -151,7 +151,7 @@ def _played(
     entities, scenery = bodies(rollout, pipeline.bodies(shown[0].x)), Scenery(pipeline)
     nearest = rollout.distance.min(axis=1)
     ttc, detections = ttc_over_time(rollout), sensed(rollout)
-    shows = vehicle_lamps(rollout)
+    shows = vehicle_lamps(rollout, pipeline.simulator.embedded.program.sirens)
     checked = constraints_in_words(pipeline.source.constraints)
     found = []
     for k, one in enumerate(shown):

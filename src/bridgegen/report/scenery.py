@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Float, Int
 from bridgegen.ego._kind_tables import IS_VEHICLE
-from bridgegen.ego.lamps import BRAKE, BRAKE_LIGHTS_FROM
+from bridgegen.ego.lamps import BLUE, BRAKE, BRAKE_LIGHTS_FROM
 from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -96,13 +96,19 @@ def lamps(rollout: Rollout, row: int, found: list[Light]) -> tuple[Lamp, ...]:
     )
 
 
-def vehicle_lamps(rollout: Rollout) -> npt.NDArray[np.int8]:
-    """Return what lamps show, ``(N, E, T)``; where it is not recorded, who brakes shows that."""
-    if rollout.lamps.size:
-        return rollout.lamps
+def vehicle_lamps(rollout: Rollout, sirens: Int) -> npt.NDArray[np.int8]:
+    """Return what lamps show, ``(N, E, T)``; where it is not recorded, who brakes shows that.
+
+    Args:
+        rollout: of N scenarios and E entities.
+        sirens: ``(E,)``, 1 of an emergency vehicle on a call.
+    """
     found = np.zeros(rollout.x.shape, dtype=np.int8)
-    if rollout.kinds.size:
+    if rollout.lamps.size:
+        found |= rollout.lamps
+    elif rollout.kinds.size:
         brakes = rollout.a[:, :, :-1] <= -BRAKE_LIGHTS_FROM
         lit = brakes & np.array(IS_VEHICLE)[rollout.kinds][:, np.newaxis]
         found[:, :, 1:][lit] = BRAKE
+    found[:, np.flatnonzero(sirens)] |= BLUE
     return found

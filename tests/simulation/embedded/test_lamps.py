@@ -68,7 +68,7 @@ def test_the_page_shows_brake_lights_of_all_that_brake():
     slows = events(("a", "bv", speeding(4.0, "linear rate 4"), after(1.0)))
     found = run(scenario(("ego", "bv"), EGO + bv(8.0), slows), None)
     assert not found.lamps.size
-    lit = np.flatnonzero(vehicle_lamps(found)[0, 1])
+    lit = np.flatnonzero(vehicle_lamps(found, np.zeros(2))[0, 1])
     assert lit.tolist() == list(range(21, 41))
     assert (found.a[0, 1, 20:40] <= -BRAKE_LIGHTS_FROM).all()
 

@@ -15,17 +15,33 @@ export function roundBox(c, x, y, width, height, radius) {
 }
 
 const FLASHES = 1.5; // a second; UN R48: 60 to 120 a minute
+const RIM = "#10161d"; // tells a lamp from a body of its own colour
+const LEAST_LAMP = [0.3, 4]; // radius [m], and [pixels] from afar
 
-// Indicators at the corners, as they flash, and brake lights.
-function drawShown(c, { length, width }, shows, time) {
-  const lamp = (x, y) => c.fillRect(x - length * 0.035, y - width * 0.11, length * 0.07, width * 0.22);
-  c.fillStyle = "#ffb000";
+// Indicators at the corners, as they flash; brake lights; and the blue lights on the roof.
+function drawShown(c, { length, width }, shows, time, scale) {
+  const r = Math.max(LEAST_LAMP[0], LEAST_LAMP[1] / scale);
+  c.strokeStyle = RIM;
+  c.lineWidth = Math.max(0.08, 1.2 / scale);
+  const lamp = (x, y, colour) => {
+    c.beginPath();
+    c.arc(x, y, r, 0, 2 * Math.PI);
+    c.fillStyle = colour;
+    c.fill();
+    c.stroke();
+  };
   const lit = (time * FLASHES) % 1 < 0.5;
-  for (const [bit, side] of [[1, 1], [2, -1]]) {
-    if (lit && shows & bit) for (const end of [-1, 1]) lamp(end * length * 0.455, side * width * 0.4);
+  for (const side of shows & 4 ? [-1, 1] : []) {
+    c.fillStyle = "#ff2d2d";
+    c.beginPath();
+    c.rect(-length / 2 - 0.6 * r, side * width * 0.25 - width * 0.14, 1.2 * r, width * 0.28);
+    c.fill();
+    c.stroke();
   }
-  c.fillStyle = "#ff2d2d";
-  if (shows & 4) for (const side of [-1, 1]) c.fillRect(-length * 0.5, side * width * 0.28 - width * 0.12, length * 0.05, width * 0.24);
+  for (const [bit, side] of [[1, 1], [2, -1]]) {
+    if (shows & bit) for (const end of [-1, 1]) lamp(end * length / 2, side * width / 2, lit ? "#ffb000" : "#7a5200");
+  }
+  for (const side of [-1, 1]) if (shows & 16) lamp(-length * 0.08, side * width * 0.2, lit === side > 0 ? "#2f8cff" : "#123a75");
 }
 
 export function drawBody(c, entity, state, colour, scale, shows = 0, time = 0) {
@@ -56,7 +72,7 @@ export function drawBody(c, entity, state, colour, scale, shows = 0, time = 0) {
   c.fillRect(-length * 0.36, -width * 0.34, length * 0.08, width * 0.68);
   c.fillStyle = "rgba(255, 255, 255, 0.9)";
   for (const side of [-1, 1]) c.fillRect(length * 0.455, side * width * 0.33 - width * 0.08, length * 0.035, width * 0.16);
-  if (shows) drawShown(c, entity, shows, time);
+  if (shows) drawShown(c, entity, shows, time, scale);
   c.restore();
 }
 

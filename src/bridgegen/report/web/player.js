@@ -168,7 +168,7 @@ export class Player {
     const state = stateAt(this.kept, this.position);
     this.scene.draw(state);
     this.curves.draw(state);
-    $("clock").textContent = `${state.time.toFixed(2)} s  ·  distance ${state.distance === null ? "–" : `${state.distance.toFixed(2)} m`}`;
+    $("clock").textContent = `${state.time.toFixed(2)}\u00a0s  ·  distance\u00a0${state.distance === null ? "–" : `${state.distance.toFixed(2)}\u00a0m`}`;
     for (const [id, framing] of FRAMINGS) $(id).setAttribute("aria-pressed", this.scene.view.framing === framing);
     this.drawFlag(state);
     $("scrub").value = Math.round(this.position);

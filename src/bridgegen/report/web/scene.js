@@ -87,15 +87,15 @@ export class Scene {
     this.drawGap(c, state);
     const words = labelLamps(c, this.kept, state.index, this.view, this.size);
     const boxes = this.layers.sensed ? detectedBoxes(this.kept, state, this.view) : [], pointer = this.drawPointer(c, state);
-    this.labels.draw(c, state, this.view, this.size, this.texts(state), pointer ? [...words, ...boxes, pointer] : [...words, ...boxes], this.crosses);
+    this.labels.draw(c, state, this.view, this.size, this.texts(state, pointer && this.camera.partner), pointer ? [...words, ...boxes, pointer] : [...words, ...boxes], this.crosses);
     drawScaleBar(c, this.size, scale);
   }
 
-  // What stands beside each body: who it is and how fast, and how the ego sees it.
-  texts(state) {
+  // What stands beside each body: who it is and how fast, and how the ego sees it. `named` has its name elsewhere.
+  texts(state, named) {
     const players = playersOf(this.kept);
     return state.entities.map((s, e) => {
-      if (!players.includes(e)) return null;
+      if (!players.includes(e) || (named && e === named)) return null;
       const seen = this.layers.sensed && e > 0 ? detectionWords(detectionAt(this.kept, e, state.index)) : "";
       const marked = seen && seen !== "seen" ? `  ${seen}` : "";
       return [`${s.name}  ${measured(s.v, "m/s", 2)} m/s${marked}`, `${s.name}${marked}`];

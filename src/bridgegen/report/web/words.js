@@ -7,6 +7,11 @@ import { SIGNALS, detectionAt, lightAt, showsAt, weatherAt } from "./unpack.js";
 
 const INDICATORS = ["", "indicates left", "indicates right", "hazard lights on"];
 
+// What a vehicle's lamps show, see `bridgegen.ego.lamps`.
+function lampWords(shows) {
+  return [INDICATORS[shows & 3], shows & 4 ? "brake lights on" : "", shows & 16 ? "blue lights on" : ""];
+}
+
 export function detectionWords(found) {
   if (!found) return "";
   if (found.status === "missed") return "missed";
@@ -36,7 +41,7 @@ export function stateWords(kept, state) {
   for (const e of playersOf(kept)) {
     const s = state.entities[e];
     if (e === 0 || !isPlaced(s)) continue;
-    const told = [INDICATORS[showsAt(kept.entities[e], state.index) & 3], detectionWords(detectionAt(kept, e, state.index))].filter(Boolean);
+    const told = [...lampWords(showsAt(kept.entities[e], state.index)), detectionWords(detectionAt(kept, e, state.index))].filter(Boolean);
     parts.push([`${s.name} ${value(s.v, "m/s", 1)}`, ...told].join(", "));
   }
   state.entities.forEach((s, e) => {
