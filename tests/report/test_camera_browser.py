@@ -200,3 +200,25 @@ def test_the_whole_is_saved_as_a_film(show, report, tmp_path):
     assert int(stream["nb_read_frames"]) > 20
     assert not opened.state()["playing"]
     opened.page.close()
+
+
+def test_a_building_is_as_wide_as_it_is(show, report):
+    """12 m long and 4 m wide, along the X axis: 4 m to its side there is ground."""
+    p = report.kept[0]
+    house = Entity("house", 12.0, 4.0, 0.0, "obstacle")
+    rows = {name: getattr(p, name).copy() for name in "xyhv"}
+    for name, value in (("x", p.x[0, 100] + 12.0), ("y", p.y[0, 100]), ("h", 0.0), ("v", 0.0)):
+        rows[name][1] = value
+    kept = replace(p, entities=(p.entities[0], house), lanes=p.lanes[:0], **rows)
+    opened = show(replace(report, kept=(kept,)))
+    page = opened.page
+    page.evaluate("bridgegen.select(0); bridgegen.seek(100)")
+    state = opened.state()
+    (x, y), scale = state["screen"][1], state["scale"]
+    with Image.open(io.BytesIO(page.locator("#scene").screenshot())) as picture:
+        image = picture.convert("RGB")
+    at = [image.getpixel((round(x + a * scale), round(y + b * scale))) for a, b in
+          ((0, 0), (5.5, 1.5), (3.0, 4.0), (0, 4.0), (-3.0, -4.0))]  # fmt: skip
+    assert at[1] == at[0]
+    assert at[0] not in at[2:]
+    page.close()

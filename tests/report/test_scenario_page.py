@@ -93,11 +93,102 @@ def test_it_tells_the_story():
         "ego, a car, starts at 40 m on lane 1 at ego_speed and goes to 190 m on lane 1.",
         "van, a van, stands at van_at on the shoulder.",
         "parked, a car, stands at 94 m on the shoulder.",
-        "walker, a pedestrian, goes from 110 m on the sidewalk to 110 m on the sidewalk of leg "
-        "main in at 0 m/s.",
+        "walker, a pedestrian, starts at 0 m/s; its path leads from 110 m on the sidewalk to 110 m "
+        "on the sidewalk of the oncoming side.",
         "walker_steps_out: walker takes up walker_speed at 3 m/s² when the distance (between "
         "reference points, as the crow flies) from walker to ego is ≤ trigger_distance.",
     ]
+
+
+DRIVEWAY = """
+scenario: driveway
+title: Car leaves a driveway
+description: It comes from behind a building.
+source: Ours.
+template: road
+roads: {lanes: 2, length: 400.0}
+duration: 20.0
+time_step: 0.05
+axes: [participants]
+include: [weather]
+driver: route-follower
+participants:
+  ego:
+    type: car
+    place_by: ego_lane
+    places:
+      left: {start: {lane: 1, distance: 50.0}, end: {lane: 1, distance: 380.0}}
+      right: {start: {lane: 2, distance: 50.0}, end: {lane: 2, distance: 380.0}}
+    speed: 9.0
+  neighbour:
+    type: car
+    model: vw_golf_sportsvan_2015
+    path: [{lane: 2, distance: 178, offset: -16}, {lane: 2, distance: 180}, {lane: 2, distance: at}]
+    speed: 3.0
+  house:
+    type: obstacle
+    body: {length: 12, width: 8}
+    start: {lane: 2, distance: 165, offset: -9}
+parameters:
+  ego_lane:
+    axis: participants
+    kind: category
+    values: [left, right]
+    default: right
+    description: The lane on which the ego starts.
+    source: Both are driven.
+  at: {axis: participants, unit: m, low: 200, high: 260, default: 230, description: To, source: o}
+objective: harm
+"""
+
+
+@pytest.fixture
+def driveway(tmp_path):
+    path = tmp_path / "driveway.yaml"
+    path.write_text(DRIVEWAY, "utf-8")
+    return path
+
+
+def test_places_paths_and_models_in_words(driveway):
+    lines = list(story_lines(load(driveway)))
+    assert lines == [
+        "ego, a car, starts at 9 m/s; ego_lane chooses its place: from 50 m on lane 1 to 380 m on "
+        "lane 1 (left); from 50 m on lane 2 to 380 m on lane 2 (right).",
+        "neighbour, a car (model vw_golf_sportsvan_2015), starts at 3 m/s; its path, a smooth "
+        "curve, leads from 178 m on lane 2, 16 m right of its centre; past 180 m on lane 2; to at "
+        "on lane 2.",
+        "house, an obstacle, stands at 165 m on lane 2, 9 m right of its centre.",
+    ]
+
+
+def test_a_negative_offset_is_to_the_right():
+    lines = list(story_lines(load("cyclist-swings-out")))
+    assert "starts at cyclist_at on lane 1, 1.5 m right of its centre at cyclist_speed" in lines[1]
+    assert "170 m on the shoulder, 0.8 m left of its centre" in lines[2]
+    assert "moves to swung left of its lane's centre" in lines[3]
+    assert "moves to 1.5 m right of its lane's centre" in lines[4]
+
+
+def test_an_emergency_vehicle_on_a_call_in_words():
+    (line,) = [one for one in story_lines(load("emergency-vehicle-on-red")) if "siren" in one]
+    assert line.startswith("ambulance, an emergency vehicle, starts at ambulance_start on lane 2")
+    assert ", with blue light and siren on, faster than allowed if need be (" in line
+
+
+@pytest.mark.parametrize(
+    ("objective", "rule"),
+    [
+        ("harm", "critical: a collision that the ego is responsible for or could have prevented, "),
+        (
+            "{terms: [{metric: d_min, weight: 1}], weights: fixed, scale: raw, critical: "
+            "{d_min_below: 1.5}}",
+            "critical: a collision, or d_min below 1.5 m while v_d is at least 1 m/s",
+        ),
+    ],
+)
+def test_the_page_names_the_rule_that_counts(driveway, objective, rule):
+    driveway.write_text(DRIVEWAY.replace("objective: harm", f"objective: {objective}"), "utf-8")
+    assert f"<li>{rule}" in show_scenario(str(driveway)).read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", names())

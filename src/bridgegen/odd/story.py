@@ -19,6 +19,13 @@ def in_words(value: Quantity, unit: str) -> str:
     return value if isinstance(value, str) else f"{value:g} {unit}"
 
 
+def beside(offset: Quantity) -> str:
+    """Return an offset [m] in words: "1.5 m right"; a parameter's is left, as it is declared."""
+    if isinstance(offset, str) or offset >= 0.0:
+        return f"{in_words(offset, 'm')} left"
+    return f"{in_words(-offset, 'm')} right"
+
+
 @dataclass(frozen=True)
 class Waypoint:
     """A place on a leg.
@@ -187,7 +194,7 @@ class LaneOffset:
     def __str__(self) -> str:
         """Return what the participant does, to be said after its name."""
         return (
-            f"moves to {in_words(self.offset, 'm')} left of its lane's centre with at most "
+            f"moves to {beside(self.offset)} of its lane's centre with at most "
             f"{in_words(self.acceleration, 'm/s²')}"
         )
 

@@ -10,13 +10,14 @@ import numpy as np
 from bridgegen.arrays import Taken
 from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
-from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.criteria import quantity
 from bridgegen.errors import ScenarioError
 from bridgegen.evaluation import Replays
-from bridgegen.objective import Objective
+from bridgegen.objective import Objective, Rule
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.odd.criteria import PREFIX
+from bridgegen.odd.thresholds import Thresholds
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import (
     WHOLE,
@@ -166,24 +167,33 @@ def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
         objective: with the rule.
         cause: the only one that counts, if one was chosen.
     """
-    limits, many = objective.thresholds, objective.thresholds.n_collision_above
-    if objective.rule == "criteria":
-        names = ", ".join(name.removeprefix(PREFIX) for name in objective.criteria)
-        rule = f"a violation of {'criterion' if len(objective.criteria) == 1 else 'one of'} {names}"
-    elif objective.rule == "harm" and objective.count == "any":
-        rule = f"a collision or a near miss, whoever is responsible, harm_any ≥ {NEAR_MISS:g}"
-    elif objective.rule == "harm":
-        rule = (
+    rule = critical_in_words(
+        objective.rule, objective.count, objective.thresholds, objective.criteria
+    )
+    return rule if cause is None else f"{rule}, put down to {cause.label}"
+
+
+def critical_in_words(
+    rule: Rule, count: Count, limits: Thresholds, criteria: Sequence[str] = ()
+) -> str:
+    """Return when a scenario is critical, in words: by harm, by thresholds, or by criteria."""
+    if rule == "criteria":
+        names = ", ".join(name.removeprefix(PREFIX) for name in criteria) or "all"
+        which = "criterion" if len(criteria) == 1 else "one of the criteria"
+        return f"a violation of {which} {names}"
+    if rule == "harm" and count == "any":
+        return f"a collision or a near miss, whoever is responsible, harm_any ≥ {NEAR_MISS:g}"
+    if rule == "harm":
+        return (
             "a collision that the ego is responsible for or could have prevented, or a near miss "
             f"that it is responsible for, harm ≥ {NEAR_MISS:g}"
         )
-    else:
-        contact = "a collision" if many == 0 else f"more than {many:g} collisions"
-        rule = (
-            f"{contact}, or d_min below {limits.d_min_below:g} m while v_d is at least "
-            f"{limits.v_d_at_least:g} m/s"
-        )
-    return rule if cause is None else f"{rule}, put down to {cause.label}"
+    many = limits.n_collision_above
+    contact = "a collision" if many == 0 else f"more than {many:g} collisions"
+    return (
+        f"{contact}, or d_min below {limits.d_min_below:g} m while v_d is at least "
+        f"{limits.v_d_at_least:g} m/s"
+    )
 
 
 def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:

@@ -7,6 +7,7 @@ from pathlib import Path
 from bridgegen.odd.parameters import Bound, Derived, Parameter
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.pipeline import Pipeline
+from bridgegen.report.build import critical_in_words
 from bridgegen.report.page import write_still_page
 from bridgegen.report.scenario_words import story_lines
 from bridgegen.report.sketch import sketch
@@ -24,14 +25,12 @@ def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
 
 
 def _body(scenario: LogicalScenario) -> Iterator[str]:
-    pipeline = Pipeline(scenario, scenario.space())
-    limits = scenario.objective.critical
+    pipeline, aim = Pipeline(scenario, scenario.space()), scenario.objective
     yield f"<h1>{_text(scenario.title)}</h1>"
     facts = [
         scenario.name, f"template {scenario.roads.template}", f"ego {pipeline.driver.name}",
         f"{scenario.duration:g} s", f"searched: {', '.join(scenario.axes)}",
-        f"critical: a collision, or closer than {limits.d_min_below:g} m at "
-        f"{limits.v_d_at_least:g} m/s or more",
+        f"critical: {critical_in_words(aim.rule, aim.count, aim.critical, aim.criteria)}",
     ]  # fmt: skip
     yield f'<ul class="facts">{"".join(f"<li>{_text(fact)}</li>" for fact in facts)}</ul>'
     yield f'<p class="lead">{_text(scenario.description)}</p>'

@@ -11,6 +11,7 @@ from bridgegen.odd.story import (
     Participant,
     RoadWorks,
     Waypoint,
+    beside,
     in_words,
 )
 
@@ -20,33 +21,51 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
     jammed = {name for jam in scenario.story.jams for name in jam.participants}
     for one in scenario.participants:
         if one.name not in jammed:
-            yield _participant(one)
+            yield _participant(one, scenario)
     yield from (_jam(jam, scenario) for jam in scenario.story.jams)
     yield from (_works(works) for works in scenario.story.works)
     yield from (_event(event) for event in scenario.events)
 
 
-def _participant(one: Participant) -> str:
-    kind = " or ".join(one.types) or one.model or one.type
+def _participant(one: Participant, scenario: LogicalScenario) -> str:
+    who, speed = f"{one.name}, {_kind(one)}", in_words(one.speed, "m/s")
+    extra = ", with blue light and siren on" if one.siren else ""
+    if one.exceeds_limit:
+        extra += f", faster than allowed if need be ({one.exceeds_limit})"
     if one.path:
-        way = " to ".join(_place(point) for point in one.path)
-        goes = "drives on a smooth curve" if one.conduct == "vehicle" else "goes"
-        return f"{one.name}, a {kind}, {goes} from {way} at {in_words(one.speed, 'm/s')}."
+        start, *between, end = map(_place, one.path)
+        past, how = ("past", ", a smooth curve,") if one.conduct == "vehicle" else ("via", "")
+        way = "".join(f"; {past} {place}" for place in between) + (";" if between else "")
+        path = f"its path{how} leads from {start}{way} to {end}"
+        return f"{who}, starts at {speed}{extra}; {path}."
     if one.ways:
-        at = [f"from {_place(start)}{f' to {_place(end)}' if end else ''}"
-              for start, end in one.ways]  # fmt: skip
-        return f"{one.name}, a {kind}, goes {' or '.join(at)} at {in_words(one.speed, 'm/s')}."
+        names = scenario.parameters[one.place_by].kind.names
+        at = [f"from {_place(start)}{f' to {_place(end)}' if end else ''} ({name})"
+              for name, (start, end) in zip(names, one.ways, strict=True)]  # fmt: skip
+        return (
+            f"{who}, starts at {speed}{extra}; {one.place_by} chooses its place: {'; '.join(at)}."
+        )
     turned = ""
     if one.heading in (180.0, -180.0):
         turned = ", against the traffic"
     elif one.heading != 0.0:
         turned = f", turned by {in_words(one.heading, 'deg')}"
-    line = f"{one.name}, a {kind}, starts at {_place(one.start)} at {in_words(one.speed, 'm/s')}"
-    if one.exceeds_limit:
-        turned += f", faster than allowed if need be ({one.exceeds_limit})"
     if one.conduct == "obstacle" or (one.speed == 0.0 and one.end is None):
-        return f"{one.name}, a {kind}, stands at {_place(one.start)}{turned}."
-    return f"{line}{turned}{'' if one.end is None else f' and goes to {_place(one.end)}'}."
+        return f"{who}, stands at {_place(one.start)}{turned}{extra}."
+    goes = "" if one.end is None else f" and goes to {_place(one.end)}"
+    return f"{who}, starts at {_place(one.start)} at {speed}{turned}{extra}{goes}."
+
+
+def _kind(one: Participant) -> str:
+    """Return what it is, with its article; a model's name is no noun."""
+    if one.types:
+        return " or ".join(map(_with_article, one.types))
+    return _with_article(one.type) + (f" (model {one.model})" if one.model else "")
+
+
+def _with_article(noun: str) -> str:
+    noun = "emergency vehicle" if noun == "emergency" else noun
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
 def _jam(jam: Jam, scenario: LogicalScenario) -> str:
@@ -86,6 +105,8 @@ def _condition(one: ConditionSpec, event: EventSpec) -> str:
 
 def _place(at: Waypoint) -> str:
     lane = f"lane {at.lane}" if isinstance(at.lane, int) else f"the {at.lane}"
-    where = "" if at.leg == "main" and at.way == "out" else f" of leg {at.leg} {at.way}"
-    aside = "" if at.offset == 0.0 else f", {in_words(at.offset, 'm')} left of its centre"
+    where = f" of leg {at.leg} {at.way}"
+    if at.leg == "main":
+        where = "" if at.way == "out" else " of the oncoming side"
+    aside = "" if at.offset == 0.0 else f", {beside(at.offset)} of its centre"
     return f"{in_words(at.distance, 'm')} on {lane}{where}{aside}"

@@ -82,7 +82,10 @@ function drawSmall(c, { shape, length, width }, colour, scale) {
   c.beginPath();
   if (shape === "person" || shape === "cone") c.arc(0, 0, half, 0, 2 * Math.PI);
   else if (shape === "cycle") c.ellipse(0, 0, Math.max(length / 2, half), Math.max(width / 2, 2 / scale), 0, 0, 2 * Math.PI);
-  else c.rect(-Math.max(length / 2, 1.5 / scale), -half, Math.max(length, 3 / scale), 2 * half);
+  else {
+    const [long, wide] = [length, shape === "sign" ? 2 * half : width].map((size) => Math.max(size, 3 / scale));
+    c.rect(-long / 2, -wide / 2, long, wide);
+  }
   c.fillStyle = shape === "cone" || shape === "sign" ? palette.cone : colour;
   c.fill();
   c.lineWidth = 1.2 / scale;
