@@ -380,3 +380,65 @@ def test_mistake_is_named_with_its_place(tmp_path, s4_text, old, new, message, l
         before, _, number = found.removesuffix(")").rpartition(f" ({path}, line ")
         assert before
         assert line in text.splitlines()[int(number) - 1]
+
+
+PLACES = """
+scenario: lanes
+title: Lanes
+description: The ego starts on either lane.
+source: Ours.
+template: road
+roads: {lanes: 2, length: 400.0, grade: road_grade}
+duration: 20.0
+time_step: 0.05
+axes: [static, participants]
+include: [weather]
+driver: route-follower
+participants:
+  ego:
+    type: car
+    place_by: ego_lane
+    places:
+      LEFT: {start: {lane: 1, distance: 50.0}, end: {lane: 1, distance: 380.0}}
+      right: {start: {lane: 2, distance: 50.0}, end: {lane: 2, distance: 380.0}}
+    speed: ego_speed
+  bv: {type: car, start: {lane: 1, distance: 120.0}, speed: 4.0}
+parameters:
+  ego_lane: {axis: participants, kind: category, values: [LEFT, right], default: right,
+             description: The ego's lane., source: Ours.}
+  ego_speed: {axis: participants, unit: m/s, low: 5, high: 9, default: 8, description: S.,
+              source: Ours.}
+  road_grade: {axis: static, unit: UNIT, low: LOW, high: 0.0, default: 0.0, description: G.,
+               source: Ours.}
+"""
+
+
+def problems_of(tmp_path, **edits):
+    text = PLACES
+    for old, new in edits.items():
+        text = text.replace(old, new)
+    path = tmp_path / "lanes.yaml"
+    path.write_text(text, "utf-8")
+    try:
+        load(path)
+    except ScenarioError as error:
+        return [one.replace(str(path), "FILE") for one in error.problems]
+    return []
+
+
+def test_a_place_of_two_words_is_the_only_mistake_named_with_its_category(tmp_path):
+    """What the section uses that cannot be read is not said to be unused."""
+    assert problems_of(tmp_path, LEFT="left", UNIT='"1"', LOW="-0.06") == []
+    problems = problems_of(tmp_path, LEFT="left lane", UNIT='"1"', LOW="-0.06")
+    assert problems[0] == (
+        "the key 'left lane' of participants.ego.places must be a word of letters, digits, '_' and "
+        "'-', got 'left lane' (FILE, line 18)"
+    )
+    assert [one for one in problems if "nothing in" in one] == []
+
+
+def test_a_share_says_how_per_cent_are_written(tmp_path):
+    (problem,) = problems_of(tmp_path, LEFT="left", UNIT='"%"', LOW="-6.0")
+    assert problem.startswith(
+        "grade needs a parameter in 1 (a share: 5 % is 0.05), 'road_grade' is in % (FILE, line "
+    )

@@ -212,6 +212,12 @@ def test_every_row_is_in_the_scatter_plot(opened, report):
     assert series(opened.page) == want
 
 
+def test_the_filter_of_names_says_which_number_is_which(opened):
+    options = opened.page.locator("#filter-axis option").all_inner_texts()
+    assert "critical (0 no, 1 yes)" in options
+    assert "bv_speed [m/s]" in options
+
+
 def test_a_filter_counts_and_thins_the_scatter_plot(opened, report):
     opened.scroll_through()
     e = report.evaluations

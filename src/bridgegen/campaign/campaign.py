@@ -116,7 +116,9 @@ def run_search(given: SearchArguments) -> Run:
         sites = roads.sites or (roads.site,)
         changes = [note for site in sites for note in adapted(judged, roads.model, site)[1]]
         if roads.sites and changes:
-            changes = [f"some lanes and routes are the map's ({len(changes)}; {changes[0]})"]
+            changes = [
+                f"{len(changes)} lanes or routes are adapted to the map; the first: {changes[0]}"
+            ]
         for note in (*roads.warnings, *dict.fromkeys(changes)):
             callbacks.warning(note)
     driven: str | None = None

@@ -260,8 +260,8 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
             over = speed - allowed
             if over.max() > slack(float(np.max(allowed))):
                 yield (
-                    f"{one.name} may be no faster than {why}, '{value}' [m/s] can be "
-                    f"{over.max():.3g} m/s faster ({scenario.place})"
+                    f"{one.name} must be no faster than {why}, the speed {value} [m/s] exceeds "
+                    f"that by up to {over.max():.3g} m/s ({scenario.place})"
                 )
 
 

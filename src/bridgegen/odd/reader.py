@@ -301,6 +301,18 @@ def _read_fragment(name: str, folder: Path | None) -> Document:
     return _read_file(folder / name)
 
 
+_USING = ("roads", "participants", "events", "jams", "road_works")
+
+
+def _texts(data: object) -> set[str]:
+    """Return all texts that are values within data."""
+    if isinstance(data, dict):
+        data = list(data.values())
+    if isinstance(data, list):
+        return set().union(*map(_texts, data))
+    return {data} if isinstance(data, str) else set()
+
+
 def _build(document: Document, folder: Path | None) -> LogicalScenario:
     problems = shape_problems(ScenarioFile, document)
     declarations = _Declarations()
@@ -335,6 +347,8 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         declarations.bounds += between
     used = quantities.used | roads.parameters | {one.name for one in changes.derived}
     used |= {prefix + name for prefix in story.later_weathers for name in NEEDED}
+    if problems or quantities.problems:  # a section that cannot be read uses what it names
+        used |= _texts([document.data.get(key) for key in _USING])
     problems += declarations.problems + quantities.problems
     problems += problems_of(
         declarations.parameters, declarations.bounds, declarations.derived, declarations.names

@@ -296,7 +296,11 @@ def knob_problems(
         elif one.kind.names:
             yield name, f"{name} needs a number, '{value}' is a category"
         elif one.unit != knob.unit:
-            yield name, f"{name} needs a parameter in {knob.unit}, '{value}' is in {one.unit}"
+            share = " (a share: 5 % is 0.05)" if (knob.unit, one.unit) == ("1", "%") else ""
+            yield (
+                name,
+                f"{name} needs a parameter in {knob.unit}{share}, '{value}' is in {one.unit}",
+            )
         elif one.low < knob.low or one.high > knob.high:
             yield name, f"{rule}, '{value}' goes from {one.low:g} to {one.high:g}"
         elif one.kind.apart != (knob.unit == "count"):

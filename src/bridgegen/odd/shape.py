@@ -228,6 +228,10 @@ def _describe(model: type[ShapedSection], document: Document, error: ErrorDetail
         choices = error["ctx"]["expected"]
         hint = nearest(str(error["input"]), re.findall("'([^']*)'", choices))
         return f"{name} must be {choices}, got {got}{hint} ({where})"
+    if last == "[key]" and parents:
+        name = f"the key '{parents[-1]}'" + (
+            f" of {inside.rpartition('.')[0]}" if parents[:-1] else ""
+        )
     return f"{name} {_MESSAGES.get(error['type'], error['msg'])}, got {got} ({where})"
 
 

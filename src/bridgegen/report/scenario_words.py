@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from bridgegen.named_models import type_of
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.story import (
     CONDITIONS,
@@ -57,15 +58,16 @@ def _participant(one: Participant, scenario: LogicalScenario) -> str:
 
 
 def _kind(one: Participant) -> str:
-    """Return what it is, with its article; a model's name is no noun."""
-    if one.types:
-        return " or ".join(map(_with_article, one.types))
-    return _with_article(one.type) + (f" (model {one.model})" if one.model else "")
+    """Return what it is, with its article: all that it may be."""
+    return " or ".join(map(_noun, one.types or (one.model or one.type,)))
 
 
-def _with_article(noun: str) -> str:
-    noun = "emergency vehicle" if noun == "emergency" else noun
-    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+def _noun(name: str) -> str:
+    """Return a type's noun with its article, or a model's with its name."""
+    kind = type_of(name)
+    noun = "emergency vehicle" if kind == "emergency" else kind
+    model = "" if kind == name else f" (model {name})"
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}{model}"
 
 
 def _jam(jam: Jam, scenario: LogicalScenario) -> str:

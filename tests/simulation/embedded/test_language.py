@@ -379,7 +379,7 @@ def test_types_vary(made, tmp_path, monkeypatch):
         assert alone.evaluate(row).metrics.tobytes() == found.metrics[k].tobytes()
     there_and_back(pipeline)
     said = " ".join(story_lines(pipeline.scenario))
-    assert "lead, a car or truck or motorcycle, starts" in said
+    assert "lead, a car or a truck or a motorcycle, starts" in said
     import bridgegen as bg
 
     run = bg.run_search(
@@ -403,7 +403,7 @@ def test_models_by_name(made):
     assert b'name="ncap_global_vehicle_target"' in written
     there_and_back(pipeline)
     said = " ".join(story_lines(pipeline.scenario))
-    assert "lead, a ncap_global_vehicle_target, starts" in said
+    assert "lead, a car (model ncap_global_vehicle_target), starts" in said
 
 
 def test_models_vary(made):

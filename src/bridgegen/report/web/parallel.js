@@ -210,7 +210,9 @@ class Parallel {
 
   connect() {
     const select = $("filter-axis");
-    const text = (axis) => (axis.words ? `${axis.name} (${axis.low} to ${axis.high})` : titled(axis.name));
+    const numbered = (words) => words.map((word, i) => `${i} ${word}`);
+    const shortened = (words) => (words.length > 4 ? [words[0], "…", words.at(-1)] : words).join(", ");
+    const text = (axis) => (axis.words ? `${axis.name} (${shortened(numbered(axis.words))})` : titled(axis.name));
     select.append(...this.axes.map((axis) => element("option", { value: axis.name }, text(axis))));
     select.addEventListener("change", () => this.showNumbers());
     for (const id of ["filter-low", "filter-high"]) {
