@@ -80,3 +80,12 @@ def test_titles_are_in_words():
             for conflict in ("contact", "near miss"):
                 key = Key(conflict, kind.label, "shared", rule.label, "animal", "", "")
                 assert "{" not in title(key)
+
+
+def test_a_title_names_the_emergency_vehicle_to_which_the_ego_did_not_give_way():
+    key = Key("contact", "crossing", "ego", "emergency vehicle", "car", "in the junction")
+    assert title(key) == (
+        "hits an emergency vehicle that crosses in the junction (ego responsible: did not give way "
+        "to an emergency vehicle with blue light and siren)"
+    )
+    assert title(key._replace(responsible="other")).startswith("hits a car that crosses")

@@ -13,7 +13,7 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.types import RULES, ConflictType
+from bridgegen.conflict.types import RULES, ConflictType, Rule
 
 APART = 0.25
 """Clusters are apart by at least this: root mean square over the searched parameters, 0 to 1 …"""
@@ -202,6 +202,8 @@ def title(key: Key, count: str = "ego") -> str:
     kinds = {one.label: one for one in ConflictType}
     contact, near = _TITLES[kinds.get(key.conflict_type, ConflictType.NONE)]
     partner = _ARTICLES.get(key.partner, f"a {key.partner}")
+    if (key.rule, key.responsible) == (Rule.EMERGENCY_VEHICLE.label, "ego"):  # a car by its kind
+        partner = "an emergency vehicle"
     text = (contact if key.conflict == "contact" else near).format(partner)
     if key.place:
         text += f" {key.place}"
