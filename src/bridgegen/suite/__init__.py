@@ -1,0 +1,1 @@
+"""Many scenario files, with all their variations, run and judged together."""

@@ -1,0 +1,151 @@
+"""The results of a suite: of each entry and ego a line of JSON, of each row what happened."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Verdict = Literal["passed", "failed", "not run"]
+
+
+class Strict(BaseModel):
+    """Part of a record; it is untrusted when it is read."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class RowResult(Strict):
+    """The result of one variation.
+
+    Attributes:
+        x: values of the entry's ``parameters``; texts by themselves.
+        problem: why there is no result; empty where there is one.
+        critical: by the rule of the suite.
+        harm: how much it is a failure of the ego, 0 to 1.
+        severity: probability of MAIS3+ in the ego's collision.
+        collisions: number of the ego's contacts.
+        d_min: smallest distance to others [m]; None: there are none.
+        conflict: of the decisive conflict: "contact", "near miss", … , or "".
+        conflict_type: its type.
+        responsible: who is, for a contact or near miss.
+        partner: the other participant.
+        implausible: why its traffic could not happen, or "".
+        margins: of the entry's criteria; None: without a result.
+    """
+
+    x: list[float | str] = []
+    problem: str = ""
+    critical: bool = False
+    harm: float = 0.0
+    severity: float = 0.0
+    collisions: float = 0.0
+    d_min: float | None = None
+    conflict: str = ""
+    conflict_type: str = ""
+    responsible: str = ""
+    partner: str = ""
+    implausible: str = ""
+    margins: list[float] = []
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the ego passes: it neither is critical nor violates a criterion."""
+        if self.problem:
+            return "not run"
+        return "failed" if self.critical or self.violated else "passed"
+
+    @property
+    def violated(self) -> list[int]:
+        """The numbers of the criteria that it violates."""
+        return [i for i, margin in enumerate(self.margins) if margin < 0.0]
+
+
+class EntryResult(Strict):
+    """The results of an entry with an ego.
+
+    Attributes:
+        entry: its name.
+        ego: as the user names it; the scenario's own driver if none.
+        digest: of the entry's files.
+        scenario: path or name.
+        distribution: path, or "".
+        driver: that drove the ego, by name.
+        title: of the scenario.
+        parameters: the names of what varies.
+        units: theirs.
+        criteria: as `bridgegen.odd.criteria.Criterion.to_dict` gives them.
+        rows: of each variation; empty if the entry cannot run.
+        problem: why it cannot; empty if it can.
+        notes: what runs otherwise than one may expect.
+    """
+
+    entry: str
+    ego: str
+    digest: str
+    scenario: str
+    distribution: str = ""
+    driver: str = ""
+    title: str = ""
+    parameters: list[str] = []
+    units: list[str] = []
+    criteria: list[dict[str, Any]] = []
+    rows: list[RowResult] = []
+    problem: str = ""
+    notes: list[str] = []
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of its rows: failed, else not run, else passed."""
+        verdicts = {one.verdict for one in self.rows}
+        if "failed" in verdicts:
+            return "failed"
+        return "not run" if self.problem or not self.rows or "not run" in verdicts else "passed"
+
+    def count(self, verdict: Verdict) -> int:
+        """Return the number of rows with a verdict; an entry that cannot run counts as one."""
+        if self.problem:
+            return int(verdict == "not run")
+        return sum(one.verdict == verdict for one in self.rows)
+
+    @property
+    def worst(self) -> int | None:
+        """The number of the worst failed row: by harm, then by the least margin."""
+        failed = [i for i, one in enumerate(self.rows) if one.verdict == "failed"]
+        return min(failed, key=lambda i: (*_rank(self.rows[i]), i), default=None)
+
+    def worst_of(self, criterion: int) -> int | None:
+        """Return the number of the row that violates a criterion the most, or None."""
+        margins = [
+            (one.margins[criterion], i)
+            for i, one in enumerate(self.rows)
+            if criterion < len(one.margins) and one.margins[criterion] < 0.0
+        ]
+        return min(margins)[1] if margins else None
+
+
+class Header(Strict):
+    """What all lines of a file of results have in common.
+
+    Attributes:
+        suite: the format's version.
+        settings: on which results depend.
+    """
+
+    suite: Literal[1] = Field(default=1)
+    settings: dict[str, Any]
+
+
+def _rank(one: RowResult) -> tuple[float, float, float]:
+    return -float(one.critical) * one.harm, -one.severity, min(one.margins, default=0.0)
+
+
+def finite(value: float) -> float | None:
+    """Return a number for JSON; None if it is infinite or NaN."""
+    return value if isfinite(value) else None
+
+
+def counts(results: Sequence[EntryResult]) -> dict[Verdict, int]:
+    """Return the numbers of rows by verdict."""
+    verdicts: tuple[Verdict, ...] = ("passed", "failed", "not run")
+    return {one: sum(each.count(one) for each in results) for one in verdicts}
