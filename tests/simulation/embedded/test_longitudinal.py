@@ -208,6 +208,23 @@ def test_a_step_to_a_relative_speed_acts_from_its_instant(speeds):
     assert way[round(2.0 / DT)] == pytest.approx(4.0 + 15.0)
 
 
+@pytest.mark.parametrize(("kind", "value"), [("delta", 0.0), ("factor", 1.0)])
+@pytest.mark.parametrize(("after_step", "at_3", "at_6"), [(20.0, 15.0, 20.0), (0.0, 1.0, 0.0)])
+def test_who_keeps_a_relative_speed_accelerates_as_the_vehicle_can(
+    kind, value, after_step, at_3, at_6
+):
+    """The other's speed steps at 2 s; the car accelerates by 5 m/s² and brakes by 9 m/s² at most.
+
+    The step of its own action is one: at 1 s, to the other's 10 m/s.
+    """
+    to = relative("lead", value, kind, dynamics="step time 0", continuous=True)
+    jump = ("jump", "lead", speeding(after_step, "step time 0"), after(2.0))
+    rollout = story(("e", "bv", to, after(1.0)), jump, speeds=(0.0, 4.0, 10.0), gap=100.0)
+    assert at(rollout, "bv", 1.0 + DT) == 10.0
+    assert at(rollout, "bv", 3.0) == pytest.approx(at_3)
+    assert at(rollout, "bv", 6.0) == at_6
+
+
 @pytest.mark.parametrize("dynamics", ["linear time 0", "cubic distance 0"])
 def test_a_change_over_no_time_is_there_at_the_start(dynamics):
     places = start("ego", lane(3, -1, 5.0), 0.0) + start("bv", lane(1, 1, 200.0), 0.0).replace(

@@ -288,21 +288,32 @@ def test_a_route_position_of_an_entity_is_where_it_is():
 @pytest.mark.parametrize(
     ("where", "expected"),
     [
-        ('FromLaneCoordinates pathS="30" laneId="2" laneOffset="0.5"', (-5.75, 63.0, SOUTH)),
-        ('FromRoadCoordinates pathS="30" t="5.75"', (-5.75, 63.0, SOUTH)),
+        ('FromLaneCoordinates pathS="30" laneId="-2" laneOffset="-0.5"', (-5.75, 63.0, SOUTH)),
+        ('FromLaneCoordinates pathS="30" laneId="1"', (1.75, 63.0, SOUTH)),
+        ('FromRoadCoordinates pathS="30" t="-5.75"', (-5.75, 63.0, SOUTH)),
         ('FromLaneCoordinates pathS="140" laneId="-1"', (-1.75, -47.0, SOUTH)),
     ],
 )
-def test_a_position_on_a_route_faces_along_the_route(where, expected):
+def test_a_position_on_a_route_has_the_routes_sides(where, expected):
     """The route leads south from s = 80 on road 3 at y = 93, on road 1 down from y = -13.
 
-    t and offsets count to the left of the reference line: west on road 3.
+    It runs against the reference line of road 3 and along that of road 1; on both, lanes below 0
+    and negative offsets are to its right, in the west.
     """
     text = f"""<Position><RoutePosition><RouteRef><Route name="r" closed="false">
 <Waypoint routeStrategy="shortest">{lane(3, 1, 80.0)}</Waypoint>
 <Waypoint routeStrategy="shortest">{lane(1, -1, 80.0)}</Waypoint></Route></RouteRef>
 <InRoutePosition><{where}/></InRoutePosition></RoutePosition></Position>"""
     there(placed(text), *expected)
+
+
+@pytest.mark.parametrize("x", [-2.5, -1.75, -1.0])
+@pytest.mark.parametrize("y", [-12.95, -12.6, -12.05])
+def test_a_body_just_before_a_lane_is_where_it_is_put(x, y):
+    """Road 1 begins at y = -13, for who travels south; a connecting lane ends there."""
+    there(placed(position("WorldPosition", x=x, y=y, h=SOUTH)), x, y, SOUTH)
+    back = placed(position("WorldPosition", x=x, y=y, h=SOUTH), 4.0)
+    assert pose(back, round(2.0 / DT))[:2] == pytest.approx((x, y - 8.0), abs=1e-2)
 
 
 def test_a_lane_of_a_route_that_is_no_number():

@@ -154,7 +154,10 @@ class PositionInRoadCoordinates(Element):
 
 @dataclass(frozen=True)
 class PositionInLaneCoordinates(Element):
-    """So far along the route, on a lane, and left of its centre [m]."""
+    """So far along the route, on a lane, and left of its centre [m].
+
+    Lane and left are the route's: lane -1 is the first to the right of who follows it.
+    """
 
     path_s: Annotated[Double, Range(0.0, FINITE)]
     lane_id: String

@@ -158,7 +158,10 @@ class WorldSpot:
 
 @dataclass(frozen=True)
 class RouteSpot:
-    """A point so far along a route [m], on a lane and left of its centre, or left of the road."""
+    """A point so far along a route [m], on a lane and left of its centre, or left of the road.
+
+    Lane and left are the route's: where it runs against the reference line, lane -1 is lane 1.
+    """
 
     waypoints: tuple["Spot", ...]
     path_s: float

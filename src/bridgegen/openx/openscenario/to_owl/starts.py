@@ -240,7 +240,7 @@ class Starts:
         )  # fmt: skip
 
     def _on_route(self, where: osc.RoutePosition) -> osc.LanePosition:
-        """Return the place so far along a route, on a lane.
+        """Return the place so far along a route, on a lane; lane and left are the route's.
 
         Raises:
             InputError: no lane leads along the route, or it is shorter.
@@ -263,9 +263,9 @@ class Starts:
                 way = 1 if step.s_end >= step.s else -1
                 s = step.s + way * left
                 if isinstance(said, osc.PositionInRoadCoordinates):
-                    return self._at(step.road_id, s, self.number(said.t), where, way)
-                road, lane = self._roads.road(step.road_id), int(self.text(said.lane_id))
-                offset = self.number(said.lane_offset or 0.0)
+                    return self._at(step.road_id, s, way * self.number(said.t), where, way)
+                road, lane = self._roads.road(step.road_id), way * int(self.text(said.lane_id))
+                offset = way * self.number(said.lane_offset or 0.0)
                 return self._along_road(road, lane, s, offset, where, way)
             left -= length
         raise ValueError("the route is shorter")

@@ -204,19 +204,20 @@ def _follow_speed(j, e, k, passed, plan, state, record):
     row = plan.courses[plan.actions[j, ROW]]
     ref, shape = row[REF], plan.actions[j, SHAPE]
     target = _wanted(j, e, record.v[ref, seen_at(e, ref, k, plan, state, record)], plan, state)
-    if shape == STEP:
-        if passed <= plan.dt + SAME_TIME and record.v[e, k] == state.command[e]:
+    before = state.command[e]
+    if shape == STEP and passed <= plan.dt + SAME_TIME:
+        if record.v[e, k] == before:
             state.mean[e] = _wanted(j, e, _mean_seen(e, ref, k, plan, state, record), plan, state)
         state.command[e] = target
         return not row[CONTINUOUS]
-    before = state.command[e]
-    if passed < state.speed_lasts[e]:
+    if shape != STEP and passed < state.speed_lasts[e]:
         share = passed / state.speed_lasts[e]
         after = changed(shape, state.origin[e], target, share)
     else:
         after = target
-    most = plan.bodies[e, 4] if after > before else plan.bodies[e, 5]
-    state.command[e] = ramped(before, after, most * plan.dt)
+    most = (plan.bodies[e, 4] if after > before else plan.bodies[e, 5]) * plan.dt
+    is_within = shape == STEP and abs(after - before) <= most  # then to the bit
+    state.command[e] = after if is_within else ramped(before, after, most)
     is_there = abs(state.command[e] - target) <= SAME_SPEED
     return passed >= state.speed_lasts[e] - SAME_TIME and is_there and not row[CONTINUOUS]
 

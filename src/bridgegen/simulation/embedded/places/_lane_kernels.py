@@ -26,6 +26,7 @@ MARGIN = 1.0  # m, up to which an entity beside a lane still counts as on it
 MOST_TURN = math.pi / 3  # rad, an entity turned more from a lane's direction is not on it
 AGAINST = 2.0  # m, by which a lane against whose traffic one is turned counts as farther
 PER_RADIAN = 1.0  # m, by which a lane counts as farther per radian of turn from it
+BEFORE = 10.0  # m, by which a lane counts as farther whose start is still ahead
 
 
 @kernel
@@ -138,11 +139,24 @@ def station_of(spans, n, node, s):
 
 
 @kernel
+def _begins(points, point_nodes, i, c, s):
+    """Return whether point i is where its lane begins for one that travels towards (c, s)."""
+    inner = i + 1
+    if point_nodes[i - 1] == point_nodes[i]:
+        if inner < points.shape[0] and point_nodes[inner] == point_nodes[i]:
+            return False
+        inner = i - 1
+    return (points[inner, 0] - points[i, 0]) * c + (points[inner, 1] - points[i, 1]) * s > 0.0
+
+
+@kernel
 def nearest_lane(points, point_nodes, x, y, h):
     """Return the node of the lane that a body is on by its place and heading, -1 if on none.
 
     ``points`` is ``(G, 4)``: x, y, heading, half width of points on lanes at most a metre apart.
-    The nearest counts; being turned from its direction counts as being farther away.
+    The nearest counts; being turned from its direction counts as being farther away. A lane that
+    begins within the next metre counts only where no other lane is: a body on it would be moved to
+    its start.
     """
     best, found = math.inf, -1
     for i in range(points.shape[0]):
@@ -152,7 +166,8 @@ def nearest_lane(points, point_nodes, x, y, h):
         if abs(dx) > 20.0 or abs(dy) > 20.0:
             continue
         c, s = math.cos(points[i, 2]), math.sin(points[i, 2])
-        if abs(dx * c + dy * s) > 1.0:
+        along = dx * c + dy * s
+        if abs(along) > 1.0:
             continue
         aside = abs(dy * c - dx * s)
         if aside > points[i, 3] + MARGIN:
@@ -161,7 +176,10 @@ def nearest_lane(points, point_nodes, x, y, h):
         cost, node = aside, point_nodes[i]
         if turn > 0.5 * math.pi:
             turn, cost, node = math.pi - turn, cost + AGAINST, node ^ 1
+            c, s, along = -c, -s, -along
         cost += PER_RADIAN * turn
+        if along < -SLACK and _begins(points, point_nodes, i, c, s):
+            cost += BEFORE
         if turn <= MOST_TURN and cost < best - 1e-9:
             best, found = cost, node
     return found

@@ -101,11 +101,11 @@ class Lanes:
             road, lane, s, aside = self._under(spot)
         else:
             road, s, way = self._along(spot)
-            t = spot.t if isinstance(spot, RoadSpot) else spot.aside
+            t = spot.t if isinstance(spot, RoadSpot) else way * spot.aside
             lane, aside = self._beside(road, s, t)
             if isinstance(spot, RouteSpot) and spot.lane is not None:
-                lane_at(road, spot.lane, s)
-                lane, aside = spot.lane, spot.aside
+                lane, aside = way * spot.lane, t
+                lane_at(road, lane, s)
         return model.roads.index(road), lane, math.nan if s is None else s, aside, way
 
     def _on_lane(self, spot: Spot) -> Place:
