@@ -288,17 +288,18 @@ def test_a_route_position_of_an_entity_is_where_it_is():
 @pytest.mark.parametrize(
     ("where", "expected"),
     [
+        ('FromLaneCoordinates pathS="30" laneId="2" laneOffset="0.5"', (-5.75, 63.0, SOUTH)),
         ('FromLaneCoordinates pathS="30" laneId="-2" laneOffset="-0.5"', (-5.75, 63.0, SOUTH)),
-        ('FromLaneCoordinates pathS="30" laneId="1"', (1.75, 63.0, SOUTH)),
-        ('FromRoadCoordinates pathS="30" t="-5.75"', (-5.75, 63.0, SOUTH)),
+        ('FromRoadCoordinates pathS="30" t="5.75"', (-5.75, 63.0, SOUTH)),
         ('FromLaneCoordinates pathS="140" laneId="-1"', (-1.75, -47.0, SOUTH)),
+        ('FromLaneCoordinates pathS="140" laneId="1" laneOffset="0.5"', (2.25, -47.0, SOUTH)),
     ],
 )
-def test_a_position_on_a_route_has_the_routes_sides(where, expected):
+def test_a_position_on_a_route_is_on_a_lane_along_the_route(where, expected):
     """The route leads south from s = 80 on road 3 at y = 93, on road 1 down from y = -13.
 
-    It runs against the reference line of road 3 and along that of road 1; on both, lanes below 0
-    and negative offsets are to its right, in the west.
+    Left is that of the reference line: west on road 3. Lanes -1 and -2 there lead north, so those
+    ids and their offsets count from the route, which has them on its right.
     """
     text = f"""<Position><RoutePosition><RouteRef><Route name="r" closed="false">
 <Waypoint routeStrategy="shortest">{lane(3, 1, 80.0)}</Waypoint>

@@ -91,6 +91,29 @@ def lane_at(road: Road, lane_id: int, s: float) -> Lane:
     return lane
 
 
+def lane_along(road: Road, lane_id: int, s: float, way: int) -> int:
+    """Return the lane of a position on a route, at ``s`` [m].
+
+    Where the route runs against the reference line, files state either the road's lane id, or one
+    that counts from the route: -1 is then the first to its right. The lane is the one of both that
+    leads along the route.
+
+    Args:
+        road: the road.
+        lane_id: as the file states it.
+        s: along the road [m].
+        way: of the route there: 1 along the reference line, or -1.
+
+    Raises:
+        InputError: the road is shorter, or has no such lane there.
+    """
+    _check_station(road, s)
+    section = road.sections[section_index(road, s)]
+    if way < 0 < road.direction(lane_id) and section.lane(-lane_id) is not None:
+        return -lane_id
+    return lane_at(road, lane_id, s).id
+
+
 def _check_station(road: Road, s: float) -> None:
     if not -SLACK <= s <= road.length + SLACK:
         raise InputError(

@@ -156,7 +156,7 @@ class PositionInRoadCoordinates(Element):
 class PositionInLaneCoordinates(Element):
     """So far along the route, on a lane, and left of its centre [m].
 
-    Lane and left are the route's: lane -1 is the first to the right of who follows it.
+    The lane is one that leads along the route, see `lane_along`.
     """
 
     path_s: Annotated[Double, Range(0.0, FINITE)]

@@ -160,7 +160,7 @@ class WorldSpot:
 class RouteSpot:
     """A point so far along a route [m], on a lane and left of its centre, or left of the road.
 
-    Lane and left are the route's: where it runs against the reference line, lane -1 is lane 1.
+    The lane is one that leads along the route, see `lane_along`.
     """
 
     waypoints: tuple["Spot", ...]

@@ -10,7 +10,7 @@ import numpy as np
 
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.geometry import reference_line
-from bridgegen.openx.opendrive.lanes import borders, lane_at, lane_pose, section_index
+from bridgegen.openx.opendrive.lanes import borders, lane_along, lane_at, lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.routes import plan_route
 from bridgegen.openx.openscenario import model as osc
@@ -240,7 +240,7 @@ class Starts:
         )  # fmt: skip
 
     def _on_route(self, where: osc.RoutePosition) -> osc.LanePosition:
-        """Return the place so far along a route, on a lane; lane and left are the route's.
+        """Return the place so far along a route, on a lane that leads along it.
 
         Raises:
             InputError: no lane leads along the route, or it is shorter.
@@ -263,9 +263,10 @@ class Starts:
                 way = 1 if step.s_end >= step.s else -1
                 s = step.s + way * left
                 if isinstance(said, osc.PositionInRoadCoordinates):
-                    return self._at(step.road_id, s, way * self.number(said.t), where, way)
-                road, lane = self._roads.road(step.road_id), way * int(self.text(said.lane_id))
-                offset = way * self.number(said.lane_offset or 0.0)
+                    return self._at(step.road_id, s, self.number(said.t), where, way)
+                road, stated = self._roads.road(step.road_id), int(self.text(said.lane_id))
+                lane = lane_along(road, stated, s, way)
+                offset = self.number(said.lane_offset or 0.0) * (1 if lane == stated else -1)
                 return self._along_road(road, lane, s, offset, where, way)
             left -= length
         raise ValueError("the route is shorter")

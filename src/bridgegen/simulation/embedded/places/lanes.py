@@ -15,7 +15,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.lane_changes import change_lanes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
-from bridgegen.openx.opendrive.lanes import borders, lane_at, section_index
+from bridgegen.openx.opendrive.lanes import borders, lane_along, lane_at, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import Piece
 from bridgegen.openx.opendrive.routes import Place, Route
@@ -101,11 +101,11 @@ class Lanes:
             road, lane, s, aside = self._under(spot)
         else:
             road, s, way = self._along(spot)
-            t = spot.t if isinstance(spot, RoadSpot) else way * spot.aside
+            t = spot.t if isinstance(spot, RoadSpot) else spot.aside
             lane, aside = self._beside(road, s, t)
             if isinstance(spot, RouteSpot) and spot.lane is not None:
-                lane, aside = way * spot.lane, t
-                lane_at(road, lane, s)
+                lane = lane_along(road, spot.lane, s, way)
+                aside = spot.aside if lane == spot.lane else -spot.aside
         return model.roads.index(road), lane, math.nan if s is None else s, aside, way
 
     def _on_lane(self, spot: Spot) -> Place:
