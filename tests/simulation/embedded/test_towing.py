@@ -249,6 +249,17 @@ def test_a_trailer_with_a_place_of_its_own_is_pulled_from_there():
     assert math.remainder(at(out, "trailer", 0)[2] - toward, math.tau) == pytest.approx(0.0)
 
 
+def test_a_trailer_that_is_put_ahead_of_its_hitch_is_straight_behind():
+    """In the car, or in front of it: a coupling does not fold by half a turn."""
+    for y in (95.0, 103.0):
+        ahead = f'<Position><WorldPosition x="-1.75" y="{y}" h="0"/></Position>'
+        out = told(EGO + SOUTH + start("trailer", ahead, 0.0), tows=behind("trailer"),
+                   more=trailer("trailer"))  # fmt: skip
+        x, y, h = at(out, "trailer", 0)
+        assert (x, y, math.remainder(h, math.tau)) == pytest.approx((-1.75, 109.0, -math.pi / 2))
+        assert out.v[0, out.names.index("trailer"), 0] == pytest.approx(10.0)
+
+
 def test_trailers_of_one_name():
     cv = start("cv", lane(1, 1, 60.0), 5.0)
     text = scenario(("ego", "bv", "cv"), EGO + SOUTH + cv)

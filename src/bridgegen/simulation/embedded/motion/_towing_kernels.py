@@ -48,7 +48,10 @@ def drawn(h, dx, dy, length):
 
 @kernel
 def start_towed(plan, roads, state, record):
-    """Put the trailers behind what tows them: straight, or towards where they stand."""
+    """Put the trailers behind what tows them: straight, or towards where they stand.
+
+    One that stands ahead of its hitch would be folded into what tows it: it is straight, too.
+    """
     for w in range(plan.tows.shape[0]):
         t, e = plan.tows[w, 0], plan.tows[w, 1]
         if state.tower[e] != t:
@@ -60,7 +63,9 @@ def start_towed(plan, roads, state, record):
         x = record.x[t, 0] + plan.couplings[t, HITCH] * math.cos(h)
         y = record.y[t, 0] + plan.couplings[t, HITCH] * math.sin(h)
         if plan.stands_apart[e]:
-            h = math.atan2(y - record.y[e, 0], x - record.x[e, 0])
+            apart = math.atan2(y - record.y[e, 0], x - record.x[e, 0])
+            if abs(turned(apart, h)) <= 0.5 * math.pi:
+                h = apart
         record.h[e, 0] = h
         record.x[e, 0], record.y[e, 0] = x - length * math.cos(h), y - length * math.sin(h)
         turn = h - record.h[t, 0]
