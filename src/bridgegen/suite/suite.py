@@ -58,8 +58,8 @@ class SuiteArguments:
     options: CommonOptions = field(
         default_factory=CommonOptions,
         metadata={
-            "help": "Options of all scenarios: criteria, critical, count, ideal, others, time_limit, "
-            "empty_trigger."
+            "help": "Options of all scenarios: criteria, critical, count, ideal, others, "
+            "time_limit, empty_trigger."
         },
     )
     samples: int = field(
@@ -143,13 +143,8 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
         _run(waiting, given.workers, path, done, callbacks)
     except KeyboardInterrupt:
         done = _done(path, settings, jobs)
-        raise Interrupted(
-            folder,
-            len(done),
-            len(jobs),
-            what="entries",
-            command=f"bridgegen suite … --out {folder}",
-        ) from None
+        again = f"bridgegen suite … --out {folder}"
+        raise Interrupted(folder, len(done), len(jobs), what="entries", command=again) from None
     finally:
         lock.release()
     results = tuple(done[job.entry.name, job.ego or ""] for job in jobs)
@@ -184,9 +179,8 @@ def _check(given: SuiteArguments) -> None:
 
 
 def _name(files: Sequence[str | Path]) -> str:
-    return "-".join(Path(one).stem or "suite" for one in files[:3]) + (
-        "-…" if len(files) > 3 else ""
-    )
+    names = [Path(one).resolve().stem for one in files]
+    return "-".join(names[:3]) + ("-and-more" if len(names) > 3 else "")
 
 
 def _settings(given: SuiteArguments) -> dict[str, Any]:
