@@ -7,6 +7,7 @@ from bridgegen.cli import (
     views,
     confirmations,
     comparisons,
+    suites,
     reproductions,
     files,
     maps,
@@ -27,5 +28,6 @@ __all__ = [
     "maps",
     "reproductions",
     "runs",
+    "suites",
     "views",
 ]
