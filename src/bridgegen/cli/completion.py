@@ -32,9 +32,9 @@ def completing(kind: str) -> Complete | None:
 
 
 def _scenarios(_: typer.Context) -> Iterable[str]:
-    from bridgegen.odd.reader import names
+    from bridgegen.odd.reader import names, pack_names
 
-    return names()
+    return (*names(), *pack_names())
 
 
 def _algorithms(_: typer.Context) -> Iterable[str]:

@@ -20,6 +20,16 @@ def list_scenarios(as_json: options.Json = False) -> None:
     print_table(("scenario", "title"), rows, as_json=as_json)
 
 
+@listing.command("packs")
+def list_packs(as_json: options.Json = False) -> None:
+    """Logical scenarios of the packs, by regulation."""
+    from bridgegen.odd.reader import load, pack_names
+    from bridgegen.screen.tables import print_table
+
+    rows = [(name, load(name).title) for name in pack_names()]
+    print_table(("scenario", "title"), rows, as_json=as_json)
+
+
 @listing.command("algorithms")
 def list_algorithms(as_json: options.Json = False) -> None:
     """Search algorithms."""

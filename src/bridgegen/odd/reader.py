@@ -53,25 +53,53 @@ def names(kind: str = "scenario") -> tuple[str, ...]:
     )
 
 
+def pack_names() -> tuple[str, ...]:
+    """Return the names of the scenarios of all packs that ship, each ``PACK/NAME``."""
+    folder = resources.files("bridgegen.packs")
+    return tuple(
+        sorted(
+            f"{pack.name}/{entry.name.removesuffix('.yaml')}"
+            for pack in folder.iterdir()
+            if pack.is_dir()
+            for entry in pack.iterdir()
+            if entry.name.endswith(".yaml")
+        )
+    )
+
+
+def shipped_text(name: str) -> bytes:
+    """Return the file of a scenario or fragment that ships.
+
+    Args:
+        name: of `names` or `pack_names`.
+    """
+    folder = "bridgegen.packs" if "/" in name else "bridgegen.catalogue"
+    return resources.files(folder).joinpath(f"{name}.yaml").read_bytes()
+
+
 def load(name_or_path: str | Path) -> LogicalScenario:
     """Read a logical scenario.
 
     Args:
-        name_or_path: a name of the catalogue, or the path of a file (ends in .yaml or .yml).
+        name_or_path: a name of the catalogue or of a pack ("r157/cut-in"), or the path of a file
+            (ends in .yaml or .yml).
 
     Raises:
-        UnknownNameError: no such name in the catalogue.
+        UnknownNameError: no such name in the catalogue or the packs.
         FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
         ScenarioError: it breaks rules; all of them, with file and line.
     """
     text = str(name_or_path)
     path = Path(text)
-    if isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
+    is_path = isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml")
+    if not is_path and len(path.parts) > 1:
+        is_path = not any(name.startswith(f"{path.parts[0]}/") for name in pack_names())
+    if is_path:
         document, folder = _read_file(path), path.parent
-    elif text in names():
-        document, folder = _read_catalogue(text), None
+    elif text in (known := (*names(), *pack_names())):
+        document, folder = _read_shipped(text), None
     else:
-        raise UnknownNameError("scenario", text, names())
+        raise UnknownNameError("scenario", text, known)
     return _build(document, folder)
 
 
@@ -86,9 +114,8 @@ def _read_file(path: Path) -> Document:
     return read_plain_yaml(data, str(path))
 
 
-def _read_catalogue(name: str) -> Document:
-    data = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_bytes()
-    return read_plain_yaml(data, f"{name}.yaml")
+def _read_shipped(name: str) -> Document:
+    return read_plain_yaml(shipped_text(name), f"{name}.yaml")
 
 
 class _Declarations:
@@ -295,7 +322,7 @@ def _read_fragment(name: str, folder: Path | None) -> Document:
         known = names("fragment")
         if name not in known:
             raise UnknownNameError("fragment", name, known)
-        return _read_catalogue(name)
+        return _read_shipped(name)
     if folder is None or Path(name).is_absolute() or ".." in Path(name).parts:
         raise ScenarioError(f"a file to include lies beside the scenario, got '{name}'")
     return _read_file(folder / name)

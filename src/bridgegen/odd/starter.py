@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.odd.json_schema import FILE, refuse_other_schema, write_schema
-from bridgegen.odd.reader import names
+from bridgegen.odd.reader import names, pack_names, shipped_text
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
@@ -20,7 +20,8 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
 
     Args:
         name: of the scenario and its file.
-        like: a scenario of the catalogue to copy; by default a small one that explains itself.
+        like: a scenario of the catalogue or of a pack to copy; by default a small one that
+            explains itself.
         folder: where to; by default here.
 
     Returns:
@@ -41,11 +42,11 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
     if like is None:
         text = resources.files("bridgegen.odd").joinpath("starter.yaml").read_text("utf-8")
         text = text.replace("NAME", name)
-    elif like in names():
-        text = resources.files("bridgegen.catalogue").joinpath(f"{like}.yaml").read_text("utf-8")
-        text = re.sub(rf"^scenario: {re.escape(like)}$", f"scenario: {name}", text, flags=re.M)
+    elif like in (known := (*names(), *pack_names())):
+        text = shipped_text(like).decode("utf-8")
+        text = re.sub(r"^scenario: .*$", f"scenario: {name}", text, count=1, flags=re.M)
     else:
-        raise UnknownNameError("scenario", like, names())
+        raise UnknownNameError("scenario", like, known)
     path = (folder or Path()) / f"{name}.yaml"
     refuse_other_schema(path.with_name(FILE))
     text = f"# yaml-language-server: $schema={FILE}\n{text}"

@@ -6,6 +6,7 @@ from pathlib import Path
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.reader import load as load_scenario
 from bridgegen.odd.reader import names as scenario_names
+from bridgegen.odd.reader import pack_names
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.ontology.check import check
 from bridgegen.ontology.files import load, save
@@ -155,8 +156,10 @@ def _seen_from(out: Path, file: Path) -> str:
 
 
 def scenario_of(individuals: Individuals) -> LogicalScenario | None:
-    """Return the scenario of the catalogue that individuals refer to; None if none."""
+    """Return the scenario of the catalogue or of a pack that individuals refer to; None if none."""
     said = {name for one in individuals.of_class("Scenario")
             for name in individuals.texts(one, "has_name")}  # fmt: skip
-    known = said.intersection(scenario_names())
-    return load_scenario(known.pop()) if len(said) == len(known) == 1 else None
+    shipped = {name: name for name in scenario_names()}
+    shipped |= {name.replace("/", "-"): name for name in pack_names()}
+    known = said.intersection(shipped)
+    return load_scenario(shipped[known.pop()]) if len(said) == len(known) == 1 else None
