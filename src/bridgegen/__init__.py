@@ -12,16 +12,19 @@ if TYPE_CHECKING:
     from bridgegen.campaign.confirm import confirm
     from bridgegen.comparison import Comparison, compare
     from bridgegen.odd.reader import load
+    from bridgegen.preventability import PreventabilityMap, map_preventability
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.choice import SimulatorChoice
 
 __all__ = [
     "Comparison",
+    "PreventabilityMap",
     "Run",
     "SimulatorChoice",
     "compare",
     "confirm",
     "load",
+    "map_preventability",
     "resume",
     "run_search",
     "simulate_file",
@@ -33,6 +36,8 @@ _HOMES = {
     "confirm": "bridgegen.campaign.confirm",
     "Run": "bridgegen.campaign",
     "load": "bridgegen.odd.reader",
+    "map_preventability": "bridgegen.preventability",
+    "PreventabilityMap": "bridgegen.preventability",
     "resume": "bridgegen.campaign",
     "run_search": "bridgegen.campaign",
     "simulate_file": "bridgegen.simulate",

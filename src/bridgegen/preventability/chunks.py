@@ -1,0 +1,93 @@
+"""A map's folder: what it is a map of, and the outcomes of the chunks of cells that are done."""
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.disk import write_whole
+from bridgegen.errors import StorageError
+from bridgegen.preventability.classes import Codes, Outcome
+from bridgegen.records import parse_json, read_bytes
+
+CHUNK = 16_384
+"""Cells of a chunk: what is lost at most when a map is stopped. No result depends on it."""
+
+SETTINGS = "map.json"
+CHUNKS = "chunks"
+
+
+class ChunkStore:
+    """The chunks of a map, a file each, which a later call with the same settings reads.
+
+    Args:
+        folder: of the map; made if it does not exist.
+        settings: what the outcomes depend on, as JSON's types.
+        drivers: how many outcomes a cell has.
+        cells: how many cells the map has.
+
+    Raises:
+        StorageError: the folder holds another map or something else, or cannot be written.
+    """
+
+    def __init__(self, folder: Path, settings: Mapping[str, Any], drivers: int, cells: int) -> None:
+        self.folder, self._drivers, self._cells = folder, drivers, cells
+        made = json.loads(json.dumps(settings))
+        path = folder / SETTINGS
+        try:
+            (folder / CHUNKS).mkdir(parents=True, exist_ok=True)
+            before = parse_json(read_bytes(path)) if path.exists() else None
+            other = any(one.name not in (SETTINGS, CHUNKS) for one in folder.iterdir())
+        except OSError as error:
+            raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+        except ValueError as error:
+            raise StorageError(f"{path}: is damaged: {error}") from None
+        if before is None:
+            if other:
+                raise StorageError(f"{folder}: holds something else than a map, choose another")
+            write_whole(path, [json.dumps(made, indent=1).encode()])
+        elif before != made:
+            known = before if isinstance(before, dict) else {}
+            differs = ", ".join(name for name in made if known.get(name) != made[name])
+            raise StorageError(
+                f"{folder}: holds another map (it differs in {differs or 'its settings'}); choose "
+                "another folder (--out), or remove it"
+            )
+
+    @property
+    def count(self) -> int:
+        """The number of chunks."""
+        return -(-self._cells // CHUNK)
+
+    def bounds(self, i: int) -> tuple[int, int]:
+        """Return the numbers of a chunk's first cell and of the one after its last."""
+        return i * CHUNK, min((i + 1) * CHUNK, self._cells)
+
+    def read(self, i: int) -> Codes | None:
+        """Return a chunk's outcomes, ``(drivers, n)``; None if it is not there, whole and sound."""
+        start, stop = self.bounds(i)
+        try:
+            found = np.load(io.BytesIO(read_bytes(self._path(i))), allow_pickle=False)
+        except (OSError, ValueError, EOFError):
+            return None
+        if not isinstance(found, np.ndarray) or found.dtype != np.int8:
+            return None
+        if found.shape != (self._drivers, stop - start):
+            return None
+        return found if np.isin(found, list(Outcome)).all() else None
+
+    def write(self, i: int, outcomes: Codes) -> None:
+        """Keep a chunk's outcomes, whole or not at all.
+
+        Raises:
+            StorageError: it cannot be written.
+        """
+        data = io.BytesIO()
+        np.save(data, outcomes, allow_pickle=False)
+        write_whole(self._path(i), [data.getvalue()])
+
+    def _path(self, i: int) -> Path:
+        return self.folder / CHUNKS / f"{i:06d}.npy"

@@ -1,0 +1,72 @@
+"""The page: a picture's pixels are cells, and it needs nothing but itself."""
+
+import base64
+import io
+import re
+
+import numpy as np
+from PIL import Image
+
+from bridgegen.preventability import CellClass, GridAxis, map_preventability
+from bridgegen.preventability.picture import COLOURS, png
+
+
+def test_a_pixel_has_the_colour_of_its_cell_s_class():
+    codes = np.array([[0, 1, 2], [3, 4, 0]], np.int8)
+    with Image.open(io.BytesIO(png(codes))) as picture:
+        assert picture.size == (3, 2)
+        pixels = np.asarray(picture.convert("RGB"))
+    for at, code in np.ndenumerate(codes):
+        assert "#" + pixels[at].tobytes().hex() == COLOURS[CellClass(code)]
+
+
+def test_the_colours_differ_in_grey_too():
+    """Two colours of one lightness would be one to who sees no colours; classes that may touch."""
+    grey = [
+        0.2126 * int(c[1:3], 16) + 0.7152 * int(c[3:5], 16) + 0.0722 * int(c[5:7], 16)
+        for one, c in COLOURS.items()
+        if one <= CellClass.NOT_APPLICABLE
+    ]
+    assert min(abs(a - b) for i, a in enumerate(grey) for b in grey[:i]) > 25.0
+
+
+def test_the_page_shows_every_driver_upright_and_loads_nothing(tmp_path):
+    found = map_preventability(
+        "r157/cut-in", ["route-follower", "un-r157"],
+        grid={
+            "gap": GridAxis(1.0, 61.0, 7),
+            "relative_speed": GridAxis("10 km/h", "50 km/h", 3),
+            "lateral_speed": GridAxis(0.6, 1.8, 2),
+        },
+        out=tmp_path / "map",
+    )  # fmt: skip
+    page = found.page.read_text("utf-8")
+    pictures = re.findall(r'href="data:image/png;base64,([^"]+)"', page)
+    assert len(pictures) == 2 * 2
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert "<script" not in page
+    with Image.open(io.BytesIO(base64.b64decode(pictures[1]))) as picture:
+        pixels = np.asarray(picture)  # of route-follower, the second lateral speed
+    expected = found.classes["route-follower"][:, :, 1].T[::-1]
+    np.testing.assert_array_equal(pixels, expected)
+    for one in (CellClass.AVOIDED, CellClass.PREVENTABLE):
+        assert f"{found.counts('route-follower')[one]:,} <small>" in page
+
+
+def test_text_of_a_user_is_escaped(tmp_path):
+    """A driver is called by its path, which may hold anything."""
+    folder = tmp_path / "<b>"
+    folder.mkdir()
+    (folder / "mine.py").write_text(
+        "import numpy as np\n"
+        "from bridgegen.ego.interface import Control\n"
+        "class D:\n"
+        "    def reset(self, n, scene): pass\n"
+        "    def act(self, o): return Control(np.full(len(o.v), -8.0), np.zeros(len(o.v)))\n"
+    )
+    found = map_preventability(
+        "r157/cut-in", f"{folder}/mine.py:D", grid=["gap=60:61:2"], out=tmp_path / "map"
+    )
+    page = found.page.read_text("utf-8")
+    assert "<b>" not in page
+    assert "&lt;b&gt;" in page
