@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.preventability.classes import CellClass, Outcome, classes
+from bridgegen.preventability.classes import CellClass, Outcome, classes, collides
+from bridgegen.simulation.rollout import Rollout
 
 A, C, F, N, X = (
     Outcome.AVOIDED, Outcome.COLLIDED, Outcome.FAILED, Outcome.NOT_APPLICABLE, Outcome.NOT_NEEDED,
@@ -35,3 +36,32 @@ def test_the_class_follows_from_the_outcomes(driver, models, expected):
 
 def test_every_class_has_a_label_of_its_own():
     assert len({one.label for one in CellClass}) == len(CellClass)
+
+
+def still(x: float, y: float = 0.0, h: float = 0.0, n_steps: int = 2) -> Rollout:
+    """An ego at the origin, 4 m by 2 m, and another at (x, y, h), 2 m by 1 m; at instant 1 only."""
+    place = np.zeros((1, 2, 2))
+    xs, ys, hs = place.copy(), place.copy(), place.copy()
+    xs[0, 1], ys[0, 1], hs[0, 1] = (100.0, x), y, h
+    return Rollout(
+        time_step=0.1, names=("ego", "other"), box=np.array([[4.0, 2.0, 1.0], [2.0, 1.0, 0.0]]),
+        x=xs, y=ys, h=hs, v=place, a=place, offset=place, n_steps=np.array([n_steps]),
+        status=np.zeros(1, np.int8),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rollout", "expected"),
+    [
+        (still(3.98 + 0.005), True),  # the ego's front is at 3 m, the other's rear at x - 1 m
+        (still(3.995), False),  # 5 mm are a touch
+        (still(4.5), False),
+        (still(1.0, 1.48), True),  # beside it: flanks at 1 m and y - 0.5 m
+        (still(1.0, 1.495), False),
+        (still(3.4, 0.0, np.pi / 2), True),  # across the way: its flank is at x - 0.5 m
+        (still(3.6, 0.0, np.pi / 2), False),
+        (still(3.98, n_steps=1), False),  # after the scenario's end
+    ],
+)
+def test_boxes_collide_that_overlap_by_more_than_a_centimetre(rollout, expected):
+    assert collides(rollout).tolist() == [expected]
