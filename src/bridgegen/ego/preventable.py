@@ -11,6 +11,12 @@ European Commission's code has it (JRC-FSM, whose crashes they have, cell for ce
 - ``fsm``, the fuzzy safety model: 0.75 s after a distance has become unsafe, it brakes by how
   unsafe it is, up to 6 m/s².
 
+Beside these two, which are the regulation's, a third is known here:
+
+- ``rss``, a driver by responsibility-sensitive safety with the parameters of the Commission's code:
+  0.75 s after the distances along and across the way have both become unsafe, it brakes by
+  12.65 m/s³ up to 0.774 g for as long as they are.
+
 The road is straight, level and dry, and braking is not limited by friction. The other vehicle does
 not react. It is a collision, too, if the other drives into the ego's side.
 
@@ -18,7 +24,7 @@ The text of the regulation adds 0.4 s of perception to each disturbance; see doc
 
 Sources: UN Regulation 157, 01 series of amendments, annex 3 (00 series: annex 4, appendix 3);
 European Commission, JRC-FSM; Mattas et al., Accident Analysis & Prevention 148 (2020) 105794 and
-174 (2022) 106743.
+174 (2022) 106743; Shalev-Shwartz, Shammah and Shashua, arXiv:1708.06374 (RSS).
 """
 
 from collections.abc import Callable
@@ -49,6 +55,13 @@ LANE_GAP = 1.6
 SIZE = (4.3, 1.9)
 """m, length and width of a car in the Commission's code."""
 MODELS = ("un-r157", "fsm")
+"""The regulation's models."""
+KNOWN = (*MODELS, "rss")
+"""All models that drive here."""
+RSS_ACCELERATION, RSS_BRAKING = 3.0, 6.0
+"""m/s², by which RSS expects the ego to accelerate while it reacts, and both to brake at least."""
+RSS_LATERAL, RSS_MARGIN = 1.0, 0.3
+"""m/s² across the way, likewise, and the distance [m] that is left there."""
 
 
 class _Place(NamedTuple):
@@ -93,7 +106,7 @@ def avoids_cut_in(
             cut-in begins, 0 where the bodies begin to overlap.
         ego_size: length and width [m].
         other_size: the same of the other.
-        driver: one of `MODELS`.
+        driver: one of `KNOWN`.
 
     Returns:
         ``(N,)`` bool.
@@ -142,7 +155,7 @@ def avoids_cut_out(
         ego_speed: ``(N,)`` [m/s].
         other_speed: ``(N,)`` [m/s], of the revealed vehicle, constant; 0: it stands.
         gap: ``(N,)`` [m], from the ego's front to the revealed vehicle's rear.
-        driver: one of `MODELS`.
+        driver: one of `KNOWN`.
 
     Returns:
         ``(N,)`` bool.
@@ -173,7 +186,7 @@ def avoids_deceleration(
         gap: ``(N,)`` [m], from the ego's front to the other's rear; the regulation's ego follows at
             2 s.
         deceleration: ``(N,)`` [m/s²], >= 0, at once and constant.
-        driver: one of `MODELS`.
+        driver: one of `KNOWN`.
 
     Returns:
         ``(N,)`` bool.
@@ -227,8 +240,8 @@ def _avoids(
 
     Positions follow from the speeds at the end of each step, as in the Commission's code.
     """
-    if driver not in MODELS:
-        raise UnknownNameError("model of a careful driver", driver, MODELS)
+    if driver not in KNOWN:
+        raise UnknownNameError("model of a careful driver", driver, KNOWN)
     half, both = 0.5 * (ego_length + other_length), ego_length + other_length
     x = v / RATE if cut_in else np.zeros_like(v)
     waits, brake, before = np.full_like(v, CAREFUL_REACTION), np.zeros_like(v), v.copy()
@@ -241,6 +254,9 @@ def _avoids(
         if driver == "un-r157":
             risk, ended = _un_r157_risk(ahead, gap, closing, other.side, cut_in)
             over |= ended
+            wanted = np.full_like(v, CAREFUL_BRAKING)
+        elif driver == "rss":
+            risk = _rss_risk(v, ahead, gap, other)
             wanted = np.full_like(v, CAREFUL_BRAKING)
         else:
             risk, wanted = _fsm_risk(v, (v - before) * RATE, ahead, gap, both, other)
@@ -255,7 +271,8 @@ def _avoids(
         waits = np.where(risk & waiting, waits - 1.0 / RATE, waits)
         collided |= ~over & (gap < 0.0) & (other.side < 0.0)
         before, v = v, np.maximum(v - change / RATE, 0.0)
-        over |= collided | (before == 0.0)
+        stands = before == 0.0
+        over |= collided | (stands & (gap >= 0.0) if cut_in else stands)
         if cut_in:  # a vehicle that is passed, or gets away
             over |= (ahead < -half) | ((gap >= 0.0) & reacts & (closing <= 0.0))
         if over.all():
@@ -298,6 +315,17 @@ def _fsm_risk(
     urgent = COMFORT_BRAKING + critical * (FSM_BRAKING - COMFORT_BRAKING)
     wanted = np.where(critical > 0.0, urgent, proactive * COMFORT_BRAKING)
     return counts & (wanted > 0.0), wanted
+
+
+def _rss_risk(v: Float, ahead: Float, gap: Float, other: _Place) -> Bool:
+    """Return where both distances are less than RSS demands; the ego keeps to its way."""
+    rho, hardest = CAREFUL_REACTION, 2.0 * RSS_BRAKING
+    long = v * rho + 0.5 * RSS_ACCELERATION * rho**2 + (v + rho * RSS_ACCELERATION) ** 2 / hardest
+    long -= other.speed**2 / hardest
+    after = other.inward + RSS_LATERAL * rho
+    across = RSS_MARGIN + 0.5 * (other.inward + after) * rho + after**2 / (2.0 * RSS_LATERAL)
+    risk: Bool = (ahead >= 0.0) & (gap < long) & (other.side < across)
+    return risk
 
 
 def _share(gap: Float, safe: Float, unsafe: Float) -> Float:

@@ -17,6 +17,7 @@ from bridgegen.errors import InputError, Interrupted
 from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
+from bridgegen.preventability import arithmetic
 from bridgegen.preventability.chunks import ChunkStore
 from bridgegen.preventability.classes import Codes, Outcome, outcomes
 from bridgegen.preventability.grid import Grid, GridAxis, grid_of
@@ -59,7 +60,8 @@ def map_preventability(
 
     Args:
         scenario: a name of the catalogue or of a pack, or the path of a file.
-        ego: the drivers under test, by name; one, or several to compare.
+        ego: the drivers under test, by name; one, or several to compare. Beside drivers,
+            `arithmetic.NAMES`: models as the regulation computes them.
         grid: the axes, by the names of parameters: the pictures' X axis, Y axis, then what the
             pictures differ in; or texts ``NAME=LOW:HIGH:N``. By default that of the scenario.
         models: the drivers that decide whether a collision is preventable.
@@ -80,8 +82,11 @@ def map_preventability(
     drivers = _distinct([ego] if isinstance(ego, str) else ego, "driver")
     judges = _distinct(models, "model")
     for name in (*drivers, *judges):
-        egos.get(name)
+        if name not in arithmetic.NAMES:
+            egos.get(name)
     logical = driven_by(load(scenario), others)
+    if any(name in arithmetic.NAMES for name in (*drivers, *judges)):
+        arithmetic.require(logical.name)
     space = logical.space(fixed=dict(fixed or {}))
     cells = grid_of(logical.name, space, grid)
     if twice := [name for name in cells.names if name in space.fixed]:
@@ -159,6 +164,8 @@ class _Run:
     def _outcomes(self, name: str, X: Float) -> Codes:
         if not len(X):
             return np.empty(0, np.int8)
+        if name in arithmetic.NAMES:
+            return arithmetic.outcomes(name, self._scenario.name, self._grid.space, X)
         if name not in self._pipelines:
             self._say.compile()
             options = PipelineOptions(ego=name)
