@@ -32,6 +32,15 @@ COUNTS = {  # (ego, other) [km/h]: crashes of un-r157, of fsm
 }  # fmt: skip
 
 
+RSS_COUNTS = {  # (ego, other) [km/h]: crashes of its "RSS"
+    (20, 10): 30, (30, 10): 87, (30, 20): 29, (40, 10): 121, (40, 20): 85, (40, 30): 29,
+    (50, 10): 159, (50, 20): 119, (50, 30): 85, (50, 40): 29, (60, 10): 196, (60, 20): 158,
+    (60, 30): 119, (60, 40): 85, (60, 50): 29, (70, 10): 125, (70, 40): 61, (90, 10): 197,
+    (90, 40): 102, (90, 70): 42, (110, 10): 306, (110, 40): 162, (110, 70): 76, (110, 100): 19,
+    (130, 10): 428, (130, 40): 247, (130, 70): 124, (130, 100): 61,
+}  # fmt: skip
+
+
 def crashes(ego: float, other: float, driver: str) -> int:
     gaps = np.arange(1, 60) if ego <= 60 else np.arange(1, 120, 2)
     lateral = np.arange(0.0, 1.8, 0.1)
@@ -43,6 +52,20 @@ def crashes(ego: float, other: float, driver: str) -> int:
 @pytest.mark.parametrize(("pair", "counts"), COUNTS.items())
 def test_it_counts_the_crashes_that_the_commissions_code_counts(pair, counts):
     assert tuple(crashes(*pair, driver) for driver in MODELS) == counts
+
+
+@pytest.mark.parametrize(("pair", "count"), RSS_COUNTS.items())
+def test_rss_counts_the_crashes_that_the_commissions_code_counts(pair, count):
+    assert crashes(*pair, "rss") == count
+
+
+def test_rss_brakes_beside_the_other_before_the_bodies_overlap():
+    """At 1 m/s it wants 0.3 + 0.75 * (1 + 1.75) / 2 + 1.75²/2 = 2.9 m beside it, more than 1.6 m.
+
+    So it reacts at once where un-r157 waits until the bodies overlap, 1.6 s later.
+    """
+    assert avoids_cut_in(20.0, 10.0, 24.0, 1.0, driver="rss")
+    assert not avoids_cut_in(20.0, 10.0, 24.0, 1.0, driver="un-r157")
 
 
 def test_a_car_that_cuts_in_at_a_ttc_of_more_than_2_s_is_preventable_by_definition():

@@ -137,7 +137,7 @@ def _block(result: PreventabilityMap, further: tuple[int, ...]) -> str:
     """Return the pictures of one block: a row a driver, a column a value of the third axis."""
     grid = result.grid
     columns = _spread(grid.shape[2], PANELS) if len(grid.shape) > 2 else [None]
-    style = f"grid-template-columns: 110px repeat({len(columns)}, minmax(150px, 260px))"
+    style = f"grid-template-columns: 130px repeat({len(columns)}, minmax(150px, 260px))"
     parts = [f'<div class="panels" style="{style}">']
     if len(grid.shape) > 2:
         parts.append("<div></div>")
@@ -145,7 +145,8 @@ def _block(result: PreventabilityMap, further: tuple[int, ...]) -> str:
             text = f"{grid.names[2]} = {grid.values[2][column]:.4g} {grid.units[2]}"
             parts.append(f'<div class="head">{escape(text)}</div>')
     for name in result.drivers:
-        parts.append(f'<div class="driver">{escape(name)}</div>')
+        label = escape(name).replace(":", ":<wbr>").replace("/", "/<wbr>")
+        parts.append(f'<div class="driver">{label}</div>')
         for column in columns:
             place = () if column is None else (column, *further)
             codes = result.classes[name][(slice(None),) * min(len(grid.shape), 2) + place]

@@ -34,7 +34,8 @@ def print_map(result: "PreventabilityMap", seconds: float, *, as_json: bool) -> 
         print_table(head, [tuple(one.values()) for one in figures], as_json=True)
         return
     rows = [(one["driver"], *(_cell(one, kind) for kind in CellClass)) for one in figures]
-    print_table(("driver", *(kind.name.lower() for kind in CellClass)), rows, as_json=False)
+    head = ("driver", *(kind.name.lower().replace("_", " ") for kind in CellClass))
+    print_table(head, rows, as_json=False)
     print(f"\n{'page':<12}{result.page}")
     print(f"{'arrays':<12}{result.folder}")
     print(f"{'wall time':<12}{seconds:.1f} s, {result.grid.cells:,} cells")
@@ -42,4 +43,4 @@ def print_map(result: "PreventabilityMap", seconds: float, *, as_json: bool) -> 
 
 def _cell(figures: dict[str, object], kind: "CellClass") -> str:
     count, share = figures[kind.name.lower()], figures.get(f"{kind.name.lower()}_share")
-    return f"{count:,} ({share:.2%})" if isinstance(share, float) else f"{count:,}"
+    return f"{count:,} {share:.1%}" if isinstance(share, float) else f"{count:,}"
