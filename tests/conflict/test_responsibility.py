@@ -106,6 +106,85 @@ def test_an_obstacle_that_is_revealed_too_late_is_nobodys(track, meeting, course
     assert verdict(early) == (EGO, Rule.STANDING_AHEAD)
 
 
+def wrong_way(track, meeting, v, stands, **more):
+    """The ego keeps v; a car comes towards it at 10 m/s, has stopped at 5 s and stands so long [s].
+
+    It brakes by 5 m/s² from 3 s on; the bodies are 4 m long, so they meet where the ego has driven
+    for 5 s and so long.
+    """
+    speed = np.interp(DT * np.arange(301), [0.0, 3.0, 5.0], [10.0, 10.0, 0.0])
+    ghost = track(x=4.0 + v * (5.0 + stands) + 40.0, h=np.pi, v=speed, t=15.0)  # 30 and 10 m
+    return meeting(track(v=v, t=15.0), ghost, claims=[0], **more)
+
+
+@pytest.mark.parametrize("v", [12.0, 20.0, 30.0])
+def test_one_that_came_against_the_traffic_is_a_standing_obstacle_since_it_stands(
+    track, meeting, v
+):
+    enough = (stopping_distance(v) + 2.0) / v
+    found = analyse(wrong_way(track, meeting, v, enough))
+    assert found.type[0, 1] == ConflictType.HEAD_ON
+    assert verdict(wrong_way(track, meeting, v, enough)) == (EGO, Rule.STANDING_AHEAD)
+    assert found.decided[0, 1] == pytest.approx(5.0 / DT, abs=1)
+    assert found.left[0, 1] == pytest.approx(enough, abs=2 * DT)
+    assert found.preventable[0, 1]
+
+
+@pytest.mark.parametrize("v", [12.0, 20.0, 30.0])
+def test_one_that_stopped_too_late_has_driven_on_the_wrong_side(track, meeting, v):
+    """A careful driver would have braked for it, all the same, when it still came: 4 s before."""
+    rollout = wrong_way(track, meeting, v, (stopping_distance(v) - 2.0) / v)
+    assert verdict(rollout) == (BV, Rule.WRONG_SIDE)
+    found = analyse(rollout)
+    assert found.left[0, 1] == pytest.approx(4.0, abs=2 * DT)
+    assert found.preventable[0, 1]
+    assert at_fault(rollout)
+    # at 4 m/s² it takes 140 m to stop from 30 m/s: 4 s are not enough on a slippery road
+    slippery = replace(wrong_way(track, meeting, 30.0, 1.0), friction=np.array([4.0]))
+    assert verdict(slippery) == (BV, Rule.WRONG_SIDE)
+    assert not at_fault(slippery)
+
+
+def test_one_that_still_comes_against_the_traffic_drives_on_the_wrong_side(track, meeting):
+    rollout = meeting(track(v=20.0), track(x=104.0, h=np.pi, v=20.0), claims=[0])
+    assert verdict(rollout) == (BV, Rule.WRONG_SIDE)
+    assert not at_fault(rollout)
+    without_map = meeting(track(v=20.0), track(x=104.0, h=np.pi, v=20.0))
+    assert verdict(without_map) == (NEITHER, Rule.LEFT_ITS_LANE)  # which side is whose?
+
+
+def test_one_that_crosses_and_stops_stands_ahead_only_since_it_stands(track, meeting, course):
+    """It has priority by the signs, so the ego gives way; or none, then it stopped too late."""
+    # at 2 m/s across from 20 m to the right of the ego's lane; it stops in it at 10 s
+    creeps = course((0.0, 2.0), (9.5, 2.0), (10.0, 0.0), (16.0, 0.0))
+
+    def met(stands, claim):
+        other = track(
+            x=4.0 + 20.0 * (10.0 + stands) - 1.0, y=-19.5, h=RIGHT_ANGLE, v=creeps, t=16.0
+        )
+        return meeting(track(v=20.0, t=16.0), other, claims=[claim])
+
+    late = met(0.9 * stopping_distance(20.0) / 20.0, BY_SIGNS)
+    assert analyse(late).type[0, 1] == ConflictType.CROSSING
+    assert verdict(late)[1] != Rule.STANDING_AHEAD
+    early = met(1.1 * stopping_distance(20.0) / 20.0, BY_SIGNS)
+    assert verdict(early) == (EGO, Rule.STANDING_AHEAD)
+    assert analyse(early).decided[0, 1] == pytest.approx(10.0 / DT, abs=1)
+
+
+def test_what_was_seen_long_ago_is_not_revealed_late(track, meeting, course):
+    """A slow lorry is seen 8 s before it is struck, more than 4 s, and 4 s are too few to brake."""
+    aside = course((0.0, 0.0), (0.95, 0.0), (1.0, 8.0), (1.5, 8.0), (1.55, 0.0), (12.0, 0.0))
+    van = track(x=15.0, v=30.0, slide=aside, t=12.0)
+    slow = track(x=4.0 + 9.5 * 28.0, v=2.0, t=12.0)
+    rollout = replace(
+        meeting(track(v=30.0, t=12.0), slow, van, claims=[0, 0]), friction=np.array([3.5])
+    )
+    found = analyse(rollout)
+    assert found.kind[0, 1] == CONTACT
+    assert verdict(rollout) == (EGO, Rule.REAR_DISTANCE)
+
+
 # The vehicle ahead, the vehicle behind.
 
 
@@ -386,6 +465,37 @@ def test_all_give_way_to_an_emergency_vehicle(track, meeting):
     assert verdict(plain) == verdict(red) == (EGO, Rule.EMERGENCY_VEHICLE)
     ours = crossing(track, meeting, SIREN)
     assert verdict(ours) == (BV, Rule.EMERGENCY_VEHICLE)
+
+
+def test_who_gives_way_to_a_siren_can_act_before_it_is_in_the_way(track, meeting):
+    """Both come 100 m at 20 m/s: it is in the ego's strip 0.3 s before, heard and seen all along."""
+    rollout = meeting(
+        track(x=-100.0, v=20.0), track(y=-100.0, h=RIGHT_ANGLE, v=20.0), claims=[-SIREN]
+    )
+    assert verdict(rollout) == (EGO, Rule.EMERGENCY_VEHICLE)
+    found = analyse(rollout)
+    assert found.left[0, 1] == pytest.approx(4.0, abs=2 * DT)
+    assert found.preventable[0, 1]
+
+
+def test_who_could_not_perceive_a_siren_in_time_is_not_blamed(track, meeting):
+    """A wall hides it until 10 m before they meet; it takes 15 m to stop."""
+    ego, other = track(x=-40.0, v=10.0), track(y=-40.0, h=RIGHT_ANGLE, v=10.0)
+    open_ = meeting(ego, other, claims=[-SIREN])
+    assert verdict(open_) == (EGO, Rule.EMERGENCY_VEHICLE)
+    # d from where they would meet, the line from the ego's front to the other's centre passes
+    # (-a, -a), a = d (d - 2) / (2 d - 2): 6 m for d = 13 m. The wall ends 6.1 m before.
+    wall = track(x=-13.2, y=-13.2, h=np.pi / 4)
+    hidden = meeting(
+        ego, other, wall, claims=[-SIREN, 0],
+        boxes=[(4.0, 2.0, 0.0), (4.0, 2.0, 0.0), (20.0, 2.0, 0.0)],
+    )  # fmt: skip
+    assert verdict(hidden) == (NEITHER, Rule.REVEALED_LATE)
+    assert not at_fault(hidden)
+    from_start = meeting(
+        track(x=-13.0, v=10.0), track(y=-13.0, h=RIGHT_ANGLE, v=10.0), claims=[-SIREN]
+    )
+    assert verdict(from_start) == (NEITHER, Rule.UNSAFE_START)
 
 
 def test_a_red_light_far_behind_does_not_decide(track, meeting):

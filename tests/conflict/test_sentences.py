@@ -54,11 +54,31 @@ def test_a_pedestrian_steps_out(track, meeting):
 def test_what_stands_far_ahead_is_no_risk_for_so_long(track, meeting):
     text = of(meeting(track(v=10.0, t=9.0), track(x=84.0, t=9.0)))
     assert text.endswith(
-        "; no other participant hid it for the last 8.0 s, and a careful driver (UN R157, "
-        "Annex 3) would have avoided it."
+        "; it stood there, hidden by no other participant, for the last 8.0 s, and a careful driver "
+        "(UN R157, Annex 3) would have avoided it."
     )
     near = of(meeting(track(v=10.0), track(x=34.0)))
     assert "; the risk arose 3.0 s before, and a careful driver" in near
+
+
+def test_one_that_came_on_the_wrong_side_and_stopped(track, meeting):
+    """From 10 m/s it stops at 5 s, 4.5 s before: 47 m of the ego's 90 m would have sufficed."""
+    v = np.interp(0.05 * np.arange(301), [0.0, 3.0, 5.0], [10.0, 10.0, 0.0])
+
+    def met(stands):
+        ghost = track(x=44.0 + 20.0 * (5.0 + stands), h=np.pi, v=v, t=15.0)
+        return of(meeting(track(v=20.0, t=15.0), ghost, claims=[0]))
+
+    assert (
+        "the ego is responsible: it did not stop for what stood in the path for long enough (StVO "
+        "§ 3 (1): stop within the distance seen); it stood there, hidden by no other participant, "
+        "for the last 4.5 s, and a careful driver"
+    ) in met(4.5)
+    assert (
+        "'bv' is responsible: it drove on the wrong side of the road, towards the ego (Vienna "
+        "Convention, Art. 10; StVO § 2 (1), (2)); the risk arose 4.0 s before, and a careful driver "
+        "(UN R157, Annex 3) would have avoided it."
+    ) in met(1.0)
 
 
 def test_near_miss(track, meeting, course):

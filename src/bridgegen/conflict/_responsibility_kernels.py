@@ -64,6 +64,7 @@ from bridgegen.conflict._codes import (
     UNSAFE_START,
     VRU_BY_FRONT,
     VRU_INTO_SIDE,
+    WRONG_SIDE,
 )
 from bridgegen.conflict._geometry_kernels import entered, visible_from
 from bridgegen.conflict._limits import (
@@ -94,9 +95,9 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     on_foot = IS_VULNERABLE[scene.kinds[e]]
     entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk = visible_from(scene, e, entry, k)
-    since = risk
-    if real[STOOD_OTHER] < STOOD:  # a moving body is a risk only once the two are near in time
-        since = max(risk, k - int(HORIZON / scene.dt))
+    since, stands = risk, still_since(scene.v[e], scene.first, k)
+    if stands > risk + 1:  # a moving body is a risk only once the two are near in time, or it stops
+        since = max(risk, min(stands, k - int(HORIZON / scene.dt)))
     level = braked(scene, 0, e, since, since, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
@@ -116,6 +117,7 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
             since,
             side,
             risk > entry,
+            stands,
             avoidable,
             whole,
             real,
@@ -125,9 +127,13 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
 
 @kernel
 def decide(
-    scene, e, k, kind, own, own_part, risk, since, side, late, avoidable, whole, real
+    scene, e, k, kind, own, own_part, risk, since, side, late, stands, avoidable, whole, real
 ):  # fmt: skip
-    """Return the responsible party, and the rule."""
+    """Return the responsible party, and the rule.
+
+    The other has been visible in the ego's way from ``risk`` on, a danger from ``since`` on, and
+    stands from ``stands`` on (k + 1: it moves); ``late``: it was hidden before ``risk``.
+    """
     if kind == EGO_STANDING:
         return OTHER, STRUCK_STANDING
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
@@ -147,12 +153,26 @@ def decide(
     if kind == OBJECT and scene.v[e, k] > STANDS and not strikes_with_front(own, own_part):
         return OTHER, LEFT_ITS_LANE
     if kind in (REAR_END_STRIKING, OBJECT):
-        return of_striking(scene, e, k, risk, side, late, avoidable, whole)
-    if real[STOOD_OTHER] >= STOOD and avoidable:
+        return of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole)
+    if real[STOOD_OTHER] >= STOOD and could_stop_since(scene, e, risk, since, stands, avoidable):
+        if stands > risk + 1:
+            whole[DECIDED] = stands
+        whole[PREVENTABLE] = True
         return EGO, STANDING_AHEAD
     if kind in (SIDE_SWIPE, HEAD_ON):
         return of_leaving(scene, e, k, kind, own, own_part, avoidable)
     return of_crossing(scene, e, k, since, whole)
+
+
+@kernel
+def could_stop_since(scene, e, risk, since, stands, avoidable):
+    """Return whether the careful driver could stop before body e since that stands.
+
+    Before, it was no standing obstacle, however long it was to be seen.
+    """
+    if stands <= max(risk + 1, since):
+        return avoidable
+    return braked(scene, 0, e, stands, stands, BRAKING) == CLEAR
 
 
 @kernel
@@ -223,17 +243,17 @@ def of_struck(scene, e, k, whole):
 
 
 @kernel
-def of_striking(scene, e, k, risk, side, late, avoidable, whole):
+def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
     """Decide where the ego drives into the rear of the other, or into an object."""
     if late and not avoidable:
-        return NEITHER, REVEALED_LATE
+        if since == risk or braked(scene, 0, e, risk, risk, BRAKING) != CLEAR:
+            return NEITHER, REVEALED_LATE
     v = scene.v
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
     moved = ego_came_over(scene, e, min(risk + 1, k), 0)
     claim = scene.claims[e]
     if mine and not its and claim < 0:  # the ego turned into the way of one that had priority
         return EGO, rule_of(claim)
-    stands = still_since(v[e], scene.first, k)
     if stands <= risk + 1 and stands <= k:  # it stood when it came into the way
         if avoidable or moved:
             return EGO, STANDING_AHEAD
@@ -280,6 +300,10 @@ def of_leaving(scene, e, k, kind, own, own_part, avoidable):
     along = v[e, k] * (c[e, k] * c[0, k] + s[e, k] * s[0, k])
     if kind == SIDE_SWIPE and strikes_with_front(own, own_part) and v[0, k] > along and avoidable:
         return EGO, CUT_IN_PREVENTABLE
+    if kind == HEAD_ON and scene.routed:
+        _, its = steering(scene, e, k, JUST_NOW)
+        if its < ASIDE:  # it has come this way all the time
+            return OTHER, WRONG_SIDE
     return OTHER, LEFT_ITS_LANE
 
 
@@ -295,6 +319,8 @@ def of_crossing(scene, e, k, risk, whole):
     if ego_could and not it_could:
         return EGO, JUNCTION_OCCUPIED
     claim = scene.claims[e]
+    if claim == -SIREN:
+        return of_siren(scene, e, k, whole)
     if claim != 0:
         return (OTHER if claim > 0 else EGO), rule_of(claim)
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
@@ -305,3 +331,19 @@ def of_crossing(scene, e, k, risk, whole):
     j = max(k - int(TURN_TIME / scene.dt), scene.first)
     from_right = scene.c[0, j] * scene.s[e, j] - scene.s[0, j] * scene.c[e, j] > 0.0
     return (EGO if from_right else OTHER), ASSUMED_RIGHT_BEFORE_LEFT
+
+
+@kernel
+def of_siren(scene, e, k, whole):
+    """Decide where the ego has not made way for body e, an emergency vehicle with a siren.
+
+    Siren and blue light say that it will come into the way, so the ego must act before it does.
+    """
+    earliest = k - int(HORIZON / scene.dt)
+    heard = visible_from(scene, e, scene.first, k)
+    since = max(heard, earliest)
+    could = braked(scene, 0, e, since, since, BRAKING) == CLEAR
+    whole[DECIDED], whole[PREVENTABLE] = since, could
+    if could or heard < earliest:
+        return EGO, EMERGENCY_VEHICLE
+    return NEITHER, (REVEALED_LATE if heard > scene.first else UNSAFE_START)

@@ -112,7 +112,7 @@ def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
     left = conflicts.left[row, other]
     arose = f"the risk arose {left:.1f} s before"
     if rule == Rule.STANDING_AHEAD and left > HORIZON:
-        arose = f"no other participant hid it for the last {left:.1f} s"
+        arose = f"it stood there, hidden by no other participant, for the last {left:.1f} s"
     if rule == Rule.UNSAFE_START or kind == ConflictType.EGO_STANDING:
         return ""
     blamed = conflicts.responsible[row, other] == Responsible.EGO

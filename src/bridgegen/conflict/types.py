@@ -130,6 +130,7 @@ class Rule(IntEnum):
     BRAKED_HARD_AHEAD = _codes.BRAKED_HARD_AHEAD
     EMERGENCY_VEHICLE = _codes.EMERGENCY_VEHICLE
     FROM_OFF_ROAD = _codes.FROM_OFF_ROAD
+    WRONG_SIDE = _codes.WRONG_SIDE
 
     @property
     def label(self) -> str:
@@ -226,6 +227,10 @@ RULES = {
     Rule.FROM_OFF_ROAD: (
         "came onto the road from beside it and did not give way to traffic on it",
         "Vienna Convention, Art. 18 (3); StVO § 10",
+    ),
+    Rule.WRONG_SIDE: (
+        "drove on the wrong side of the road, towards the other",
+        "Vienna Convention, Art. 10; StVO § 2 (1), (2)",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",
