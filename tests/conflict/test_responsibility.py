@@ -468,7 +468,7 @@ def test_all_give_way_to_an_emergency_vehicle(track, meeting):
 
 
 def test_who_gives_way_to_a_siren_can_act_before_it_is_in_the_way(track, meeting):
-    """Both come 100 m at 20 m/s: it is in the ego's strip 0.3 s before, heard and seen all along."""
+    """Both come 100 m at 20 m/s: it is in the ego's strip 0.3 s before, perceived all along."""
     rollout = meeting(
         track(x=-100.0, v=20.0), track(y=-100.0, h=RIGHT_ANGLE, v=20.0), claims=[-SIREN]
     )

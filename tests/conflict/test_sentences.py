@@ -54,8 +54,8 @@ def test_a_pedestrian_steps_out(track, meeting):
 def test_what_stands_far_ahead_is_no_risk_for_so_long(track, meeting):
     text = of(meeting(track(v=10.0, t=9.0), track(x=84.0, t=9.0)))
     assert text.endswith(
-        "; it stood there, hidden by no other participant, for the last 8.0 s, and a careful driver "
-        "(UN R157, Annex 3) would have avoided it."
+        "; it stood there, hidden by no other participant, for the last 8.0 s, and a careful "
+        "driver (UN R157, Annex 3) would have avoided it."
     )
     near = of(meeting(track(v=10.0), track(x=34.0)))
     assert "; the risk arose 3.0 s before, and a careful driver" in near
@@ -76,8 +76,8 @@ def test_one_that_came_on_the_wrong_side_and_stopped(track, meeting):
     ) in met(4.5)
     assert (
         "'bv' is responsible: it drove on the wrong side of the road, towards the ego (Vienna "
-        "Convention, Art. 10; StVO § 2 (1), (2)); the risk arose 4.0 s before, and a careful driver "
-        "(UN R157, Annex 3) would have avoided it."
+        "Convention, Art. 10; StVO § 2 (1), (2)); the risk arose 4.0 s before, and a careful "
+        "driver (UN R157, Annex 3) would have avoided it."
     ) in met(1.0)
 
 

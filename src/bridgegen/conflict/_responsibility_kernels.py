@@ -245,9 +245,9 @@ def of_struck(scene, e, k, whole):
 @kernel
 def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
     """Decide where the ego drives into the rear of the other, or into an object."""
-    if late and not avoidable:
-        if since == risk or braked(scene, 0, e, risk, risk, BRAKING) != CLEAR:
-            return NEITHER, REVEALED_LATE
+    in_time = since != risk and braked(scene, 0, e, risk, risk, BRAKING) == CLEAR
+    if late and not avoidable and not in_time:
+        return NEITHER, REVEALED_LATE
     v = scene.v
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
     moved = ego_came_over(scene, e, min(risk + 1, k), 0)

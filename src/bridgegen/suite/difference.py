@@ -94,7 +94,9 @@ def difference(
         if a.problem or b.problem or len(a.rows) != len(b.rows):
             rows.append(RowChange(a.entry, 0, "not comparable", 0.0, 0.0))
             continue
-        rows += [_change(a.entry, i, *both) for i, both in enumerate(zip(a.rows, b.rows))]
+        rows += [
+            _change(a.entry, i, *both) for i, both in enumerate(zip(a.rows, b.rows, strict=True))
+        ]
     return Difference(*egos, tuple(rows))
 
 

@@ -94,7 +94,7 @@ def pipeline_of(job: Job) -> Pipeline:
 
 def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
     """Return the rows of an entry, ``(N, len(pipeline.space.names))``."""
-    return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed)
+    return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed)[0]
 
 
 def _digest(entry: Entry) -> str:
@@ -106,8 +106,11 @@ def _digest(entry: Entry) -> str:
 
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     pipeline = pipeline_of(job)
-    X = rows_of_job(job, pipeline)
     space = pipeline.space
+    X, excluded = rows_of(pipeline.scenario, space, job.samples, job.seed)
+    notes = [*pipeline.scenario.notes, *pipeline.notes]
+    if excluded:
+        notes.append(f"{excluded} combinations are excluded by the scenario's own constraints")
     names = [name for name in space.names if name in {*space.variables, *space.derived}]
     rows: list[RowResult] = []
     for start in range(0, len(X), AT_ONCE):
@@ -123,7 +126,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             "units": [units[name] for name in names],
             "criteria": [one.to_dict() for one in pipeline.monitor],
             "rows": rows,
-            "notes": [*pipeline.scenario.notes, *pipeline.notes],
+            "notes": notes,
         }
     )
 

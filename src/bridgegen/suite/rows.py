@@ -22,7 +22,9 @@ MOST_ROWS = 100_000
 _DRAWS = 31  # a stream of random numbers of its own
 
 
-def rows_of(scenario: SearchedScenario, space: SearchSpace, samples: int, seed: int) -> Float:
+def rows_of(
+    scenario: SearchedScenario, space: SearchSpace, samples: int, seed: int
+) -> tuple[Float, int]:
     """Return the rows that a suite runs of a scenario.
 
     Of a deterministic distribution all combinations of its values; of a stochastic one as many
@@ -30,12 +32,24 @@ def rows_of(scenario: SearchedScenario, space: SearchSpace, samples: int, seed: 
     scrambled Sobol sequence); of a scenario in which nothing varies that one.
 
     Returns:
-        X: ``(N, len(space.names))``, feasible where a distribution leaves that open; see
-        ``SearchedScenario.broken``.
+        X: ``(N, len(space.names))``; and the number of combinations that the scenario's own
+        constraints exclude, which are not among them.
 
     Raises:
-        InputError: there are more than MOST_ROWS.
+        InputError: there are more than MOST_ROWS, or none is left.
     """
+    X = _all(scenario, space, samples, seed)
+    table = {name: X[:, i] for i, name in enumerate(space.names)}
+    excluded = np.zeros(len(X), np.bool_)
+    for rows in scenario.broken(table).values():
+        excluded |= rows
+    if excluded.all():
+        raise InputError(f"{scenario.place}: the scenario's constraints exclude all variations")
+    return X[~excluded], int(excluded.sum())
+
+
+def _all(scenario: SearchedScenario, space: SearchSpace, samples: int, seed: int) -> Float:
+    """Return all rows, those that the scenario's constraints exclude among them."""
     if not space.n_var:
         return space.row({})[np.newaxis]
     if isinstance(scenario, FileScenario):

@@ -157,7 +157,7 @@ def read_suite(folder: Path) -> SuiteRun:
     Raises:
         StorageError: there are none, or they are damaged.
     """
-    header, results = _read(folder / FILE)
+    header, results, _ = _read(folder / FILE)
     if header is None:
         raise StorageError(f"{folder}: holds no results of a suite ({FILE})")
     egos = tuple(dict.fromkeys(one.ego for one in results))
@@ -251,7 +251,7 @@ def _done(
     Raises:
         StorageError: the file is damaged, or of other settings.
     """
-    header, results = _read(path)
+    header, results, torn = _read(path)
     if header is None:
         line = Header(settings=settings).model_dump_json() + "\n"
         write_whole(path, [line.encode()])
@@ -268,7 +268,7 @@ def _done(
         entry = wanted.get((one.entry, one.ego))
         if entry is not None and one.digest and one.digest == _digest(entry):
             found[one.entry, one.ego] = one
-    if len(found) < len(results):  # what has changed is run again, and said once
+    if torn or len(found) < len(results):  # what has changed is run again, and said once
         lines = [header.model_dump_json(), *(one.model_dump_json() for one in found.values())]
         write_whole(path, [("\n".join(lines) + "\n").encode()])
     return found
@@ -281,8 +281,10 @@ def _digest(entry: Entry) -> str:
         return ""
 
 
-def _read(path: Path) -> tuple[Header | None, list[EntryResult]]:
-    """Return the header and the results in a file; a last line without an end is left out.
+def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
+    """Return the header and the results in a file, and whether its last line has no end.
+
+    Such a line, of a process that was killed as it wrote, is left out.
 
     Raises:
         StorageError: it cannot be read, or is damaged.
@@ -293,12 +295,12 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult]]:
             raise StorageError(f"{path}: may have at most {MOST_BYTES} bytes, got {size}")
         data = path.read_bytes()
     except FileNotFoundError:
-        return None, []
+        return None, [], False
     except OSError as error:
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
-    *lines, _ = data.split(b"\n")
+    *lines, rest = data.split(b"\n")
     if not lines:
-        return None, []
+        return None, [], False
     try:
         header = Header.model_validate(parse_json(lines[0]))
         results = [EntryResult.model_validate(parse_json(line)) for line in lines[1:]]
@@ -311,7 +313,7 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult]]:
         raise StorageError(f"{path}: is damaged: {where}: {first['msg']}") from None
     except (InputError, ValueError) as error:
         raise StorageError(f"{path}: is damaged: {error}") from None
-    return header, results
+    return header, results, bool(rest)
 
 
 def _cores() -> int:

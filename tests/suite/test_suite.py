@@ -1,0 +1,157 @@
+"""Suites: what is found, all variations, resuming, and what a broken file costs."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.errors import InputError, StorageError
+from bridgegen.options import CommonOptions
+from bridgegen.suite.difference import difference
+from bridgegen.suite.entries import find_entries
+from bridgegen.suite.results import EntryResult, RowResult, counts
+from bridgegen.suite.suite import FILE, read_suite, run_suite
+from bridgegen.verdict.fail_if import Comparison
+from bridgegen.verdict.of_suite import SuiteCriteria, figures_of, figures_of_difference
+
+CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
+
+
+def test_scenarios_and_distributions_are_found_in_folders(folder):
+    (folder / "catalogue.xosc").write_text(
+        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2025-01-01T00:00:00" '
+        'description="" author=""/><Catalog name="c"/></OpenSCENARIO>'
+    )
+    (folder / "readme.yaml").write_text("notes: none")
+    shutil.copy(folder / "plain.xosc", folder / "sub" / "twin.xosc")
+    shutil.copy(folder / "plain.xosc", folder / "twin.xosc")
+    found = find_entries([folder, "cut-in"])
+    named = {one.name: (Path(one.scenario).name, bool(one.distribution)) for one in found}
+    assert named == {
+        "cut-in": ("cut-in", False),
+        "plain": ("plain.xosc", False),
+        "varied_distribution": ("varied.xosc", True),  # the scenario itself is among them
+        f"{folder.name}/twin": ("twin.xosc", False),
+        "sub/twin": ("twin.xosc", False),
+    }
+
+
+def test_what_is_no_scenario_is_refused(folder, tmp_path):
+    (tmp_path / "notes.yaml").write_text("a: 1")
+    with pytest.raises(InputError) as refused:
+        find_entries([tmp_path / "notes.yaml", "nowhere", folder])
+    problems = "\n".join(refused.value.problems)
+    assert "notes.yaml: is no scenario" in problems
+    assert "nowhere: no such file, folder or scenario" in problems
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="no scenario in"):
+        find_entries([tmp_path / "empty"])
+
+
+def test_all_variations_run_and_are_judged(folder, tmp_path):
+    suite = run_suite(
+        folder, egos=["route-follower"], options=CRITERIA, out=tmp_path / "out", workers=1
+    )
+    by_name = {one.entry: one for one in suite.results}
+    varied = by_name["varied_distribution"]
+    assert varied.parameters == ["EgoSpeed", "Gap"]
+    # 3 x 2 combinations, of which the constraint Gap >= 2 s EgoSpeed excludes two
+    assert [row.x for row in varied.rows] == [[8.0, 18.0], [8.0, 40.0], [10.0, 40.0], [14.0, 40.0]]
+    assert any("2 combinations are excluded" in note for note in varied.notes)
+    assert [row.x[0] for row in varied.rows if row.violated] == [14.0]  # faster than 12 m/s
+    assert varied.verdict == "failed"
+    figures = figures_of(suite.results)
+    assert figures["criterion:C-1"] == 2  # and the scenario alone, at 15 m/s
+    assert figures["variations"] == 5
+
+
+def test_workers_and_resuming_change_no_bit(folder, tmp_path):
+    whole = run_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
+    text = (tmp_path / "a" / FILE).read_bytes()
+    (tmp_path / "b").mkdir()
+    head, first, *_ = text.splitlines(keepends=True)
+    (tmp_path / "b" / FILE).write_bytes(head + first + b'{"entry": "torn')  # killed while writing
+    again = run_suite(folder, egos=["reference"], out=tmp_path / "b", workers=2)
+    assert again.results == whole.results
+    read = {one.entry: one for one in read_suite(tmp_path / "b").results}
+    assert read == {one.entry: one for one in whole.results}
+
+
+def test_a_changed_file_is_run_again(folder, tmp_path):
+    run_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
+    path = folder / "plain.xosc"
+    path.write_text(path.read_text("utf-8").replace('name="s"', 'name="t"'), "utf-8")
+    ran = []
+    from bridgegen.suite.suite import SuiteCallbacks
+
+    run_suite(
+        folder, egos=["reference"], out=tmp_path / "a", workers=1,
+        callbacks=SuiteCallbacks(ended=lambda one: ran.append(one.entry)),
+    )  # fmt: skip
+    assert ran == ["plain"]
+
+
+def test_other_settings_are_refused(folder, tmp_path):
+    run_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
+    with pytest.raises(StorageError, match=r"other settings \(criteria\)"):
+        run_suite(folder / "plain.xosc", egos=["reference"], options=CRITERIA, out=tmp_path / "a")
+
+
+def test_a_broken_file_is_a_row_and_the_others_run(folder, tmp_path):
+    (folder / "broken.xosc").write_text("<OpenSCENARIO><Storyboard>")
+    text = (folder / "plain.xosc").read_text("utf-8")
+    (folder / "nomap.xosc").write_text(text.replace("straight.xodr", "nowhere.xodr"), "utf-8")
+    suite = run_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
+    problems = {one.entry: one.problem for one in suite.results}
+    assert "not well-formed XML" in problems["broken"]
+    assert "nowhere.xodr" in problems["nomap"]
+    assert problems["plain"] == ""
+    assert counts(suite.results)["not run"] == 2
+    outcomes = SuiteCriteria.read((), tmp_path / "j.xml").judge(suite)
+    assert outcomes[0].verdict != "passed"
+    assert (tmp_path / "j.xml").read_text("utf-8").count("<error") == 2
+
+
+def test_results_are_untrusted(folder, tmp_path):
+    run_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
+    path = tmp_path / "a" / FILE
+    head, line, *_ = path.read_text("utf-8").splitlines()
+    for bad in ('{"suite": 1}', "[1]", line.replace('"rows"', '"rowz"'), "{" * 9000):
+        path.write_text(f"{head}\n{bad}\n", "utf-8")
+        with pytest.raises(StorageError, match="is damaged"):
+            read_suite(tmp_path / "a")
+    path.write_text(json.dumps({"settings": {}, "more": 1}) + "\n", "utf-8")
+    with pytest.raises(StorageError, match="is damaged"):
+        read_suite(tmp_path / "a")
+
+
+def results(*verdicts: str) -> tuple[EntryResult]:
+    rows = [
+        RowResult(problem="x") if one == "n" else RowResult(critical=one == "f", severity=0.1 * i)
+        for i, one in enumerate(verdicts)
+    ]
+    return (EntryResult(entry="e", ego="", digest="d", scenario="s", rows=rows),)
+
+
+def test_a_difference_by_hand():
+    found = difference(results(*"ppffnpp"), results(*"pfpffff"), ("a", "b"))
+    assert found.counts == {
+        "broken": 3, "fixed": 1, "both fail": 1, "both pass": 1, "not comparable": 1,
+    }  # fmt: skip
+    # of four discordant pairs, 3 to 1 or more uneven: 2 (1 + 4) / 16
+    assert found.p_value == pytest.approx(10 / 16)
+    low, high = found.interval("broken")
+    assert low == pytest.approx(0.1181, abs=1e-3)  # Clopper-Pearson of 3 in 6
+    assert high == pytest.approx(0.8819, abs=1e-3)
+    figures = figures_of_difference(found)
+    assert (figures["broken"], figures["fixed"], figures["more_severe"]) == (3, 1, 0)
+    assert np.isfinite(list(figures.values())).all()
+
+
+def test_conditions_are_checked_before_anything_runs(tmp_path):
+    read = SuiteCriteria.read(["failed > 2"], None)
+    assert read.conditions[0].comparisons == (Comparison("failed", ">", 2.0),)
+    with pytest.raises(InputError, match="unknown figure of --fail-if 'faild'"):
+        SuiteCriteria.read(["faild > 2"], None)
