@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen import search as toolkit
+from bridgegen.arrays import Int
 from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.campaign.critical import export_critical, most_critical
 from bridgegen.campaign.exportable import require_exportable
@@ -288,18 +289,22 @@ def _finish(
 ) -> Run:
     """Triage the results, export the most critical scenarios, and write the report."""
     callbacks.stage("triage")
-    rows, record = Recorded(store, whole=WHOLE), None
-    best = np.zeros(0, dtype=np.int64)
+    rows, record = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names)), None
+    best, rule = np.zeros(0, dtype=np.int64), pipeline.objective.rule
+    if rule == "criteria":
+        best = _critical_by_objective(rows, settings.keep)
     if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
         triaged = triage(
-            pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep
-        )
-        record, best = triaged.record, np.array(triaged.exports, dtype=np.int64)
+            pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep,
+            chosen=best.tolist() if rule == "criteria" else None,
+        )  # fmt: skip
+        record = triaged.record
+        if rule != "criteria":
+            best = np.array(triaged.exports, dtype=np.int64)
         write_record(store.folder, record)
-    if pipeline.objective.rule != "harm" and len(best) < settings.keep:
-        # Fill up with what the rule calls critical, in the objective's order.
-        at = np.flatnonzero(rows.critical)
-        more = at[most_critical(rows.U[at], rows.F[at], rows.critical[at], settings.keep)]
+    if rule == "thresholds" and len(best) < settings.keep:
+        # Fill up with what the paper calls critical, in the paper's order.
+        more = _critical_by_objective(rows, settings.keep)
         best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]
     callbacks.stage("export")
     chosen = rows.take(best)
@@ -311,6 +316,13 @@ def _finish(
     there = np.flatnonzero(np.isin(best, [one.evaluation for one in exported]))
     write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
+
+
+def _critical_by_objective(rows: Recorded, keep: int) -> Int:
+    """Return distinct critical rows in the objective's order, ``keep`` at most."""
+    at = np.flatnonzero(rows.critical)
+    found: Int = at[most_critical(rows.U[at], rows.F[at], rows.critical[at], keep)]
+    return found
 
 
 def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bridgegen.campaign.drawing import draw, worst_rollout
+from bridgegen.criteria import headline as judged
 from bridgegen.metrics.metric import distance
 from bridgegen.simulation.rollout import Rollout
 
@@ -53,6 +54,8 @@ def run_html(run: "Run") -> str:
     s, found = run.summary, run.triage
     parts = [f"<p><b>{html.escape(run.settings.scenario)}</b>, ego {html.escape(run.settings.ego)}"]
     parts.append(f": {s.critical} critical of {s.evaluations} evaluations.</p>")
+    if text := judged(run.settings.ego, run.criteria):
+        parts.append(f"<p><b>{html.escape(text)}</b></p>")
     if found is not None:
         parts.append(f"<p>{html.escape(headline(found))}</p>")
         modes = [f"<li>{html.escape(shortly(one))}</li>" for one in found.modes[:10]]

@@ -36,7 +36,7 @@ def rewrite_report(run: Run, pipeline: Pipeline, stage: Callable[[str], None]) -
         return ()
     stage("report")
     with Store.open(run.folder) as store:
-        rows = Recorded(store, whole=WHOLE)
+        rows = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names))
         return (write_run_report(pipeline, Run.of(store, rows), rows, run.exported(len(rows))),)
 
 

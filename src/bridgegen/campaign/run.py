@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from bridgegen.campaign.criteria import CriterionSummary, summarise_criteria
 from bridgegen.campaign.exported import (
     FOLDER,
     MINIMAL,
@@ -18,6 +17,8 @@ from bridgegen.campaign.exported import (
     not_exported,
 )
 from bridgegen.campaign.settings import Settings
+from bridgegen.criteria import CriterionSummary, summarise_criteria
+from bridgegen.errors import StorageError
 from bridgegen.odd.criteria import read_criterion
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows, Store
@@ -131,12 +132,8 @@ class Run:
     @cached_property
     def criteria(self) -> tuple[CriterionSummary, ...]:
         """How its evaluations meet its pass criteria, in their order."""
-        criteria = [read_criterion(one) for one in self.settings.criteria]
-        if not criteria:
-            return ()
         with Store.open(self.folder) as store:
-            rows = Recorded(store, whole=tuple(one.quantity for one in criteria))
-            return summarise_criteria(criteria, rows.metrics, store.metrics)
+            return judged(store, self.settings)
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -174,6 +171,27 @@ class Run:
     def __repr__(self) -> str:
         s = self.summary
         return f"Run({str(self.folder)!r}: {s.critical} critical of {s.evaluations} evaluations)"
+
+
+def judged(store: Store, settings: Settings) -> tuple[CriterionSummary, ...]:
+    """Return how a run's evaluations meet its pass criteria; only their margins are read.
+
+    Raises:
+        StorageError: the database is damaged.
+    """
+    criteria = [read_criterion(one) for one in settings.criteria]
+    if not criteria:
+        return ()
+    of, n = dict(zip(store.metrics, store.columns.metrics, strict=True)), len(store)
+    names = [one.quantity for one in criteria]
+    if missing := sorted({*names} - of.keys()):
+        raise StorageError(f"{store.folder}: the margins of {', '.join(missing)} are not recorded")
+    margins, at = np.empty((n, len(names))), 0
+    for found in store.select([of[name] for name in names], 0, n):
+        with store.damage():
+            margins[at : at + len(found)] = np.array(found, dtype=np.float64)
+        at += len(found)
+    return summarise_criteria(criteria, margins, names)
 
 
 def _summary(store: Store, rows: Rows | Recorded) -> Summary:

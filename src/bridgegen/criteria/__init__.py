@@ -1,7 +1,21 @@
 """Pass criteria applied to rollouts: signals, margins, and what of them a search records."""
 
 from bridgegen.criteria.measured import evaluate, quantity
-from bridgegen.criteria.monitor import CriterionResult, Monitor, unit_of
+from bridgegen.criteria.monitor import CriterionResult, Monitor, margin_in_words, unit_of
 from bridgegen.criteria.signals import SIGNALS, Signal
+from bridgegen.criteria.summary import CriterionSummary, by_gravity, headline, summarise_criteria
 
-__all__ = ["SIGNALS", "CriterionResult", "Monitor", "Signal", "evaluate", "quantity", "unit_of"]
+__all__ = [
+    "SIGNALS",
+    "CriterionResult",
+    "CriterionSummary",
+    "Monitor",
+    "Signal",
+    "by_gravity",
+    "evaluate",
+    "headline",
+    "margin_in_words",
+    "quantity",
+    "summarise_criteria",
+    "unit_of",
+]

@@ -17,6 +17,7 @@ from bridgegen.odd.criteria import ANY, Criterion
 from bridgegen.odd.parameters import at
 from bridgegen.simulation.rollout import Rollout
 from bridgegen.stl import (
+    TINY,
     Dimension,
     Reading,
     check_units,
@@ -180,6 +181,14 @@ class Monitor:
             hint = _near(entity, others) or f"; known: {', '.join(dict.fromkeys(others))}"
             problems.append(f"unknown {kind} '{entity}'{hint}{where}")
         return problems
+
+
+def margin_in_words(margin: float, unit: str, digits: int = 4) -> str:
+    """Return a margin with its unit; 0 where the sides of a comparison are equal."""
+    if isnan(margin):
+        return "unknown"
+    value = 0.0 if abs(margin) <= TINY else margin
+    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
 
 
 def unit_of(one: Criterion) -> str:

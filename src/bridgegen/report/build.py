@@ -11,7 +11,7 @@ from bridgegen.arrays import Taken
 from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict.harm import NEAR_MISS, Count
-from bridgegen.criteria import quantity
+from bridgegen.criteria import by_gravity, quantity, summarise_criteria
 from bridgegen.errors import ScenarioError
 from bridgegen.evaluation import Replays
 from bridgegen.objective import Objective, Rule
@@ -131,6 +131,7 @@ def build_report(
         view=view,
         independent=algorithm == INDEPENDENT,
         harm=pipeline.objective.harm if rule != "thresholds" else "",
+        criteria=pipeline.objective.criteria,
         hashes=hashes,
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
@@ -143,6 +144,12 @@ def build_report(
     if triage and not modes:  # the scenarios nearest to harm
         nearest = [one.evaluation for one in triage.bound.least if one.evaluation is not None]
         first = nearest[:1]
+    judged = summarise_criteria(
+        [one for one in pipeline.monitor if one.quantity in pipeline.metrics],
+        rows.metrics, pipeline.metrics,
+    )  # fmt: skip
+    worst = [one.at for one in (*by_gravity(judged), *judged)]
+    first += [at - 1 for at in worst if at is not None]
     return ReportData(
         head,
         _evaluations(pipeline, rows),
@@ -157,6 +164,7 @@ def build_report(
         confirmations=confirmations,
         triage=triage,
         minimal=_minimal(pipeline, modes, minimal_files),
+        criteria=judged,
     )
 
 
@@ -218,7 +226,9 @@ def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
         Column(
             name,
             pipeline.units[name],
-            rows.metrics[:, j] if name in WHOLE else Deferred(measured, j),
+            rows.metrics[:, j]
+            if name in WHOLE or name.startswith(PREFIX)
+            else Deferred(measured, j),
             quantity(name).description,
         )
         for j, name in enumerate(pipeline.metrics)

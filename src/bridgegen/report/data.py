@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int, Numbers, as_float
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict.findings import Findings
+from bridgegen.criteria import CriterionSummary
 from bridgegen.odd.coverage import CoverageMap
 from bridgegen.report.notes import NoteTable
 from bridgegen.report.playback import Playback
@@ -55,6 +56,7 @@ class RunSummary:
         independent: whether each row was drawn by itself, as random search draws them.
         harm: the metric that makes a scenario critical, "harm" or "harm_any"; "" where the paper's
             thresholds do.
+        criteria: names of the margins that make a scenario critical, where pass criteria do.
         hashes: of the run's inputs and results, name → digest.
         settings: further settings, name → text, in display order.
     """
@@ -86,6 +88,7 @@ class RunSummary:
     view: str = ""
     independent: bool = False
     harm: str = ""
+    criteria: tuple[str, ...] = ()
     hashes: Mapping[str, str] | None = None
     settings: Mapping[str, str] | None = None
 
@@ -149,7 +152,7 @@ class Column:
         name: of the parameter, metric or objective, unique over all columns.
         unit: "m", "m/s", "%", "deg", "s", "count" …; "1" or "" for a pure number.
         values: ``(N,)`` float64 in that unit; NaN or ±inf where it does not exist. Those of
-            objectives and of the metrics of `WHOLE` must be in memory.
+            objectives, of the metrics of `WHOLE` and of margins must be in memory.
         description: one line for people; may be empty.
         low: lower end of the declared range, in the unit; None where there is none.
         high: upper end.
@@ -247,6 +250,7 @@ class ReportData:
         confirmations: of its scenarios in other simulators, one each.
         triage: the failure modes and the bound of the harmful share, once the run has finished.
         minimal: the minimal scenarios of failure modes; ``evaluation`` is the mode's ``shown``.
+        criteria: how the evaluations meet the pass criteria, whose margins are metrics.
     """
 
     summary: RunSummary
@@ -260,6 +264,7 @@ class ReportData:
     confirmations: Sequence[Record] = ()
     triage: Triage | None = None
     minimal: tuple[Playback, ...] = ()
+    criteria: tuple[CriterionSummary, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Bool
+from bridgegen.odd.criteria import PREFIX
 from bridgegen.physics import HARD_BRAKING
 from bridgegen.report import convergence, sentences
+from bridgegen.report.criteria_payload import margins_shown
 from bridgegen.report.data import WHOLE, Column, Evaluations, ReportData
 from bridgegen.report.findings_payload import findings_payload, implausible_payload
 from bridgegen.report.packed import packed_files, packed_motions, road_key
@@ -79,6 +81,7 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
     wanted += [one.evaluation for each in data.confirmations for one in each.scenarios]
     modes = data.triage.modes if data.triage else ()
     wanted += [one.shown for one in modes]
+    wanted += [one.at - 1 for one in data.criteria if one.at is not None]
     shown = _shown(data.evaluations, wanted)
     page = {
         "live": False,
@@ -102,7 +105,7 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
 
 def _of_rows(data: ReportData, shown: Bool) -> dict[str, Any]:
     """Return what the page holds of some rows, and the sections."""
-    rows = _rows(data.evaluations, shown, harm=data.summary.harm)
+    rows = _rows(data.evaluations, shown, harm=_harm_of(data))
     return {"rows": rows, **sections_payload(data, shown)}
 
 
@@ -112,7 +115,7 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
     It has the new rows, and the ranks of all; or all rows again (``whole``) where a long run is
     thinned. Everything else is complete; the sections' data are under ``sections``.
     """
-    e, harm = data.evaluations, data.summary.harm
+    e, harm = data.evaluations, _harm_of(data)
     shown = _shown(e, [])
     whole = e.status.size > ROWS
     new = shown if whole else shown & (np.arange(shown.size) >= after)
@@ -160,7 +163,12 @@ def _shown(e: Evaluations, kept: list[int]) -> Bool:
     return ok
 
 
-def _rows(e: Evaluations, ok: Bool, *, harm: str = "") -> dict[str, Any]:
+def _harm_of(data: ReportData) -> str | None:
+    """Return the harm by which scenarios are ranked; None where only the objectives rank them."""
+    return None if data.summary.criteria else data.summary.harm
+
+
+def _rows(e: Evaluations, ok: Bool, *, harm: str | None = "") -> dict[str, Any]:
     groups = [("parameter", e.parameters), ("metric", e.metrics), ("objective", e.objectives)]
     return {
         "n": int(e.status.size),
@@ -178,10 +186,11 @@ def _rows(e: Evaluations, ok: Bool, *, harm: str = "") -> dict[str, Any]:
     }
 
 
-def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
+def _ranks(e: Evaluations, ok: Bool, *, harm: str | None = "") -> list[int]:
     """Return each row's place among all critical ones, 1 for the most critical; 0 for others.
 
-    No near miss is above a contact: by harm where that makes a scenario critical, else by whether
+    Where pass criteria make a scenario critical (no harm, None), the objectives decide. Else no
+    near miss is above a contact: by harm where that makes a scenario critical, else by whether
     there is a collision. Then the severity decides, then the objectives.
     """
     critical = np.flatnonzero(e.critical & (e.status == 0))
@@ -192,10 +201,10 @@ def _ranks(e: Evaluations, ok: Bool, *, harm: str = "") -> list[int]:
         else np.zeros((critical.size, 1))
     )
     measured = {c.name: c.whole[critical] for c in e.metrics if c.name in WHOLE}
-    if not harm and "n_collision" in measured:
+    if harm == "" and "n_collision" in measured:
         measured["n_collision"] = np.minimum(measured["n_collision"], 1.0)  # whether, not how many
     order = by_merit(F)
-    for name in ("severity", harm or "n_collision"):
+    for name in () if harm is None else ("severity", harm or "n_collision"):
         if name in measured:
             order = order[np.argsort(-measured[name][order], kind="stable")]
     order = critical[order]
@@ -226,8 +235,13 @@ def _column(column: Column, group: str, ok: Any) -> dict[str, Any]:
         "high": _number(column.high),
         "searched": column.searched,
         **column.labels,
-        "values": significant(column.values[ok]),
+        "values": _values(column, ok),
     }
+
+
+def _values(column: Column, ok: Any) -> list[float | None]:
+    values = column.values[ok]
+    return margins_shown(values) if column.name.startswith(PREFIX) else significant(values)
 
 
 def _number(value: float | None) -> float | None:

@@ -4,6 +4,7 @@ import html
 from collections.abc import Iterator
 from pathlib import Path
 
+from bridgegen.odd.criteria import Criterion
 from bridgegen.odd.parameters import Bound, Derived, Parameter
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.pipeline import Pipeline
@@ -48,6 +49,10 @@ def _body(scenario: LogicalScenario) -> Iterator[str]:
     for parameter in scenario.parameters.values():
         yield _parameter(parameter)
     yield "</tbody></table></div></section>"
+    if scenario.criteria:
+        yield '<section class="card"><h2>Pass criteria</h2><dl class="rules">'
+        yield from map(_criterion, scenario.criteria)
+        yield "</dl></section>"
     yield '<section class="card"><h2>Constraints</h2><dl class="rules">'
     rules: tuple[Bound | Derived, ...] = (*scenario.bounds, *scenario.derived)
     for rule in rules:
@@ -65,6 +70,14 @@ def _parameter(one: Parameter) -> str:
         f'<td class="number">{one.kind.span_text(one.low, one.high, "{:g}".format, unit)}</td>'
         f'<td class="number">{one.kind.text(one.default, "{:g}".format)}{unit}</td>'
         f"<td>{_text(one.description)}<small>{_text(one.source)}</small></td></tr>"
+    )
+
+
+def _criterion(one: Criterion) -> str:
+    kind = ", ".join((one.severity, *one.tags))
+    return (
+        f"<dt>{_text(f'{one.id}: {one.states}')}</dt>"
+        f"<dd>{_text(one.text)} <small>{_text(kind)}</small></dd>"
     )
 
 

@@ -13,6 +13,7 @@ from bridgegen.report.batches_payload import TRENDS, TRENDS_OF_HARM, batches_pay
 from bridgegen.report.causes_payload import causes_payload
 from bridgegen.report.confirmation_payload import confirmations_payload
 from bridgegen.report.coverage_payload import coverage_payload
+from bridgegen.report.criteria_payload import criteria_payload
 from bridgegen.report.data import ReportData
 from bridgegen.report.findings_payload import triage_payload
 from bridgegen.report.notes import notes_payload
@@ -36,6 +37,10 @@ class Section:
     key: str = "rows"
     payload: Callable[[ReportData, Bool], Any] | None = None
     grows: bool = False
+
+
+def _criteria(data: ReportData, _shown: Bool) -> Any:
+    return criteria_payload(data)
 
 
 def _triage(data: ReportData, _shown: Bool) -> Any:
@@ -67,6 +72,7 @@ def _notes(data: ReportData, _shown: Bool) -> Any:
 
 
 SECTIONS = (
+    Section("criteria.js", "criteria", _criteria, grows=True),
     Section("modes.js", "triage", _triage),
     Section("causes.js", "causes", _causes, grows=True),
     Section("elsewhere.js", "confirmations", _confirmations, grows=True),

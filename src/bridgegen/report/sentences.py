@@ -6,6 +6,7 @@ import numpy as np
 
 from bridgegen.cause import CAUSES, Cause
 from bridgegen.confirmation.verdict import sentences as verdicts
+from bridgegen.criteria import headline
 from bridgegen.regions.evidence import wilson
 from bridgegen.report.data import ReportData, RunSummary
 
@@ -23,10 +24,19 @@ AVOIDED = {
 
 
 def sentences(data: ReportData) -> list[str]:
-    """Return a few sentences: the search, its findings, their severity and confirmation."""
+    """Return a few sentences: the search, its findings, their severity and confirmation.
+
+    Where there are pass criteria, how they are met comes first.
+    """
     s = data.summary
     if s.n_evaluations == 0:
         return [f"No scenario of “{s.title}” has been simulated yet."]
+    judged = headline(s.ego, data.criteria)
+    return [*([f"{judged}."] if judged else []), *_sentences(data)]
+
+
+def _sentences(data: ReportData) -> list[str]:
+    s = data.summary
     words = [
         f"{_count(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
         f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego} "
@@ -82,9 +92,10 @@ def _of_harm(data: ReportData) -> list[tuple[str, str]]:
     assert e.findings is not None
     critical = e.critical & (e.status == 0)
     contact = critical & (e.findings.conflict == "contact")
+    near = critical & (e.findings.conflict == "near miss")
     rows = [
         ("Critical: collisions", f"{np.count_nonzero(contact):,}"),
-        ("Critical: near misses", f"{np.count_nonzero(critical & ~contact):,}"),
+        ("Critical: near misses", f"{np.count_nonzero(near):,}"),
     ]
     for column in e.metrics:
         if column.name == "severity":
@@ -193,7 +204,9 @@ def _worst_harm(data: ReportData) -> str:
     critical = e.critical & (e.status == 0)
     contact = critical & (e.findings.conflict == "contact")
     n_contact = int(np.count_nonzero(contact))
-    n_near = int(np.count_nonzero(critical)) - n_contact
+    n_near = int(np.count_nonzero(critical & (e.findings.conflict == "near miss")))
+    if not n_contact and n_near < np.count_nonzero(critical):  # other criteria than harm
+        return f"{_count(n_near, 'near miss')} among them; no collision."
     if not n_contact:
         return f"{'It is a near miss' if n_near == 1 else 'All are near misses'}; no collision."
     text = f"{_count(n_contact, 'collision')}"
@@ -201,7 +214,7 @@ def _worst_harm(data: ReportData) -> str:
     if severity is not None:
         worst = float(severity[contact].max())
         text += f", the most severe with a probability of {share(worst)} of a MAIS3+ injury"
-    return f"{text}; {n_near:,} {'near miss' if n_near == 1 else 'near misses'}."
+    return f"{text}; {_count(n_near, 'near miss')}."
 
 
 def _worst(data: ReportData) -> str:
@@ -237,7 +250,8 @@ def _interval(s: RunSummary) -> str:
 
 
 def _count(n: int, noun: str) -> str:
-    return f"{n:,} {noun}{'' if n == 1 else 's'}"
+    plural = "es" if noun.endswith("s") else "s"
+    return f"{n:,} {noun}{'' if n == 1 else plural}"
 
 
 def _at(evaluation: int | None) -> str:

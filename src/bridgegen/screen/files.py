@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 def print_file_result(file: Path, result: "FileResult") -> None:
     """Print the result of one scenario file."""
+    from bridgegen.criteria import margin_in_words
+
     print(f"{file}: ego {result.driver}, {result.seconds:g} s simulated")
     if result.status != "ok":
         print(f"failed: {result.status}")
@@ -26,9 +28,8 @@ def print_file_result(file: Path, result: "FileResult") -> None:
         print(f"at {one.step * result.rollout.time_step:.2f} s: {one.kind}: {one.what}")
     _print_conflict(result.conflicts)
     for each in result.criteria:
-        unit = "" if each.unit == "1" else f" {each.unit}"
         text = each.criterion.text or each.criterion.states
-        verdict = f"{each.verdict} (margin {each.margin:.4g}{unit})"
+        verdict = f"{each.verdict} (margin {margin_in_words(each.margin, each.unit)})"
         print(f"criterion {each.criterion.id} {verdict}: {text}")
     _print_metrics(result.metrics)
 

@@ -117,6 +117,7 @@ def print_summary(run: "Run", seconds: float) -> None:
 
 def conclusion(run: "Run") -> list[tuple[str, str]]:
     """Return what matters of a run: the verdict, the worst failure, where it is; and its page."""
+    from bridgegen.criteria import headline as judged
     from bridgegen.triage.words import headline, shortly
 
     s, found = run.summary, run.triage
@@ -127,15 +128,11 @@ def conclusion(run: "Run") -> list[tuple[str, str]]:
     else:
         failed = f"; {s.failed} of {s.evaluations} evaluations failed" if s.failed else ""
         rows = [("verdict", (headline(found) if found is not None else critical) + failed)]
-    violated = [one for one in run.criteria if one.violated]
-    if violated:
-        names = "; ".join(
-            f"{one.criterion.id} in {one.violated} of {one.met + one.violated}" for one in violated
-        )
-        rows = [
-            ("verdict", f"{run.settings.ego} violates {names} evaluations"),
-            ("harm", rows[0][1]),
-        ]
+    if text := judged(run.settings.ego, run.criteria):
+        if any(one.violated for one in run.criteria):
+            rows = [("verdict", text), ("harm", rows[0][1])]
+        else:
+            rows.append(("criteria", text))
     if found is not None and found.modes:
         worst = max(found.modes, key=lambda one: (one.severity, one.harm))
         rows.append(("worst", shortly(worst)))
@@ -147,7 +144,7 @@ def conclusion(run: "Run") -> list[tuple[str, str]]:
 
 def _print_rows(rows: list[tuple[str, str]]) -> None:
     for name, value in rows:
-        print(f"{name:<22}{value}")
+        print(f"{name:<21} {value}")
 
 
 def _print_modes(found: "Triage") -> None:

@@ -10,9 +10,10 @@ Donze and Maler, Robust satisfaction of temporal logic over real-valued signals 
 from bridgegen.stl.dimensions import Dimension, check_units, dimension_of_unit
 from bridgegen.stl.formula import Formula, Reading, horizon, readings
 from bridgegen.stl.parser import parse
-from bridgegen.stl.robustness import robustness
+from bridgegen.stl.robustness import TINY, robustness
 
 __all__ = [
+    "TINY",
     "Dimension",
     "Formula",
     "Reading",

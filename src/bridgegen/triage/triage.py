@@ -63,7 +63,13 @@ class Triaged:
 
 
 def triage(
-    pipeline: Pipeline, rows: Rows | Recorded, *, algorithm: str, seed: int, keep: int
+    pipeline: Pipeline,
+    rows: Rows | Recorded,
+    *,
+    algorithm: str,
+    seed: int,
+    keep: int,
+    chosen: Sequence[int] | None = None,
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
@@ -75,8 +81,10 @@ def triage(
         algorithm: of the run; only rows of "random" and "sobol" estimate shares of the space.
         seed: of the run.
         keep: how many scenarios to export.
+        chosen: positions of the rows to export, best first, where something else than harm chooses
+            them; the harmful ones among them are tested.
     """
-    return _Triage(pipeline, rows, algorithm, seed, keep).run()
+    return _Triage(pipeline, rows, algorithm, seed, keep, chosen).run()
 
 
 def harmful_rows(
@@ -105,10 +113,17 @@ class _Triage:
     """One call of `triage`; positions are those among all rows unless stated otherwise."""
 
     def __init__(
-        self, pipeline: Pipeline, rows: Rows | Recorded, algorithm: str, seed: int, keep: int
+        self,
+        pipeline: Pipeline,
+        rows: Rows | Recorded,
+        algorithm: str,
+        seed: int,
+        keep: int,
+        chosen: Sequence[int] | None,
     ) -> None:
         self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
         self._algorithm, self._seed, self._keep = algorithm, seed, keep
+        self._chosen = chosen
         name = pipeline.objective.harm
         harmful, self._harm = harmful_rows(
             rows.metrics, pipeline.metrics, name, rows.status, rows.findings
@@ -181,13 +196,16 @@ class _Triage:
 
     def _choose(self, shown: Sequence[int], U: Float, harm: Float) -> list[int]:
         """Return the rows to export, one of each mode and others: robust ones first, then harm."""
+        if self._chosen is not None:
+            known = {at: i for i, at in enumerate(self._at.tolist())}
+            return [known[at] for at in self._chosen if at in known]
         critical = self._rows.critical[self._at]
         first = sorted((i for i in shown if critical[i]), key=lambda i: self._rank(i, harm))
         first = first[: self._keep]
         every = by_harm(harm, U)
-        known = [i for i in every.tolist() if i in self._found and critical[i]]
-        known.sort(key=lambda i: self._rank(i, harm))
-        more = distinct(U, np.array(known, dtype=np.int64), self._keep, first)
+        tried = [i for i in every.tolist() if i in self._found and critical[i]]
+        tried.sort(key=lambda i: self._rank(i, harm))
+        more = distinct(U, np.array(tried, dtype=np.int64), self._keep, first)
         if len(first) + len(more) < self._keep:  # rows of unknown robustness
             kept = [*first, *more]
             more += distinct(U, every[critical[every]], self._keep, kept)
@@ -299,7 +317,8 @@ class _Triage:
         rows, pipeline = self._rows, self._pipeline
         space, shares = self._shares(groups)
         ids = rows.id[self._at]
-        names = {i: f"{k:04d}" for k, i in enumerate(exports, start=1)}
+        order = self._at[exports].tolist() if self._chosen is None else list(self._chosen)
+        names = {i: f"{order.index(self._at[i]) + 1:04d}" for i in exports}
         modes = []
         for k, (one, i) in enumerate(zip(groups, shown, strict=True), start=1):
             members = np.isin(exports, one.rows).tolist()

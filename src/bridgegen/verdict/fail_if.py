@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Literal
 
-from bridgegen.criteria import CriterionResult
+from bridgegen.criteria import CriterionResult, margin_in_words
 from bridgegen.errors import BridgeGenError, InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -105,8 +105,7 @@ def outcome_of(one: CriterionResult) -> Outcome:
     verdict: Verdict = "unknown"
     if one.verdict != "unknown":
         verdict = "passed" if one.verdict == "met" else "failed"
-    unit = "" if one.unit == "1" else f" {one.unit}"
-    margin = "unknown" if isnan(one.margin) else f"{one.margin:.6g}{unit}"
+    margin = margin_in_words(one.margin, one.unit, 6)
     return Outcome(words_of(one.criterion), verdict, f"margin {margin}, {one.criterion.states}")
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from bridgegen.campaign.criteria import CriterionSummary
 from bridgegen.campaign.exported import Facts, ParameterValue, Quantity, read_facts
 from bridgegen.campaign.run import Run
 from bridgegen.cause import CAUSES
+from bridgegen.criteria import CriterionSummary
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.criteria import PREFIX, read_criterion

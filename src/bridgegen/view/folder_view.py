@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from bridgegen.criteria import headline
 from bridgegen.errors import StorageError
 from bridgegen.report.page import page_of, still_page
 from bridgegen.report.payload import script_json
@@ -79,6 +80,8 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "budget": line.budget, "finished": line.finished,
         "modes": len(line.modes) + (line.triage.unrecorded_modes if line.triage else 0),
         "worst": worst.title if worst else "",
+        "judged": headline(line.ego, line.criteria),
+        "violated": any(one.violated for one in line.criteria),
         "failures": bound.harmful if bound else None,
         "share": bound.space.share if bound else None,
         "low": bound.space.low if bound else None,
@@ -124,6 +127,7 @@ _FIGURES: dict[str, Callable[[RunLine], str]] = {
     "driver": lambda one: one.ego,
     "algorithm": lambda one: f"{one.algorithm}, seed {one.seed}",
     "evaluations": lambda one: f"{one.evaluations:,}" + ("" if one.finished else ", not finished"),
+    "pass criteria": lambda one: headline(one.ego, one.criteria) or "–",
     "failures": lambda one: f"{one.triage.bound.harmful:,}" if one.triage else "–",
     "failure modes": lambda one: f"{len(one.modes):,}" if one.triage else "–",
     "harmful share of the space": _share,

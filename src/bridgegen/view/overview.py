@@ -5,7 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bridgegen.campaign.run import judged
 from bridgegen.campaign.settings import Settings
+from bridgegen.criteria import CriterionSummary
 from bridgegen.errors import BridgeGenError
 from bridgegen.store import Store
 from bridgegen.store.run_file import FILE
@@ -34,6 +36,7 @@ class RunLine:
         changed: when its file was last written [s since 1970].
         size: of its folder on disk [bytes].
         triage: its failure modes; None before it has finished.
+        criteria: how its evaluations meet its pass criteria.
         problem: why it cannot be read; empty if it can. All else but path, changed and size is
             then empty.
     """
@@ -49,6 +52,7 @@ class RunLine:
     budget: int = 0
     finished: bool = False
     triage: Triage | None = field(default=None, repr=False)
+    criteria: tuple[CriterionSummary, ...] = ()
     problem: str = ""
 
     @property
@@ -104,7 +108,7 @@ def read_line(folder: Path, run: Path) -> RunLine:
     try:
         with Store.open(run) as store:
             settings, n = Settings.from_dict(store.settings, run), len(store)
-            finished = store.finished is not None
+            finished, criteria = store.finished is not None, judged(store, settings)
         triage = read_record(run / JSON_FILE)
     except BridgeGenError as error:
         return RunLine(path, changed, size, problem="; ".join(error.problems))
@@ -112,7 +116,7 @@ def read_line(folder: Path, run: Path) -> RunLine:
         path, changed, size,
         scenario=settings.scenario, ego=settings.ego, algorithm=settings.algorithm,
         seed=settings.seed, evaluations=n, budget=settings.budget, finished=finished,
-        triage=triage,
+        triage=triage, criteria=criteria,
     )  # fmt: skip
 
 

@@ -112,5 +112,6 @@ class RunView:
 
     def _read(self, store: Store) -> Recorded:
         """Return all rows, to be used while the store is open; only what is new is read."""
-        self._rows = Recorded(store, self._rows, whole=WHOLE)
+        names = (*WHOLE, *self._pipeline.monitor.names)
+        self._rows = Recorded(store, self._rows, whole=names)
         return self._rows

@@ -3,10 +3,21 @@
 import { CAUSE_HELP } from "./causes.js";
 import { $, element } from "./common.js";
 import { conflictLines } from "./conflict.js";
+import { criterionOf, marginText } from "./criteria_rows.js";
 import { columns, data } from "./data.js";
 import { fileLink } from "./downloads.js";
 import { number, quantity, turned, worded } from "./numbers.js";
 import { Picture } from "./picture.js";
+
+// How the scenario meets the pass criteria.
+function criteriaLines(metrics) {
+  const found = (data.criteria?.list ?? []).filter(({ quantity: name }) => typeof metrics[name] === "number");
+  if (!found.length) return [];
+  return [element("h3", {}, "Its pass criteria"), ...found.map(({ id, text, formula, quantity: name, unit }) => {
+    const margin = metrics[name], verdict = margin < 0 ? "violated" : "met";
+    return element("div", { title: text ? `${text}\n${formula}` : formula }, element("span", { class: "name" }, id), element("b", { class: margin < 0 ? "hit" : "" }, `${verdict}, ${marginText(margin, unit)}`));
+  })];
+}
 
 export function fillDetails(kept) {
   const line = (name, value, column) => {
@@ -24,8 +35,9 @@ export function fillDetails(kept) {
   const heading = kept.minimal ? `Scenario ${kept.name}, simplest form of evaluation` : `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"}`;
   const name = element("h3", {}, `${heading} ${number(kept.evaluation + 1)}`);
   const cause = kept.cause ? [element("div", { title: `Quick label, of one replay: ${CAUSE_HELP[data.causes.labels.indexOf(kept.cause)]}` }, element("span", { class: "name" }, "cause (quick label)"), element("b", {}, kept.cause))] : [];
-  const metrics = kept.conflict ? [element("h3", {}, "Its metrics")] : [];
-  $("measures").replaceChildren(name, ...cause, ...conflictLines(kept.conflict), ...metrics, ...lines(kept.metrics));
+  const metrics = kept.conflict || data.criteria ? [element("h3", {}, "Its metrics")] : [];
+  const others = Object.fromEntries(Object.entries(kept.metrics).filter(([one]) => !criterionOf(one)));
+  $("measures").replaceChildren(name, ...cause, ...criteriaLines(kept.metrics), ...conflictLines(kept.conflict), ...metrics, ...lines(others));
   const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
   if (kept.files.length) {
     const links = kept.files.map(fileLink);

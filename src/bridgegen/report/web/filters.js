@@ -1,5 +1,6 @@
 // What the page is narrowed to: ranges of columns, and a region. The table and the charts follow.
 
+import { criterionOf } from "./criteria_rows.js";
 import { columns, rows } from "./data.js";
 import { isInMode } from "./findings.js";
 import { isInRegion } from "./region_rows.js";
@@ -28,6 +29,18 @@ class Filters {
     if (low === null && high === null) this.ranges.delete(name);
     else this.ranges.set(name, [low ?? -Infinity, high ?? Infinity]);
     this.notify();
+  }
+
+  // The criterion, by its column, whose violations alone are shown; null where there is none.
+  get violated() {
+    for (const [name, [low, high]] of this.ranges) if (low === -Infinity && high === 0 && criterionOf(name)) return name;
+    return null;
+  }
+
+  violating(name) {
+    for (const known of [...this.ranges.keys()]) if (criterionOf(known)) this.ranges.delete(known);
+    if (name === null) this.notify();
+    else this.set(name, null, 0); // no margin is 0
   }
 
   inMode(mode) {

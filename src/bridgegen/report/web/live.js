@@ -1,6 +1,7 @@
 // A page that is served takes in what is new of its run, while another process goes on with it.
 
 import { $ } from "./common.js";
+import { anyViolated } from "./criteria_rows.js";
 import { columns, data, rows } from "./data.js";
 import { filters } from "./filters.js";
 import { number } from "./numbers.js";
@@ -52,7 +53,7 @@ class Live {
   }
 
   take(news) {
-    const shape = () => [rows.critical.includes(1), Boolean(rows.findings), Boolean(data.triage), rows.cause === null, data.regions === null, data.confirmations.map(({ simulator }) => simulator)].join();
+    const shape = () => [rows.critical.includes(1), anyViolated(), Boolean(rows.findings), Boolean(data.triage), rows.cause === null, data.regions === null, data.confirmations.map(({ simulator }) => simulator)].join();
     const before = shape();
     if (news.whole) ["evaluation", "iteration", "critical", "cause"].forEach((name) => { if (rows[name]) rows[name].length = 0; });
     for (const name of ["evaluation", "iteration", "critical"]) append(rows[name], news.rows[name]);

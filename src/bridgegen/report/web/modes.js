@@ -1,6 +1,7 @@
 // The failure modes: the ways in which the driver fails, or what is known where there is none.
 
 import { $, NARROW, element } from "./common.js";
+import { anyViolated } from "./criteria_rows.js";
 import { data } from "./data.js";
 import { filters } from "./filters.js";
 import { nearestToHarm } from "./findings.js";
@@ -27,13 +28,13 @@ class Modes {
   fill() {
     const found = data.triage;
     const n = found.modes.length + found.more;
-    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails` : "No failure found";
+    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails` : data.criteria ? "No harm found" : "No failure found";
     $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^[^:]*: / : /^No failure found in /, "")); // the title says the rest
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));
     $("modes-list").hidden = !n;
     const notes = [], nearest = nearestToHarm();
-    if (nearest !== null) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
+    if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");

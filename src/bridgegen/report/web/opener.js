@@ -2,6 +2,7 @@
 
 import { readAddress } from "./address.js";
 import { $ } from "./common.js";
+import { worstViolation } from "./criteria_rows.js";
 import { data, rows } from "./data.js";
 import { fillDetails, showPicture } from "./details.js";
 import { nearestToHarm } from "./findings.js";
@@ -105,6 +106,7 @@ export class Opener {
       this.kept(0);
       this.player.begin();
     } else if (rows.critical.includes(1)) await this.row(rows.rank.indexOf(1));
+    else if (worstViolation() !== null) await this.row(rows.evaluation.indexOf(worstViolation()));
     else if (nearestToHarm() !== null) {
       await this.row(rows.evaluation.indexOf(nearestToHarm()));
       this.made?.begin();

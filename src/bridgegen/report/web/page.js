@@ -3,6 +3,7 @@
 import { darkScheme } from "./colours.js";
 import { $, copy } from "./common.js";
 import "./contents.js";
+import { anyViolated } from "./criteria_rows.js";
 import { data, rows } from "./data.js";
 import { filters } from "./filters.js";
 import { nearestToHarm } from "./findings.js";
@@ -17,7 +18,7 @@ import { TableTools } from "./table_tools.js";
 hook.filter = (name, low, high) => filters.set(name, low, high);
 drawSections();
 foldSections();
-if (rows.critical.includes(1) || data.kept.length) listScenarios();
+if (rows.critical.includes(1) || data.kept.length || anyViolated()) listScenarios();
 else playNearest();
 
 function listScenarios() {

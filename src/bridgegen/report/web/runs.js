@@ -21,7 +21,9 @@ function nameCell(run) {
 }
 
 const shareCell = ({ share, low, high }) => (share === null ? ["–"] : [perCent(share), element("small", {}, `${perCent(low)} to ${perCent(high)}`)]);
-const modesCell = ({ modes, worst, finished, problem }) => [worst || (finished && !problem ? "no failure found" : ""), modes > 1 ? element("small", {}, `the worst of ${plain(modes)} ways`) : ""];
+const noneFound = ({ finished, problem, judged }) => (finished && !problem ? (judged ? "no harm found" : "no failure found") : "");
+const judgedCell = ({ judged, violated }) => (judged ? [element("small", { class: violated ? "problem" : "" }, judged)] : []);
+const modesCell = (run) => [run.worst || noneFound(run), ...judgedCell(run), run.modes > 1 ? element("small", {}, `the worst of ${plain(run.modes)} ways`) : ""];
 
 /** @type {[string, (run: any) => any, (run: any) => any[], string][]} title, what it is sorted by, its cell, its class */
 const COLUMNS = [
@@ -32,7 +34,7 @@ const COLUMNS = [
   ["evaluations", ({ evaluations }) => evaluations, ({ evaluations, problem }) => [problem ? "" : plain(evaluations)], "number"],
   ["failures", ({ failures }) => failures ?? -1, ({ failures, problem }) => [problem ? "" : plain(failures)], "number"],
   ["of the space", ({ share }) => share ?? -1, shareCell, "number"],
-  ["worst failure", ({ modes }) => modes, modesCell, "words"],
+  ["worst failure", ({ modes, violated }) => modes + Number(violated), modesCell, "words"],
   ["changed", ({ changed }) => changed, ({ changed }) => [new Date(1000 * changed).toLocaleString("sv-SE").slice(0, 16)], "number"],
   ["size", ({ size }) => size, ({ size }) => [sizeText(size)], "number"],
 ];
@@ -69,8 +71,8 @@ class Runs {
   get shown() {
     const text = $("text").value.toLowerCase(), [, key] = COLUMNS[this.column];
     const chosen = runs.filter((run) => (!$("scenario").value || run.scenario === $("scenario").value)
-      && (!$("ego").value || run.ego === $("ego").value) && (!$("failing").checked || run.modes > 0)
-      && [run.path, run.scenario, run.ego, run.algorithm, run.worst].some((one) => one.toLowerCase().includes(text)));
+      && (!$("ego").value || run.ego === $("ego").value) && (!$("failing").checked || run.modes > 0 || run.violated)
+      && [run.path, run.scenario, run.ego, run.algorithm, run.worst, run.judged].some((one) => one.toLowerCase().includes(text)));
     const order = (a, b) => (key(a) < key(b) ? -1 : key(a) > key(b) ? 1 : a.number - b.number);
     return chosen.sort((a, b) => (this.down ? -order(a, b) : order(a, b)));
   }

@@ -1,6 +1,7 @@
 // The table of all critical scenarios: sorted, filtered; only the rows in sight are in the document.
 
 import { $, element } from "./common.js";
+import { criterionOf, marginText, shortName, violatedCriteria, violatesAny } from "./criteria_rows.js";
 import { columns, data, rows } from "./data.js";
 import { filters } from "./filters.js";
 import { conflictWord, findingOf } from "./findings.js";
@@ -15,6 +16,7 @@ const TEXTS = ["conflict", "type", "responsible", "partner"]; // of a row's find
 const PLACE_OF = { conflict: 0, type: 1, responsible: 2, partner: 4 };
 const SHORT = { n_collision: "collisions", responsible: "by", cause: "cause" };
 const UNDER = { cause: "quick label", responsible: "responsible", severity: "MAIS3+" };
+const MOST_MARGINS = 3; // columns of criteria
 const ROW_HEIGHT = 32; // as in table.css
 const SPARE = 6; // rows above and below those in sight
 
@@ -22,7 +24,8 @@ export class Table {
   // open(i, play): called with the row of the page to be shown.
   constructor(open) {
     this.open = open;
-    this.sorting = { by: "rank", down: false };
+    this.sorting = { by: this.usual, down: false };
+    this.violated = null; // column of the criterion whose violations alone are listed
     this.only = null; // a metric that is filtered, but has no column of its own
     this.scroll = $("list-scroll");
     this.body = $("list-body");
@@ -39,8 +42,21 @@ export class Table {
     const listed = (data.summary.harm ? LISTED_OF_HARM : [...LISTED, "severity", "harm"]).filter((name) => metrics.includes(name));
     const chosen = listed.length ? listed : metrics.slice(0, 4), texts = rows.findings ? TEXTS : [];
     if (this.only && !chosen.includes(this.only)) chosen.push(this.only);
-    const names = data.summary.harm ? [...texts, ...chosen] : [...chosen, ...texts];
+    const margins = this.margins;
+    chosen.unshift(...margins.filter((name) => !chosen.includes(name)));
+    const names = margins.length ? [...chosen, ...texts] : data.summary.harm ? [...texts, ...chosen] : [...chosen, ...texts];
     return ["rank", ...names, ...(rows.cause ? ["cause"] : []), ...(data.regions ? ["region"] : []), ...elsewhere.map(({ column }) => column)];
+  }
+
+  // The criteria whose margins are columns: those that make a scenario critical, or are violated where nothing else is critical.
+  get margins() {
+    const names = rows.n_critical ? data.criteria?.critical ?? [] : violatedCriteria().map(({ quantity }) => quantity);
+    return [...new Set([...(filters.violated ? [filters.violated] : []), ...names.slice(0, MOST_MARGINS)])];
+  }
+
+  // The column that the list is sorted by at first.
+  get usual() {
+    return rows.n_critical ? "rank" : this.margins[0] ?? "rank";
   }
 
   value(name, i) {
@@ -53,7 +69,7 @@ export class Table {
   fillHead() {
     const cells = this.columns.map((name) => {
       const unit = unitText(columns.get(name)?.unit ?? "");
-      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? elsewhereBy(name)?.simulator ?? name, element("small", {}, UNDER[name] ?? (unit || "\u00a0")));
+      const button = element("button", { type: "button", title: `Sort by ${name}` }, SHORT[name] ?? elsewhereBy(name)?.simulator ?? shortName(name), element("small", {}, UNDER[name] ?? (unit || "\u00a0")));
       button.addEventListener("click", () => {
         this.sorting = { by: name, down: this.sorting.by === name && !this.sorting.down };
         this.refill();
@@ -63,13 +79,19 @@ export class Table {
     $("list-head").replaceChildren(element("tr", {}, ...cells));
   }
 
+  // Whether a row is one of the list's: a critical one; a violation, where these are asked for, or nothing is critical.
+  belongs(i) {
+    if (rows.critical[i] || filters.violated) return true;
+    return !rows.n_critical && violatesAny(i);
+  }
+
   // Which rows there are, and in which order.
   refill() {
     const { by, down } = this.sorting, sign = down ? -1 : 1, kept = $("only-kept").checked;
     const there = [];
     for (let i = 0; i < rows.critical.length; i++) {
       const exported = playbacks.keptAt.has(rows.evaluation[i]);
-      if ((rows.critical[i] || exported) && (exported || !kept) && filters.passes(i)) there.push(i);
+      if ((this.belongs(i) || exported) && (exported || !kept) && filters.passes(i)) there.push(i);
     }
     const key = new Map(there.map((i) => [i, this.value(by, i)]));
     const order = (a, b) => {
@@ -86,8 +108,27 @@ export class Table {
     this.draw(true);
   }
 
+  // After a change of the filters: the violations of a criterion are listed with their margins, the least first.
+  follow() {
+    const { violated } = filters;
+    if (violated !== this.violated) {
+      this.violated = violated;
+      this.sorting = { by: violated ?? this.usual, down: false };
+      this.fillHead();
+    }
+    this.refill();
+  }
+
   note() {
-    const here = rows.critical.reduce((a, b) => a + b, 0), all = rows.n_critical, n = this.order.length;
+    const n = this.order.length, criterion = criterionOf(filters.violated);
+    $("scenarios-title").textContent = criterion || !rows.n_critical ? "Violations of pass criteria" : "Critical scenarios";
+    if (criterion || !rows.n_critical) {
+      const which = criterion ? `that violate ${criterion.id}` : "that violate a pass criterion";
+      $("list-note").textContent = `${number(n)} ${n === 1 ? "evaluation" : "evaluations"} ${rows.evaluation.length < rows.n - rows.n_failed ? "of this page " : ""}${n === 1 ? which.replace("violate", "violates") : which}`;
+      $("list-clear").hidden = !filters.any && !$("only-kept").checked;
+      return;
+    }
+    const here = rows.critical.reduce((a, b) => a + b, 0), all = rows.n_critical;
     const some = filters.any || $("only-kept").checked;
     const which = here < all ? `${number(here)} of ${number(all)} critical scenarios, evenly chosen` : `${number(all)} critical ${all === 1 ? "scenario" : "scenarios"}`;
     $("list-note").textContent = some ? `${number(n)} of ${which}` : which;
@@ -109,7 +150,7 @@ export class Table {
     };
     const drawn = this.order.slice(first, last).map((i, k) => this.row(i, first + k));
     if (!this.order.length) {
-      const empty = element("td", { colspan: this.columns.length }, "No critical scenario passes the filter.");
+      const empty = element("td", { colspan: this.columns.length }, rows.n_critical ? "No critical scenario passes the filter." : "No evaluation passes the filter.");
       return void this.body.replaceChildren(element("tr", { class: "none" }, empty));
     }
     this.body.replaceChildren(...(first ? [room(first)] : []), ...drawn, ...(last < this.order.length ? [room(this.order.length - last)] : []));
@@ -123,6 +164,7 @@ export class Table {
     const button = element("button", { type: "button", "aria-label": label, title: SOURCES[source ?? "none"], class: `from-${source ?? "none"}` }, `${rank}`);
     const first = element("td", {}, button);
     if (kept) button.append(element("small", {}, kept.name));
+    else if (!rows.rank[i]) button.append(element("small", {}, `evaluation ${number(evaluation + 1)}`));
     const row = element("tr", { "data-i": i, "aria-rowindex": place + 2 }, first);
     if (evaluation === this.shown) row.setAttribute("aria-current", "true");
     for (const name of this.columns.slice(1)) row.append(this.cell(name, i));
@@ -138,6 +180,7 @@ export class Table {
     if (elsewhereBy(name)) return verdictCell(value);
     const digits = name === "harm" || name === "harm_any" ? 4 : 3; // collisions differ by their severity, in the third decimal
     const column = columns.get(name);
+    if (criterionOf(name)) return element("td", { class: value < 0 ? "hit" : "" }, marginText(value, "1"));
     const cell = element("td", {}, worded(value, column) ?? measured(turned(value, column), column?.unit, digits));
     if (name === "n_collision" && value > 0) cell.className = "hit";
     return cell;
@@ -185,7 +228,7 @@ export class Table {
     });
     $("only-kept").addEventListener("change", () => this.refill());
     $("list-clear").addEventListener("click", () => { $("only-kept").checked = false; filters.clear(); });
-    document.addEventListener("filters", () => this.refill());
+    document.addEventListener("filters", () => this.follow());
     document.addEventListener("grown", () => this.refill());
     document.addEventListener("shown", ({ detail }) => this.mark(detail));
   }

@@ -3,7 +3,7 @@
 import { $, element } from "./common.js";
 import { data, rows } from "./data.js";
 import { filters } from "./filters.js";
-import { titled } from "./numbers.js";
+import { number, titled } from "./numbers.js";
 import { LISTED } from "./table.js";
 import { VERDICTS, elsewhere } from "./verdicts.js";
 
@@ -14,11 +14,13 @@ export class TableTools {
     $("list-metric").append(...metrics.map(({ name, description }) => element("option", { value: name, title: description }, titled(name))));
     const first = LISTED.find((name) => metrics.some((column) => column.name === name));
     if (first) $("list-metric").value = first;
+    this.choices($("list-criterion"), data.criteria?.list.map(({ id, quantity, violated }) => [quantity, `${id} (${number(violated)})`]));
     this.choices($("list-cause"), data.causes?.labels.slice(1).map((label, k) => [k + 1, label]));
     this.choices($("list-region"), data.regions?.regions.map((region, k) => [k, `${region.number}: ${region.rule}`]));
     this.choices($("list-elsewhere"), elsewhere.length ? elsewhere.flatMap(({ column }, k) => Object.entries(VERDICTS).map(([value, [, words]]) => [`${k}:${value}`, `${words} ${column}`])) : null);
     $("list-metric").addEventListener("change", () => { this.column(); this.show(); });
     for (const id of ["list-low", "list-high"]) $(id).addEventListener("input", () => this.metric());
+    $("list-criterion").addEventListener("change", ({ target: { value } }) => filters.violating(value === "" ? null : value));
     $("list-cause").addEventListener("change", ({ target: { value } }) => {
       if (value === "") filters.set("cause");
       else filters.set("cause", value - 0.3, Number(value) + 0.3);
@@ -62,6 +64,7 @@ export class TableTools {
     $("list-cause").value = cause && cause[1] - cause[0] < 1 ? Math.round((cause[0] + cause[1]) / 2) : "";
     const k = elsewhere.findIndex(({ column }) => filters.ranges.has(column));
     $("list-elsewhere").value = k < 0 ? "" : `${k}:${Math.round(filters.ranges.get(elsewhere[k].column)[0])}`;
+    $("list-criterion").value = filters.violated ?? "";
     $("list-region").value = filters.region ?? "";
   }
 }

@@ -6,8 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.arrays import Numbers
-from bridgegen.criteria import unit_of
+from bridgegen.criteria.monitor import margin_in_words, unit_of
 from bridgegen.odd.criteria import Criterion
+
+MOST_NAMED = 3
+"""Maximum number of violated criteria that a headline names."""
+
+_SEVERITIES = ("critical", "major", "minor")
 
 
 @dataclass(frozen=True)
@@ -38,8 +43,8 @@ class CriterionSummary:
         done = self.met + self.violated
         if not done:
             return "unknown: all evaluations failed"
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        worst = f"least margin {self.worst:.3g}{unit} (evaluation {self.at})"
+        least = margin_in_words(self.worst, self.unit, 3)
+        worst = f"least margin {least} (evaluation {self.at})"
         if not self.violated:
             return f"met in all {done} evaluations; {worst}"
         return f"violated in {self.violated} of {done} evaluations; {worst}"
@@ -73,3 +78,36 @@ def summarise_criteria(
             )
         )
     return tuple(found)
+
+
+def by_gravity(found: Sequence[CriterionSummary]) -> list[CriterionSummary]:
+    """Return the violated ones, the gravest first, then those violated most often."""
+    violated = [one for one in found if one.violated]
+    return sorted(
+        violated, key=lambda one: (_SEVERITIES.index(one.criterion.severity), -one.violated)
+    )
+
+
+def headline(ego: str, found: Sequence[CriterionSummary]) -> str:
+    """Return how a driver meets criteria in one clause; empty where nothing is known.
+
+    Args:
+        ego: the driver.
+        found: of all criteria of a run.
+    """
+    done = max((one.met + one.violated for one in found), default=0)
+    if not done:
+        return ""
+    evaluations = f"{done:,} evaluation{'s' * (done != 1)}"
+    violated = by_gravity(found)
+    if not violated:
+        which = found[0].criterion.id if len(found) == 1 else f"all {len(found)} pass criteria"
+        return f"{ego} meets {which} in {'all ' if done > 1 else ''}{evaluations}"
+    named = [f"{one.criterion.id} in {one.violated:,}" for one in violated[:MOST_NAMED]]
+    if len(violated) > MOST_NAMED:
+        return (
+            f"{ego} violates {len(violated)} of {len(found)} pass criteria: {', '.join(named)}, … "
+            f"of {evaluations}"
+        )
+    text = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+    return f"{ego} violates {text} of {evaluations}"
