@@ -165,3 +165,27 @@ def test_the_same_said_twice_is_one():
     assert joined([one], [Criterion("A", "ttc > 1", place="elsewhere")]) == (one,)
     with pytest.raises(InputError, match="'A' occurs twice"):
         joined([one], [other])
+
+
+def test_a_package_adds_its_own(monkeypatch):
+    from importlib.metadata import EntryPoint, EntryPoints
+
+    points = [
+        EntryPoint(name, f"{__name__}:{value}", "bridgegen.criteria")
+        for name, value in {"ours": "OURS", "one": "ONE", "none": "HELD"}.items()
+    ]
+
+    def entry_points(**which):
+        return EntryPoints(points if which.get("group") == "bridgegen.criteria" else [])
+
+    monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
+    assert [one.id for one in read_criteria(["ours", "B: ttc > 1"])] == ["P-1", "P-2", "B"]
+    assert read_criteria(["one"]) == (ONE,)
+    with pytest.raises(InputError, match=r"criterion 'none' .* must be a .*Criterion, or a list"):
+        read_criteria(["none"])
+    with pytest.raises(InputError, match="--criterion must read ID: FORMULA"):
+        read_criteria(["ourz"])
+
+
+ONE = Criterion("P-1", "ttc > 1")
+OURS = [ONE, Criterion("P-2", "always(ego.v < 50 km/h)")]

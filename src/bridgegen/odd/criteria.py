@@ -12,12 +12,15 @@ from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.parameters import at, nearest
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
 from bridgegen.odd.shape import ShapedSection, Text, section, shape_problems
+from bridgegen.plugins import PlugIns
 from bridgegen.stl import Formula, parse, readings
 
 Severity = Literal["minor", "major", "critical"]
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
 """The pattern of an id."""
+
+ADDED = PlugIns("criterion", "bridgegen.criteria")
 
 ANY = "any"
 """In a formula, any other participant: the least value of all."""
@@ -184,7 +187,8 @@ def read_criteria(texts: Sequence[str]) -> tuple[Criterion, ...]:
 
     Args:
         texts: each ``ID: FORMULA``; or a YAML mapping in braces with the keys of a criterion; or
-            the path of a YAML file with a list ``criteria``.
+            the path of a YAML file with a list ``criteria``; or the name of an entry point of
+            installed packages.
 
     Raises:
         InputError: all that is wrong.
@@ -210,9 +214,27 @@ def _of_text(text: str) -> tuple[Criterion, ...]:
             raise InputError(f"--criterion must be a mapping in braces, got '{text}'")
         return (read_criterion(document.data, "--criterion"),)
     name, colon, formula = text.partition(":")
+    if not colon and name in ADDED.names(()):
+        return _of_package(name)
     if not colon or not formula.strip():
         raise InputError(f"--criterion must read ID: FORMULA, or name a YAML file, got '{text}'")
     return (read_criterion({"id": name.strip(), "formula": formula.strip()}, "--criterion"),)
+
+
+def _of_package(name: str) -> tuple[Criterion, ...]:
+    """Return the criteria that an installed package offers by a name.
+
+    Raises:
+        InputError: it is no criterion, nor a sequence of them.
+    """
+    found = ADDED.load(name, ())
+    several = (found,) if isinstance(found, Criterion) else found
+    if not isinstance(several, list | tuple) or not all(isinstance(c, Criterion) for c in several):
+        raise InputError(
+            f"{ADDED.place(name)} must be a bridgegen.odd.criteria.Criterion, or a list of them, "
+            f"got {type(found).__name__}"
+        )
+    return tuple(several)
 
 
 def read_criteria_file(path: FilePath) -> tuple[Criterion, ...]:
