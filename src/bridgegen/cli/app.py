@@ -26,7 +26,7 @@ app = Application(
     rich_markup_mode=None,
 )
 listing = Application(
-    help="List scenarios, algorithms, drivers, metrics …",
+    help="List scenarios, algorithms, drivers …",
     no_args_is_help=True,
     rich_markup_mode=None,
 )

@@ -166,7 +166,7 @@ def diff(
     ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Compare two drivers, or two versions of one, on the same variations.
+    """Compare two drivers on the same variations.
 
     Lists what the second breaks and fixes, with the confidence of either share.
     """

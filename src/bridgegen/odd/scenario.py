@@ -3,19 +3,21 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.odd.constraints import Constraints
-from bridgegen.odd.criteria import Criterion
 from bridgegen.odd.kinds import slack
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at
 from bridgegen.odd.roads import RoadsSpec
 from bridgegen.odd.space import SearchSpace
 from bridgegen.odd.story import Adversary, EventSpec, Participant, Story
 from bridgegen.odd.thresholds import Thresholds
+
+if TYPE_CHECKING:  # the checks of individuals start without pydantic
+    from bridgegen.odd.criteria import Criterion
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class SearchedScenario:
     seed: int = field(default=0, kw_only=True)
     checks: tuple[Bound, ...] = field(default=(), kw_only=True, compare=False, repr=False)
     notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
-    criteria: tuple[Criterion, ...] = field(default=(), kw_only=True, repr=False)
+    criteria: "tuple[Criterion, ...]" = field(default=(), kw_only=True, repr=False)
 
     @property
     def fingerprint(self) -> str:

@@ -200,7 +200,7 @@ def test_a_weather_that_contradicts_itself_is_noticed(individuals, s4):
         ('s="12.25"', 's="INF"', "the number inf in LanePosition"),
         ('s="12.25"', 's="${$Speed*2}"', "the expression ${$Speed*2} in LanePosition"),
         ('maxSpeed="60"', 'maxSpeed="INF"', "the number inf in Performance"),
-        ('name="the other one">', 'name="Hero">', "a second entity of the name Hero"),
+        ('name="the other one">', 'name="Hero">', "a second entity of the name"),
         ('<Private entityRef="the other one">', '<Private entityRef="nobody">', "is no entity"),
     ],
 )  # fmt: skip

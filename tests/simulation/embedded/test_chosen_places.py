@@ -87,8 +87,8 @@ def test_each_row_is_that_of_its_place_alone(made):
         assert one.evaluate(row).metrics.tobytes() == found[k].tobytes()
     assert found[2].tobytes() == found[0].tobytes()
     said = " ".join(story_lines(pipeline.scenario))
-    assert "ego, a car, goes from near on lane 1 of leg A in to" in said
-    assert " or from 40 m on lane 1 of leg C in to" in said
+    assert "ego, a car, starts at ego_speed; side chooses its place: from near on lane 1" in said
+    assert "from 40 m on lane 1 of leg C in to" in said
 
 
 def test_what_a_place_lacks_is_told_of_that_place(made):
