@@ -453,3 +453,9 @@ def test_step_that_cannot_be(route: Route, ds: float) -> None:
 def test_station_of_a_road_that_is_not_on_the_route(route: Route) -> None:
     with pytest.raises(InputError, match="the route runs over roads 3, 110, 1, got road 2"):
         route.station("2", 1.0)
+
+
+def test_no_places_have_no_stations() -> None:
+    """A part of a batch may hold no row of one of its road networks."""
+    route = plan_route(read(SPIRAL), ("1", -1, 0.0), [], ("1", -1, 400.0))
+    assert route.stations("1", np.empty(0)).shape == (0,)

@@ -118,6 +118,7 @@ class Route:
         """
         on_road = self._on_road(road_id)
         away = np.array([[_away(piece, one) for piece in on_road] for one in s.tolist()])
+        away = away.reshape(len(s), len(on_road))  # also of no places
         nearest, found = away.argmin(axis=1), np.empty(len(s))
         for i, piece in enumerate(on_road):
             found[nearest == i] = piece.stations(s[nearest == i])
