@@ -247,3 +247,20 @@ def test_a_report_has_no_place_for_who_is_not_there(monkeypatch):
     for name in "xyva":
         assert (np.isnan(getattr(shown, name)) == ~present[0]).all()
     assert np.isinf(shown.distance[20:]).all()
+
+
+def test_the_page_lists_pass_criteria_whatever_their_texts_are(tmp_path):
+    path = start_scenario("mine", like="cut-in", folder=tmp_path)
+    hostile = "</dd><script>alert(1)</script>"
+    with path.open("a", encoding="utf-8") as file:
+        file.write(
+            "\ncriteria:\n  - id: R-12\n    formula: always(gap to bv > 2 m)\n"
+            f'    text: "{hostile}"\n    severity: critical\n    tags: [gap]\n'
+        )
+    text = show_scenario(str(path)).read_text("utf-8")
+    assert "<dt>R-12: always(gap to bv &gt; 2 m)</dt>" in text
+    assert "critical, gap" in text
+    assert hostile not in text
+    assert "Pass criteria" not in show_scenario("cut-in", tmp_path / "plain.html").read_text(
+        "utf-8"
+    )

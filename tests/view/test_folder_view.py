@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import bridgegen as bg
 from bridgegen.errors import StorageError
 from bridgegen.store import Store
 from bridgegen.view import folder_view
@@ -226,3 +227,21 @@ def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, run
     page.close()
     server.shutdown()
     server.server_close()
+
+
+def test_a_run_that_violates_a_criterion_is_not_listed_as_without_failure(tmp_path):
+    bg.run_search(
+        "cut-in", budget=60, algorithm="random", keep=0, causes=False, out=tmp_path / "runs" / "a",
+        criteria=["R-12: always(gap to bv > 2 m)", "R-14: n_collision == 0"],
+    )  # fmt: skip
+    run = listed(FolderView(tmp_path / "runs").page())["a"]
+    violated = bg.Run(tmp_path / "runs" / "a").criteria[0].violated
+    assert run["judged"] == f"reference violates R-12 in {violated} of 60 evaluations"
+    assert run["violated"]
+    line = read_line(tmp_path / "runs", tmp_path / "runs" / "a")
+    assert folder_view._FIGURES["pass criteria"](line) == run["judged"]
+
+
+def test_a_run_without_criteria_says_nothing_of_them(runs):
+    run = listed(FolderView(runs).page())["s4"]
+    assert (run["judged"], run["violated"]) == ("", False)
