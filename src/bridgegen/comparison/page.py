@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from bridgegen.comparison.table import Line
 from bridgegen.criteria import quantity
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
+from bridgegen.metrics import Quantity
 
 FIGURES = "figures"
 
@@ -59,7 +61,7 @@ def _facts(comparison: Comparison) -> Iterable[str]:
         if value not in (None, False, (), {}):
             shown = value
             if isinstance(value, tuple):
-                shown = ", ".join(value)
+                shown = ", ".join(map(_shown, value))
             elif isinstance(value, dict):
                 shown = ", ".join(
                     k if one is None else f"{k} = {one:g}" for k, one in value.items()
@@ -67,6 +69,11 @@ def _facts(comparison: Comparison) -> Iterable[str]:
             yield name.replace("_", " ") if value is True else f"{name.replace('_', ' ')}: {shown}"
     if comparison.gaps:
         yield f"{_many(len(comparison.gaps), 'run')} failed"
+
+
+def _shown(value: str | Mapping[str, Any]) -> str:
+    """Return one of an option's values in words: a pass criterion by its id and formula."""
+    return value if isinstance(value, str) else f"{value['id']}: {value['formula']}"
 
 
 def _scenario(comparison: Comparison, scenario: str, measures: Sequence[Measure]) -> str:
@@ -227,13 +234,19 @@ def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> str
     return f"<tr>{link}<td>{record.evaluations:,}</td>{values}{command}</tr>"
 
 
+def _range(term: Quantity, worst: float, best: float) -> str:
+    """Return a term's values in its unit, given as larger = more critical."""
+    low, high = (term.sign * one + 0.0 for one in (worst, best))  # no negative zero
+    return f"{term.name} {low:.4g} to {high:.4g} {term.unit}".removesuffix(" 1")
+
+
 def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
     plan = comparison.plan
     terms = "".join(f"<dt>{escape(one.title)}</dt><dd>{escape(one.text)}</dd>" for one in measures)
     k = waited_for(plan.budget)
     boxes = "; ".join(
         f"{name}: " + ", ".join(
-            f"{term} {abs(worst):.4g} to {abs(best):.4g} {quantity(term).unit}".removesuffix(" 1")
+            _range(quantity(term), worst, best)
             for term, worst, best in zip(
                 next(r for c, r in comparison.records.items() if c.scenario == name).terms,
                 one.scale.worst, one.scale.best, strict=True,
