@@ -409,3 +409,37 @@ def test_a_report_that_is_there_is_written_again(finished, tmp_path, double):
     (folder / "confirmation-double.json").write_text("{}")  # and nobody takes it for what it is not
     with pytest.raises(FileFormatError, match="confirmation-double"):
         bg.resume(folder)
+
+
+@pytest.fixture(scope="module")
+def by_criteria(tmp_path_factory):
+    place = tmp_path_factory.mktemp("runs") / "judged"
+    bg.run_search(
+        "cut-in", budget=120, keep=3, causes=False, algorithm="ga", out=place,
+        criteria=["R-12: always(gap to bv > 2 m)", "R-14: n_collision == 0"], critical="criteria",
+        objective={"criterion:R-12": None},
+    )  # fmt: skip
+    return place
+
+
+def test_a_run_judged_by_criteria_is_confirmed_by_them(by_criteria, tmp_path, double, cli):
+    folder = shutil.copytree(by_criteria, tmp_path / "judged")
+    found = confirm(folder, elsewhere())
+    assert (found.summary.confirmed, found.summary.lost) == (3, 0)
+    for one in found.scenarios:
+        assert one.here.margins == one.there.margins
+        assert one.here.margins["R-12"].value < 0.0
+    double.disturb = lambda rollout: replace(rollout, y=np.add(rollout.y, [[0.0], [30.0]]))
+    found = confirm(folder, elsewhere(), again=True)
+    assert (found.summary.confirmed, found.summary.lost) == (0, 3)
+    for one in found.scenarios:
+        margins = [side.margins["R-12"].value for side in (one.here, one.there)]
+        assert margins[0] < 0.0 < margins[1]
+        assert one.explanation.startswith(
+            f"R-12 is met there: its margin is {margins[1]:.3g} m there, {margins[0]:.3g} m here."
+        )
+        assert "threshold" not in one.explanation
+    assert "R-12 is met there" in (folder / "report.html").read_text("utf-8")
+    code, out, err = cli("confirm", folder, "--simulator", "double")
+    assert code == 0, err
+    assert "R-12 [m]" in out

@@ -13,9 +13,10 @@ from bridgegen.confirmation.differences import (
     Offset,
     Parting,
 )
-from bridgegen.confirmation.schema import Differences, Outcome
+from bridgegen.confirmation.schema import Differences, Margin, Outcome
 from bridgegen.confirmation.words import explanation
 from bridgegen.odd.thresholds import Thresholds
+from bridgegen.stl import TINY
 
 LIMITS = Thresholds()
 
@@ -237,3 +238,27 @@ def test_what_is_critical_there_is_told_as_ever():
     text = said(came_to(True, 1.0, 5.0), closest=CLOSEST, partings=(LATER,))
     assert "bv diverges first" in text
     assert "closest approach" not in text
+
+
+def test_a_criterion_that_is_met_there_is_named_with_both_margins():
+    def of(critical, **margins):
+        units = {"gap": "m", "ttc": "s", "crash": "1"}
+        return Outcome(
+            critical=critical, d_min=1.0, v_d=5.0, n_collision=0.0, F=(0.0,),
+            margins={k: Margin(value=v, unit=units[k]) for k, v in margins.items()},
+        )  # fmt: skip
+
+    here = of(True, gap=-0.15, ttc=2.0, crash=-1.0)
+    told = explanation(
+        here, of(False, gap=0.35, ttc=1.0, crash=TINY), Differences(), LIMITS, "criteria"
+    )
+    assert told.startswith(
+        "gap is met there: its margin is 0.35 m there, -0.15 m here. "
+        "crash is met there: its margin is 0 there, -1 here."
+    )
+    assert "ttc" not in told  # it is met here, too
+    assert "threshold" not in told
+    assert "d_min" not in told
+    kept = explanation(here, of(True, gap=-0.1, ttc=1.0, crash=-1.0), Differences(), LIMITS,
+                       "criteria")  # fmt: skip
+    assert "met there" not in kept

@@ -9,13 +9,22 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.confirmation.compare import compare, first_contact, tracks
 from bridgegen.confirmation.record import digest_of
-from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Scenario, number
+from bridgegen.confirmation.schema import (
+    Change,
+    Course,
+    Differences,
+    Margin,
+    Outcome,
+    Scenario,
+    number,
+)
 from bridgegen.confirmation.words import explanation
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import Count
 from bridgegen.errors import InputError
 from bridgegen.objective import CLASSIFYING
+from bridgegen.odd.criteria import PREFIX
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.rollout import STATUS_MESSAGES, WORKER_ENDED, Rollout
 from bridgegen.store import Rows
@@ -158,6 +167,12 @@ def _outcome(
         F=tuple(number(one) for one in F),
         **measured,
         **{name: finding[name] or "" for name in FOUND},
+        margins={
+            name.removeprefix(PREFIX): Margin(
+                value=float(metrics[names.index(name)]), unit=pipeline.units[name]
+            )
+            for name in pipeline.objective.criteria
+        },
     )
 
 

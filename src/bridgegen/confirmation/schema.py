@@ -37,6 +37,18 @@ class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+class Margin(_Model):
+    """By how much a scenario meets a pass criterion.
+
+    Attributes:
+        value: > 0 where it is met, < 0 where it is violated.
+        unit: of it; "1" of a mixture or a number.
+    """
+
+    value: Number
+    unit: str
+
+
 class Outcome(_Model):
     """The outcome of a scenario in one simulator.
 
@@ -54,6 +66,7 @@ class Outcome(_Model):
         conflict_type: label of its type.
         responsible: the responsible participant.
         partner: the other participant.
+        margins: of the pass criteria that make a scenario critical, by id; empty by other rules.
     """
 
     critical: bool
@@ -69,6 +82,7 @@ class Outcome(_Model):
     conflict_type: str = ""
     responsible: str = ""
     partner: str = ""
+    margins: dict[str, Margin] = {}
 
 
 class Change(_Model):
@@ -211,7 +225,7 @@ class Record(_Model):
         scenario: the logical scenario.
         ego: the driver.
         thresholds: when a scenario is critical by the rule "thresholds".
-        rule: what makes a scenario critical, "harm" or "thresholds".
+        rule: what makes a scenario critical, "harm", "thresholds" or "criteria".
         count: whose conflicts are harm, "ego" or "any".
         objectives: the names of F's columns.
         parted_at: see `differences.PARTED`.

@@ -12,8 +12,9 @@ from bridgegen.confirmation.differences import (
     LightTimes,
     Parting,
 )
-from bridgegen.confirmation.schema import Differences, Outcome
+from bridgegen.confirmation.schema import Differences, Margin, Outcome
 from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.criteria import margin_in_words
 from bridgegen.objective import Rule
 from bridgegen.odd.thresholds import Thresholds
 
@@ -54,13 +55,29 @@ def explanation(
     """
     verdict = []
     if not there.critical:
-        verdict = [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
+        verdict = _verdict(here, there, limits, rule)
     contacts = _contacts(here, there)
     if there.critical or found.closest is None:
         return " ".join([*verdict, *contacts, *_story(found)])
     if there.contact or found.closest.distance > 0.0:  # else it is in the sentence on contacts
         contacts.append(_closest(found.closest))
     return " ".join([*verdict, *contacts, *_until(found, found.closest.time)])
+
+
+def _verdict(here: Outcome, there: Outcome, limits: Thresholds, rule: Rule) -> list[str]:
+    """Return why a scenario is not critical there."""
+    if rule == "criteria":
+        return [
+            f"{name} is met there: its margin is {_margin(there.margins[name])} there, "
+            f"{_margin(one)} here."
+            for name, one in here.margins.items()
+            if one.value < 0.0 and name in there.margins
+        ]
+    return [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
+
+
+def _margin(one: Margin) -> str:
+    return margin_in_words(one.value, one.unit, 3)
 
 
 def _less_harm(here: Outcome, there: Outcome) -> str:

@@ -69,7 +69,11 @@ def _scenario(one: Scenario) -> dict[str, Any]:
 
 def _outcome(one: Outcome) -> dict[str, Any]:
     contact = None if one.contact is None else one.contact.time
-    return {"harm": one.harm, "d_min": one.d_min, "v_d": one.v_d, "contact": contact}
+    margins = {name: shown.value for name, shown in one.margins.items()}
+    return {
+        "harm": one.harm, "d_min": one.d_min, "v_d": one.v_d, "contact": contact,
+        "margins": margins,
+    }  # fmt: skip
 
 
 def _tracks(record: Record, one: Scenario) -> list[dict[str, Any]]:

@@ -2,6 +2,8 @@
 
 import json
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -12,6 +14,9 @@ from bridgegen.screen.live import Live
 if TYPE_CHECKING:
     from bridgegen.campaign.confirm import RunConfirmation, Tally
     from bridgegen.confirmation.schema import Outcome
+
+MOST_MARGINS = 3
+"""Maximum number of columns with margins of pass criteria."""
 
 
 class ConfirmationScreen(Live):
@@ -69,8 +74,7 @@ def _table(found: "RunConfirmation") -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
     table.add_column("scenario", no_wrap=True)
     table.add_column("there", no_wrap=True)
-    by_harm = found.record.rule == "harm"
-    figures = ("harm", "d_min [m]") if by_harm else ("d_min [m]", "v_d [m/s]")
+    figures = _figures(found)
     for name in (*figures, "collision [s]", "diverges [s]"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("first", overflow="fold")
@@ -85,14 +89,35 @@ def _table(found: "RunConfirmation") -> Table:
         table.add_row(
             name,
             words[one.confirmed],
-            *([_change(here.harm, there.harm, none="–")] if by_harm else []),
-            _change(here.d_min, there.d_min),
-            *([] if by_harm else [_change(here.v_d, there.v_d)]),
+            *(
+                _change(of(here), of(there), none="∞" if of is _distance else "–")
+                for of in figures.values()
+            ),
             _change(_touch(here), _touch(there), none="–"),
             f"{parting.time:.2f}" if parting else "never",
             parting.entity if parting else "",
         )
     return table
+
+
+def _figures(found: "RunConfirmation") -> dict[str, Callable[["Outcome"], float | None]]:
+    """Return what the verdict depends on, by its title: of the run's rule."""
+    if found.record.rule == "harm":
+        return {"harm": lambda one: one.harm, "d_min [m]": _distance}
+    if found.record.rule == "thresholds":
+        return {"d_min [m]": _distance, "v_d [m/s]": lambda one: one.v_d}
+    margins = found.scenarios[0].here.margins if found.scenarios else {}
+    units = {name: f"{name} [{one.unit}]".replace(" [1]", "") for name, one in margins.items()}
+    shown = list(units.items())[:MOST_MARGINS]
+    return {title: partial(_margin_of, name) for name, title in shown} | {"d_min [m]": _distance}
+
+
+def _margin_of(name: str, one: "Outcome") -> float | None:
+    return one.margins[name].value if name in one.margins else None
+
+
+def _distance(one: "Outcome") -> float | None:
+    return one.d_min
 
 
 def _touch(one: "Outcome") -> float | None:
