@@ -96,6 +96,16 @@ def test_one_outlier_does_not_flatten_a_histogram():
     assert histogram(margins)["width"] <= 0.2
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_one_violation_of_a_thousand_stands_left_of_zero(sign):
+    """However few lie on a side of 0, they are not counted on the other."""
+    margins = sign * np.concatenate([np.linspace(5.0, 9.0, 1000), [-0.1]])
+    found = histogram(margins)
+    left = -found["first"]
+    assert sum(found["counts"][:left]) == int((margins < 0.0).sum())
+    assert sum(found["counts"][left:]) == int((margins > 0.0).sum())
+
+
 def test_histograms_of_equal_margins_and_of_none():
     assert histogram(np.full(5, TINY)) == {"first": 0, "width": 1.0, "counts": [5]}
     assert histogram(np.full(5, -2.0))["counts"][0] == 5

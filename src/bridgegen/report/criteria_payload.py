@@ -61,7 +61,7 @@ def histogram(margins: Float) -> dict[str, Any] | None:
     """Return how many margins lie in bins of equal width, of which 0 is an edge.
 
     Margins without a value, and those at the limit, which stand for infinity, have no part; None
-    where no other is left. The outermost bins also count what lies beyond them.
+    where no other is left. The outermost bins also count what lies beyond them, on their side of 0.
 
     Args:
         margins: ``(N,)``, NaN where an evaluation failed.
@@ -72,7 +72,9 @@ def histogram(margins: Float) -> dict[str, Any] | None:
     low, high = np.quantile(values, [OUTER, 1.0 - OUTER]).tolist()
     low, high = min(low, 0.0), max(high, 0.0)
     width = _step((high - low) / (BINS - 2)) if high - low > 2.0 * LEAST else 1.0
-    first, last = floor(low / width), max(ceil(high / width), floor(low / width) + 1)
+    violated = values < 0.0
+    first = min(floor(low / width), -1 if violated.any() else 0)
+    last = max(ceil(high / width), 0 if violated.all() else 1)
     bins = np.clip(np.floor(values / width), first, last - 1).astype(np.int64) - first
     counts: list[int] = np.bincount(bins, minlength=last - first).tolist()
     return {"first": first, "width": width, "counts": counts}
