@@ -12,7 +12,7 @@ import pytest
 from bridgegen.report import page
 from bridgegen.report.modules import Module, ModuleError, bundle, in_order
 
-ENTRIES = (*page.SERVED, "show.js", "runs.js")
+ENTRIES = (*page.SERVED, "show.js", "runs.js", "suite.js")
 OURS = {
     file.name: Module(file.name, file.read_text("utf-8"))
     for file in page.WEB.iterdir()
@@ -297,11 +297,11 @@ def test_a_statement_declares_one_name(module):
 
 def test_every_module_of_ours_is_used():
     needed = {module.name for module in in_order(page.SERVED, page._text)}
-    needed |= {module.name for module in in_order(["show.js", "runs.js"], page._text)}
+    needed |= {module.name for module in in_order(["show.js", "runs.js", "suite.js"], page._text)}
     assert needed == {*OURS}
 
 
-@pytest.mark.parametrize("entries", [page.REPORT, page.SERVED, ("show.js",), ("runs.js",)], ids=str)
+@pytest.mark.parametrize("entries", [page.REPORT, page.SERVED, ("show.js",), ("runs.js",), ("suite.js",)], ids=str)
 def test_node_reads_what_is_joined(tmp_path, entries):
     node = shutil.which("node")
     if node is None:

@@ -42,7 +42,8 @@ def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
     title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
     connect = b"'self'" if live else b"'none'"
     script, style = _bundled(SERVED if live else REPORT)
-    text = to_json(data, live=live, code=len(script) + len(style) + len(_own("page.html")))
+    code = len(script) + len(style) + len(_own("page.html")) + len(_own("player.html"))
+    text = to_json(data, live=live, code=code)
     return filled(
         "page.html", title, style, data=text.encode("ascii"), script=script, connect=connect
     )
@@ -68,6 +69,12 @@ def page_of(entry: str, title: str, data: str) -> list[bytes]:
     script, style = _bundled((entry,))
     template = entry.replace(".js", ".html")
     return filled(template, title, style, script=script, data=data.encode("ascii"))
+
+
+def code_of(entry: str) -> int:
+    """Return how many characters a page has besides its title and data; see `write_page`."""
+    parts = [*_bundled((entry,)), _own(entry.replace(".js", ".html")), _own("player.html")]
+    return sum(map(len, parts))
 
 
 def write_still_page(path: Path, template: str, title: str, body: bytes) -> None:
@@ -98,9 +105,10 @@ def filled(template: str, title: str, css: bytes, **more: bytes) -> list[bytes]:
         template: a file of ``web``.
         title: plain text.
         css: its style.
-        more: of the template's other placeholders.
+        more: of the template's other placeholders; ``{{player}}`` is the player of playbacks.
     """
-    fill = {"title": html.escape(title).encode("utf-8", "replace"), "css": css, **more}
+    heading = html.escape(title).encode("utf-8", "replace")
+    fill = {"title": heading, "css": css, "player": _own("player.html"), **more}
     parts = re.split(rb"\{\{(\w+)\}\}", _own(template))
     return [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
 

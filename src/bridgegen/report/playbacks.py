@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Float
 from bridgegen.cause import Cause
@@ -98,6 +99,24 @@ def minimal_playbacks(
         return ()
     X = np.array([one.x for *_, one in wanted])
     noise = np.array([one.noise_key for *_, one in wanted], dtype=np.uint64)
+    names = [(name, evaluation, files) for name, evaluation, files, _ in wanted]
+    return measured_playbacks(pipeline, names, X, noise)
+
+
+def measured_playbacks(
+    pipeline: Pipeline,
+    wanted: Sequence[tuple[str, int, tuple[str, ...]]],
+    X: Float,
+    noise: npt.NDArray[np.uint64] | None = None,
+) -> tuple[Playback, ...]:
+    """Return the playbacks of rows, without picture and planned course; they are measured anew.
+
+    Args:
+        pipeline: what evaluates them.
+        wanted: name, evaluation and files of each.
+        X: the rows, ``(N, len(space.names))``.
+        noise: keys of the sensors' noise, ``(N,)``; by default each row's own.
+    """
     replays = pipeline.replays(X, plans=False, noise=noise)
     metrics = np.empty((len(X), len(pipeline.metrics)))
     for at, replay in replays.parts:
@@ -105,7 +124,7 @@ def minimal_playbacks(
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
     shown = [
         Shown(name, evaluation, files, X[k], metrics[k], bool(critical[k]), "")
-        for k, (name, evaluation, files, _) in enumerate(wanted)
+        for k, (name, evaluation, files) in enumerate(wanted)
     ]
     return _all_played(pipeline, shown, replays, brief=True)
 

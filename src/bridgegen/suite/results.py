@@ -112,7 +112,7 @@ class EntryResult(Strict):
     def worst(self) -> int | None:
         """The number of the worst failed row: by harm, then by the least margin."""
         failed = [i for i, one in enumerate(self.rows) if one.verdict == "failed"]
-        return min(failed, key=lambda i: (*_rank(self.rows[i]), i), default=None)
+        return min(failed, key=lambda i: (*rank(self.rows[i]), i), default=None)
 
     def worst_of(self, criterion: int) -> int | None:
         """Return the number of the row that violates a criterion the most, or None."""
@@ -136,7 +136,8 @@ class Header(Strict):
     settings: dict[str, Any]
 
 
-def _rank(one: RowResult) -> tuple[float, float, float]:
+def rank(one: RowResult) -> tuple[float, float, float]:
+    """Return a key that is less for a worse failure: by harm, severity, then the least margin."""
     return -float(one.critical) * one.harm, -one.severity, min(one.margins, default=0.0)
 
 

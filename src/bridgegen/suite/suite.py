@@ -91,12 +91,14 @@ class SuiteRun:
         egos: that were tested, as named; "" for the scenarios' own drivers.
         results: of each entry, in the order of entries, then of egos.
         settings: on which the results depend.
+        jobs: of which they are the results, in the same order; empty where they were only read.
     """
 
     folder: Path
     egos: tuple[str, ...]
     results: tuple[EntryResult, ...]
     settings: dict[str, Any]
+    jobs: tuple[Job, ...] = ()
 
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""
@@ -148,7 +150,7 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
     finally:
         lock.release()
     results = tuple(done[job.entry.name, job.ego or ""] for job in jobs)
-    return SuiteRun(folder, drivers, results, settings)
+    return SuiteRun(folder, drivers, results, settings, tuple(jobs))
 
 
 def read_suite(folder: Path) -> SuiteRun:

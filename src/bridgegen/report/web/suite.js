@@ -1,0 +1,28 @@
+// The page of a suite: the result in words, pass criteria, scenarios with their variations and playbacks.
+
+import { darkScheme } from "./colours.js";
+import { $, element } from "./common.js";
+import { hook } from "./hook.js";
+import { showCriteria } from "./suite_criteria.js";
+import { motions } from "./suite_motions.js";
+import { table } from "./suite_table.js";
+import { bar, suite } from "./suite_words.js";
+
+function showResult() {
+  $("name").textContent = suite.name;
+  $("facts").hidden = !suite.facts.length;
+  $("facts").append(...suite.facts.map((fact) => element("li", {}, fact)));
+  suite.headlines.forEach((headline, e) => {
+    const count = (v) => suite.entries.filter(({ results }) => results[e]?.v === v).length;
+    $("result").append(element("p", { class: "headline" }, `${headline}.`), bar([count("p"), count("f"), count("n")]));
+  });
+  if (suite.differences) $("result").append(element("p", { class: "differences" }, suite.differences));
+}
+
+showResult();
+showCriteria();
+table.fill();
+table.go();
+hook.open = (name) => table.show(suite.entries.findIndex((one) => one.name === name));
+hook.shown = () => table.order.map((k) => suite.entries[k].name);
+darkScheme.addEventListener("change", () => motions.player?.redraw());

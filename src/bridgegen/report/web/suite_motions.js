@@ -1,0 +1,59 @@
+// The playbacks of a suite's worst failures: each is inflated when it is wanted, and so is its road.
+
+import { $ } from "./common.js";
+import { data } from "./data.js";
+import { hook } from "./hook.js";
+import { inflated } from "./inflate.js";
+import { Player } from "./player.js";
+import { suite } from "./suite_words.js";
+
+const packed = suite.motions;
+const made = new Map(); // number → the playback, or its promise
+const unpacked = async (text) => JSON.parse(new TextDecoder().decode(await inflated(text)));
+
+class Motions {
+  constructor() {
+    this.wanted = -1;
+    /** @type {Player | null} */
+    this.player = null;
+  }
+
+  // The number of the playback of that name; −1 if there is none.
+  named(name) {
+    return packed.names.indexOf(name);
+  }
+
+  async get(k) {
+    if (!made.has(k)) made.set(k, this.read(k));
+    return made.get(k);
+  }
+
+  async read(k) {
+    const on = packed.on[k], [kept, road] = await Promise.all([unpacked(packed.texts[k]), data.roads[on] ?? unpacked(packed.roads[on])]);
+    data.roads[on] = road;
+    kept.road = on;
+    data.kept.push(kept); // the player's address is by name
+    return kept;
+  }
+
+  // Plays one inside an element.
+  async show(k, host, seconds) {
+    this.wanted = k;
+    $("player").setAttribute("aria-busy", "true");
+    const kept = await this.get(k);
+    if (this.wanted !== k || !host.isConnected) return; // another was chosen meanwhile
+    host.append($("player"));
+    $("player").removeAttribute("aria-busy");
+    this.player ??= new Player(hook);
+    this.player.show(kept);
+    if (seconds !== null) this.player.seek(Math.round(seconds / kept.time_step), false);
+  }
+
+  park() {
+    this.wanted = -1;
+    this.player?.pause();
+    $("parked").append($("player"));
+  }
+}
+
+export const motions = new Motions();

@@ -1,0 +1,90 @@
+"""A suite's results in words: what each ego passes, and where they differ."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from bridgegen.suite.results import EntryResult, Verdict, counts
+from bridgegen.suite.suite import SuiteRun
+
+MOST_DIFFERENCES = 4
+"""Kinds of differences that a sentence names."""
+
+_WORD: dict[Verdict, str] = {"failed": "fails", "passed": "passes", "not run": "did not run"}
+
+
+def label_of(suite: SuiteRun, ego: str) -> str:
+    """Return how an ego is called; of the scenarios' own drivers, the one that all have."""
+    if ego:
+        return ego
+    drivers = {one.driver for one in suite.of_ego(ego) if one.driver}
+    return drivers.pop() if len(drivers) == 1 else "the scenarios' own drivers"
+
+
+def headline(results: Sequence[EntryResult], label: str) -> str:
+    """Return what an ego passes of its entries, as a sentence without an end.
+
+    Args:
+        results: with one ego.
+        label: how the ego is called.
+    """
+    n, rows = len(results), sum(len(one.rows) for one in results)
+    number = Counter(one.verdict for one in results)
+    of = f"all {n:,} scenarios" if number["passed"] == n > 1 else f"{number['passed']:,} of {n:,}"
+    if not of.startswith("all"):
+        of += " scenario" if n == 1 else " scenarios"
+    if rows > n:
+        passed = counts(results)["passed"]
+        share = f"{rows:,}" if passed == rows else f"{passed:,} of {rows:,}"
+        of += f" ({share} variations)"
+    some = label.startswith("the scenarios'")
+    words = f"{label[:1].upper() + label[1:] if some else label} pass{'' if some else 'es'} {of}"
+    if number["failed"]:
+        words += f" and fail{'' if some else 's'} {number['failed']:,}"
+    partly = sum(one.verdict == "not run" and one.count("passed") > 0 for one in results)
+    lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
+    lost += [f"{partly:,} ran only in part"] if partly else []
+    return "; ".join([words, *lost])
+
+
+def difference(verdicts: Sequence[Verdict], labels: Sequence[str]) -> str:
+    """Return how egos differ in an entry, in words; empty if they do not."""
+    if len(set(verdicts)) <= 1:
+        return ""
+    who: dict[Verdict, list[str]] = {}
+    for verdict, label in zip(verdicts, labels, strict=True):
+        who.setdefault(verdict, []).append(label)
+    for verdict in ("failed", "passed"):
+        alone = who.get(verdict, [])
+        if len(who) == 2 and "not run" not in who and len(alone) == 1:
+            return f"only {alone[0]} {_WORD[verdict]}"
+    parts = [
+        f"{', '.join(who[verdict])} {_of_many(_WORD[verdict], len(who[verdict]))}"
+        for verdict in ("failed", "passed", "not run")
+        if verdict in who
+    ]
+    return "; ".join(parts)
+
+
+def differences(of_entries: Sequence[Sequence[Verdict]], labels: Sequence[str]) -> str:
+    """Return in how many entries egos agree and differ, as a sentence; empty for one ego."""
+    if len(labels) < 2:
+        return ""
+    two = len(labels) == 2
+    same = Counter(one[0] for one in of_entries if len(set(one)) == 1)
+    differ = Counter(words for one in of_entries if (words := difference(one, labels)))
+    often = differ.most_common(MOST_DIFFERENCES)
+    rest = sum(differ.values()) - sum(count for _, count in often)
+    parts = [f"in {count:,} {words}" for words, count in often]
+    parts += [f"in {rest:,} they differ otherwise"] if rest else []
+    if same["failed"]:
+        parts.append(f"{'both' if two else 'all'} fail {same['failed']:,}")
+    if same["passed"]:
+        parts.append(f"{'both' if two else 'all'} pass {same['passed']:,}")
+    if same["not run"]:
+        parts.append(f"{'neither' if two else 'none'} ran in {same['not run']:,}")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def _of_many(word: str, number: int) -> str:
+    return {"fails": "fail", "passes": "pass"}.get(word, word) if number > 1 else word
