@@ -301,7 +301,9 @@ def test_every_module_of_ours_is_used():
     assert needed == {*OURS}
 
 
-@pytest.mark.parametrize("entries", [page.REPORT, page.SERVED, ("show.js",), ("runs.js",), ("suite.js",)], ids=str)
+@pytest.mark.parametrize(
+    "entries", [page.REPORT, page.SERVED, ("show.js",), ("runs.js",), ("suite.js",)], ids=str
+)
 def test_node_reads_what_is_joined(tmp_path, entries):
     node = shutil.which("node")
     if node is None:

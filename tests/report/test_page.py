@@ -14,9 +14,9 @@ from bridgegen.report.page import write_report
 from bridgegen.report.payload import to_json
 from bridgegen.report.sections import SECTIONS
 
-PAGES = ("page.html", "show.html", "runs.html", "scenario.html", "pair.html")
+PAGES = ("page.html", "show.html", "runs.html", "suite.html", "scenario.html", "pair.html")
 STILL = ("scenario.css", "pair.css")
-SCRIPTED = ("show", "runs")
+SCRIPTED = ("show", "runs", "suite")
 VOID = {"meta", "link", "input", "br", "img", "hr"}
 
 
@@ -95,7 +95,7 @@ def test_nothing_is_fetched(written):
     assert "http" not in policy
     assert "connect-src 'none'" in policy
     assert "unsafe-eval" not in policy
-    parts = [page._own(name) for name in (*PAGES, *STILL)]
+    parts = [page._own(name) for name in (*PAGES, *STILL, "player.html")]
     for entries in (page.REPORT, *((f"{name}.js",) for name in SCRIPTED)):
         parts += page._bundled(entries)
     own = b"".join(parts).decode()
@@ -119,13 +119,15 @@ def test_every_id_that_a_script_asks_for_exists(written):
 def test_every_id_of_a_small_page_exists(name):
     scripts = page._bundled((f"{name}.js",))[0].decode()
     asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
-    assert asked <= set(re.findall(r'id="([\w-]+)"', page._own(f"{name}.html").decode()))
+    parts = page.page_of(f"{name}.js", "", "{}")
+    assert asked <= set(re.findall(r'id="([\w-]+)"', b"".join(parts).decode()))
 
 
 def test_every_style_of_ours_is_used():
     ours = [file.name for file in page.WEB.iterdir() if file.name.endswith(".css")]
     assert len(ours) > 8
     needed = [page._bundled(page.SERVED)[1], page._bundled(("runs.js",))[1]]
+    needed.append(page._bundled(("suite.js",))[1])
     needed += [page._own(name) for name in STILL]
     assert [name for name in ours if not any(page._own(name) in one for one in needed)] == []
 

@@ -10,6 +10,7 @@ from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.evaluation import Evaluation
 from bridgegen.odd.parameters import Parameter
+from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
@@ -137,13 +138,18 @@ def _rows(
     space = pipeline.space
     columns = [space.index(name) for name in names]
     parameters: list[Parameter | None] = [space.parameters.get(name) for name in names]
+    scenario = pipeline.scenario
+    of_file = scenario.texts if isinstance(scenario, FileScenario) else {}
     metrics = {name: evaluation.metrics[:, pipeline.metrics.index(name)] for name in QUANTITIES}
     margins = [evaluation.metrics[:, pipeline.metrics.index(one)] for one in pipeline.monitor.names]
     rows = []
     for i in range(len(X)):
         x: list[float | str] = []
-        for column, one in zip(columns, parameters, strict=True):
+        for name, column, one in zip(names, columns, parameters, strict=True):
             value = float(X[i, column])
+            if name in of_file:  # of a set of values, too, which has no parameter of its own
+                x.append(of_file[name][round(value)])
+                continue
             written = value if one is None else one.kind.written(value)
             x.append(written if isinstance(written, str) else float(written))
         if evaluation.status[i]:

@@ -6,7 +6,7 @@ import { number, quantity, shareText, unitText } from "./numbers.js";
 import { MARKS, PASSES, WORSE, button, counted, suite } from "./suite_words.js";
 
 const ROWS_AT_ONCE = 100;
-const FEW = 6; // parameters that stand before the results
+const FEW_PARAMETERS = 6; // parameters that stand before the results
 const valueText = (value) => (typeof value === "string" ? value : number(value));
 
 // The columns: title, values by row, the cell's text, its class, an explanation.
@@ -22,7 +22,7 @@ function columnsOf(found, words, ego) {
       if (k !== ego) columns.push([label, found.beside.map((letters) => WORSE[letters[k]] ?? 3), (_, i) => markCell(found.beside[i][k]), "", `the same variation with ${label}`]);
     });
   }
-  const parameters = parametersOf(found), few = parameters.length <= FEW;
+  const parameters = parametersOf(found), few = parameters.length <= FEW_PARAMETERS;
   if (few) columns.push(...parameters);
   found.criteria.forEach((at, k) => {
     const { id, text, formula } = suite.criteria[at];

@@ -1,0 +1,264 @@
+"""The page of a suite: its words, what it holds of each variation, its size, hostile texts."""
+
+import base64
+import json
+import re
+import shlex
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridgegen.options import CommonOptions
+from bridgegen.suite import page
+from bridgegen.suite.page import FILE, write_suite_page
+from bridgegen.suite.page_payload import payload
+from bridgegen.suite.results import EntryResult, RowResult
+from bridgegen.suite.sentences import difference, differences, headline
+from bridgegen.suite.suite import SuiteRun, run_suite
+
+CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
+HIT = RowResult(critical=True, harm=0.5, severity=0.1, collisions=1.0, d_min=0.0)
+KEPT = RowResult(d_min=3.0)
+LOST = RowResult(problem="it diverges")
+
+
+def result(entry: str, ego: str = "", rows: tuple[RowResult, ...] = (), **more: Any) -> EntryResult:
+    return EntryResult(
+        entry=entry, ego=ego, digest="", scenario=f"{entry}.xosc", driver=ego or "reference",
+        rows=list(rows), **more,
+    )  # fmt: skip
+
+
+def suite_of(*results: EntryResult, folder: Any = "suites/some") -> SuiteRun:
+    egos = tuple(dict.fromkeys(one.ego for one in results))
+    return SuiteRun(Path(folder), egos, results, {})
+
+
+def unpacked(text: str) -> Any:
+    return json.loads(zlib.decompress(base64.b64decode(text)))
+
+
+def data_of(text: str) -> dict[str, Any]:
+    (found,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)
+    return json.loads(found)
+
+
+# ---- words ----
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([(KEPT,), (KEPT,)], "ref passes all 2 scenarios"),
+        ([(KEPT,)], "ref passes 1 of 1 scenario"),
+        ([(KEPT, KEPT), (KEPT,)], "ref passes all 2 scenarios (3 variations)"),
+        ([(KEPT, HIT), (KEPT,)], "ref passes 1 of 2 scenarios (2 of 3 variations) and fails 1"),
+        ([(KEPT,), ()], "ref passes 1 of 2 scenarios; 1 did not run"),
+        ([(KEPT, LOST)], "ref passes 0 of 1 scenario (1 of 2 variations); 1 ran only in part"),
+        ([(LOST, HIT), (LOST,)], "ref passes 0 of 2 scenarios (0 of 3 variations) and fails 1; "
+                                 "1 did not run"),
+    ],
+)  # fmt: skip
+def test_the_headline_counts_scenarios_and_variations(rows, words):
+    results = [result(f"e{k}", rows=some) for k, some in enumerate(rows)]
+    assert headline(results, "ref") == words
+
+
+def test_own_drivers_are_many():
+    assert headline([result("a", rows=(HIT,))], "the scenarios' own drivers") == (
+        "The scenarios' own drivers pass 0 of 1 scenario and fail 1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "words"),
+    [
+        (("failed", "failed"), ""),
+        (("failed", "passed"), "only A fails"),
+        (("not run", "failed"), "B fails; A did not run"),
+        (("passed", "failed", "failed"), "only A passes"),
+        (("passed", "failed", "passed"), "only B fails"),
+        (("passed", "failed", "failed", "passed"), "B, C fail; A, D pass"),
+    ],
+)
+def test_differences_of_egos_are_said(verdicts, words):
+    assert difference(verdicts, "ABCD"[: len(verdicts)]) == words
+
+
+def test_agreement_is_counted_too():
+    of = [("failed", "passed")] * 2 + [("passed", "passed")] * 3 + [("not run", "not run")]
+    assert differences(of, "AB") == "In 2 only A fails; both pass 3; neither ran in 1."
+    assert differences([("failed",)], "A") == ""
+
+
+# ---- data ----
+
+
+def test_the_failed_variations_are_first_and_keep_their_numbers():
+    rows = (KEPT, LOST, HIT, HIT.model_copy(update={"harm": 0.9, "x": [7.123456789]}))
+    one = result("a", rows=rows, parameters=["speed"], units=["m/s"])
+    found = payload(suite_of(one), {}, {})["suite"]
+    assert found["entries"][0]["results"] == [
+        {"v": "f", "n": [1, 2, 1], "problem": "it diverges", "severity": 0.1,
+         "conflict": ["", "", ""]}
+    ]  # fmt: skip
+    details = unpacked(found["details"][0])["results"][0]
+    assert (details["at"], details["verdict"], details["worst"]) == ([3, 2, 1, 0], "ffnp", 3)
+    assert details["x"] == [[7.12346, None, None, None]]
+    assert details["d_min"] == [0.0, 0.0, None, 3.0]
+
+
+def test_criteria_are_counted_by_ego():
+    criterion = {"id": "R-1", "formula": "ttc >= 1.5 s", "severity": "critical"}
+    other = {"id": "R-1", "formula": "ttc >= 9 s"}  # of another file: another requirement
+    bad, good = (
+        KEPT.model_copy(update={"margins": [-1e-9]}),
+        KEPT.model_copy(update={"margins": [2.0]}),
+    )
+    suite = suite_of(
+        result("a", "A", (bad, good, LOST), criteria=[criterion]),
+        result("a", "B", (good,), criteria=[criterion]),
+        result("b", "A", (good,), criteria=[other]),
+        result("b", "B", (), criteria=[other]),
+    )
+    found = payload(suite, {}, {})["suite"]
+    first, second = found["criteria"]
+    assert (first["formula"], first["severity"]) == ("ttc >= 1.5 s", "critical")
+    assert first["of"] == [
+        {"entries": [1, 0, 0], "rows": [1, 1, 1]}, {"entries": [0, 1, 0], "rows": [0, 1, 0]},
+    ]  # fmt: skip
+    assert (second["formula"], second["severity"]) == ("ttc >= 9 s", "major")
+    assert [one["entries"] for one in second["of"]] == [[0, 1, 0], [0, 0, 1]]
+    assert found["entries"][0]["results"][0]["violated"] == [0]
+    assert found["entries"][0]["differ"] == "only A fails"
+    details = unpacked(found["details"][0])["results"]
+    assert details[0]["margins"] == [[-1e-9, None, 2.0]]  # rounding keeps the sign
+    assert details[1]["beside"] == []  # not the same variations
+
+
+def test_egos_are_compared_on_the_same_variations():
+    rows = [KEPT.model_copy(update={"x": [value]}) for value in (1.0, 2.0)]
+    more = {"parameters": ["v"], "units": ["m/s"]}
+    fails = rows[1].model_copy(update={"critical": True})
+    suite = suite_of(
+        result("a", "A", (rows[0], fails), **more), result("a", "B", tuple(rows), **more)
+    )
+    first, second = unpacked(payload(suite, {}, {})["suite"]["details"][0])["results"]
+    assert (first["at"], first["beside"]) == ([1, 0], ["fp", "pp"])
+    assert (second["at"], second["beside"]) == ([0, 1], ["pp", "fp"])
+
+
+def test_a_thousand_entries_with_many_variations_fit():
+    """Numbers that nothing compresses; each entry keeps its worst."""
+    rng = np.random.default_rng(0)
+    rows = tuple(
+        RowResult(
+            x=rng.random(4).tolist(), critical=bool(rng.random() < 0.5), harm=rng.random(),
+            severity=rng.random(), d_min=rng.random(), margins=[1.0 + rng.random()],
+        )
+        for _ in range(400)
+    )  # fmt: skip
+    names = [f"p{k}" for k in range(4)]
+    some = [
+        result(
+            f"Entry {k}", rows=rows[k % 300 : k % 300 + 100], parameters=names, units=["m/s"] * 4,
+            title="A scenario with a title of usual length",
+            criteria=[{"id": "R", "formula": "ttc > 1 s"}],
+        )
+        for k in range(1000)
+    ]  # fmt: skip
+    data = payload(suite_of(*some), {}, {}, code=200_000)
+    assert len(json.dumps(data)) < 3_000_000 - 200_000
+    assert len(data["suite"]["details"]) == 1000
+    for one, packed in zip(some[:50], data["suite"]["details"], strict=False):
+        (found,) = unpacked(packed)["results"]
+        assert found["total"] == 100
+        assert 1 <= len(found["at"]) <= 100
+        assert found["at"][0] == one.worst
+
+
+# ---- pages of suites that ran ----
+
+
+@pytest.fixture
+def run(folder, tmp_path):
+    return run_suite(
+        folder, egos=["route-follower", "reference"], options=CRITERIA, out=tmp_path / "out",
+        workers=1,
+    )  # fmt: skip
+
+
+def test_the_page_plays_the_worst_failure_of_each(run):
+    path = write_suite_page(run, run.jobs)
+    assert path == run.folder / FILE
+    data = data_of(path.read_text("utf-8"))
+    failed = [one for one in run.results if one.verdict == "failed"]
+    assert len(failed) >= 2
+    motions = data["suite"]["motions"]
+    assert len(motions["texts"]) == len(failed)
+    assert len(motions["roads"]) < len(failed)  # the same road is held once
+    cells = {
+        (entry["name"], label): cell
+        for entry in data["suite"]["entries"]
+        for label, cell in zip(data["suite"]["egos"], entry["results"], strict=True)
+    }
+    for one in failed:
+        motion = unpacked(motions["texts"][cells[one.entry, one.ego]["motion"]])
+        row = one.rows[one.worst]
+        assert motion["evaluation"] == one.worst
+        assert bool(motion["contacts"]) == bool(row.collisions)
+        assert motions["names"][cells[one.entry, one.ego]["motion"]] == f"{one.entry} ({one.ego})"
+    assert path.read_bytes() == write_suite_page(run, run.jobs).read_bytes()
+
+
+def test_there_are_at_most_so_many_playbacks_the_most_severe(run, monkeypatch):
+    monkeypatch.setattr(page, "MOST_PLAYBACKS", 1)
+    suite = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]
+    failed = [one for one in run.results if one.verdict == "failed"]
+    most = max(one.rows[one.worst].severity for one in failed)
+    (name,) = suite["motions"]["names"]
+    (played,) = [one for one in failed if f"{one.entry} ({one.ego})" == name]
+    assert played.rows[played.worst].severity == most
+
+
+def test_no_playback_of_files_that_have_changed(run, folder):
+    for file in folder.rglob("*.xosc"):
+        file.write_text(file.read_text("utf-8") + "<!-- changed -->", "utf-8")
+    suite = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]
+    assert suite["motions"]["texts"] == []
+    assert not any("motion" in one for entry in suite["entries"] for one in entry["results"])
+
+
+def test_the_command_shows_the_failure_again(run, folder):
+    by_name = {(job.entry.name, job.ego): job for job in run.jobs}
+    plain = next(one for one in run.results if one.entry == "plain")
+    words = shlex.split(page.command_of(by_name["plain", plain.ego], plain))
+    assert words[:3] == ["bridgegen", "simulate", str(folder / "plain.xosc")]
+    found = subprocess.run(
+        [Path(sys.executable).with_name("bridgegen"), *words[1:], "--json"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert found.returncode == (3 if plain.verdict == "failed" else 0), found.stderr
+    varied = next(one for one in run.results if one.entry != "plain")
+    words = shlex.split(page.command_of(by_name[varied.entry, varied.ego], varied))
+    assert words[:3] == ["bridgegen", "suite", str(folder / "varied_distribution.xosc")]
+    assert words[3:] == ["--ego", varied.ego, "--criterion", "C-1: always(ego.v < 12 m/s)"]
+
+
+def test_hostile_texts_stay_texts(tmp_path):
+    bad = "</script><script>alert(1)</script><!-- \ud800 &amp; {{data}}"
+    row = HIT.model_copy(update={"conflict": "contact", "partner": bad, "x": [bad]})
+    folder = tmp_path / "<b>&{{css}}"
+    folder.mkdir()
+    one = result(bad, rows=(row,), title=bad, parameters=[bad], units=[bad], notes=[bad])
+    text = write_suite_page(suite_of(one, folder=folder), ()).read_text("utf-8")
+    assert "alert(1)</script>" not in text
+    assert "<title>&lt;b&gt;&amp;{{css}}: suite – BridgeGen</title>" in text
+    entry = data_of(text)["suite"]["entries"][0]
+    assert (entry["name"], entry["results"][0]["conflict"][2]) == (bad, bad)
+    assert text.count("default-src 'none'") == 1
