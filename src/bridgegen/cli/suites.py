@@ -103,6 +103,7 @@ def suite(
     """
     from bridgegen.screen.suite import SuiteScreen, print_suite
     from bridgegen.screen.verdict import print_outcomes
+    from bridgegen.suite.page import write_suite_page
     from bridgegen.suite.suite import run_suite
     from bridgegen.verdict.of_suite import SuiteCriteria
 
@@ -122,7 +123,9 @@ def suite(
             out=out,
             callbacks=screen.callbacks,
         )
-    print_suite(found, screen.seconds, as_json=as_json)
+        screen.show(what="page", facts="")
+        page = write_suite_page(found, found.jobs)
+    print_suite(found, screen.seconds, page, as_json=as_json)
     if not print_outcomes(judges.judge(found)):
         raise typer.Exit(FAILED)
 
@@ -173,6 +176,7 @@ def diff(
     from bridgegen.screen.suite import SuiteScreen, print_difference
     from bridgegen.screen.verdict import print_outcomes
     from bridgegen.suite.difference import difference
+    from bridgegen.suite.page import write_suite_page
     from bridgegen.suite.suite import run_suite
     from bridgegen.verdict.of_suite import DifferenceCriteria
 
@@ -191,9 +195,11 @@ def diff(
             out=out,
             callbacks=screen.callbacks,
         )
+        screen.show(what="page", facts="")
+        page = write_suite_page(found, found.jobs)
     first, second = (found.of_ego(one) for one in ego)
     made = difference(first, second, (ego[0], ego[1]))
-    print_difference(made, as_json=as_json)
+    print_difference(made, page, as_json=as_json)
     if not print_outcomes(judges.judge(made)):
         raise typer.Exit(FAILED)
 

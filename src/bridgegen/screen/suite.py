@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -49,7 +50,7 @@ class SuiteScreen(Live):
         self.show(what="scenarios", done=self._done, total=self._entries, facts=facts)
 
 
-def print_suite(suite: "SuiteRun", seconds: float, *, as_json: bool = False) -> None:
+def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool = False) -> None:
     """Print the entries that fail or did not run, others if there is room; then the totals."""
     from bridgegen.suite.results import counts
 
@@ -87,10 +88,10 @@ def print_suite(suite: "SuiteRun", seconds: float, *, as_json: bool = False) -> 
             f"variations {number['passed']} pass, {number['failed']} fail, "
             f"{number['not run']} did not run"
         )
-    print(f"{suite.folder}: results ({seconds:.1f} s)")
+    print(f"page: {page} ({seconds:.1f} s)")
 
 
-def print_difference(found: "Difference", *, as_json: bool = False) -> None:
+def print_difference(found: "Difference", page: Path, *, as_json: bool = False) -> None:
     """Print what is broken and fixed from the first ego to the second."""
     counts = found.counts
     if as_json:
@@ -133,6 +134,7 @@ def print_difference(found: "Difference", *, as_json: bool = False) -> None:
     if counts["not comparable"]:
         print(f"  {'not comparable':<16}{counts['not comparable']}")
     print(f"  {'by chance':<16}p = {found.p_value:.3g} (McNemar's exact test)")
+    print(f"page: {page}")
 
 
 def _verdict(one: "EntryResult") -> str:
