@@ -153,6 +153,14 @@ def test_egos_are_compared_on_the_same_variations():
     assert (second["at"], second["beside"]) == ([0, 1], ["pp", "fp"])
 
 
+def test_other_variations_are_not_compared():
+    first, second = (KEPT.model_copy(update={"x": [value]}) for value in (1.0, 2.0))
+    more = {"parameters": ["v"], "units": ["m/s"]}
+    suite = suite_of(result("a", "A", (first,), **more), result("a", "B", (second,), **more))
+    of_a, of_b = unpacked(payload(suite, {}, {})["suite"]["details"][0])["results"]
+    assert (of_a["beside"], of_b["beside"]) == (["p-"], ["-p"])
+
+
 def test_a_thousand_entries_with_many_variations_fit():
     """Numbers that nothing compresses; each entry keeps its worst."""
     rng = np.random.default_rng(0)

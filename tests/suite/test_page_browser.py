@@ -81,6 +81,7 @@ def test_a_failure_opens_with_its_playback(written, show, width):
     assert rows.count() == len(worst.rows)
     assert "fails" in rows.first.inner_text()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('.variations').scrollWidth") <= width
     before = page.evaluate("bridgegen.state().position")
     page.evaluate("bridgegen.seek(3)")
     assert page.evaluate("bridgegen.state().position") == 3 != before

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.campaign.braking import scenario_text, value_sets, write_pair
 
 from bridgegen.errors import InputError, StorageError
 from bridgegen.options import CommonOptions
@@ -65,6 +66,19 @@ def test_all_variations_run_and_are_judged(folder, tmp_path):
     figures = figures_of(suite.results)
     assert figures["criterion:C-1"] == 2  # and the scenario alone, at 15 m/s
     assert figures["variations"] == 5
+
+
+def test_texts_of_value_sets_are_written_as_texts(tmp_path):
+    declared = '<ParameterDeclaration name="Surface" parameterType="string" value="dry"/>'
+    text = scenario_text().replace(
+        "</ParameterDeclarations>", f"{declared}</ParameterDeclarations>"
+    )
+    sets = value_sets({"EgoSpeed": 8, "Surface": "dry"}, {"EgoSpeed": 14, "Surface": "wet"})
+    write_pair(tmp_path, sets, text)
+    suite = run_suite(tmp_path, egos=["reference"], out=tmp_path / "out", workers=1)
+    (varied,) = suite.results
+    rows = [dict(zip(varied.parameters, row.x, strict=True)) for row in varied.rows]
+    assert [(row["EgoSpeed"], row["Surface"]) for row in rows] == [(8.0, "dry"), (14.0, "wet")]
 
 
 def test_workers_and_resuming_change_no_bit(folder, tmp_path):

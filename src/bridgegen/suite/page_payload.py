@@ -224,7 +224,7 @@ def _details(
     room: int,
 ) -> list[str]:
     """Return each entry's variations, deflated; as many as there is room for."""
-    most = MOST_ROWS
+    most = min(MOST_ROWS, max((len(one.rows) for one in suite.results), default=0))
     while True:
         texts = [
             _packed(_of_entry([of_it.get(ego) for ego in suite.egos], criteria, commands, most))
