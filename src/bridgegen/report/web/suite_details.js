@@ -44,7 +44,7 @@ export class Details {
       tab.disabled = !result;
       return tab;
     }));
-    const stage = element("div", { class: "playback" });
+    const stage = element("div", { class: of.motion === undefined ? "playback none" : "playback" });
     const parts = [this.facts(found, of), stage, ...(found.total ? [new Variations(found, words, ego, of.motion !== undefined).node] : [])];
     this.body.replaceChildren(...parts);
     if (of.v !== "f") return void stage.remove();
