@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 from bridgegen.extras import EXTRAS, is_installed
+from bridgegen.workers.process import cores
 
 LIBRARIES = ("numpy", "numba", "llvmlite", "pyoxigraph", "pyshacl")
 """Packages whose versions decide on results, or on compiled code."""
@@ -41,8 +42,7 @@ def examine() -> Iterator[Finding]:
     yield Finding("bridgegen", version("bridgegen"))
     yield Finding("Python", f"{platform.python_version()}, {platform.platform()}")
     yield from _libraries()
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    yield Finding("cores", str(cores))
+    yield Finding("cores", str(cores()))
     yield _cache()
     for extra, (_, use) in EXTRAS.items():
         if is_installed(extra):

@@ -283,7 +283,7 @@ class Pipeline:
         if objective is None:
             spec = self.scenario.objective
             if margins := [one.metric for one in spec.terms if one.metric.startswith(PREFIX)]:
-                self._violated(margins)
+                self._margins_that_count(margins)
             sample = None
             if needs_sample(spec.weights, spec.scale, objectives):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
@@ -300,13 +300,13 @@ class Pipeline:
                 thresholds=spec.critical,
                 rule=spec.rule,
                 count=spec.count,
-                criteria=self._violated(spec.criteria) if spec.rule == "criteria" else (),
+                criteria=self._margins_that_count(spec.criteria) if spec.rule == "criteria" else (),
                 sample=sample,
             )
         self.objective = objective
         return objective
 
-    def _violated(self, asked: Sequence[str]) -> tuple[str, ...]:
+    def _margins_that_count(self, asked: Sequence[str]) -> tuple[str, ...]:
         """Return the margins that make a scenario critical: those asked for, or all.
 
         Raises:

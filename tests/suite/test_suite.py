@@ -107,6 +107,24 @@ def test_a_changed_file_is_run_again(folder, tmp_path):
     assert ran == ["plain"]
 
 
+def test_a_changed_map_is_noticed(folder, tmp_path):
+    before = {one.name: one.digest for one in find_entries([folder])}
+    assert {len(one) for one in before.values()} == {64}
+    path = folder / "roads" / "straight.xodr"
+    path.write_bytes(path.read_bytes() + b"<!-- another -->")
+    after = {one.name: one.digest for one in find_entries([folder])}
+    assert not {*before.values()} & {*after.values()}  # the distribution's scenario names it, too
+
+
+def test_an_option_that_means_nothing_in_a_suite_is_refused(folder):
+    options = CommonOptions(fixed={"a": 1.0}, axes=["weather"])
+    with pytest.raises(InputError) as refused:
+        run_suite(folder, options=options)
+    assert [*refused.value.problems] == [
+        "a suite takes no option 'axes'", "a suite takes no option 'fixed'",
+    ]  # fmt: skip
+
+
 def test_other_settings_are_refused(folder, tmp_path):
     run_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
     with pytest.raises(StorageError, match=r"other settings \(criteria\)"):

@@ -1,6 +1,5 @@
 """A comparison from start to finish: make the missing runs, measure, test, draw, write."""
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +19,7 @@ from bridgegen.options import CommonOptions, called_with
 from bridgegen.search.algorithm import Value
 from bridgegen.store.sqlite import Lock
 from bridgegen.workers import read_choice
+from bridgegen.workers.process import cores
 
 LOCK = "compare.lock"
 
@@ -169,7 +169,7 @@ def _run(
         done.append(name)
         callbacks.ended(name, failure)
 
-    at_once, cluster = (executor, None) if isinstance(executor, int) else (_cores(), executor)
+    at_once, cluster = (executor, None) if isinstance(executor, int) else (cores(), executor)
     of_runs = RunCallbacks(callbacks.compile, callbacks.batch, ended)
     failed = run_all(tasks, at_once, of_runs, cluster)
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
@@ -217,10 +217,3 @@ def _task(plan: Plan, cell: Cell) -> Task:
 
 def _absolute(path: Path | str | None) -> str | None:
     return None if path is None else str(Path(path).resolve())
-
-
-def _cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -16,7 +16,7 @@ def quantity(name: str) -> Quantity:
     """Return the quantity of a name: a metric, a measure of the conflict analysis, or a margin.
 
     Raises:
-        UnknownNameError: there is none; the message suggests the nearest.
+        UnknownNameError: no such quantity; the message suggests the nearest.
     """
     if name.startswith(PREFIX):
         one = name.removeprefix(PREFIX)

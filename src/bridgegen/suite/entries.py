@@ -5,10 +5,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bridgegen.errors import InputError
+from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.odd.plain_yaml import MAX_BYTES
+from bridgegen.odd.reader import load
 from bridgegen.odd.reader import names as catalogue_names
-from bridgegen.openx.openscenario.kind import kind_of_file
+from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
 
 MOST_FILES = 100_000
 """Files that are looked at in all folders together."""
@@ -35,13 +36,16 @@ class Entry:
 
     @property
     def digest(self) -> str:
-        """A digest of the contents of its files; of a catalogue's name, the name."""
+        """A digest of its files, their map and catalogues; empty if they cannot be read."""
         made = hashlib.sha256()
-        for one in (self.scenario, self.distribution):
-            path = Path(one) if one is not None else None
-            made.update(
-                path.read_bytes() if path is not None and path.is_file() else str(one).encode()
-            )
+        try:
+            if not self.scenario.lower().endswith(_STORYBOARD):
+                return load(self.scenario).fingerprint
+            for one in filter(None, (self.scenario, self.distribution)):
+                for path in (Path(one), *files_named_in(Path(one))):
+                    made.update(hashlib.sha256(path.read_bytes()).digest())
+        except (BridgeGenError, OSError):
+            return ""
         return made.hexdigest()
 
 

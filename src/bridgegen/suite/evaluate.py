@@ -58,7 +58,7 @@ def evaluate(job: Job) -> EntryResult:
     found = EntryResult(
         entry=entry.name,
         ego=job.ego or "",
-        digest=_digest(entry),
+        digest=entry.digest,
         scenario=entry.scenario,
         distribution=entry.distribution or "",
         problem=entry.problem,
@@ -96,13 +96,6 @@ def pipeline_of(job: Job) -> Pipeline:
 def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
     """Return the rows of an entry, ``(N, len(pipeline.space.names))``."""
     return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed)[0]
-
-
-def _digest(entry: Entry) -> str:
-    try:
-        return entry.digest
-    except OSError:
-        return ""
 
 
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:

@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,10 @@ from bridgegen.options import CommonOptions, called_with
 from bridgegen.records import parse_json
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store.sqlite import Lock
-from bridgegen.suite.entries import Entry, find_entries
+from bridgegen.suite.entries import find_entries
 from bridgegen.suite.evaluate import Job, evaluate
 from bridgegen.suite.results import EntryResult, Header
+from bridgegen.workers.process import cores
 from bridgegen.workers.tasks import TaskPool
 
 FILE = "results.jsonl"
@@ -29,6 +31,12 @@ MOST_BYTES = 2**30
 """Of a file of results."""
 
 SAMPLES = 100
+
+NOT_OF_A_SUITE = (
+    "ego", "metrics", "causes", "cause", "distribution", "axes", "fixed", "road_map", "junction",
+    "weights", "scale", "objectives", "adversary",
+)  # fmt: skip
+"""Options of a search that would mean nothing in a suite."""
 
 
 @dataclass(frozen=True)
@@ -176,6 +184,12 @@ def _check(given: SuiteArguments) -> None:
         problems.append(f"workers must be at least 1, got {given.workers}")
     if given.options.objective and PAPER in given.options.objective and given.options.critical:
         problems.append("the objective 'paper' says what is critical; leave --critical out")
+    default = CommonOptions()
+    problems += [
+        f"a suite takes no option '{name}'"
+        for name in NOT_OF_A_SUITE
+        if getattr(given.options, name) != getattr(default, name)
+    ]
     if problems:
         raise InputError(*problems)
 
@@ -200,6 +214,8 @@ def _settings(given: SuiteArguments) -> dict[str, Any]:
         "ideal": list(options.ideal),
         "others": options.others,
         "empty_trigger": options.empty_trigger,
+        "time_limit": options.time_limit,
+        "version": version("bridgegen"),
     }
 
 
@@ -211,7 +227,7 @@ def _run(
     callbacks: SuiteCallbacks,
 ) -> None:
     """Run entries, and append each result to the file as it is there."""
-    at_once = min(workers or _cores(), len(jobs))
+    at_once = min(workers or cores(), len(jobs))
 
     def ended(job: Job, result: EntryResult | None, crash: str | None) -> None:
         if result is None:
@@ -268,19 +284,12 @@ def _done(
     found = {}
     for one in results:
         entry = wanted.get((one.entry, one.ego))
-        if entry is not None and one.digest and one.digest == _digest(entry):
+        if entry is not None and one.digest and one.digest == entry.digest:
             found[one.entry, one.ego] = one
     if torn or len(found) < len(results):  # what has changed is run again, and said once
         lines = [header.model_dump_json(), *(one.model_dump_json() for one in found.values())]
         write_whole(path, [("\n".join(lines) + "\n").encode()])
     return found
-
-
-def _digest(entry: Entry) -> str:
-    try:
-        return entry.digest
-    except OSError:
-        return ""
 
 
 def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
@@ -316,10 +325,3 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
     except (InputError, ValueError) as error:
         raise StorageError(f"{path}: is damaged: {error}") from None
     return header, results, bool(rest)
-
-
-def _cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -1,5 +1,6 @@
 """A process that calls functions on request; this is the side of its parent."""
 
+import os
 import queue
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,6 +14,13 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 Said = queue.SimpleQueue[tuple["Process", tuple[Any, ...]]]
 """Messages of processes: ("started",), ("answer", result), ("raised", exception), ("died",) when
 the process has ended, and the messages of functions that are called with ``tells``."""
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 class Process:

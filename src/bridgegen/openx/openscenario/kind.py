@@ -7,7 +7,30 @@ from bridgegen.errors import FileFormatError
 from bridgegen.openx.openscenario.read import DISTRIBUTION
 from bridgegen.openx.xml import parse_xml
 
+_PATHS = ("path", "filepath")
+"""Attributes that name files and folders."""
+
 Kind = Literal["storyboard", "distribution", "catalog", "other"]
+
+
+def files_named_in(path: Path) -> tuple[Path, ...]:
+    """Return the files that an OpenSCENARIO file may read: its map, those of its catalogues.
+
+    Also the maps that values of its parameters name.
+
+    Raises:
+        FileFormatError: it cannot be read.
+    """
+    found: dict[Path, None] = {}
+    for element in parse_xml(path).iter():
+        for name, value in element.attrib.items():
+            text = str(value)
+            if not (str(name) in _PATHS or text.lower().endswith(".xodr")) or "\0" in text:
+                continue
+            named = path.parent / text
+            some = sorted(named.glob("*.xosc")) if named.is_dir() else [named]
+            found.update(dict.fromkeys(one for one in some if one.is_file()))
+    return tuple(found)
 
 
 def kind_of_file(path: Path) -> tuple[Kind, str, str]:

@@ -46,7 +46,7 @@ def stated_criteria(scenario: osc.OpenScenario) -> tuple[tuple[Criterion, ...], 
 
 
 def _criterion(name: str, condition: osc.Condition) -> Criterion | None:
-    """Return a criterion of ScenarioRunner's as ours; None if there is none."""
+    """Return our criterion for one of ScenarioRunner's; None if it is not evaluated here."""
     if name not in _FORMULAS:
         return None
     text, formula = _FORMULAS[name]
